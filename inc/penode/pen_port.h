@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+/**
+ * All that the library asks of a target. `pen_port_target.h` is found on the include path: port/gnu for GCC and clang
+ * on any core, port/template (plain C99, the one to copy) for everything else. It defines, as `static inline`:
+ *
+ *   uint32_t   pen_port_load(const volatile uint32_t *word)             one aligned word, read in one piece
+ *   void       pen_port_store(volatile uint32_t *word, uint32_t value)  one aligned word, written in one piece
+ *   void       pen_port_barrier(void)       no load or store moves across it, neither in compiler nor in core
+ *   pen_real_t pen_port_abs(pen_real_t x)   |x|; NaN stays NaN, -0 becomes +0; one instruction where the core has one
+ *   uint32_t   pen_port_cycles(void)        free-running counter for measurements; wraps; 0 where there is none
+ *
+ * Cost on a Cortex-M with FPU: load, store, abs one instruction each, barrier one (DMB).
+ */
+#ifndef PEN_PORT_H
+#define PEN_PORT_H
+
+#include <stdint.h>
+
+#include "penode/pen_real.h"
+#include "pen_port_target.h"
+
+#endif

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+/**
+ * The number type of the library, its version, and the numerical contract.
+ *
+ * Everything is computed in `pen_real_t`: float, or double if PEN_REAL_DOUBLE is defined for the library and for
+ * everything that includes it. Results are bit-identical on every target that keeps IEEE 754 arithmetic in that type:
+ * compile with -ffp-contract=off and without -ffast-math; what can be checked at compile time is checked here.
+ */
+#ifndef PEN_REAL_H
+#define PEN_REAL_H
+
+#include <float.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+#define PEN_VERSION "0.1.0"
+#define PEN_ABI 1 /* generated code names the ABI it was written for and stops the compiler on another one */
+
+#ifdef __FAST_MATH__
+#error "penode: -ffast-math removes the NaN and Inf checks that this library promises; compile without it"
+#endif
+#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD != 0)
+#error "penode: intermediate results wider than their type break bit-identity; on x86 use -mfpmath=sse"
+#endif
+
+#ifdef PEN_REAL_DOUBLE
+typedef double pen_real_t;
+#define PEN_REAL_MAX DBL_MAX
+#else
+typedef float pen_real_t;
+#define PEN_REAL_MAX FLT_MAX
+#endif
+
+/**
+ * True if all n values are finite. No branch on the data: 0 * v is NaN for NaN and Inf alike, and NaN stays in the sum.
+ * Cost: one multiplication and one addition a value.
+ */
+static inline bool pen_finite(size_t n, const pen_real_t value[])
+{
+    pen_real_t sum = (pen_real_t)0;
+    for (size_t i = 0U; i < n; i++) {
+        sum += (pen_real_t)0 * value[i];
+    }
+    return sum >= (pen_real_t)0; /* false for NaN; -0 >= 0 is true */
+}
+
+#endif
