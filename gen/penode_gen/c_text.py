@@ -1,0 +1,126 @@
+"""C text for numbers and expressions: shortest exact literals, every precedence explicit."""
+
+from __future__ import annotations
+
+import math
+from typing import Callable
+
+import numpy as np
+import sympy as sp
+
+from . import expressions as ex
+
+
+def literal(value: float) -> str:
+    """
+    The shortest C literal for `value` as pen_real_t: 0.25F where float holds it exactly, else a cast double, which the
+    compiler rounds once. Raises ValueError for NaN and Inf: they have no literal.
+    """
+    value = float(value)
+    if not math.isfinite(value):
+        raise ValueError(f"{value} has no C literal")
+    with np.errstate(over="ignore"):
+        single = np.float32(value)
+    if float(single) == value:
+        return _decimal(np.format_float_scientific(single, unique=True, trim="-")) + "F"
+    return f"(pen_real_t){_decimal(repr(value))}"
+
+
+def real(value: float) -> str:
+    """A literal for use inside an expression, in pen_real_t."""
+    return f"(pen_real_t){_decimal(repr(float(value)))}"
+
+
+def _decimal(text: str) -> str:
+    """Plain notation where it is short, and always a decimal point or an exponent."""
+    number = float(text)
+    plain = np.format_float_positional(float(text), unique=True, trim="0")
+    digits, exponent = np.format_float_scientific(float(text), unique=True, trim="-").split("e")
+    if "e" in text:  # digits of the narrower type
+        digits, exponent = text.split("e")
+        mantissa = digits.replace(".", "").lstrip("-")
+        shift = int(exponent) - (len(mantissa) - 1)
+        plain = np.format_float_positional(float(f"{int(mantissa)}e{shift}") * (-1 if digits.startswith("-") else 1), unique=True, trim="0")
+    if number == 0.0 or 1e-4 <= abs(number) < 1e7:
+        return plain
+    return f"{digits if '.' in digits else digits + '.0'}e{int(exponent)}"
+
+
+class Printer:
+    """Prints SymPy expressions; `name` gives the C text of a symbol."""
+
+    _calls = {
+        sp.exp: "pen_exp", sp.tanh: "pen_tanh", ex.Sigmoid: "pen_sigmoid", ex.Softplus: "pen_softplus", sp.Abs: "pen_port_abs",
+        sp.sign: "pen_sign", sp.Heaviside: "pen_heaviside", sp.Max: "pen_max", sp.Min: "pen_min",
+    }  # fmt: skip
+
+    def __init__(self, name: Callable[[sp.Symbol], str]):
+        self._name = name
+
+    def __call__(self, expr: sp.Expr) -> str:
+        """C text, without outer parentheses."""
+        if expr.is_Symbol:
+            return self._name(expr)
+        if expr.is_Rational or expr.is_Float:
+            return real(float(expr))
+        if expr.is_Add:
+            return self._add(expr)
+        if expr.is_Mul:
+            return self._mul(expr)
+        if expr.is_Pow:
+            return self._pow(expr)
+        if isinstance(expr, (sp.Max, sp.Min)):
+            function = self._calls[expr.func]
+            first, *rest = sorted(expr.args, key=sp.default_sort_key)
+            text = self(first)
+            for argument in rest:
+                text = f"{function}({text}, {self(argument)})"
+            return text
+        if expr.func in self._calls:
+            return f"{self._calls[expr.func]}({self(expr.args[0])})"
+        if isinstance(expr, sp.Piecewise):
+            (yes, condition), *rest = expr.args
+            if condition == sp.true:
+                return self(yes)
+            relation = f"{self.inner(condition.args[0])} {condition.rel_op} {self.inner(condition.args[1])}"
+            return f"({relation}) ? {self.inner(yes)} : {self.inner(sp.Piecewise(*rest))}"
+        raise ValueError(f"no C for {expr.func.__name__} in {expr}")
+
+    def inner(self, expr: sp.Expr) -> str:
+        """C text that can stand as an operand."""
+        text = self(expr)
+        whole = expr.is_Symbol or (expr.is_number and expr >= 0) or expr.func in self._calls
+        return text if whole else f"({text})"
+
+    def _add(self, expr: sp.Add) -> str:
+        terms = expr.as_ordered_terms()
+        if all(t.could_extract_minus_sign() for t in terms):
+            return f"-({self(-expr)})"
+        terms.sort(key=lambda t: t.could_extract_minus_sign())  # a positive term first
+        text = self.inner(terms[0])
+        for term in terms[1:]:
+            text += f" - {self.inner(-term)}" if term.could_extract_minus_sign() else f" + {self.inner(term)}"
+        return text
+
+    def _mul(self, expr: sp.Mul) -> str:
+        coefficient, rest = expr.as_coeff_Mul()
+        if coefficient < 0 and rest != 1:
+            return f"-{self.inner(-expr)}"
+        above = [f for f in expr.args if not (f.is_Pow and f.exp.is_number and f.exp < 0)]
+        below = [1 / f for f in expr.args if f.is_Pow and f.exp.is_number and f.exp < 0]
+        if coefficient.is_Rational and coefficient.q != 1 and coefficient.p == 1 and not coefficient.is_Integer:
+            above = [f for f in above if f != coefficient] + [coefficient]
+        text = " * ".join(self.inner(f) for f in above) or real(1.0)
+        if not below:
+            return text
+        text = f"({text})" if len(above) > 1 else text
+        divisor = self.inner(sp.Mul(*below))
+        return f"{text} / {divisor}"
+
+    def _pow(self, expr: sp.Pow) -> str:
+        base, exponent = expr.as_base_exp()
+        if not exponent.is_Integer:
+            raise ValueError(f"no C for the power {expr}")
+        if exponent < 0:
+            return f"{real(1.0)} / {self.inner(base ** -exponent)}"
+        return " * ".join([self.inner(base)] * int(exponent))

@@ -1,0 +1,387 @@
+"""
+From a model to an ordered list of assignments: what the step computes, and in which order.
+
+All equations of a model (kinematics, force laws, Newton's law, plain equations) are one system. Each equation is matched
+with one unknown, strongly connected blocks are found (block lower triangular form) and each block, linear in its
+unknowns, is solved symbolically. What is left is straight-line code without any solver call.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Iterable
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+
+from . import expressions as ex
+from . import units
+from .laws import LAWS
+from .model import GROUND, Body, Input, Model
+
+Problem = tuple[tuple[str, ...], str, str]  # where (path of keys), what, remedy
+
+
+class CausaliseError(Exception):
+    """Equations that cannot be ordered or solved; `problems` lists all."""
+
+    def __init__(self, problems: list[Problem]):
+        self.problems = problems
+        super().__init__("; ".join(what for _, what, _ in problems))
+
+
+@dataclass(frozen=True)
+class Step:
+    """`target := value`, or, with a network, `target := network(*arguments)`."""
+
+    target: sp.Symbol
+    value: sp.Expr | None
+    network: str = ""
+    arguments: tuple[sp.Expr, ...] = ()
+    comment: str = ""
+
+    @property
+    def reads(self) -> set[sp.Symbol]:
+        """Symbols on the right-hand side."""
+        parts = self.arguments if self.network else (self.value,)
+        return set().union(*(p.free_symbols for p in parts))
+
+
+@dataclass(frozen=True)
+class Causal:
+    """A model as straight-line code. Rates, outputs and sensors are expressions over states, inputs and step targets."""
+
+    model: Model
+    states: tuple[sp.Symbol, ...]
+    inputs: tuple[sp.Symbol, ...]
+    steps: tuple[Step, ...]
+    rates: tuple[sp.Expr, ...]
+    outputs: tuple[sp.Expr, ...]
+    sensors: tuple[sp.Expr, ...]
+
+    @property
+    def input_rates(self) -> tuple[sp.Symbol, ...]:
+        """Symbols of the inputs' time derivatives."""
+        return tuple(ex.derivative(u.name) for u in self.inputs)
+
+    @property
+    def n_mechanical(self) -> int:
+        """Number of positions; the velocities follow them in `states`."""
+        return len(self.model.bodies)
+
+    def needed(self, results: Iterable[sp.Expr]) -> tuple[Step, ...]:
+        """The steps that `results` depend on, in order."""
+        wanted = set().union(*(r.free_symbols for r in results)) if results else set()
+        chosen = []
+        for step in reversed(self.steps):
+            if step.target in wanted:
+                chosen.append(step)
+                wanted |= step.reads
+        return tuple(reversed(chosen))
+
+    def uses(self, results: Iterable[sp.Expr], symbols: Iterable[sp.Symbol]) -> bool:
+        """Do `results`, through all steps, depend on any of `symbols`?"""
+        seen = set().union(*(r.free_symbols for r in results), *(s.reads for s in self.needed(results)))
+        return bool(seen & set(symbols))
+
+    @cached_property
+    def kinematics(self) -> dict[sp.Symbol, sp.Symbol]:
+        """Position -> velocity."""
+        return {ex.symbol(b.position): ex.symbol(b.velocity) for b in self.model.bodies}
+
+
+@dataclass(frozen=True)
+class _Equation:
+    where: tuple[str, ...]
+    left: sp.Expr
+    right: sp.Expr
+    comment: str = ""
+
+    @property
+    def residual(self) -> sp.Expr:
+        return self.left - self.right
+
+
+def causalise(model: Model) -> Causal:
+    """Order and solve the equations of a model. Raises CausaliseError."""
+    problems: list[Problem] = []
+    ports = {name: len(port.input_units) for name, port in model.networks.items()}
+    kinematic, unit_of = _kinematics(model)
+    unit_of |= {f"F_{e.name}": "N" for e in model.elements}
+    names = set(unit_of)
+
+    def parse(where: tuple[str, ...], text: str, extra: set[str] = frozenset()) -> sp.Expr:
+        try:
+            return ex.parse(text, names | extra, ports)
+        except ex.ExpressionError as error:
+            problems.append((where, str(error), "use names of the model"))
+            return sp.Integer(0)
+
+    equations = list(kinematic)
+    shared = _shared_ends(model)
+    for e in model.elements:
+        where = ("elements", e.name)
+        force = ex.symbol(f"F_{e.name}")
+        s, v = (ex.symbol(f"{k}_{shared[e.name]}") for k in "sv")
+        if e.law == "network":
+            kinds = {"deflection": s, "rate": v}
+            value = ex.network(e.network)(*(kinds.get(k, s) for k in e.network_inputs))
+            comment = f"force of {e.name}: network {e.network}"
+        else:
+            text = e.expression if e.law == "expression" else LAWS[e.law].force
+            arguments = {} if e.law == "expression" else e.arguments
+            value = parse(where, text, {"s", "v", *arguments})
+            value = value.subs({ex.symbol("s"): s, ex.symbol("v"): v} | {ex.symbol(k): ex.symbol(p) for k, p in arguments.items()})
+            comment = f"force of {e.name}"
+        equations.append(_Equation(where, force, value, comment))
+    for b in model.bodies:
+        pull = sp.Add(*(_sign(e.ends, b.name) * ex.symbol(f"F_{e.name}") for e in model.elements))
+        equations.append(
+            _Equation(("bodies", b.name), ex.derivative(b.velocity), pull / ex.symbol(b.mass), f"acceleration of {b.name}")
+        )
+    for q in model.equations:
+        left, right = (parse(("equations", q.name), side) for side in q.text.split("="))
+        equations.append(_Equation(("equations", q.name), left, right, q.name))
+    signals = {
+        section: [parse((section, s.name), s.expression) for s in getattr(model, section)] for section in ("outputs", "sensors")
+    }
+    alias = {f"{k}_{e.name}": f"{k}_{shared[e.name]}" for e in model.elements for k in "sv"}
+    rename = {ex.symbol(a): ex.symbol(b) for a, b in alias.items() if a != b}
+    equations = [replace(q, left=q.left.subs(rename), right=q.right.subs(rename)) for q in equations if q.left not in rename]
+    signals = {section: [s.subs(rename) for s in found] for section, found in signals.items()}
+
+    problems += _check_units(model, equations, signals, unit_of)
+    if problems:
+        raise CausaliseError(problems)
+
+    unknowns = [q.left for q in kinematic if q.left not in rename]
+    unknowns += [ex.symbol(f"F_{e.name}") for e in model.elements] + [ex.derivative(b.velocity) for b in model.bodies]
+    unknowns += [ex.derivative(s.name) for s in model.extra_states] + [ex.symbol(v.name) for v in model.variables]
+    steps = _solve(equations, unknowns)
+    states = tuple(ex.symbol(n) for n in model.states)
+    velocities = {b.position: ex.symbol(b.velocity) for b in model.bodies}
+    causal = Causal(
+        model, states, tuple(ex.symbol(i.name) for i in model.inputs), tuple(_hoist(steps)),
+        tuple(velocities.get(n, ex.derivative(n)) for n in model.states), tuple(signals["outputs"]), tuple(signals["sensors"]),
+    )  # fmt: skip
+    _check_result(causal)
+    return causal
+
+
+def check(model: Model) -> list[Problem]:
+    """All problems of a model's equations, [] if there are none."""
+    try:
+        causalise(model)
+        return []
+    except CausaliseError as error:
+        return error.problems
+
+
+# -- mechanics --------------------------------------------------------------------------------------------------------
+
+
+def _sign(ends: tuple[str, str], body: str) -> int:
+    """Direction of a pulling force on a body: down on the first end, up on the second."""
+    return (ends[1] == body) - (ends[0] == body)
+
+
+def _shared_ends(model: Model) -> dict[str, str]:
+    """Element -> the first element between the same ends, whose deflection and rate it shares."""
+    first: dict[tuple[str, str], str] = {}
+    return {e.name: first.setdefault(e.ends, e.name) for e in model.elements}
+
+
+def _kinematics(model: Model) -> tuple[list[_Equation], dict[str, str]]:
+    """Deflection and rate of each element, and the unit of every name of the model."""
+    ends: dict[str, Body | Input] = {b.name: b for b in model.bodies} | {i.name: i for i in model.inputs}
+
+    def motion(end: str) -> tuple[sp.Expr, sp.Expr]:
+        thing = ends.get(end)
+        if isinstance(thing, Body):
+            return ex.symbol(thing.position), ex.symbol(thing.velocity)
+        if end == GROUND or thing is None:
+            return sp.Integer(0), sp.Integer(0)
+        return ex.symbol(end), ex.derivative(end)
+
+    found = []
+    unit_of = {p.name: p.unit for p in model.parameters.values()} | {i.name: i.unit for i in model.inputs}
+    unit_of |= {b.position: "m" for b in model.bodies} | {b.velocity: "m/s" for b in model.bodies}
+    unit_of |= {s.name: s.unit for s in model.extra_states} | {v.name: v.unit for v in model.variables}
+    for e in model.elements:
+        (z_a, v_a), (z_b, v_b) = map(motion, e.ends)
+        between = f"of {e.name}" if e.ends[1] == GROUND else f"between {e.ends[0]} and {e.ends[1]}"
+        found.append(_Equation(("elements", e.name), ex.symbol(f"s_{e.name}"), z_a - z_b, f"deflection {between}"))
+        found.append(_Equation(("elements", e.name), ex.symbol(f"v_{e.name}"), v_a - v_b, f"rate {between}"))
+        unit_of |= {f"s_{e.name}": "m", f"v_{e.name}": "m/s"}
+    return found, unit_of
+
+
+# -- checks -----------------------------------------------------------------------------------------------------------
+
+
+def _check_units(
+    model: Model, equations: list[_Equation], signals: dict[str, list[sp.Expr]], unit_of: dict[str, str]
+) -> Iterable[Problem]:
+    per_second = units.dimension("1/s")
+
+    def of(leaf: sp.Basic) -> units.Dimension:
+        if isinstance(leaf, AppliedUndef):
+            port = model.networks[leaf.func.__name__]
+            for argument, unit in zip(leaf.args, port.input_units):
+                given = units.dimension_of(argument, of)
+                if given is not None and given != units.dimension(unit):
+                    raise units.UnitError(f"network '{port.name}' takes {unit}, given is {units.describe(given)}")
+            return units.dimension(port.output_unit)
+        name = leaf.name
+        if name.startswith("der("):
+            return units.dimension(unit_of[name[4:-1]]) * per_second
+        return units.dimension(unit_of[name])
+
+    def compare(where: tuple[str, ...], left: sp.Expr | units.Dimension, right: sp.Expr) -> Iterable[Problem]:
+        try:
+            a = left if isinstance(left, units.Dimension) else units.dimension_of(left, of)
+            b = units.dimension_of(right, of)
+        except units.UnitError as error:
+            yield where, str(error), "mend the units"
+            return
+        if a is not None and b is not None and a != b:
+            yield where, f"{units.describe(a)} is set equal to {units.describe(b)}", "mend the units"
+
+    for q in equations:
+        yield from compare(q.where, q.left, q.right)
+    for section, found in signals.items():
+        for signal, value in zip(getattr(model, section), found):
+            yield from compare((section, signal.name), units.dimension(signal.unit), value)
+
+
+def _check_result(causal: Causal) -> None:
+    """What the C cannot do is refused here."""
+    model = causal.model
+    problems: list[Problem] = []
+    everything = [*causal.rates, *causal.outputs, *causal.sensors]
+    if model.interpolation == "held" and causal.uses(everything, causal.input_rates):
+        problems.append((("model", "input"), "the model uses the rate of an input, which is not defined for a held input", 'write input = "linear"'))
+    for step in causal.steps:
+        for power in (step.value or sp.Integer(0)).atoms(sp.Pow):
+            if not (power.exp.is_Integer and abs(int(power.exp)) <= 8):
+                problems.append((("model",), f"'{power}': the C has whole powers up to 8 only", "write it with products, exp or a network"))
+    known = {*causal.states, *causal.inputs, *causal.input_rates, *(s.target for s in causal.steps)}
+    known |= {ex.symbol(p) for p in model.parameters}
+    for section, found in (("outputs", causal.outputs), ("sensors", causal.sensors)):
+        for signal, value in zip(getattr(model, section), found):
+            value = value.subs({ex.derivative(q.name): v for q, v in causal.kinematics.items()})
+            for missing in sorted(s.name for s in value.free_symbols - known):
+                problems.append(((section, signal.name), f"'{missing}' is not computed by the model", "add an equation for it"))
+            if value.atoms(AppliedUndef):
+                problems.append(((section, signal.name), "calls a network", "name its output as a variable with an equation of its own"))
+    if problems:
+        raise CausaliseError(problems)
+
+
+# -- order and solution -----------------------------------------------------------------------------------------------
+
+
+def _solve(equations: list[_Equation], unknowns: list[sp.Symbol]) -> list[Step]:
+    """Block lower triangular form, each block solved for its unknowns."""
+    where = {u: i for i, u in enumerate(unknowns)}
+    reads = [{where[s] for s in q.residual.free_symbols if s in where} for q in equations]
+    match = _match(equations, unknowns, reads)
+    maker = {u: q for q, u in match.items()}  # unknown -> equation
+    steps: list[Step] = []
+    problems: list[Problem] = []
+    for block in _blocks({q: sorted(maker[u] for u in reads[q] if maker[u] != q) for q in range(len(equations))}):
+        targets = [unknowns[match[q]] for q in block]
+        first = equations[block[0]]
+        if len(block) == 1 and first.left == targets[0] and targets[0] not in first.right.free_symbols:
+            steps.append(Step(targets[0], first.right, comment=first.comment))
+            continue
+        residuals = [equations[q].residual for q in block]
+        names = ", ".join(f"'{equations[q].where[-1]}'" for q in block)
+        try:
+            a, b = sp.linear_eq_to_matrix(residuals, targets)
+            solution = a.LUsolve(b)
+        except (sp.solvers.solveset.NonlinearError, ValueError):
+            unknown = ", ".join(t.name for t in targets)
+            problems.append((first.where, f"equations {names} form an algebraic loop that is not linear in {unknown}", "break it with a state, or write it solved"))
+            continue
+        if any(not set(e.free_symbols).isdisjoint(targets) or e.has(sp.nan, sp.zoo) for e in solution):
+            problems.append((first.where, f"equations {names} have no unique solution for {', '.join(t.name for t in targets)}", "check for an equation said twice"))
+            continue
+        steps += [Step(t, sp.simplify(e), comment=equations[q].comment) for t, e, q in zip(targets, solution, block)]
+    if problems:
+        raise CausaliseError(problems)
+    return steps
+
+
+def _match(equations: list[_Equation], unknowns: list[sp.Symbol], reads: list[set[int]]) -> dict[int, int]:
+    """One unknown for each equation (augmenting paths, an equation's own left side first)."""
+    owner: dict[int, int] = {}
+
+    def place(q: int, tried: set[int]) -> bool:
+        left = equations[q].left
+        for u in sorted(reads[q], key=lambda u: (unknowns[u] != left, u)):
+            if u not in tried:
+                tried.add(u)
+                if u not in owner or place(owner[u], tried):
+                    owner[u] = q
+                    return True
+        return False
+
+    problems: list[Problem] = []
+    for q, equation in enumerate(equations):
+        if not place(q, set()):
+            problems.append((equation.where, "nothing is left that this equation could determine", "remove it, or add a variable"))
+    for u, unknown in enumerate(unknowns):
+        if u not in owner and not problems:
+            name = unknown.name[4:-1] if unknown.name.startswith("der(") else unknown.name
+            section = "states" if unknown.name.startswith("der(") else "variables"
+            problems.append(((section, name), f"no equation determines {unknown.name}", "add one to [equations]"))
+    if problems:
+        raise CausaliseError(problems)
+    return {q: u for u, q in owner.items()}
+
+
+def _blocks(needs: dict[int, list[int]]) -> list[list[int]]:
+    """Strongly connected components in the order of evaluation (Tarjan)."""
+    index: dict[int, int] = {}
+    low: dict[int, int] = {}
+    stack: list[int] = []
+    blocks: list[list[int]] = []
+
+    def visit(q: int) -> None:
+        index[q] = low[q] = len(index)
+        stack.append(q)
+        for other in needs[q]:
+            if other not in index:
+                visit(other)
+                low[q] = min(low[q], low[other])
+            elif other in stack:
+                low[q] = min(low[q], index[other])
+        if low[q] == index[q]:
+            block = []
+            while not block or block[-1] != q:
+                block.append(stack.pop())
+            blocks.append(sorted(block))
+
+    for q in needs:
+        if q not in index:
+            visit(q)
+    return blocks
+
+
+def _hoist(steps: list[Step]) -> Iterable[Step]:
+    """Give each network call a step of its own."""
+    count = 0
+    for step in steps:
+        if isinstance(step.value, AppliedUndef):
+            yield Step(step.target, None, step.value.func.__name__, step.value.args, step.comment)
+            continue
+        value = step.value
+        while calls := sorted(value.atoms(AppliedUndef), key=lambda c: (c.has(AppliedUndef) and len(c.atoms(AppliedUndef)), str(c))):
+            count += 1
+            inner = calls[0]
+            target = ex.symbol(f"{inner.func.__name__}_{count}")
+            yield Step(target, None, inner.func.__name__, inner.args, f"network {inner.func.__name__}")
+            value = value.subs(inner, target)
+        yield replace(step, value=value)

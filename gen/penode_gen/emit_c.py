@@ -1,0 +1,511 @@
+"""From a model to C: what is printed is decided here, how it looks stands in templates/. Same model, same bytes."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import sympy as sp
+
+from . import expressions as ex
+from . import sets, units
+from .c_text import Printer, literal, real
+from .causalise import Causal, Step, causalise
+from .jacobian import Derivatives
+from .model import Model, ModelError
+from .networks import Affine, Dense, Layer, Network
+
+VERSION = "0.1.0"
+_TEMPLATES = jinja2.Environment(
+    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
+)  # fmt: skip
+
+# Runge-Kutta methods in which every stage builds on the one before: nodes, weights and the divisor of the weights.
+_RUNGE_KUTTA = {
+    "euler": ((0.0,), (1.0,), 1.0),
+    "heun": ((0.0, 1.0), (1.0, 1.0), 2.0),
+    "rk4": ((0.0, 0.5, 0.5, 1.0), (1.0, 2.0, 2.0, 1.0), 6.0),
+}
+# Names of the templates inside functions that also hold names of the model; the model's get a _ there.
+_TAKEN = frozenset(
+    "p x u y z dx fx fu yx yu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
+    "inner along drive copy begin finish usable unit zero solve integrate node".split()
+)
+_MATH = ("pen_exp", "pen_tanh", "pen_sigmoid", "pen_softplus", "pen_sign", "pen_heaviside", "pen_max", "pen_min")
+_AFFINE = {"centre": "pen_centre", "rescale": "pen_rescale"}
+_METHOD_NAMES = {
+    "euler": "explicit Euler", "heun": "Heun (order 2)", "rk4": "Runge-Kutta of order 4",
+    "ros1": "Rosenbrock of order 1 (linearly implicit Euler)", "ros2": "Rosenbrock of order 2 (ROS2, L-stable)",
+}  # fmt: skip
+
+
+def render(model: Model) -> dict[str, str]:
+    """File name -> text of the C of a model. Pure: no clock, no path beyond the model file's name."""
+    context = _Emitter(model).context()
+    names = {"model.h.j2": f"{model.name}.h", "model.c.j2": f"{model.name}.c", "params.c.j2": f"{model.name}_params.c"}
+    return {name: _TEMPLATES.get_template(template).render(context) for template, name in names.items()}
+
+
+def generate(model: Model, directory: str | Path) -> list[Path]:
+    """Write the C of a model into `directory`: all files, or none."""
+    texts = render(model)
+    directory = Path(directory)
+    directory.mkdir(parents=True, exist_ok=True)
+    written: list[tuple[str, Path]] = []
+    try:
+        for name, text in texts.items():
+            handle, temporary = tempfile.mkstemp(dir=directory, prefix=f".{name}.")
+            written.append((temporary, directory / name))
+            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+            os.chmod(temporary, 0o644)
+        for temporary, path in written:
+            os.replace(temporary, path)
+    finally:
+        for temporary, _ in written:
+            Path(temporary).unlink(missing_ok=True)
+    return [path for _, path in written]
+
+
+@dataclass(frozen=True)
+class _NetworkCode:
+    """One function for all networks of the same architecture."""
+
+    name: str
+    shape: str
+    users: tuple[str, ...]
+    network: Network
+
+    @property
+    def n(self) -> int:
+        """Number of inputs."""
+        return self.network.n_inputs
+
+    @property
+    def width(self) -> int:
+        """Values of the widest layer."""
+        return max(self.n, *(layer.n_out for layer in self.network.layers))
+
+    def layers(self) -> list[tuple[Layer, str]]:
+        """Each layer with the C text of where its values begin."""
+        return [(la, f"&p[{piece.offset}]") for la, piece in zip(self.network.layers, sets.network_pieces(self.network)[1:])]
+
+
+class _Emitter:
+    def __init__(self, model: Model):
+        self.model = model
+        self.causal: Causal = causalise(model)
+        first = model.sets.get("default")
+        straight = [n for n, net in (first.networks if first else {}).items() if net.is_piecewise_linear and model.outside != "fade"]
+        self.derivatives = Derivatives(self.causal, frozenset(straight))
+        self.prefix = model.name.upper()
+        self.at = sets.offsets(model)
+        everything = [*self.causal.rates, *self.causal.outputs, *self.causal.sensors]
+        self.uses_input_rate = self.causal.uses(everything, self.causal.input_rates)
+        self.drive = self.causal.inputs + (self.causal.input_rates if self.uses_input_rate else ())
+        self.networks = self._network_code()
+        self.function_of = {user: code.name for code in self.networks for user in code.users}
+        self.constants: dict[str, sp.Symbol] = {}
+        problems = []
+        upper: dict[str, str] = {}
+        for p in model.parameters:
+            if upper.setdefault(p.upper(), p) != p or p.upper() in ("N_X", "N_U", "N_Y", "N_SENSORS", "LAYOUT", "H", "READY"):
+                problems.append(f"{model.path}: parameters.{p}: its C constant {self.prefix}_{p.upper()} is already taken; rename it")
+        if not model.inputs or not model.outputs:
+            problems.append(f"{model.path}: the C needs at least one input and one output; add [inputs] or [outputs]")
+        if problems:
+            raise ModelError(problems)
+
+    # -- what the templates see -----------------------------------------------------------------------------------
+
+    def context(self) -> dict[str, Any]:
+        model, causal = self.model, self.causal
+        rosenbrock = model.method.startswith("ros")
+        nodes, weights, divisor = _RUNGE_KUTTA.get(model.method, ((), (), 1.0))
+        functions = {
+            "rates": self._function(causal.rates, "dx"),
+            "rates_jacobian": self._function(causal.rates, "dx", ("fx", "fu")),
+            "outputs": self._function(causal.outputs, "y"),
+            "outputs_jacobian": self._function(causal.outputs, "y", ("yx", "yu"), values=False),
+            "sensors": self._function(causal.sensors, "z"),
+            "curvature": self._curvature() if rosenbrock else None,
+        }
+        return {
+            "model": model, "name": model.name, "prefix": self.prefix, "version": VERSION, "abi": sets.ABI,
+            "source": model.path.name, "digest": model.digest[:16], "method_name": _METHOD_NAMES[model.method],
+            "states": [{"name": s, "unit": self._unit(s), "start": literal(x)} for s, x in zip(model.states, model.start)],
+            "n_x": len(model.states), "n_q": causal.n_mechanical, "n_u": len(model.inputs), "n_drive": len(self.drive),
+            "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
+            "functions": functions, "constants": self._constants(), "networks": self.networks,
+            "network_lines": {c.name: self._network_lines(c) for c in self.networks},
+            "bend_lines": {c.name: self._bend_lines(c) for c in self.networks if self._bent(c, functions)},
+            "slope_lines": {c.name: self._slope_lines(c) for c in self.networks},
+            "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),
+            "set_length": len(sets.set_values(model, "default")), "offsets": self._offset_lines(),
+            "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
+            "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
+            "sample_time": real(model.sample_time), "literal": literal, "real": real, "columns": len(model.states) + 2 * len(model.inputs),
+            "needs_math": self._mentions(functions, _MATH), "needs_abs": self._mentions(functions, ("pen_port_abs",)),
+        }  # fmt: skip
+
+    @staticmethod
+    def _bent(code: _NetworkCode, functions: dict[str, dict[str, Any] | None]) -> bool:
+        """Does the curvature of the model need this network's second derivatives?"""
+        curvature = functions["curvature"]
+        return bool(curvature) and any(line.startswith(f"{code.name}_bend(") for line in curvature["lines"])
+
+    @staticmethod
+    def _mentions(functions: dict[str, dict[str, Any] | None], names: tuple[str, ...]) -> bool:
+        """Does any function's text call one of `names`?"""
+        return any(name in line for f in functions.values() if f for line in f["lines"] for name in names)
+
+    def _unit(self, state: str) -> str:
+        for b in self.model.bodies:
+            if state in (b.position, b.velocity):
+                return "m" if state == b.position else "m/s"
+        return next(s.unit for s in self.model.extra_states if s.name == state)
+
+    # -- expressions and functions --------------------------------------------------------------------------------
+
+    def _c_name(self, s: sp.Symbol) -> str:
+        parameter = self.model.parameters.get(s.name)
+        if parameter and not parameter.tunable:
+            self.constants[s.name] = s
+            return f"{self.prefix}_{s.name.upper()}"
+        if s.name.startswith("1/"):
+            self.constants[s.name] = s
+            return f"{self.prefix}_{s.name[2:].upper()}_INVERSE"
+        name = s.name.replace("der(", "der_").replace(")", "")
+        return f"{name}_" if name in _TAKEN else name
+
+    def _inverses(self, expr: sp.Expr) -> sp.Expr:
+        """Divisions by constants become multiplications with constants of their own."""
+        constants = {ex.symbol(p.name) for p in self.model.parameters.values() if not p.tunable}
+        return expr.replace(
+            lambda e: e.is_Pow and e.base in constants and e.exp.is_Integer and e.exp < 0,
+            lambda e: ex.symbol(f"1/{e.base.name}") ** -e.exp,
+        )
+
+    def _print(self, expr: sp.Expr) -> str:
+        return Printer(self._c_name)(self._inverses(expr))
+
+    def _function(
+        self, results: tuple[sp.Expr, ...], target: str, jacobian: tuple[str, str] | None = None, values: bool = True
+    ) -> dict[str, Any]:
+        """Body of a function that computes `results`, and with `jacobian` their derivatives, as lines of C."""
+        kinematics = {ex.derivative(q.name): v for q, v in self.causal.kinematics.items()}
+        results = tuple(r.subs(kinematics) for r in results)
+        wanted: list[tuple[str, sp.Expr]] = [(f"{target}[{i}]", r) for i, r in enumerate(results)] if values else []
+        if jacobian:
+            for name, variables in zip(jacobian, (self.causal.states, self.drive)):
+                for i, row in enumerate(self.derivatives.of(results, variables)):
+                    wanted += [(f"{name}[{i}][{j}]", entry) for j, entry in enumerate(row)]
+        return self._body(wanted)
+
+    def _curvature(self) -> dict[str, Any] | None:
+        """Derivatives of fx * kx + fu * ku along states and drive; None where they vanish (and no code is needed)."""
+        entries = self.derivatives.curvature(self.causal.rates, self.causal.states, self.drive)
+        if all(e == 0 for rows in entries for row in rows for e in row):
+            return None
+        wanted = [
+            (f"{name}[{i}][{j}]", entry)
+            for name, rows in zip(("cx", "cu"), entries)
+            for i, row in enumerate(rows)
+            for j, entry in enumerate(row)
+        ]
+        body = self._body(wanted)
+        return body | {k: any(f"{k}[" in line for line in body["lines"]) for k in ("kx", "ku")}
+
+    def _body(self, wanted: list[tuple[str, sp.Expr]]) -> dict[str, Any]:
+        model, causal = self.model, self.causal
+        # common parts of derivatives get names of their own; values stay as they are, so that they keep their rounding
+        plain = [(name, e) for name, e in wanted if "][" not in name]
+        derived = [(name, e) for name, e in wanted if "][" in name]
+        derived = [(name, self._inverses(e)) for name, e in derived]
+        known = {s.name for s in (*causal.states, *self.drive, *(step.target for step in causal.steps))} | set(model.parameters)
+        numbered = (ex.symbol(f"t{i}") for i in range(1, 10000) if f"t{i}" not in known)
+        temporaries, reduced = sp.cse([e for _, e in derived], symbols=numbered, order="canonical") if derived else ([], [])
+        wanted = plain + [(name, e) for (name, _), e in zip(derived, reduced)]
+        used = set().union(*(e.free_symbols for _, e in wanted), *(e.free_symbols for _, e in temporaries))
+        needs_slope = {t for t, group in self.derivatives.slopes.items() if used & set(group)}
+        needs_bend = {t for t, rows in self.derivatives.bends.items() if used & set().union(*rows)}
+        steps = causal.needed([*(e for _, e in wanted), *(e for _, e in temporaries), *needs_slope, *needs_bend])
+        used |= set().union(*(s.reads for s in steps)) if steps else set()
+        lines: list[str] = []
+        for i, s in enumerate(causal.states):
+            if s in used:
+                lines.append(f"const pen_real_t {self._c_name(s)} = x[{i}];")
+        for i, s in enumerate(self.drive):
+            if s in used:
+                lines.append(f"const pen_real_t {self._c_name(s)} = u[{i}];")
+        for p in model.tunable:
+            if ex.symbol(p.name) in used:
+                lines.append(f"const pen_real_t {self._c_name(ex.symbol(p.name))} = p[{self.at[p.name]}]; /* {p.unit} */")
+        if lines and steps:
+            lines.append("")
+        calls = uses_p = False
+        for step in steps:
+            if step.network:
+                bend = step.target in needs_bend
+                slope = step.target in needs_slope
+                value = slope or step.target in used or not bend
+                lines += self._call(step, value, slope, bend)
+                calls = calls or value
+                uses_p = True
+            else:
+                lines += _remarked(f"const pen_real_t {self._c_name(step.target)} = {self._print(step.value)};", step)
+        lines += [f"const pen_real_t {t.name} = {self._print(e)};" for t, e in temporaries]
+        if lines and wanted:
+            lines.append("")
+        lines += [f"{name} = {self._print(e)};" for name, e in wanted]
+        return {
+            "lines": lines, "calls": calls, "uses_p": uses_p or any(ex.symbol(p.name) in used for p in model.tunable),
+            "uses_x": any(s in used for s in causal.states), "uses_u": any(s in used for s in self.drive),
+        }  # fmt: skip
+
+    def _call(self, step: Step, value: bool, slope: bool, bend: bool) -> list[str]:
+        name = self._c_name(step.target)
+        function = self.function_of[step.network]
+        values = f"&p[{self.prefix}_AT_{step.network.upper()}]"
+        lines = []
+        if len(step.arguments) == 1 and step.arguments[0].is_Symbol:
+            argument = f"&{self._c_name(step.arguments[0])}"
+        else:
+            argument = f"{name}_in"
+            parts = ", ".join(self._print(a) for a in step.arguments)
+            lines.append(f"const pen_real_t {argument}[{len(step.arguments)}] = {{ {parts} }};")
+        if value:
+            lines += _remarked(f"pen_real_t {name};", step)
+        if slope:
+            lines.append(f"pen_real_t {name}_slope[{len(step.arguments)}];")
+            lines.append(f"status |= {function}_slope({values}, {argument}, &{name}, {name}_slope);")
+            for i, s in enumerate(self.derivatives.slopes[step.target]):
+                lines.append(f"const pen_real_t {s.name} = {name}_slope[{i}];")
+        elif value:
+            lines.append(f"status |= {function}({values}, {argument}, &{name});")
+        if bend:
+            n = len(step.arguments)
+            lines.append(f"pen_real_t {name}_bend[{n}][{n}];")
+            lines.append(f"{function}_bend({values}, {argument}, {name}_bend);")
+            for i, row in enumerate(self.derivatives.bends[step.target]):
+                lines += [f"const pen_real_t {s.name} = {name}_bend[{i}][{j}];" for j, s in enumerate(row) if j >= i]
+        return lines
+
+    # -- networks -------------------------------------------------------------------------------------------------
+
+    def _network_code(self) -> list[_NetworkCode]:
+        first = self.model.sets.get("default")
+        groups: dict[object, list[tuple[str, Network]]] = {}
+        for name, network in (first.networks if first else {}).items():
+            groups.setdefault(network.architecture, []).append((name, network))
+        found = []
+        for i, users in enumerate(groups.values()):
+            name = f"network_{chr(ord('a') + i)}" if len(groups) > 1 else "network"
+            sizes = [users[0][1].n_inputs] + [la.n_out for la in users[0][1].layers if isinstance(la, Dense)]
+            found.append(_NetworkCode(name, " -> ".join(map(str, sizes)), tuple(n for n, _ in users), users[0][1]))
+        return found
+
+    def _network_lines(self, code: _NetworkCode) -> dict[str, Any]:
+        """Statements that take a network from `in` to `*out`, and the buffers they need."""
+        lines, here, relu = [], "in", ""  # relu: the activation of the layer before is still to be applied
+        if self.model.outside == "clamp":
+            lines.append(f"pen_clamp({code.n}U, &p[0], in, h);")
+            here = "h"
+        for layer, at in code.layers():
+            fresh = "h" if here == "in" else here  # where a layer that reads all before it writes may put its result
+            if isinstance(layer, Affine):
+                lines += [f"pen_act_relu({layer.n_out}U, {here});"] if relu else []
+                lines.append(_affine(layer, at, here, fresh))
+            elif layer.n_out == 1:
+                lines.append(f"{fresh}[0] = pen_dense1{relu}({layer.n_in}U, {at}, {here});")
+            elif layer.n_out == 16 and layer.n_in == 1 and not relu:
+                lines.append(f"pen_dense16_scalar({at}, {here}[0], {fresh});")
+            elif layer.n_out == 16 and relu:
+                lines.append(f"pen_dense16_relu({layer.n_in}U, {at}, {here}, {fresh});")
+            else:
+                fresh = "g" if here == "h" else "h"
+                lines.append(f"pen_dense{relu}({layer.n_out}U, {layer.n_in}U, {at}, {here}, {fresh});")
+            lines += _activation(layer, fresh)
+            here, relu = fresh, _relu(layer)
+        lines += [f"pen_act_relu(1U, {here});"] if relu else []
+        lines.append(f"*out = {here}[0];")
+        if self.model.outside == "fade":
+            lines.append(f"*out *= pen_fade({code.n}U, &p[0], {real(self.model.fade_width)}, in);")
+        return {"lines": lines, "buffers": [b for b in "hg" if any(f"{b}[" in t or f" {b})" in t or f" {b}," in t for t in lines)]}
+
+    def _slope_lines(self, code: _NetworkCode) -> list[str]:
+        """Statements for value and derivatives: h is the value, t[i] the change of h with input i; g and s the next ones."""
+        n, fade = code.n, real(self.model.fade_width)
+        lines: list[str] = []
+
+        def each(statement: str) -> None:
+            lines.extend(_loops(statement, n))
+
+        if self.model.outside == "clamp":
+            lines.append(f"pen_clamp({n}U, &p[0], in, h);")
+            start = f"pen_clamp_slope({n}U, &p[0], in, @U)"
+        else:
+            each("h[@] = in[@];")
+            start = "(pen_real_t)1"
+        each(f"t[@][%] = {start};" if n == 1 else f"t[@][%] = (@ == %) ? {start} : (pen_real_t)0;")
+        h, g, t, s, relu = "h", "g", "t", "s", ""
+        for layer, at in code.layers():
+            if isinstance(layer, Affine):
+                lines += [f"pen_act_relu({layer.n_out}U, {h});"] if relu else []
+                lines.append(_affine(layer, at, h, h))
+                each(f"{_AFFINE[layer.form]}_tangent({layer.n_out}U, {at}, {t}[@]);")
+                relu = ""
+                continue
+            lines.append(f"pen_dense{relu}({layer.n_out}U, {layer.n_in}U, {at}, {h}, {g});")
+            lines += _activation(layer, g)
+            each(f"pen_dense_tangent({layer.n_out}U, {layer.n_in}U, {at}, {t}[@], {s}[@]);")
+            if layer.activation != "identity":
+                each(f"pen_slope_{layer.activation}({layer.n_out}U, {g}, {s}[@]);")
+            h, g, t, s, relu = g, h, s, t, _relu(layer)
+        lines += [f"pen_act_relu(1U, {h});"] if relu else []
+        each(f"slope[@] = {t}[@][0];")
+        lines.append(f"*out = {h}[0];")
+        if self.model.outside == "fade":
+            lines.append(f"const pen_real_t trust = pen_fade({n}U, &p[0], {fade}, in);")
+            each(f"slope[@] = (trust * slope[@]) + (*out * pen_fade_slope({n}U, &p[0], {fade}, in, @U));")
+            lines.append("*out *= trust;")
+        return lines
+
+    def _bend_lines(self, code: _NetworkCode) -> list[str]:
+        """Statements for second derivatives: t[i] as above, c[i][j] the change of t[i] with input j."""
+        n, fade = code.n, real(self.model.fade_width)
+        lines: list[str] = []
+
+        def each(statement: str) -> None:
+            lines.extend(_loops(statement, n))
+
+        clamp = self.model.outside == "clamp"
+        if clamp:
+            lines.append(f"pen_clamp({n}U, &p[0], in, h);")
+        else:
+            each("h[@] = in[@];")
+        start = f"pen_clamp_slope({n}U, &p[0], in, @U)" if clamp else "(pen_real_t)1"
+        each(f"t[@][%] = {start};" if n == 1 else f"t[@][%] = (@ == %) ? {start} : (pen_real_t)0;")
+        each("c[@][%][#] = (pen_real_t)0;")
+        h, g, t, s, c, d, relu = "h", "g", "t", "s", "c", "d", ""
+        for layer, at in code.layers():
+            if isinstance(layer, Affine):
+                lines += [f"pen_act_relu({layer.n_out}U, {h});"] if relu else []
+                lines.append(_affine(layer, at, h, h))
+                each(f"{_AFFINE[layer.form]}_tangent({layer.n_out}U, {at}, {t}[@]);")
+                each(f"{_AFFINE[layer.form]}_tangent({layer.n_out}U, {at}, {c}[@][%]);")
+                relu = ""
+                continue
+            lines.append(f"pen_dense{relu}({layer.n_out}U, {layer.n_in}U, {at}, {h}, {g});")
+            lines += _activation(layer, g)
+            each(f"pen_dense_tangent({layer.n_out}U, {layer.n_in}U, {at}, {t}[@], {s}[@]);")
+            each(f"pen_dense_tangent({layer.n_out}U, {layer.n_in}U, {at}, {c}[@][%], {d}[@][%]);")
+            if layer.activation in ("relu", "step"):
+                each(f"pen_slope_{layer.activation}({layer.n_out}U, {g}, {d}[@][%]);")
+            elif layer.activation != "identity":
+                each(f"pen_bend_{layer.activation}({layer.n_out}U, {g}, {s}[@], {s}[%], {d}[@][%]);")
+            if layer.activation != "identity":
+                each(f"pen_slope_{layer.activation}({layer.n_out}U, {g}, {s}[@]);")
+            h, g, t, s, c, d, relu = g, h, s, t, d, c, _relu(layer)
+        each(f"bend[@][%] = {c}[@][%][0];")
+        if self.model.outside == "fade":
+            lines.append(f"const pen_real_t trust = pen_fade({n}U, &p[0], {fade}, in);")
+            slope = f"pen_fade_slope({n}U, &p[0], {fade}, in, ?U)"
+            each(
+                f"bend[@][%] = (trust * bend[@][%]) + ({t}[@][0] * {slope.replace('?', '%')}) + ({t}[%][0] * {slope.replace('?', '@')});",
+            )
+        return lines
+
+    # -- sets -----------------------------------------------------------------------------------------------------
+
+    def _constants(self) -> list[dict[str, str]]:
+        """Macros of the constant parameters that the code uses, in the order of the model file."""
+        found = []
+        for p in self.model.parameters.values():
+            remark = f"{p.unit}{', ' + p.description if p.description else ''}"
+            if not units.same_dimension(p.unit, "1") and units.factor(p.unit) != 1.0:
+                remark = f"SI value of a quantity in {remark}"
+            if p.name in self.constants:
+                found.append({"name": f"{self.prefix}_{p.name.upper()}", "text": f"({real(p.value)})", "remark": remark})
+            if f"1/{p.name}" in self.constants:
+                value = real(p.value).removeprefix("(pen_real_t)")
+                found.append({"name": f"{self.prefix}_{p.name.upper()}_INVERSE", "text": f"((pen_real_t)(1.0 / {value}))", "remark": f"1 / {p.name}"})
+        return found
+
+    def _offset_lines(self) -> list[dict[str, str]]:
+        tunable = {p.name: p for p in self.model.tunable}
+        found = []
+        for name, at in self.at.items():
+            if name in tunable:
+                remark = f"{tunable[name].unit}, in SI" + (f": {tunable[name].description}" if tunable[name].description else "")
+            else:
+                remark = f"network {name}"
+            found.append({"name": f"{self.prefix}_AT_{name.upper()}", "at": f"{at}U", "remark": remark})
+        return found
+
+    def _set_summary(self) -> list[str]:
+        first = self.model.sets.get("default")
+        found = []
+        for name, network in (first.networks if first else {}).items():
+            port = self.model.networks[name]
+            sizes = [network.n_inputs] + [la.n_out for la in network.layers if isinstance(la, Dense)]
+            found.append(f"{name} [{', '.join(port.input_units)}] -> [{port.output_unit}]: {'-'.join(map(str, sizes))}, {network.n_parameters} parameters")
+        return found
+
+    def _set(self, name: str) -> dict[str, Any]:
+        chosen = self.model.sets[name]
+        pieces = [
+            {"comment": p.comment, "rows": [", ".join(literal(v) for v in p.values[i : i + p.columns]) for i in range(0, p.length, p.columns)]}
+            for p in sets.pieces(self.model, chosen)
+        ] or [{"comment": "this model has nothing to tune", "rows": ["0.0F"]}]
+        return {
+            "name": name, "id": chosen.id, "pieces": pieces,
+            "checksum_float": sets.set_head(self.model, name)[3], "checksum_double": sets.set_head(self.model, name, float)[3],
+        }  # fmt: skip
+
+
+def _loops(statement: str, n: int) -> list[str]:
+    """The statement for every input @, every pair of inputs @, % or every triple @, %, #."""
+    if n == 1:
+        return [statement.replace("@U", "0U").replace("%U", "0U").replace("@", "0").replace("%", "0").replace("#", "0")]
+    marks = [(mark, name) for mark, name in zip("@%#", "ijk") if mark in statement]
+    for mark, name in marks:
+        statement = statement.replace(f"{mark}U", name).replace(mark, name)
+    lines = [statement]
+    for _, name in reversed(marks):
+        lines = [f"for (size_t {name} = 0U; {name} < {n}U; {name}++) {{", *(f"    {line}" for line in lines), "}"]
+    return lines
+
+
+def _affine(layer: Affine, at: str, here: str, there: str) -> str:
+    """A single value is scaled in place of a call."""
+    if layer.n_out > 1:
+        return f"{_AFFINE[layer.form]}({layer.n_out}U, {at}, {here}, {there});"
+    first = int(at[3:-1])
+    if layer.form == "centre":
+        return f"{there}[0] = ({here}[0] - p[{first}]) * p[{first + 1}];"
+    return f"{there}[0] = ({here}[0] * p[{first}]) + p[{first + 1}];"
+
+
+def _relu(layer: Layer) -> str:
+    """Suffix of the kernel that reads this layer's values: it applies the ReLU."""
+    return "_relu" if isinstance(layer, Dense) and layer.activation == "relu" else ""
+
+
+def _activation(layer: Layer, buffer: str) -> list[str]:
+    if isinstance(layer, Affine) or layer.activation in ("relu", "identity"):
+        return []
+    return [f"pen_act_{layer.activation}({layer.n_out}U, {buffer});"]
+
+
+def _remarked(line: str, step: Step) -> list[str]:
+    """The line with its comment behind it, or above it where it is long."""
+    comment = f"/* {step.comment} */"
+    if not step.comment:
+        return [line]
+    return [f"{line} {comment}"] if len(line) + len(comment) < 112 else [comment, line]

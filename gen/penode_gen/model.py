@@ -1,0 +1,176 @@
+"""The model as plain data: what a model file says, in SI units, before any mathematics is done to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .networks import Network
+
+METHODS = ("euler", "heun", "rk4", "ros1", "ros2")
+INTERPOLATIONS = ("held", "linear")
+OUTSIDE = ("extrapolate", "clamp", "fade")
+GROUND = "ground"
+
+
+class ModelError(Exception):
+    """A model that cannot be used; `problems` lists all of them, one line each, with place and remedy."""
+
+    def __init__(self, problems: list[str]):
+        self.problems = list(problems)
+        super().__init__("\n".join(problems))
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known), 0 if nothing is said."""
+
+    name: str
+    value: float
+    unit: str
+    tolerance: float = 0.0
+    tunable: bool = False
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Input:
+    """A measured signal that drives the model. `noise` is the standard deviation of its measurement, SI."""
+
+    name: str
+    unit: str
+    minimum: float | None = None
+    maximum: float | None = None
+    noise: float = 0.0
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mass that moves along one axis; its two states are `position` [m] and `velocity` [m/s]."""
+
+    name: str
+    mass: str
+    position: str
+    velocity: str
+    start: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Element:
+    """A force between two ends (bodies, position inputs or ground): deflection s = z_a - z_b, positive force pulls."""
+
+    name: str
+    ends: tuple[str, str]
+    law: str
+    arguments: dict[str, str] = field(default_factory=dict)  # argument of the law -> parameter
+    network: str = ""
+    network_inputs: tuple[str, ...] = ()
+    expression: str = ""
+
+
+@dataclass(frozen=True)
+class State:
+    """A state that is not mechanical; its equation gives der(name)."""
+
+    name: str
+    unit: str
+    start: float = 0.0
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """An algebraic unknown of the plain equations."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Equation:
+    """`left = right` between parameters, inputs, states, variables and networks."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Signal:
+    """An output or a sensor: an expression, its unit and, for a sensor, the standard deviation of its noise (SI)."""
+
+    name: str
+    expression: str
+    unit: str
+    noise: float = 0.0
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class NetworkPort:
+    """What a network stands for: names and units of its inputs and of its output."""
+
+    name: str
+    input_units: tuple[str, ...]
+    output_unit: str
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """One choice of all that is tunable: a trained network for each port, and values for the tunable parameters."""
+
+    name: str
+    id: int
+    networks: dict[str, Network]
+    parameters: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A checked model. All values are SI; `digest` identifies the files it was read from."""
+
+    name: str
+    description: str
+    sample_time: float
+    method: str
+    substeps: int
+    interpolation: str
+    outside: str
+    fade_width: float
+    parameters: dict[str, Parameter]
+    inputs: tuple[Input, ...]
+    bodies: tuple[Body, ...]
+    elements: tuple[Element, ...]
+    extra_states: tuple[State, ...]
+    variables: tuple[Variable, ...]
+    equations: tuple[Equation, ...]
+    networks: dict[str, NetworkPort]
+    outputs: tuple[Signal, ...]
+    sensors: tuple[Signal, ...]
+    sets: dict[str, ParameterSet]
+    path: Path
+    digest: str
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of all states: positions, velocities, then the others."""
+        return (
+            tuple(b.position for b in self.bodies)
+            + tuple(b.velocity for b in self.bodies)
+            + tuple(s.name for s in self.extra_states)
+        )
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Initial values of `states`, SI."""
+        return (
+            tuple(b.start[0] for b in self.bodies)
+            + tuple(b.start[1] for b in self.bodies)
+            + tuple(s.start for s in self.extra_states)
+        )
+
+    @property
+    def tunable(self) -> tuple[Parameter, ...]:
+        """The parameters that are part of every set, in the order of the model file."""
+        return tuple(p for p in self.parameters.values() if p.tunable)

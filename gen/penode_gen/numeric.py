@@ -1,0 +1,83 @@
+"""A model as float64 functions: what the reference simulation integrates. Shares no arithmetic with the C."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+import numpy as np
+import sympy as sp
+
+from . import expressions as ex
+from .causalise import Causal, causalise
+from .model import Model
+
+_NUMPY = [
+    {"Softplus": lambda x: np.logaddexp(0.0, x), "Sigmoid": lambda x: 1.0 / (1.0 + np.exp(-x))},
+    "numpy",
+]
+
+
+class Numeric:
+    """Right-hand side, outputs and sensors of a model with one parameter set; x [n_x], u [n_u], udot = du/dt [n_u]."""
+
+    def __init__(self, model: Model, set_name: str = "default"):
+        self.model = model
+        self._causal = causalise(model)
+        chosen = model.sets.get(set_name)
+        if chosen is None and set_name != "default":
+            raise KeyError(f"{model.path.name} has no set '{set_name}'; it has {', '.join(model.sets)}")
+        self._networks = chosen.networks if chosen else {}
+        values = {p.name: p.value for p in model.parameters.values()} | (chosen.parameters if chosen else {})
+        self._values = {ex.symbol(n): sp.Float(v, 17) for n, v in values.items()}
+        self._rates, self._outputs, self._sensors = map(
+            self._function, (self._causal.rates, self._causal.outputs, self._causal.sensors)
+        )
+
+    def initial_state(self) -> np.ndarray:
+        """Start values of all states, SI."""
+        return np.array(self.model.start, dtype=float)
+
+    def rates(self, x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
+        """dx/dt [n_x]."""
+        return self._rates(x, u, udot)
+
+    def outputs(self, x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
+        """Outputs [n_y]."""
+        return self._outputs(x, u, udot)
+
+    def sensors(self, x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
+        """Sensors [n_z], without noise."""
+        return self._sensors(x, u, udot)
+
+    def _function(self, results: tuple[sp.Expr, ...]) -> Callable[..., np.ndarray]:
+        causal: Causal = self._causal
+        given = [*causal.states, *causal.inputs, *causal.input_rates]
+        kinematics = {ex.derivative(q.name): v for q, v in causal.kinematics.items()}
+        results = tuple(r.subs(kinematics) for r in results)
+        known = list(given)
+        plan: list[tuple[Callable[..., object], str]] = []
+        for step in causal.needed(results):
+            parts = step.arguments if step.network else (step.value,)
+            plan.append((self._lambdify(known, [p.subs(kinematics) for p in parts]), step.network))
+            known.append(step.target)
+        last = self._lambdify(known, results)
+        networks = {n: net.evaluate for n, net in self._networks.items()}
+
+        def function(x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
+            values = [*x, *u, *udot]
+            for expression, network in plan:
+                found = expression(*values)
+                values.append(float(networks[network](np.array(found, dtype=float))[0]) if network else found[0])
+            return np.array(last(*values), dtype=float)
+
+        return function
+
+    def _lambdify(self, known: list[sp.Symbol], parts: list[sp.Expr] | tuple[sp.Expr, ...]) -> Callable[..., list[float]]:
+        names = [sp.Symbol(f"a{i}", real=True) for i in range(len(known))]
+        swap = dict(zip(known, names))
+        return sp.lambdify(names, [p.subs(self._values).subs(swap) for p in parts], modules=_NUMPY, cse=True)
+
+
+def numeric(model: Model, set_name: str = "default") -> Numeric:
+    """The float64 functions of a model with one of its sets. Raises KeyError for an unknown set."""
+    return Numeric(model, set_name)

@@ -1,0 +1,112 @@
+"""Units: everything that enters becomes SI, and expressions are checked for dimensions that do not fit."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Callable
+
+import pint
+import sympy as sp
+
+_registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=False)
+Dimension = pint.util.UnitsContainer
+NONE: Dimension = _registry.dimensionless.dimensionality
+
+_QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
+
+
+class UnitError(ValueError):
+    """A unit that is unknown or does not fit; the message says which and what would."""
+
+
+@cache
+def _unit(text: str) -> pint.Unit:
+    plain = text.replace("·", "*").replace("²", "^2").replace("³", "^3").strip() or "dimensionless"
+    try:
+        unit = _registry.parse_units("dimensionless" if plain == "1" else plain.replace("1/", "dimensionless/"))
+    except Exception as error:  # pint raises a dozen kinds
+        raise UnitError(f"unknown unit '{text}'") from error
+    if not _registry.Quantity(1, unit)._is_multiplicative:
+        raise UnitError(f"unit '{text}' has an offset; use kelvin or another unit that starts at zero")
+    return unit
+
+
+def factor(text: str) -> float:
+    """How many SI units one `text` is."""
+    return float(_registry.Quantity(1.0, _unit(text)).to_base_units().magnitude)
+
+
+def dimension(text: str) -> Dimension:
+    """The physical dimension of a unit."""
+    return _unit(text).dimensionality
+
+
+def same_dimension(a: str, b: str) -> bool:
+    """Do two units measure the same kind of thing?"""
+    return dimension(a) == dimension(b)
+
+
+def quantity(text: str) -> tuple[float, str]:
+    """'10 kN/m' -> (10000.0, 'kN/m'): the value in SI and the unit as written."""
+    match = _QUANTITY.match(text)
+    if not match:
+        raise UnitError(f"'{text}' is not a number with a unit, such as '10 kN/m'")
+    return float(match[1]) * factor(match[2]), match[2] or "1"
+
+
+def describe(dim: Dimension) -> str:
+    """A dimension in base units, for messages."""
+    if not dim:
+        return "no unit"
+    names = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[temperature]": "K", "[current]": "A"}
+    parts = [names.get(k, k) + ("" if v == 1 else f"^{v:g}") for k, v in sorted(dim.items()) if v]
+    return "*".join(parts)
+
+
+def dimension_of(expr: sp.Expr, of: Callable[[sp.Basic], Dimension]) -> Dimension | None:
+    """
+    Dimension of an expression; `of` gives that of its symbols and network calls.
+
+    None stands for a bare zero, which fits anything. Raises UnitError where terms do not fit.
+    """
+    if expr.is_Symbol or isinstance(expr, sp.core.function.AppliedUndef):
+        return of(expr)
+    if expr.is_number:
+        return None if expr == 0 else NONE
+    if isinstance(expr, sp.Piecewise):
+        for _, condition in expr.args:
+            if isinstance(condition, sp.core.relational.Relational):
+                _equal(condition, [dimension_of(a, of) for a in condition.args])
+        return _equal(expr, [dimension_of(value, of) for value, _ in expr.args])
+    parts = [dimension_of(a, of) for a in expr.args]
+    if expr.is_Add or isinstance(expr, (sp.Max, sp.Min)):
+        return _equal(expr, parts)
+    if expr.is_Mul:
+        total = NONE
+        for part in parts:
+            total = total * (part if part is not None else NONE)
+        return total
+    if expr.is_Pow:
+        base, exponent = expr.args
+        if not exponent.is_number:
+            if parts[0] or parts[1]:
+                raise UnitError(f"'{expr}': a power with a variable exponent needs numbers without unit")
+            return NONE
+        return (parts[0] or NONE) ** float(exponent)
+    if isinstance(expr, sp.Abs):
+        return parts[0]
+    if isinstance(expr, sp.sign):
+        return NONE
+    for part in parts:  # exp, tanh, ...
+        if part:
+            raise UnitError(f"'{expr}': the argument has the unit {describe(part)}; divide it by a parameter of that unit")
+    return NONE
+
+
+def _equal(expr: sp.Basic, parts: list[Dimension | None]) -> Dimension | None:
+    known = [p for p in parts if p is not None]
+    for part in known[1:]:
+        if part != known[0]:
+            raise UnitError(f"'{expr}' combines {describe(known[0])} with {describe(part)}")
+    return known[0] if known else None

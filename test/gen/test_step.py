@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The generated step: order of every method, exact derivatives, networks of every shape, envelope policies."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import models
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import penode_gen
+from penode_sil.targets import Sil
+
+ORDERS = {"euler": 1, "heun": 2, "rk4": 4, "ros1": 1, "ros2": 2}
+EXTRA = 0x10  # PEN_OUTSIDE
+
+
+@pytest.mark.parametrize("input", ["linear", "held"])
+@pytest.mark.parametrize("method", ORDERS)
+def test_order_of_convergence(tmp_path, method, input, show):
+    """Halving the sample time divides the error by 2^order. The inputs are straight lines (constant if held), so that
+    sampling them loses nothing; the reference is the model's equations by hand, integrated by SciPy to 1e-12."""
+    slope = 1.0 if input == "linear" else 0.0
+    force, foot, foot_rate = (lambda t: 1.0 + 2.0 * slope * t), (lambda t: 0.02 + 0.1 * slope * t), (lambda t: 0.1 * slope)
+    duration, errors = 0.32, []
+    for h in (4e-3, 2e-3, 1e-3):
+        path = models.rich(tmp_path, method, h, input)
+        n = round(duration / h)
+        t = np.arange(n + 1) * h
+        u = np.stack([np.vectorize(force)(t), np.vectorize(foot)(t)], axis=1)
+        run = Sil(penode_gen.load(path), np.float64).run(u)
+        assert not np.any(run.status & ~np.uint32(EXTRA))
+        data = json.loads((tmp_path / "n2.json").read_text())
+        damping = 3.0 if input == "linear" else 0.0
+        exact = solve_ivp(
+            lambda t, x: models.rich_by_hand(data, t, x, force, foot, foot_rate, damping),
+            (0.0, duration), [0.01, 0.0, 0.5], method="DOP853", rtol=1e-12, atol=1e-14,
+        ).y[:, -1]  # fmt: skip
+        errors.append(np.max(np.abs(run.x[-1] - exact)))
+    orders = [math.log2(a / b) for a, b in zip(errors, errors[1:])]
+    show(f"{method}, input {input}: error {errors[-1]:.1e} at 1 ms, order {orders[0]:.2f}, {orders[1]:.2f}")
+    # the leading error term dominates by about h/tau = 1 ms / 50 ms; what is left moves the slope by that share
+    assert abs(orders[-1] - ORDERS[method]) < 0.1
+
+
+def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: bool) -> dict[str, np.ndarray]:
+    """The parts of the jacobian struct by name."""
+    shapes = {"x_x": (n_x, n_x), "x_u_before": (n_x, n_u), "x_u": (n_x, n_u), "y_x": (n_y, n_x), "y_u": (n_y, n_u)}
+    shapes |= {"y_u_before": (n_y, n_u)} if moving else {}
+    parts, at = {}, 0
+    for name, (rows, columns) in shapes.items():
+        parts[name] = jacobian[at : at + rows * columns].reshape(rows, columns)
+        at += rows * columns
+    return parts
+
+
+@pytest.mark.parametrize("outside", ["extrapolate", "clamp", "fade"])
+@pytest.mark.parametrize("input", ["linear", "held"])
+@pytest.mark.parametrize("method", ORDERS)
+def test_step_jacobian_against_differences(tmp_path, method, input, outside):
+    """Central differences of the discrete step in double, at random states inside, on and outside of the envelope."""
+    moving = input == "linear"
+    model = penode_gen.load(models.rich(tmp_path, method, 5e-3, input, outside, substeps=2, low=-0.3, high=0.3))
+    sil, draw = Sil(model, np.float64), np.random.default_rng(11)
+    n_x, n_u, n_y = 3, 2, 2
+    size = n_x * n_x + 2 * n_x * n_u + n_y * n_x + n_y * n_u * (2 if moving else 1)
+
+    def step(x, before, now):
+        instance = sil.instance()
+        instance.step(before)
+        instance.set_state(x)
+        state, y, status = instance.step(now)
+        assert status in (0, EXTRA)
+        return np.concatenate([state, y])
+
+    def difference(function, at, i):
+        d = np.zeros_like(at)
+        d[i] = 1e-5
+        return (function(at + d) - function(at - d)) / 2e-5
+
+    for _ in range(6):
+        x, before, now = draw.uniform(-0.5, 0.5, n_x), draw.uniform(-1, 1, n_u) * [1, 0.1], draw.uniform(-1, 1, n_u) * [1, 0.1]
+        instance = sil.instance()
+        instance.step(before)
+        instance.set_state(x)
+        y, found, status = instance.step_jacobian(now, size)
+        assert status in (0, EXTRA)
+        plain = step(x, before, now)
+        assert np.array_equal(instance.get_state(), plain[:n_x]) and np.array_equal(y, plain[n_x:])  # to the bit
+        j = flatten(found, n_x, n_u, n_y, moving)
+        # differences: third derivative (about 1e3) * 1e-10 / 6 + rounding 1e-16 / 1e-5 * values of 1e2; relative 1e-6
+        tolerance = dict(rtol=1e-6, atol=2e-7)
+        for i in range(n_x):
+            column = difference(lambda v: step(v, before, now), x, i)
+            np.testing.assert_allclose(j["x_x"][:, i], column[:n_x], **tolerance)
+            np.testing.assert_allclose((j["y_x"] @ j["x_x"])[:, i], column[n_x:], rtol=1e-6, atol=1e-5)
+        for i in range(n_u):
+            column = difference(lambda v: step(x, v, now), before, i)
+            np.testing.assert_allclose(j["x_u_before"][:, i], column[:n_x], **tolerance)
+            direct = j["y_u_before"][:, i] if moving else 0.0
+            np.testing.assert_allclose((j["y_x"] @ j["x_u_before"])[:, i] + direct, column[n_x:], rtol=1e-6, atol=1e-5)
+            column = difference(lambda v: step(x, before, v), now, i)
+            np.testing.assert_allclose(j["x_u"][:, i], column[:n_x], **tolerance)
+            np.testing.assert_allclose((j["y_x"] @ j["x_u"])[:, i] + j["y_u"][:, i], column[n_x:], rtol=1e-6, atol=1e-5)
+
+
+@pytest.mark.parametrize("method", ["rk4", "ros1", "ros2"])
+def test_jacobian_through_relu_networks(tmp_path, method):
+    """The project's nQVM in double: a point on no kink, so differences of 1e-7 see straight lines only."""
+    source = (models.Path(__file__).parents[2] / "gen" / "nqvm").resolve()
+    path = tmp_path / "nqvm.toml"
+    path.write_text((source / "nqvm.toml").read_text().replace('"rk4"', f'"{method}"').replace('"networks/', f'"{source}/networks/'))
+    sil, draw = Sil(penode_gen.load(path), np.float64), np.random.default_rng(2)
+    for _ in range(20):
+        x = draw.uniform(-1, 1, 4) * [0.04, 0.02, 0.5, 0.8]
+        before, now = draw.uniform(-0.02, 0.02, (2, 1))
+
+        def start(state):
+            instance = sil.instance()
+            instance.step(before)
+            instance.set_state(state)
+            return instance
+
+        first = start(x)
+        _, found, status = first.step_jacobian(now, 4 * 4 + 4 + 4 + 2 * 4 + 2)
+        assert status == 0
+        j = flatten(found, 4, 1, 2, False)
+        for i in range(4):
+            d = np.eye(4)[i] * 1e-9
+            column = (start(x + d).step(now)[0] - start(x - d).step(now)[0]) / 2e-9
+            # rounding of states of 0.5 by 1e-16 over 1e-9, some ten operations; a kink within 1e-9 m has odds of 1e-4
+            np.testing.assert_allclose(j["x_x"][:, i], column, atol=3e-6, rtol=1e-6)
+
+
+SHAPES = [
+    ([1, 1], ["identity"]), ([1, 16, 1], ["relu", "identity"]), ([1, 16, 16, 16, 1], ["relu", "relu", "relu", "identity"]),
+    ([1, 16, 1], ["relu", "relu"]), ([3, 5, 1], ["tanh", "identity"]), ([2, 20, 37, 1], ["relu", "relu", "identity"]),
+    ([4, 32, 16, 1], ["sigmoid", "softplus", "identity"]), ([2, 16, 16, 1], ["tanh", "relu", "tanh"]), ([1, 7, 4, 1], ["softplus", "step", "identity"]),
+    ([3, 64, 64, 1], ["relu", "relu", "sigmoid"]), ([1, 256, 1], ["relu", "identity"]), ([8, 4, 4, 4, 4, 4, 1], ["relu"] * 5 + ["identity"]),
+]  # fmt: skip
+
+
+def bare(folder, sizes, activations, seed, outside="extrapolate", low=-1.0, high=1.0):
+    data = models.network_file(folder / "net.json", sizes, activations, seed, low, high)
+    names = [f"u{i}" for i in range(sizes[0])]
+    path = folder / f"bare_{outside}.toml"
+    path.write_text(
+        models.BARE.format(
+            outside=outside, units=json.dumps(["1"] * sizes[0]), names=", ".join(names),
+            inputs="\n".join(f'{n} = {{ unit = "1" }}' for n in names),
+        )
+    )  # fmt: skip
+    return data, penode_gen.load(path)
+
+
+@pytest.mark.parametrize("sizes, activations", SHAPES, ids=lambda v: "-".join(map(str, v)))
+def test_networks_of_every_shape(tmp_path, sizes, activations):
+    data, model = bare(tmp_path, sizes, activations, seed=len(sizes) + sizes[0])
+    inputs = np.random.default_rng(4).uniform(-1, 1, (200, sizes[0]))
+    expected = np.array([models.network_by_hand(data, x) for x in inputs])
+    # sums of up to 256 terms of size 1: relative error below n * eps in double, and n^0.5 * 2^-24 typical in float
+    for dtype, tolerance in ((np.float64, 1e-12), (np.float32, 2e-5)):
+        run = Sil(model, dtype).run(inputs.astype(dtype))
+        if "step" in activations and dtype == np.float32:
+            continue  # a rounding error may land on the other side of a step
+        np.testing.assert_allclose(run.y[:, 0], expected, rtol=tolerance, atol=tolerance)
+        assert not run.status.any()
+
+
+def test_outside_of_the_envelope(tmp_path):
+    """Extrapolate, clamp, fade: value and flag, inside and outside."""
+    inputs = np.random.default_rng(6).uniform(-1.2, 1.2, (300, 2))
+    low, high, width = -0.4, 0.6, 0.5
+    for outside in ("extrapolate", "clamp", "fade"):
+        data, model = bare(tmp_path, [2, 9, 1], ["tanh", "identity"], 8, outside, low, high)
+        run = Sil(model, np.float64).run(inputs)
+        seen = np.clip(inputs, low, high) if outside == "clamp" else inputs
+        expected = np.array([models.network_by_hand(data, x) for x in seen])
+        if outside == "fade":
+            distance = np.maximum(np.maximum(low - inputs, inputs - high), 0.0).max(axis=1)
+            expected *= np.clip(1.0 - distance / (width * (high - low)), 0.0, 1.0)
+        np.testing.assert_allclose(run.y[:, 0], expected, rtol=1e-12, atol=1e-13)
+        leaves = ((inputs < low) | (inputs > high)).any(axis=1)
+        assert np.array_equal(run.status == EXTRA, leaves) and np.array_equal(run.status == 0, ~leaves)
+
+
+def test_tunable_parameter_is_part_of_the_set(tmp_path):
+    """Selecting the set "heavy" doubles the mass and nothing else."""
+    model = penode_gen.load(models.rich(tmp_path))
+    data = json.loads((tmp_path / "n2.json").read_text())
+    sil = Sil(model, np.float64)
+    for name, mass in (("default", 2.0), ("heavy", 4.0)):
+        instance = sil.instance(name)
+        _, y, status = instance.step([1.5, 0.03])
+        assert status == 0
+        rate = models.rich_by_hand(data, 0.0, np.array([0.01, 0.0, 0.5]), lambda t: 1.5, lambda t: 0.03, lambda t: 0.0, mass=mass)
+        np.testing.assert_allclose(y, [0.01, rate[1]], rtol=1e-12)
+        np.testing.assert_allclose(instance.sensors(), [(1.5 + 0.3 * 50 * (0.01 - 0.03)) / 1.5], rtol=1e-12)
+
+
+def test_substeps_equal_a_shorter_sample_time(tmp_path):
+    """Four substeps of 1 ms are four samples of 0.25 ms of the same straight line, to rounding."""
+    fine = Sil(penode_gen.load(models.rich(tmp_path, "rk4", 2.5e-4)), np.float64)
+    coarse = Sil(penode_gen.load(models.rich(tmp_path, "rk4", 1e-3, substeps=4)), np.float64)
+    t = np.arange(401) * 2.5e-4
+    u = np.stack([np.sin(20 * t), 0.01 * np.cos(30 * t)], axis=1)
+    knots = u[::4]
+    straight = np.stack([np.interp(t, t[::4], knots[:, i]) for i in range(2)], axis=1)
+    np.testing.assert_allclose(coarse.run(knots).x, fine.run(straight).x[::4], rtol=1e-9, atol=1e-12)
