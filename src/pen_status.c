@@ -15,26 +15,25 @@ void pen_status_clear(pen_status_log_t *log)
     }
 }
 
-/* In every step, so unrolled: four instructions a flag. */
+/* The counters of `flags` flags from the one at `first` on. */
+static void note(volatile uint32_t first[], uint32_t flags, pen_status_t status)
+{
+    pen_status_t rest = status;
+
+    for (uint32_t i = 0U; i < flags; i++) {
+        pen_port_store(&first[i], pen_port_load(&first[i]) + (rest & 1U));
+        rest >>= 1U;
+    }
+}
+
 void pen_status_note_step(pen_status_log_t *log, pen_status_t status)
 {
-    uint32_t *const count = log->count;
-
-    pen_port_store(&count[0], pen_port_load(&count[0]) + (status & 1U));
-    pen_port_store(&count[1], pen_port_load(&count[1]) + ((status >> 1U) & 1U));
-    pen_port_store(&count[2], pen_port_load(&count[2]) + ((status >> 2U) & 1U));
-    pen_port_store(&count[3], pen_port_load(&count[3]) + ((status >> 3U) & 1U));
-    pen_port_store(&count[4], pen_port_load(&count[4]) + ((status >> 4U) & 1U));
-    pen_port_store(&count[5], pen_port_load(&count[5]) + ((status >> 5U) & 1U));
-    pen_port_store(&count[6], pen_port_load(&count[6]) + ((status >> 6U) & 1U));
-    pen_port_store(&count[7], pen_port_load(&count[7]) + ((status >> 7U) & 1U));
+    note(&log->count[0], PEN_STATUS_STEP, status);
 }
 
 void pen_status_note_tune(pen_status_log_t *log, pen_status_t status)
 {
-    for (uint32_t flag = PEN_STATUS_STEP; flag < PEN_STATUS_FLAGS; flag++) {
-        pen_port_store(&log->count[flag], pen_port_load(&log->count[flag]) + ((status >> flag) & 1U));
-    }
+    note(&log->count[PEN_STATUS_STEP], PEN_STATUS_FLAGS - PEN_STATUS_STEP, status >> PEN_STATUS_STEP);
 }
 
 void pen_status_read(pen_status_log_t *log, pen_status_report_t *report)

@@ -21,7 +21,7 @@
 #ifdef __FAST_MATH__
 #error "penode: -ffast-math removes the NaN and Inf checks that this library promises; compile without it"
 #endif
-#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD != 0)
+#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD != 0) && (FLT_EVAL_METHOD != 16) /* 16: half floats in hardware */
 #error "penode: intermediate results wider than their type break bit-identity; on x86 use -mfpmath=sse"
 #endif
 

@@ -1,0 +1,329 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "penode/pen_math.h"
+#include "penode/pen_net.h"
+#include "unity.h"
+
+#define MAX_OUT 40U
+#define MAX_IN  20U
+#define POISON  ((pen_real_t)-99)
+
+static pen_real_t weight[MAX_OUT][MAX_IN]; /* as a mathematician writes them */
+static pen_real_t bias[MAX_OUT];
+static pen_real_t stream[MAX_OUT * (MAX_IN + 1U)]; /* as the kernels read them */
+static pen_real_t x[MAX_IN];
+static pen_real_t y[MAX_OUT + 1U];
+static pen_real_t nan_value;
+static pen_real_t inf_value;
+static uint32_t   seed;
+
+/* Eighths from -2 to 2: every product and sum below is exact in float, so expected values are exact, too. */
+static pen_real_t eighth(void)
+{
+    seed = (seed * 1664525U) + 1013904223U;
+    return ((pen_real_t)((seed >> 16U) % 33U) - (pen_real_t)16) / (pen_real_t)8;
+}
+
+void setUp(void)
+{
+    volatile pen_real_t zero = (pen_real_t)0;
+
+    seed = 1U;
+    nan_value = zero / zero;
+    inf_value = (pen_real_t)1 / zero;
+    for (size_t i = 0U; i <= MAX_OUT; i++) {
+        y[i] = POISON;
+    }
+}
+
+void tearDown(void) {}
+
+/* Fill a layer and write its stream: blocks of 16, 4 and 1 rows; in each the biases, then column by column. */
+static void make(size_t n_out, size_t n_in)
+{
+    static const size_t sizes[3] = { 16U, 4U, 1U };
+    size_t row = 0U;
+    size_t at = 0U;
+
+    for (size_t r = 0U; r < n_out; r++) {
+        bias[r] = eighth();
+        for (size_t i = 0U; i < n_in; i++) {
+            weight[r][i] = eighth();
+        }
+    }
+    for (size_t i = 0U; i < n_in; i++) {
+        x[i] = eighth();
+    }
+    for (size_t b = 0U; b < 3U; b++) {
+        for (; (n_out - row) >= sizes[b]; row += sizes[b]) {
+            for (size_t r = 0U; r < sizes[b]; r++) {
+                stream[at] = bias[row + r];
+                at++;
+            }
+            for (size_t i = 0U; i < n_in; i++) {
+                for (size_t r = 0U; r < sizes[b]; r++) {
+                    stream[at] = weight[row + r][i];
+                    at++;
+                }
+            }
+        }
+    }
+}
+
+static pen_real_t positive(pen_real_t v)
+{
+    return (v > (pen_real_t)0) ? v : (pen_real_t)0;
+}
+
+static void expect_rows(size_t n_out, size_t n_in, int with_bias, int with_relu)
+{
+    for (size_t r = 0U; r < n_out; r++) {
+        pen_real_t sum = with_bias ? bias[r] : (pen_real_t)0;
+        for (size_t i = 0U; i < n_in; i++) {
+            sum += weight[r][i] * (with_relu ? positive(x[i]) : x[i]);
+        }
+        TEST_ASSERT_TRUE(y[r] == sum);
+    }
+    TEST_ASSERT_TRUE(y[n_out] == POISON); /* nothing is written behind the end */
+}
+
+void test_dense_of_every_shape_is_exact(void)
+{
+    for (size_t n_out = 1U; n_out <= MAX_OUT; n_out++) {
+        for (size_t n_in = 1U; n_in <= MAX_IN; n_in += 3U) {
+            setUp();
+            make(n_out, n_in);
+            pen_dense(n_out, n_in, stream, x, y);
+            expect_rows(n_out, n_in, 1, 0);
+            pen_dense_relu(n_out, n_in, stream, x, y);
+            expect_rows(n_out, n_in, 1, 1);
+            pen_dense_tangent(n_out, n_in, stream, x, y);
+            expect_rows(n_out, n_in, 0, 0);
+        }
+    }
+}
+
+void test_special_kernels_agree_with_the_general_one(void)
+{
+    make(16U, 1U);
+    pen_dense16_scalar(stream, x[0], y);
+    expect_rows(16U, 1U, 1, 0);
+    make(16U, 16U);
+    pen_dense16_relu(16U, stream, x, y);
+    expect_rows(16U, 16U, 1, 1);
+    make(1U, 16U);
+    y[0] = pen_dense1(16U, stream, x);
+    y[1] = POISON;
+    expect_rows(1U, 16U, 1, 0);
+    y[0] = pen_dense1_relu(16U, stream, x);
+    expect_rows(1U, 16U, 1, 1);
+}
+
+void test_dense16_relu_may_write_over_its_input(void)
+{
+    make(16U, 16U);
+    for (size_t i = 0U; i < 16U; i++) {
+        y[i] = x[i];
+    }
+    pen_dense16_relu(16U, stream, y, y);
+    expect_rows(16U, 16U, 1, 1);
+}
+
+/* Neither NaN nor either Inf may vanish in a layer, wherever it stands: this is what the step's one check rests on. */
+static void expect_nonfinite(size_t n, const pen_real_t value[])
+{
+    TEST_ASSERT_FALSE(pen_finite(n, value));
+}
+
+void test_nonfinite_input_of_relu_layer_reaches_every_row(void)
+{
+    pen_real_t bad[3];
+
+    bad[0] = nan_value;
+    bad[1] = inf_value;
+    bad[2] = -inf_value; /* max(0, -Inf) would be 0 */
+    for (size_t b = 0U; b < 3U; b++) {
+        for (size_t i = 0U; i < 16U; i++) {
+            make(21U, 16U);
+            x[i] = bad[b];
+            pen_dense_relu(21U, 16U, stream, x, y);
+            for (size_t r = 0U; r < 21U; r++) {
+                if (!(weight[r][i] == (pen_real_t)0) || (b != 1U)) {
+                    expect_nonfinite(1U, &y[r]);
+                }
+            }
+        }
+    }
+}
+
+void test_activations_do_not_hide_inf(void)
+{
+    static void (*const act[5])(size_t, pen_real_t[]) = { pen_act_relu, pen_act_tanh, pen_act_sigmoid, pen_act_softplus, pen_act_step };
+
+    for (size_t a = 0U; a < 5U; a++) {
+        pen_real_t h[3];
+        h[0] = nan_value;
+        h[1] = inf_value;
+        h[2] = -inf_value;
+        act[a](3U, h);
+        for (size_t i = 0U; i < 3U; i++) {
+            expect_nonfinite(1U, &h[i]);
+        }
+    }
+}
+
+void test_relu_and_step_values(void)
+{
+    pen_real_t h[5] = { (pen_real_t)-2, (pen_real_t)-0.125, (pen_real_t)0, (pen_real_t)0.125, (pen_real_t)2 };
+
+    pen_act_relu(5U, h);
+    TEST_ASSERT_TRUE((h[0] == (pen_real_t)0) && (h[1] == (pen_real_t)0) && (h[2] == (pen_real_t)0));
+    TEST_ASSERT_TRUE((h[3] == (pen_real_t)0.125) && (h[4] == (pen_real_t)2));
+    h[0] = (pen_real_t)-0.5;
+    h[1] = (pen_real_t)0;
+    h[2] = (pen_real_t)0.5;
+    pen_act_step(3U, h);
+    TEST_ASSERT_TRUE((h[0] == (pen_real_t)0) && (h[1] == (pen_real_t)1) && (h[2] == (pen_real_t)1));
+}
+
+void test_smooth_activations_are_those_of_pen_math(void)
+{
+    for (int i = -40; i <= 40; i++) {
+        const pen_real_t v = (pen_real_t)i / (pen_real_t)8;
+        pen_real_t h[3] = { v, v, v };
+        pen_act_tanh(1U, &h[0]);
+        pen_act_sigmoid(1U, &h[1]);
+        pen_act_softplus(1U, &h[2]);
+        TEST_ASSERT_TRUE((h[0] == pen_tanh(v)) && (h[1] == pen_sigmoid(v)) && (h[2] == pen_softplus(v)));
+    }
+}
+
+/* Slopes and bends by hand at values that are exact: h = 1/2. softplus: e^-h = 0.60653066, from mpmath. */
+void test_slopes_from_the_value(void)
+{
+    const pen_real_t h[1] = { (pen_real_t)0.5 };
+    pen_real_t t[1] = { (pen_real_t)3 };
+
+    pen_slope_tanh(1U, h, t);
+    TEST_ASSERT_TRUE(t[0] == (pen_real_t)2.25); /* 3 (1 - 1/4) */
+    pen_slope_sigmoid(1U, h, t);
+    TEST_ASSERT_TRUE(t[0] == (pen_real_t)0.5625); /* 2.25 / 4 */
+    pen_slope_relu(1U, h, t);
+    TEST_ASSERT_TRUE(t[0] == (pen_real_t)0.5625);
+    t[0] = (pen_real_t)1;
+    pen_slope_softplus(1U, h, t);
+    TEST_ASSERT_TRUE((t[0] > (pen_real_t)0.39346929) && (t[0] < (pen_real_t)0.39346940)); /* 0.39346934, 1 ulp of exp each side */
+    pen_slope_step(1U, h, t);
+    TEST_ASSERT_TRUE(t[0] == (pen_real_t)0);
+}
+
+void test_relu_slope_is_zero_at_and_below_the_kink(void)
+{
+    const pen_real_t h[3] = { (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1 };
+    pen_real_t t[3] = { (pen_real_t)5, (pen_real_t)5, (pen_real_t)5 };
+
+    pen_slope_relu(3U, h, t);
+    TEST_ASSERT_TRUE((t[0] == (pen_real_t)0) && (t[1] == (pen_real_t)0) && (t[2] == (pen_real_t)5));
+}
+
+void test_bends_from_the_value(void)
+{
+    const pen_real_t h[1] = { (pen_real_t)0.5 };
+    const pen_real_t a[1] = { (pen_real_t)2 };
+    const pen_real_t b[1] = { (pen_real_t)3 };
+    pen_real_t c[1] = { (pen_real_t)8 };
+
+    pen_bend_tanh(1U, h, a, b, c);
+    TEST_ASSERT_TRUE(c[0] == (pen_real_t)1.5); /* 3/4 * 8 - 2 * 1/2 * 3/4 * 6 */
+    c[0] = (pen_real_t)8;
+    pen_bend_sigmoid(1U, h, a, b, c);
+    TEST_ASSERT_TRUE(c[0] == (pen_real_t)2); /* 1/4 * 8 + (1 - 1) ... */
+    c[0] = (pen_real_t)8;
+    pen_bend_softplus(1U, h, a, b, c);
+    /* 0.39346934 * (8 + 0.60653066 * 6) = 4.57966203, from Python; rounding of 4 operations, each 2^-24 of it, 3e-7 */
+    TEST_ASSERT_TRUE((c[0] > (pen_real_t)4.57966) && (c[0] < (pen_real_t)4.579664));
+}
+
+void test_scaling_there_and_back(void)
+{
+    const pen_real_t p[4] = { (pen_real_t)1, (pen_real_t)-2, (pen_real_t)0.5, (pen_real_t)4 };
+    const pen_real_t q[4] = { (pen_real_t)2, (pen_real_t)0.25, (pen_real_t)1, (pen_real_t)-2 };
+    pen_real_t v[2] = { (pen_real_t)3, (pen_real_t)-1 };
+
+    pen_centre(2U, p, v, v);
+    TEST_ASSERT_TRUE((v[0] == (pen_real_t)1) && (v[1] == (pen_real_t)4));
+    pen_rescale(2U, q, v, v);
+    TEST_ASSERT_TRUE((v[0] == (pen_real_t)3) && (v[1] == (pen_real_t)-1));
+    pen_centre_tangent(2U, p, v);
+    TEST_ASSERT_TRUE((v[0] == (pen_real_t)1.5) && (v[1] == (pen_real_t)-4));
+    pen_rescale_tangent(2U, q, v);
+    TEST_ASSERT_TRUE((v[0] == (pen_real_t)3) && (v[1] == (pen_real_t)-1));
+}
+
+/* A PCA is centring and a dense layer with the components as rows: here the diagonals of a square, length sqrt(2). */
+void test_pca_is_centring_and_a_dense_layer(void)
+{
+    const pen_real_t centre[4] = { (pen_real_t)1, (pen_real_t)1, (pen_real_t)1, (pen_real_t)1 };
+    const pen_real_t component[6] = { (pen_real_t)0, (pen_real_t)0.5, (pen_real_t)0.5, (pen_real_t)0, (pen_real_t)0.5, (pen_real_t)-0.5 };
+    const pen_real_t in[2] = { (pen_real_t)4, (pen_real_t)2 };
+    pen_real_t h[2];
+
+    pen_centre(2U, centre, in, h);
+    pen_dense(2U, 2U, component, h, y);
+    TEST_ASSERT_TRUE((y[0] == (pen_real_t)2) && (y[1] == (pen_real_t)1));
+}
+
+static const pen_real_t range[4] = { (pen_real_t)-1, (pen_real_t)10, (pen_real_t)3, (pen_real_t)20 };
+
+void test_envelope_flag(void)
+{
+    const pen_real_t inside[2] = { (pen_real_t)-1, (pen_real_t)20 }; /* the edges belong to it */
+    const pen_real_t low[2] = { (pen_real_t)0, (pen_real_t)9.5 };
+    const pen_real_t high[2] = { (pen_real_t)3.5, (pen_real_t)15 };
+    pen_real_t broken[2] = { (pen_real_t)0, (pen_real_t)15 };
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_outside(2U, range, inside));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, pen_outside(2U, range, low));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, pen_outside(2U, range, high));
+    broken[1] = nan_value;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, pen_outside(2U, range, broken));
+}
+
+void test_clamp(void)
+{
+    pen_real_t v[2] = { (pen_real_t)-7, (pen_real_t)25 };
+
+    TEST_ASSERT_TRUE(pen_clamp_slope(2U, range, v, 0U) == (pen_real_t)0);
+    pen_clamp(2U, range, v, v);
+    TEST_ASSERT_TRUE((v[0] == (pen_real_t)-1) && (v[1] == (pen_real_t)20));
+    TEST_ASSERT_TRUE(pen_clamp_slope(2U, range, v, 0U) == (pen_real_t)1);
+    v[0] = nan_value;
+    pen_clamp(2U, range, v, v);
+    expect_nonfinite(1U, v);
+}
+
+/* Half a width of 4 and 10 is 2 and 5: trust falls from 1 to 0 over that distance, the worst input counts. */
+void test_fade(void)
+{
+    const pen_real_t half = (pen_real_t)0.5;
+    const pen_real_t inside[2] = { (pen_real_t)0, (pen_real_t)12 };
+    const pen_real_t near_edge[2] = { (pen_real_t)-1.5, (pen_real_t)12 };
+    const pen_real_t both[2] = { (pen_real_t)-1.5, (pen_real_t)22.5 };
+    const pen_real_t far[2] = { (pen_real_t)0, (pen_real_t)30 };
+    pen_real_t broken[2] = { (pen_real_t)0, (pen_real_t)0 };
+
+    TEST_ASSERT_TRUE(pen_fade(2U, range, half, inside) == (pen_real_t)1);
+    TEST_ASSERT_TRUE(pen_fade(2U, range, half, near_edge) == (pen_real_t)0.75);
+    TEST_ASSERT_TRUE(pen_fade(2U, range, half, both) == (pen_real_t)0.5);
+    TEST_ASSERT_TRUE(pen_fade(2U, range, half, far) == (pen_real_t)0);
+    TEST_ASSERT_TRUE(pen_fade_slope(2U, range, half, near_edge, 0U) == (pen_real_t)0.5);
+    TEST_ASSERT_TRUE(pen_fade_slope(2U, range, half, both, 0U) == (pen_real_t)0); /* the other input counts */
+    TEST_ASSERT_TRUE(pen_fade_slope(2U, range, half, both, 1U) == (pen_real_t)-0.2);
+    TEST_ASSERT_TRUE(pen_fade_slope(2U, range, half, far, 1U) == (pen_real_t)0);
+    broken[0] = nan_value;
+    expect_nonfinite(1U, (pen_real_t[1]){ pen_fade(2U, range, half, broken) });
+}

@@ -1,0 +1,340 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "penode/pen_set.h"
+#include "unity.h"
+
+#define N      5U
+#define LAYOUT 0x12345678U
+
+static pen_tuning_t tuning;
+static pen_real_t   bank0[N];
+static pen_real_t   bank1[N];
+static pen_real_t   first_value[N];
+static pen_real_t   other_value[N];
+static pen_set_t    first;
+static pen_set_t    other;
+
+static void fill(pen_set_t *set, pen_real_t value[], uint32_t id)
+{
+    for (uint32_t i = 0U; i < N; i++) {
+        value[i] = (pen_real_t)((100U * id) + i);
+    }
+    set->head.layout = LAYOUT;
+    set->head.length = N;
+    set->head.id = id;
+    set->head.checksum = pen_set_checksum(value, N);
+    set->value = value;
+}
+
+void setUp(void)
+{
+    fill(&first, first_value, 1U);
+    fill(&other, other_value, 2U);
+    for (uint32_t i = 0U; i < N; i++) {
+        bank0[i] = (pen_real_t)-1;
+        bank1[i] = (pen_real_t)-1;
+    }
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_init(&tuning, LAYOUT, N, &first, bank0, bank1));
+}
+
+void tearDown(void) {}
+
+/* What a step would run with now. */
+static pen_status_t adopt(uint32_t *id)
+{
+    const pen_real_t *value = NULL;
+    const pen_status_t status = pen_tuning_adopt(&tuning, &value);
+
+    *id = (uint32_t)value[0] / 100U;
+    for (uint32_t i = 0U; i < N; i++) {
+        TEST_ASSERT_TRUE(value[i] == (pen_real_t)((100U * *id) + i)); /* never torn */
+    }
+    TEST_ASSERT_EQUAL_UINT32(*id, pen_tuning_running(&tuning).id);
+    return status;
+}
+
+static void expect_running(uint32_t expected)
+{
+    uint32_t id = 0U;
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, adopt(&id));
+    TEST_ASSERT_EQUAL_UINT32(expected, id);
+}
+
+static void expect_adoption(uint32_t expected)
+{
+    uint32_t id = 0U;
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_ADOPTED, adopt(&id));
+    TEST_ASSERT_EQUAL_UINT32(expected, id);
+}
+
+static void stage(uint32_t id)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, id);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, 2U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 2U, &value[2], N - 2U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_commit(&tuning));
+}
+
+/* The check value of CRC-32 is that of the nine characters "123456789"; here over whole numbers, by zlib in Python:
+   zlib.crc32(numpy.array([1, 2, 3], dtype).tobytes()) */
+void test_checksum_is_crc32(void)
+{
+    const pen_real_t value[3] = { (pen_real_t)1, (pen_real_t)2, (pen_real_t)3 };
+    const uint32_t expected = (sizeof(pen_real_t) == 4U) ? 0xb20e96b1U : 0x5b25e824U;
+
+    TEST_ASSERT_EQUAL_HEX32(expected, pen_set_checksum(value, 3U));
+    TEST_ASSERT_EQUAL_HEX32(0U, pen_set_checksum(value, 0U));
+}
+
+void test_init_refuses_what_commit_would(void)
+{
+    pen_tuning_t untouched;
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_init(NULL, LAYOUT, N, &first, bank0, bank1));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_init(&untouched, LAYOUT, N, NULL, bank0, bank1));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_init(&untouched, LAYOUT, N, &first, bank0, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_init(&untouched, LAYOUT, N, &first, NULL, bank1));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, pen_tuning_init(&untouched, LAYOUT + 1U, N, &first, bank0, bank1));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, pen_tuning_init(&untouched, LAYOUT, N - 1U, &first, bank0, bank1));
+    first.head.checksum++;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CHECKSUM, pen_tuning_init(&untouched, LAYOUT, N, &first, bank0, bank1));
+    first.value = NULL;
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_init(&untouched, LAYOUT, N, &first, bank0, bank1));
+}
+
+void test_staged_set_runs_from_the_next_step_on(void)
+{
+    expect_running(1U);
+    stage(3U);
+    TEST_ASSERT_EQUAL_UINT32(1U, pen_tuning_running(&tuning).id); /* committed is not yet running */
+    expect_adoption(3U);
+    expect_running(3U);
+    stage(4U);
+    expect_adoption(4U);
+    stage(5U);
+    expect_adoption(5U);
+    expect_running(5U);
+}
+
+void test_nothing_can_be_staged_while_a_set_waits(void)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 9U);
+    stage(3U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BUSY, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BUSY, pen_tuning_select(&tuning, &other));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BUSY, pen_tuning_rollback(&tuning));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, 0U, value, 1U)); /* write after commit */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_commit(&tuning));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_abort(&tuning));
+    expect_adoption(3U);
+}
+
+void test_short_set_is_refused_and_can_be_completed(void)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 6U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_SHORT, pen_tuning_commit(&tuning));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N - 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_SHORT, pen_tuning_commit(&tuning));
+    expect_running(1U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N - 1U, &value[N - 1U], 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_commit(&tuning));
+    expect_adoption(6U);
+}
+
+void test_wrong_checksum_is_refused_and_the_chunk_can_be_sent_again(void)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 6U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    value[2] += (pen_real_t)1;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CHECKSUM, pen_tuning_commit(&tuning));
+    expect_running(1U);
+    value[2] -= (pen_real_t)1;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 2U, &value[2], 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_commit(&tuning));
+    expect_adoption(6U);
+}
+
+void test_nan_and_inf_are_refused_even_with_the_right_checksum(void)
+{
+    volatile pen_real_t zero = (pen_real_t)0;
+    pen_real_t bad[3];
+
+    bad[0] = zero / zero;
+    bad[1] = (pen_real_t)1 / zero;
+    bad[2] = (pen_real_t)-1 / zero;
+    for (size_t b = 0U; b < 3U; b++) {
+        for (uint32_t i = 0U; i < N; i++) {
+            pen_set_t set;
+            pen_real_t value[N];
+            fill(&set, value, 6U);
+            value[i] = bad[b];
+            set.head.checksum = pen_set_checksum(value, N);
+            TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+            TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N));
+            TEST_ASSERT_EQUAL_HEX32(PEN_SET_NONFINITE, pen_tuning_commit(&tuning));
+            TEST_ASSERT_EQUAL_HEX32(PEN_SET_NONFINITE, pen_tuning_select(&tuning, &set));
+            expect_running(1U);
+        }
+    }
+}
+
+void test_other_layout_or_length_is_refused(void)
+{
+    pen_set_head_t head = first.head;
+
+    head.layout ^= 1U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, pen_tuning_begin(&tuning, &head));
+    head = first.head;
+    head.length--;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, pen_tuning_begin(&tuning, &head));
+    other.head.layout ^= 1U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, pen_tuning_select(&tuning, &other));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_begin(&tuning, NULL));
+    expect_running(1U);
+}
+
+void test_chunks_may_not_leave_the_set(void)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 6U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, 0U, value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, 1U, value, 1U)); /* a gap */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, 0U, value, N + 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, 1U, value, UINT32_MAX)); /* offset + n wraps */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, UINT32_MAX, value, 2U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_write(&tuning, 0U, NULL, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, value, 0U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_commit(&tuning));
+}
+
+/* A flipped bit in `fill` must not open the way out of the bank. */
+void test_damaged_fill_does_not_open_the_bank(void)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 6U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    tuning.fill = 0x80000000U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, 0x7fffffffU, value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_SHORT, pen_tuning_commit(&tuning));
+}
+
+void test_abort_drops_the_open_set(void)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 6U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_abort(&tuning));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_abort(&tuning));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_commit(&tuning));
+    expect_running(1U);
+}
+
+void test_rollback_returns_to_the_set_before_and_forth_again(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_NO_PREVIOUS, pen_tuning_rollback(&tuning));
+    stage(3U);
+    expect_adoption(3U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_rollback(&tuning));
+    expect_adoption(1U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_rollback(&tuning));
+    expect_adoption(3U);
+    stage(4U);
+    expect_adoption(4U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_rollback(&tuning)); /* two banks: 3 is still whole */
+    expect_adoption(3U);
+}
+
+void test_rollback_is_kept_while_a_bank_is_free_and_given_up_when_not(void)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 6U);
+    stage(3U);
+    expect_adoption(3U); /* 3 runs in a bank, 1 lies in flash: begin takes the free bank */
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_abort(&tuning));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_rollback(&tuning));
+    expect_adoption(1U);
+    stage(4U);
+    expect_adoption(4U);
+    stage(5U);
+    expect_adoption(5U); /* both banks hold 4 and 5: begin must take that of 4 */
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_NO_PREVIOUS, pen_tuning_rollback(&tuning));
+    expect_running(5U);
+}
+
+void test_select_borrows_a_set_and_drops_an_open_one(void)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 6U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_select(&tuning, &other));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, 0U, value, 1U));
+    expect_adoption(2U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_select(&tuning, &first));
+    expect_adoption(1U);
+    other.head.checksum ^= 1U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CHECKSUM, pen_tuning_select(&tuning, &other));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_select(&tuning, NULL));
+    other.value = NULL;
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_select(&tuning, &other));
+    expect_running(1U);
+}
+
+void test_without_banks_only_select_works(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_init(&tuning, LAYOUT, N, &first, NULL, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_begin(&tuning, &other.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_select(&tuning, &other));
+    expect_adoption(2U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_rollback(&tuning));
+    expect_adoption(1U);
+}
+
+void test_hold_does_not_keep_a_set_from_being_adopted(void)
+{
+    uint32_t id = 0U;
+
+    pen_tuning_hold(&tuning, true);
+    TEST_ASSERT_EQUAL_HEX32(PEN_HELD, adopt(&id));
+    stage(3U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_HELD | PEN_ADOPTED, adopt(&id));
+    TEST_ASSERT_EQUAL_UINT32(3U, id);
+    pen_tuning_hold(&tuning, false);
+    expect_running(3U);
+}
