@@ -162,14 +162,15 @@ pen_real_t pen_dense1(size_t n_in, const pen_real_t w[], const pen_real_t x[])
     return a;
 }
 
+/* Twice the sum, halved at the end: exact, and a multiplication less for each input. */
 pen_real_t pen_dense1_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[])
 {
-    pen_real_t a = w[0];
+    pen_real_t twice = w[0] + w[0];
 
     for (size_t i = 0U; i < n_in; i++) {
-        a += w[i + 1U] * rectified(x[i]);
+        twice += w[i + 1U] * (x[i] + pen_port_abs(x[i]));
     }
-    return a;
+    return HALF * twice;
 }
 
 /* Activations. Adding 0 * h keeps the value and turns Inf into NaN. */

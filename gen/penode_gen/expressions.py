@@ -3,8 +3,16 @@
 from __future__ import annotations
 
 import ast
+import re
+import warnings
+from collections.abc import Collection
 
 import sympy as sp
+
+_LARGEST = 3.4e38  # what a float holds, and the least it holds with all its digits
+_LEAST = 1.2e-38
+_LONGEST = 2000  # characters of an expression
+_HIGHEST = 8  # power
 
 
 class ExpressionError(ValueError):
@@ -15,18 +23,29 @@ class Softplus(sp.Function):
     """log(1 + e^x), kept whole so that the C calls pen_softplus."""
 
     nargs = 1
+    is_extended_real = True
+    is_positive = True
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         return Sigmoid(self.args[0])
+
+    def _eval_evalf(self, prec: int) -> sp.Expr:
+        x = self.args[0]._eval_evalf(prec)
+        return sp.Max(x, 0) + sp.log(1 + sp.exp(-sp.Abs(x)))._eval_evalf(prec)
 
 
 class Sigmoid(sp.Function):
     """1 / (1 + e^-x), kept whole so that the C calls pen_sigmoid."""
 
     nargs = 1
+    is_extended_real = True
+    is_positive = True
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         return self * (1 - self)
+
+    def _eval_evalf(self, prec: int) -> sp.Expr:
+        return (1 / (1 + sp.exp(-self.args[0])))._eval_evalf(prec)
 
 
 def symbol(name: str) -> sp.Symbol:
@@ -54,21 +73,40 @@ FUNCTIONS = {
     "min": (2, sp.Min),
     "max": (2, sp.Max),
 }
-_OPERATORS = {ast.Add: sp.Add, ast.Mult: sp.Mul, ast.Pow: sp.Pow}
 _RELATIONS = {ast.Lt: sp.StrictLessThan, ast.LtE: sp.LessThan, ast.Gt: sp.StrictGreaterThan, ast.GtE: sp.GreaterThan}
 
 
-def parse(text: str, names: set[str], networks: dict[str, int]) -> sp.Expr:
+def sides(text: str) -> list[str]:
+    """The parts of `text` around each equals sign; <=, >= and == are none."""
+    return re.split(r"(?<![<>=!])=(?!=)", text)
+
+
+def in_range(value: float) -> bool:
+    """Is it zero or a number that a float holds with all its digits? False for NaN."""
+    return value == 0.0 or _LEAST <= abs(value) <= _LARGEST
+
+
+def parse(text: str, names: Collection[str], networks: dict[str, int], moving: Collection[str] = ()) -> sp.Expr:
     """
-    Parse `text`. Known: numbers, `names`, + - * / ^, der(name), where(a < b, x, y), FUNCTIONS, and `networks`
-    with their number of inputs. Raises ExpressionError.
+    Parse `text`. Known: numbers, `names`, + - * / ^, der(name) of `moving` names, where(a < b, x, y), FUNCTIONS, and
+    `networks` with their number of inputs. Raises ExpressionError.
     """
-    try:
-        tree = ast.parse(text.replace("^", "**").strip(), mode="eval")
-    except SyntaxError as error:
-        raise ExpressionError(f"'{text}' cannot be read as an expression ({error.msg})") from error
+    shown = text if len(text) <= 60 else f"{text[:57]}..."
+
+    def refuse(what: str) -> ExpressionError:
+        return ExpressionError(f"'{shown}' {what}")
 
     def walk(node: ast.AST) -> sp.Expr:
+        found = build(node)
+        if found.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
+            raise refuse(f"divides by zero in '{ast.unparse(node)}'")
+        if found.is_number and not found.is_Rational:
+            found = sp.Float(found.evalf(17), 17)
+        if found.is_Number and not (in_range(found) and (not found.is_Rational or found.q < 10**40)):
+            raise refuse("holds a number that a float cannot hold")
+        return found
+
+    def build(node: ast.AST) -> sp.Expr:
         match node:
             case ast.Constant(value=bool()):
                 pass
@@ -76,36 +114,64 @@ def parse(text: str, names: set[str], networks: dict[str, int]) -> sp.Expr:
                 return sp.Integer(value) if isinstance(value, int) else sp.Float(value, 17)
             case ast.Name(id=name):
                 if name not in names:
-                    raise ExpressionError(f"'{text}' uses '{name}', which the model does not define")
+                    raise refuse(f"uses '{name}', which the model does not define")
                 return symbol(name)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return -walk(operand)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
                 return walk(operand)
+            case ast.BinOp(left=left, op=ast.Add(), right=right):
+                return walk(left) + walk(right)
             case ast.BinOp(left=left, op=ast.Sub(), right=right):
                 return walk(left) - walk(right)
+            case ast.BinOp(left=left, op=ast.Mult(), right=right):
+                return walk(left) * walk(right)
             case ast.BinOp(left=left, op=ast.Div(), right=right):
                 return walk(left) / walk(right)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-                return _OPERATORS[type(op)](walk(left), walk(right))
-            case ast.Call(func=ast.Name(id="der"), args=[ast.Name(id=name)], keywords=[]):
+            case ast.BinOp(left=left, op=ast.Pow(), right=right):
+                base, exponent = walk(left), walk(right)
+                if not (exponent.is_Integer and abs(exponent) <= _HIGHEST):
+                    raise refuse(f"has the power '{ast.unparse(right)}'; whole powers up to {_HIGHEST} are known, and exp")
+                return base**exponent
+            case ast.Call(func=ast.Name(id="der"), args=arguments):
+                if len(arguments) != 1 or not isinstance(arguments[0], ast.Name):
+                    raise refuse("has a 'der' that is not der(name)")
+                name = arguments[0].id
                 if name not in names:
-                    raise ExpressionError(f"'{text}' uses der({name}), but the model does not define '{name}'")
+                    raise refuse(f"uses der({name}), but the model does not define '{name}'")
+                if name not in moving:
+                    raise refuse(f"uses der({name}), but '{name}' is no state or input")
                 return derivative(name)
-            case ast.Call(func=ast.Name(id="where"), args=[ast.Compare(left, [relation], [right]), yes, no], keywords=[]):
-                if type(relation) in _RELATIONS:
-                    condition = _RELATIONS[type(relation)](walk(left), walk(right))
-                    return sp.Piecewise((walk(yes), condition), (walk(no), True))
+            case ast.Call(func=ast.Name(id="where"), args=arguments):
+                match arguments:
+                    case [ast.Compare(left, [relation], [right]), yes, no] if type(relation) in _RELATIONS:
+                        condition = _RELATIONS[type(relation)](walk(left), walk(right))
+                        return sp.Piecewise((walk(yes), condition), (walk(no), True))
+                raise refuse("has a 'where' that is not where(a < b, x, y)")
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                 count, function = FUNCTIONS.get(name, (None, None))
                 if name in networks:
                     count, function = networks[name], network(name)
                 if function is None:
                     known = ", ".join(sorted([*FUNCTIONS, *networks, "der", "where"]))
-                    raise ExpressionError(f"'{text}' calls '{name}'; known are {known}")
+                    raise refuse(f"calls '{name}'; known are {known}")
                 if len(arguments) != count:
-                    raise ExpressionError(f"'{text}': {name} takes {count} argument(s), not {len(arguments)}")
+                    raise refuse(f"has {name} with {len(arguments)} argument(s); it takes {count}")
                 return function(*map(walk, arguments))
-        raise ExpressionError(f"'{text}' contains '{ast.unparse(node)}', which is no part of an expression")
+        raise refuse(f"contains '{ast.unparse(node)}', which is no part of an expression")
 
-    return walk(tree.body)
+    if len(text) > _LONGEST:
+        raise refuse(f"has {len(text)} characters, which is more than {_LONGEST}; split it with variables")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's remarks on its own syntax
+            tree = ast.parse(text.replace("^", "**").strip(), mode="eval")
+        return walk(tree.body)
+    except SyntaxError as error:
+        raise refuse(f"cannot be read as an expression ({error.msg})") from error
+    except (RecursionError, MemoryError) as error:
+        raise refuse("is nested too deeply; split it with variables") from error
+    except (ValueError, TypeError, OverflowError) as error:
+        if isinstance(error, ExpressionError):
+            raise
+        raise refuse(f"is no expression of real numbers ({error})") from error

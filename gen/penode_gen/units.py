@@ -13,6 +13,11 @@ _registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=False)
 Dimension = pint.util.UnitsContainer
 NONE: Dimension = _registry.dimensionless.dimensionality
 
+# names with powers, joined by * and /, in parentheses where need be; nothing that a unit registry would have to compute
+_POWER = r"(?:\s*(?:\^|\*\*)\s*-?\d(?:\.\d{1,2})?|[\u00b2\u00b3])?"
+_NAMED = rf"(?:[^\W\d][^\W\d]*|[%°]){_POWER}"
+_GROUP = rf"(?:{_NAMED}|\(\s*{_NAMED}(?:\s*[*/·]\s*{_NAMED})*\s*\){_POWER})"
+_UNIT = re.compile(rf"\s*(?:1|1\s*/\s*{_GROUP}|{_GROUP})?(?:\s*[*/·]\s*{_GROUP})*\s*")
 _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
 
@@ -23,8 +28,10 @@ class UnitError(ValueError):
 @cache
 def _unit(text: str) -> pint.Unit:
     plain = text.replace("·", "*").replace("²", "^2").replace("³", "^3").strip() or "dimensionless"
+    if len(text) > 60 or not _UNIT.fullmatch(text):
+        raise UnitError(f"unknown unit '{text}'")
     try:
-        unit = _registry.parse_units("dimensionless" if plain == "1" else plain.replace("1/", "dimensionless/"))
+        unit = _registry.parse_units(re.sub(r"^1", "dimensionless", plain))
     except Exception as error:  # pint raises a dozen kinds
         raise UnitError(f"unknown unit '{text}'") from error
     if not _registry.Quantity(1, unit)._is_multiplicative:
@@ -35,6 +42,11 @@ def _unit(text: str) -> pint.Unit:
 def factor(text: str) -> float:
     """How many SI units one `text` is."""
     return float(_registry.Quantity(1.0, _unit(text)).to_base_units().magnitude)
+
+
+def si(text: str) -> str:
+    """The SI unit of what `text` measures: `text` itself if it is one, 'm' for 'mm'."""
+    return text if factor(text) == 1.0 else describe(dimension(text)).replace("no unit", "1")
 
 
 def dimension(text: str) -> Dimension:
@@ -59,7 +71,8 @@ def describe(dim: Dimension) -> str:
     """A dimension in base units, for messages."""
     if not dim:
         return "no unit"
-    names = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[temperature]": "K", "[current]": "A"}
+    names = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[temperature]": "K", "[current]": "A", "[substance]": "mol"}
+    names |= {"[luminosity]": "cd"}
     parts = [names.get(k, k) + ("" if v == 1 else f"^{v:g}") for k, v in sorted(dim.items()) if v]
     return "*".join(parts)
 

@@ -345,30 +345,35 @@ static void copy(size_t n, const pen_real_t from[], pen_real_t to[])
 static pen_status_t begin(nqvm_euler_t *self, sample_t *sample)
 {
     pen_status_t status = pen_tuning_adopt(&self->tuning, &sample->p);
-    const bool whole = pen_finite(N_X, self->x);
+    const pen_real_t *const state[2] = { self->kept, self->x };
+    const size_t whole = pen_finite(N_X, self->x) ? 1U : 0U;
+    const pen_real_t *const input[2] = { sample->u, self->u };
 
-    sample->u0 = (self->running == 1U) ? self->u : sample->u;
+    sample->u0 = input[self->running & 1U];
     status |= pen_finite(NQVM_EULER_N_U, sample->u) ? PEN_OK : PEN_INPUT_NONFINITE;
-    status |= whole ? PEN_OK : PEN_STATE_NONFINITE;
-    sample->x0 = whole ? self->x : self->kept;
+    status |= (whole == 1U) ? PEN_OK : PEN_STATE_NONFINITE;
+    sample->x0 = state[whole];
     copy(N_X, sample->x0, sample->x);
     return status;
 }
 
-/* keep the new state and outputs if they are good, else what was there; the same work either way */
+/* keep the new state and outputs if they are good, else what was there: picked from a pair, so the same work either way */
 static pen_status_t finish(nqvm_euler_t *self, const sample_t *sample, const pen_real_t x[], pen_status_t status)
 {
-    const bool known = !pen_advanced(status); /* why it does not advance has been said already */
-    const bool finite_y = pen_finite(NQVM_EULER_N_Y, sample->y);
-    const bool finite_x = pen_finite(N_X, x);
-    const pen_status_t result = status | ((known || (finite_x && finite_y)) ? PEN_OK : PEN_STEP_NONFINITE);
-    const bool good = pen_advanced(result);
+    const pen_real_t *const state[2] = { sample->x0, x };
+    const pen_real_t *const drive_now[2] = { self->u, sample->u };
+    const pen_real_t *const output[2] = { self->y, sample->y };
+    const pen_status_t finite_x = pen_finite(N_X, x) ? PEN_OK : PEN_STEP_NONFINITE;
+    const pen_status_t finite_y = pen_finite(NQVM_EULER_N_Y, sample->y) ? PEN_OK : PEN_STEP_NONFINITE;
+    const pen_status_t result = status | finite_x | finite_y;
+    const size_t good = pen_advanced(result) ? 1U : 0U;
+    const size_t received = ((result & PEN_INPUT_NONFINITE) == PEN_OK) ? 1U : 0U;
 
-    copy(N_X, good ? x : sample->x0, self->x);
+    copy(N_X, state[good], self->x);
     copy(N_X, self->x, self->kept);
-    copy(N_DRIVE, ((result & PEN_INPUT_NONFINITE) == PEN_OK) ? sample->u : self->u, self->u);
-    copy(NQVM_EULER_N_Y, good ? sample->y : self->y, self->y);
-    self->running |= good ? 1U : 0U;
+    copy(N_DRIVE, drive_now[received], self->u);
+    copy(NQVM_EULER_N_Y, output[good], self->y);
+    self->running |= (uint32_t)good;
     pen_status_note_step(&self->log, result);
     return result;
 }
@@ -407,7 +412,8 @@ pen_status_t nqvm_euler_step(nqvm_euler_t *self, const nqvm_euler_u_t *u, nqvm_e
         sample_t sample;
         sample.u[0] = u->z_road;
         status = begin(self, &sample);
-        const pen_real_t *const x = (self->running == 1U) ? sample.x : sample.x0; /* the first sample does not integrate */
+        const pen_real_t *const state[2] = { sample.x0, sample.x };
+        const pen_real_t *const x = state[self->running & 1U]; /* the first sample does not integrate */
         status |= integrate(sample.p, sample.u0, sample.x);
         outputs(x, sample.y);
         status = finish(self, &sample, x, status);
@@ -425,7 +431,7 @@ pen_status_t nqvm_euler_step_jacobian(nqvm_euler_t *self, const nqvm_euler_u_t *
         sample_t sample;
         sample.u[0] = u->z_road;
         status = begin(self, &sample);
-        const bool first = (self->running != 1U);
+        const bool first = ((self->running & 1U) == 0U);
         const pen_real_t *const x = first ? sample.x0 : sample.x;
         pen_real_t d[N_X][N_COLUMNS];
         pen_real_t yx[NQVM_EULER_N_Y][N_X];
