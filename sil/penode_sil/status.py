@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The flags of inc/penode/pen_status.h by name."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+FLAGS = (
+    "input_nonfinite", "state_nonfinite", "step_nonfinite", "singular", "outside", "held", "adopted", "badarg",
+    "set_busy", "set_closed", "set_range", "set_short", "set_checksum", "set_nonfinite", "set_layout", "set_no_previous",
+)  # fmt: skip
+BIT = {name: 1 << n for n, name in enumerate(FLAGS)}
+HOLDING = sum(
+    BIT[name] for name in ("input_nonfinite", "state_nonfinite", "step_nonfinite", "singular", "held", "badarg")
+)
+
+
+def names(status: int) -> list[str]:
+    """The flags that are set."""
+    return [name for name in FLAGS if status & BIT[name]]
+
+
+def counts(statuses: ArrayLike) -> dict[str, int]:
+    """How many samples raised each flag; flags that none raised are left out."""
+    array = np.asarray(statuses, dtype=np.uint32)
+    return {name: n for name in FLAGS if (n := int(np.count_nonzero(array & BIT[name])))}

@@ -1,0 +1,543 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The generated C as it is deployed: compiled into a shared library (SiL), or for an emulated Cortex-M (PiL).
+
+Both take the same inputs and the same calls (see schedule) and give the same bits.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import penode_gen
+
+from .errors import UserError
+from .schedule import Call
+
+ROOT = Path(__file__).resolve().parents[2]
+FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
+Progress = Callable[[int], None]  # told the samples done
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Instructions of the steps of one kind ("normal", "adopting", "holding"): how many steps, fewest and most."""
+
+    steps: int
+    least: int
+    most: int
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What a target did: per sample x, y, z [n, .] and status [n]; per call its status; on PiL what it cost."""
+
+    x: NDArray[Any]
+    y: NDArray[Any]
+    z: NDArray[Any]
+    status: NDArray[np.uint32]
+    calls: list[tuple[Call, int]]
+    cost: dict[str, Cost] = field(default_factory=dict)
+    stack: int = 0  # [bytes] most that a step took
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 over the bytes of states and outputs of all samples."""
+        return hashlib.sha256(self.x.tobytes() + self.y.tobytes()).hexdigest()
+
+
+# -- building ---------------------------------------------------------------------------------------------------------
+
+
+def build_directory() -> Path:
+    """Where compiled things are kept: PENODE_BUILD, else build/sil of the checkout, else the user's cache."""
+    if "PENODE_BUILD" in os.environ:
+        return Path(os.environ["PENODE_BUILD"])
+    if os.access(ROOT, os.W_OK):
+        return ROOT / "build" / "sil"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "penode"
+
+
+def _digest(parts: Iterable[str | bytes | Path]) -> str:
+    """A short name for texts, bytes and the contents of files."""
+    sha = hashlib.sha256()
+    for part in parts:
+        data = part.read_bytes() if isinstance(part, Path) else part.encode() if isinstance(part, str) else part
+        sha.update(len(data).to_bytes(8, "little") + data)
+    return sha.hexdigest()[:16]
+
+
+def _files(*places: tuple[str, str]) -> list[Path]:
+    """Files of the checkout by folder and pattern, sorted."""
+    return sorted(path for folder, pattern in places for path in (ROOT / folder).rglob(pattern))
+
+
+def generated(model: Any) -> Path:
+    """The folder with the model's C, generated unless an earlier call did; keyed by model and generator."""
+    sources = [path for path in _files(("gen/penode_gen", "*")) if path.is_file() and path.suffix != ".pyc"]
+    folder = build_directory() / f"{model.name}-{_digest([model.digest, *sources])}"
+    if not (folder / f"{model.name}_params.c").exists():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
+            penode_gen.generate(model, Path(scratch) / "c")
+            _move(Path(scratch) / "c", folder)
+    return folder
+
+
+def _move(source: Path, target: Path) -> None:
+    """Rename, unless another process was faster."""
+    try:
+        os.replace(source, target)
+    except OSError:
+        if not target.exists():
+            raise
+
+
+def model_options(model: Any) -> list[str]:
+    """Compiler options that tell sil/firmware/sample.h which model it is about."""
+    return [
+        f'-DMODEL_HEADER="{model.name}.h"',
+        f"-DMODEL(name)={model.name}_##name",
+        f"-DMODEL_SIZE(name)={model.name.upper()}_##name",
+        *(["-DMODEL_STATES"] if model.states else []),
+        *(["-DMODEL_SENSORS"] if model.sensors else []),
+    ]
+
+
+def compile_program(command: Sequence[str], output: Path) -> None:
+    """Run a compiler that writes `output`, all or nothing. UserError if it is missing or refuses."""
+    with tempfile.TemporaryDirectory(dir=output.parent) as scratch:
+        part = Path(scratch) / output.name
+        try:
+            result = subprocess.run(
+                [*command, "-o", str(part)], capture_output=True, text=True, stdin=subprocess.DEVNULL
+            )
+        except FileNotFoundError as exc:
+            raise UserError(f"{command[0]}: this compiler is not installed; install it (make test does)") from exc
+        if result.returncode != 0:
+            lines = (
+                [line for line in result.stderr.splitlines() if "error" in line] or result.stderr.splitlines() or ["?"]
+            )
+            raise UserError(f"{output.name}: {command[0]} refused it: {lines[0]}; report this with the model file")
+        _move(part, output)
+
+
+def build_library(
+    model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None
+) -> Path:
+    """The shared library of a model; `source` is a folder with its C if it is not to be generated."""
+    source = source or generated(model)
+    runtime, code = _files(("src", "*.c")), [source / f"{model.name}.c", source / f"{model.name}_params.c"]
+    shim = ROOT / "sil" / "firmware" / "sil.c"
+    command = [
+        *compiler,
+        *FLAGS,
+        "-shared",
+        "-fPIC",
+        *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []),
+        *model_options(model),
+        f"-I{ROOT}/inc",
+        f"-I{ROOT}/port/gnu",
+        f"-I{source}",
+        *map(str, [shim, *code, *runtime]),
+    ]
+    headers = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))
+    version = (
+        subprocess.run([compiler[0], "--version"], capture_output=True).stdout if shutil.which(compiler[0]) else b""
+    )
+    key = _digest([*command, version, shim, *code, source / f"{model.name}.h", *runtime, *headers])
+    library = build_directory() / f"{model.name}-{key}.so"
+    if not library.exists():
+        library.parent.mkdir(parents=True, exist_ok=True)
+        compile_program(command, library)
+    return library
+
+
+# -- SiL --------------------------------------------------------------------------------------------------------------
+
+
+class Head(ctypes.Structure):
+    """pen_set_head_t"""
+
+    _fields_ = [(name, ctypes.c_uint32) for name in ("layout", "length", "id", "checksum")]
+
+
+class Report(ctypes.Structure):
+    """pen_status_report_t"""
+
+    _fields_ = [("flags", ctypes.c_uint32), ("times", ctypes.c_uint32 * 16)]
+
+
+class Set(ctypes.Structure):
+    """pen_set_t"""
+
+    _fields_ = [("head", Head), ("value", ctypes.c_void_p)]
+
+
+class Sil:
+    """A model's shared library; instance() gives as many independent copies as wanted."""
+
+    def __init__(
+        self, model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None
+    ):
+        self.model, self.dtype = model, dtype
+        self._library = ctypes.CDLL(str(build_library(model, dtype, compiler, source)))
+        sizes = list((ctypes.c_uint32 * 7).in_dll(self._library, "sil_sizes"))
+        self.instance_size, self.banks_size = sizes[0], sizes[1]
+        if sizes[2] != np.dtype(dtype).itemsize:
+            raise AssertionError("the library was built for another real type")
+        self.n_x, self.n_u, self.n_y, self.n_z = (size // sizes[2] for size in sizes[3:7])
+        self.set_length = self.banks_size // (2 * sizes[2])
+
+    def function(self, name: str, result: Any = ctypes.c_uint32) -> Any:
+        """A function of the generated interface, without the model's prefix."""
+        function = getattr(self._library, name if name.startswith("sil_") else f"{self.model.name}_{name}")
+        function.restype = result
+        return function
+
+    def flash_set(self, name: str) -> Set:
+        """The committed set of that name, as it lies in the library."""
+        return Set.in_dll(self._library, f"{self.model.name}_set_{name}")
+
+    def instance(self, set_name: str = "default", banks: bool = True) -> SilInstance:
+        """A fresh, initialised instance."""
+        return SilInstance(self, set_name, banks)
+
+    def run(
+        self,
+        u: NDArray[Any],
+        calls: Sequence[Call] = (),
+        set_name: str = "default",
+        progress: Progress = lambda n: None,
+    ) -> Run:
+        """Initialise an instance with a set and step through u [n, n_u]."""
+        return self.instance(set_name).run(u, calls, progress)
+
+
+class SilInstance:
+    """One instance in memory of its own. Calls are those of the generated header; statuses are returned as they come.
+
+    `memory` and `banks` are the instance's bytes and its two staging areas, for tests that poke.
+    """
+
+    def __init__(self, sil: Sil, set_name: str, banks: bool):
+        self.sil, self.dtype = sil, sil.dtype
+        self.memory = np.zeros(sil.instance_size + 8, dtype=np.uint8)
+        shift = -self.memory.ctypes.data % 8
+        self.memory = self.memory[shift : shift + sil.instance_size]
+        self.banks = np.zeros((2, sil.set_length), dtype=self.dtype)
+        self._kept: list[Any] = []  # what the instance borrows
+        self._y = np.zeros(sil.n_y, dtype=self.dtype)
+        status = sil.function("init")(
+            self._self, ctypes.byref(sil.flash_set(set_name)), self._pointer(self.banks) if banks else None
+        )
+        if status:
+            raise AssertionError(f"init refused its own set: {status:#x}")
+
+    @property
+    def _self(self) -> ctypes.c_void_p:
+        return self._pointer(self.memory)
+
+    @staticmethod
+    def _pointer(array: NDArray[Any]) -> ctypes.c_void_p:
+        return ctypes.c_void_p(array.ctypes.data)
+
+    def _vector(self, values: Any) -> NDArray[Any]:
+        return np.ascontiguousarray(values, dtype=self.dtype)
+
+    def step(self, u: Any) -> tuple[NDArray[Any], NDArray[Any], int]:
+        """One step with u [n_u]: state, outputs (those before if it holds) and status."""
+        status = self.sil.function("step")(self._self, self._pointer(self._vector(u)), self._pointer(self._y))
+        return self.get_state(), self._y.copy(), status
+
+    def step_jacobian(self, u: Any, entries: int) -> tuple[NDArray[Any], NDArray[Any], int]:
+        """One step and its derivatives: outputs, the `entries` reals of the jacobian struct, status."""
+        jacobian = np.zeros(entries, dtype=self.dtype)
+        status = self.sil.function("step_jacobian")(
+            self._self, self._pointer(self._vector(u)), self._pointer(self._y), self._pointer(jacobian)
+        )
+        return self._y.copy(), jacobian, status
+
+    def get_state(self) -> NDArray[Any]:
+        x = np.zeros(self.sil.n_x, dtype=self.dtype)
+        if x.size:
+            self.sil.function("get_state")(self._self, self._pointer(x))
+        return x
+
+    def set_state(self, x: Any) -> int:
+        return self.sil.function("set_state")(self._self, self._pointer(self._vector(x)))
+
+    def sensors(self) -> NDArray[Any]:
+        z = np.zeros(self.sil.n_z, dtype=self.dtype)
+        self.sil.function("sensors")(self._self, self._pointer(z))
+        return z
+
+    def status(self) -> Report:
+        """Read and clear the sticky flags and their counts."""
+        report = Report()
+        self.sil.function("status")(self._self, ctypes.byref(report))
+        return report
+
+    def begin(self, head: Sequence[int]) -> int:
+        return self.sil.function("tune_begin")(self._self, ctypes.byref(Head(*head)))
+
+    def write(self, offset: int, values: Any) -> int:
+        values = self._vector(values)
+        return self.sil.function("tune_write")(
+            self._self, ctypes.c_uint32(offset), self._pointer(values), ctypes.c_uint32(values.size)
+        )
+
+    def commit(self) -> int:
+        return self.sil.function("tune_commit")(self._self)
+
+    def abort(self) -> int:
+        return self.sil.function("tune_abort")(self._self)
+
+    def rollback(self) -> int:
+        return self.sil.function("tune_rollback")(self._self)
+
+    def select(self, what: str | Set) -> int:
+        """Select a committed set by name, or one that the caller made (it is kept alive)."""
+        chosen = self.sil.flash_set(what) if isinstance(what, str) else what
+        self._kept.append(chosen)
+        return self.sil.function("tune_select")(self._self, ctypes.byref(chosen))
+
+    def hold(self, on: bool) -> int:
+        return self.sil.function("tune_hold")(self._self, ctypes.c_bool(on))
+
+    def running(self) -> Head:
+        return self.sil.function("tune_running", Head)(self._self)
+
+    def call(self, call: Call) -> int:
+        """Make one scheduled call."""
+        if call.kind == "begin":
+            return self.begin(call.head)
+        if call.kind == "write":
+            return self.write(call.offset, call.values)
+        if call.kind == "select":
+            return self.select(call.set)
+        if call.kind == "hold":
+            return self.hold(call.on)
+        if call.kind == "state":
+            return self.set_state(call.values)
+        return {"commit": self.commit, "abort": self.abort, "rollback": self.rollback}[call.kind]()
+
+    def run(self, u: NDArray[Any], calls: Sequence[Call] = (), progress: Progress = lambda n: None) -> Run:
+        """Step through u [n, n_u], making each call before its sample."""
+        u = np.ascontiguousarray(np.asarray(u).reshape(-1, self.sil.n_u), dtype=self.dtype)
+        total = len(u)
+        samples = np.zeros((total, self.sil.n_x + self.sil.n_y + self.sil.n_z), dtype=self.dtype)
+        status, made, done = np.zeros(total, dtype=np.uint32), [], 0
+        loop = self.sil.function("sil_run", None)
+
+        def advance(until: int) -> None:
+            nonlocal done
+            while done < until:
+                n = min(until - done, 10_000)
+                loop(
+                    self._self,
+                    ctypes.c_uint32(n),
+                    self._pointer(u[done:]),
+                    self._pointer(samples[done:]),
+                    self._pointer(self._y),
+                    self._pointer(status[done:]),
+                )
+                done += n
+                progress(done)
+
+        for call in calls:
+            advance(min(call.sample, total))
+            made.append((call, self.call(call)))
+        advance(total)
+        x, y, z = np.split(samples, np.cumsum([self.sil.n_x, self.sil.n_y]), axis=1)
+        return Run(np.ascontiguousarray(x), np.ascontiguousarray(y), np.ascontiguousarray(z), status, made)
+
+
+# -- PiL --------------------------------------------------------------------------------------------------------------
+
+MACHINES = {
+    "m4f": "mps2-an386",
+    "m3": "mps2-an385",
+    "m7": "mps2-an500",
+    "m33": "mps2-an505",
+    "m55": "mps3-an547",
+    "host": "",
+}
+TAPE_MAGIC = 0x314C4950
+OPERATION = {
+    "end": 0,
+    "step": 1,
+    "begin": 2,
+    "write": 3,
+    "commit": 4,
+    "abort": 5,
+    "select": 6,
+    "rollback": 7,
+    "hold": 8,
+    "state": 9,
+}
+COST_KINDS = ("normal", "adopting", "holding")
+PORT = ROOT / "port" / "cortex-m"
+TROUBLE = {1: "it could not open, read or write its files", 2: "it was given a tape for another model",
+           3: "it refused the first parameter set", 70: "it met a processor fault", 124: "it took too long"}  # fmt: skip
+
+
+def build_firmware(model: Any, machine: str, source: Path | None = None, optimise: str = "-O2") -> Path:
+    """The PiL program of a model for one of MACHINES."""
+    source = source or generated(model)
+    code, runtime = [source / f"{model.name}.c", source / f"{model.name}_params.c"], _files(("src", "*.c"))
+    program, board = ROOT / "sil" / "firmware" / "pil.c", MACHINES[machine]
+    port = ROOT / "port" / "host" / "board.c"
+    sets = ",".join(f"&{model.name}_set_{name}" for name in model.sets)
+    command = [
+        *(
+            [str(PORT / "cc"), board]
+            if board
+            else ["gcc", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/sil/firmware"]
+        ),
+        *FLAGS,
+        optimise,
+        *model_options(model),
+        f"-DMODEL_SETS={sets}",
+        f"-I{source}",
+        *map(str, [program, *code, *runtime, *([] if board else [port])]),
+    ]
+    compiler = "arm-none-eabi-gcc" if board else "gcc"
+    if shutil.which(compiler) is None:
+        raise UserError(f"{compiler}: this compiler is not installed; install it (make test does)")
+    parts = _files(("inc", "*.h"), ("port", "*"), ("sil/firmware", "*.h"))
+    key = _digest([*command, program, *code, source / f"{model.name}.h", *runtime, *(p for p in parts if p.is_file())])
+    elf = build_directory() / f"{model.name}-{machine}-{key}.elf"
+    if not elf.exists():
+        elf.parent.mkdir(parents=True, exist_ok=True)
+        compile_program(command, elf)
+    return elf
+
+
+class Pil:
+    """A model's C in float on an emulated Cortex-M, or in a process of its own ("host")."""
+
+    dtype = np.float32
+
+    def __init__(
+        self, model: Any, machine: str = "m4f", source: Path | None = None, optimise: str = "-O2", limit: int = 900
+    ):
+        self.model, self.machine, self.limit = model, machine, limit
+        self.program = build_firmware(model, machine, source, optimise)
+
+    def run(
+        self,
+        u: NDArray[Any],
+        calls: Sequence[Call] = (),
+        set_name: str = "default",
+        progress: Progress = lambda n: None,
+    ) -> Run:
+        """Initialise an instance with a set and step through u [n, n_u], making each call before its sample."""
+        u = np.ascontiguousarray(np.asarray(u).reshape(-1, len(self.model.inputs)), dtype=self.dtype)
+        with tempfile.TemporaryDirectory() as folder:
+            Path(folder, "tape").write_bytes(self._tape(u, calls, set_name))
+            board = MACHINES[self.machine]
+            command = [str(PORT / "run"), board, str(self.program)] if board else [str(self.program)]
+            environment = os.environ | {"LIMIT": str(self.limit)}
+            try:
+                process = subprocess.Popen(
+                    [*command, "tape", "record"],
+                    cwd=folder,
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.STDOUT,
+                    text=True,
+                )
+            except FileNotFoundError as exc:
+                raise UserError(f"{command[0]}: it cannot be run: {exc.strerror}; restore the checkout") from exc
+            record = Path(folder, "record")
+            while process.poll() is None:
+                try:
+                    process.wait(0.2)
+                except subprocess.TimeoutExpired:
+                    progress(min(len(u), self._rows(record.stat().st_size if record.exists() else 0)))
+            text = (process.stdout.read() if process.stdout else "").strip().replace("\n", " | ")
+            if process.returncode != 0:
+                what = TROUBLE.get(process.returncode, f"it ended with {process.returncode}")
+                raise UserError(
+                    f"pil:{self.machine}: {what}{': ' + text if text else ''}; run make test to check the installation"
+                )
+            progress(len(u))
+            return self._read(np.fromfile(record, dtype="<u4"), len(u), calls)
+
+    @property
+    def _widths(self) -> tuple[int, int, int]:
+        return len(self.model.states), len(self.model.outputs), len(self.model.sensors)
+
+    def _rows(self, size: int) -> int:
+        return size // (4 * (sum(self._widths) + 1))
+
+    def _tape(self, u: NDArray[Any], calls: Sequence[Call], set_name: str) -> bytes:
+        """Inputs and calls as pil.c reads them."""
+        names, (n_x, n_y, n_z) = list(self.model.sets), self._widths
+        layout, length, *_ = penode_gen.set_head(self.model, set_name, self.dtype)
+        parts: list[Any] = [
+            [TAPE_MAGIC, 4, 4 * n_x, 4 * u.shape[1], 4 * n_y, 4 * n_z, length, layout, names.index(set_name)]
+        ]
+        done = 0
+        for call in [*calls, None]:
+            until = len(u) if call is None else min(call.sample, len(u))
+            if until > done:
+                parts += [[OPERATION["step"], until - done], u[done:until]]
+                done = until
+            if call is None:
+                break
+            parts.append([OPERATION[call.kind]])
+            if call.kind == "begin":
+                parts.append(list(call.head))
+            elif call.kind == "write":
+                parts += [[call.offset, len(call.values)], call.values]
+            elif call.kind == "select":
+                parts.append([names.index(call.set)])
+            elif call.kind == "hold":
+                parts.append([int(call.on)])
+            elif call.kind == "state":
+                parts.append(call.values)
+        parts.append([OPERATION["end"]])
+        return b"".join(np.asarray(p, dtype="<u4" if isinstance(p, list) else "<f4").tobytes() for p in parts)
+
+    def _read(self, words: NDArray[np.uint32], total: int, calls: Sequence[Call]) -> Run:
+        """The record as pil.c writes it."""
+        widths = self._widths
+        row = sum(widths) + 1
+        if words.size != total * row + len(calls) + 3 * len(COST_KINDS) + 1:
+            raise AssertionError(f"the record has {words.size} words, which is not what the tape asked for")
+        rows, made, done, at = np.empty((total, row), dtype=np.uint32), [], 0, 0
+        for call in [*calls, None]:
+            until = total if call is None else min(call.sample, total)
+            n = (until - done) * row
+            rows[done:until] = words[at : at + n].reshape(-1, row)
+            done, at = until, at + n
+            if call is not None:
+                made.append((call, int(words[at])))
+                at += 1
+        cost = {kind: Cost(*map(int, words[at + 3 * k : at + 3 * k + 3])) for k, kind in enumerate(COST_KINDS)}
+        cost = {kind: c for kind, c in cost.items() if c.steps and c.most}
+        x, y, z = np.split(rows[:, :-1].view(np.float32), np.cumsum(widths[:2]), axis=1)
+        return Run(
+            np.ascontiguousarray(x),
+            np.ascontiguousarray(y),
+            np.ascontiguousarray(z),
+            rows[:, -1].copy(),
+            made,
+            cost,
+            int(words[-1]),
+        )
