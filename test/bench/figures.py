@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What the step costs and how exact it is: measured, kept in figures.json, shown in README.md.
+
+`figures.py` measures and rewrites both; `figures.py --check` measures and fails where a figure is more than 2 % worse
+than the kept one, or where the table of README.md is not that of figures.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "gen"), str(ROOT / "sil")]
+
+import penode_gen  # noqa: E402
+from penode_sil.schedule import Call  # noqa: E402
+from penode_sil.targets import MACHINES, Pil  # noqa: E402
+
+KEPT = Path(__file__).with_name("figures.json")
+README = ROOT / "README.md"
+CORES = {"m3": "Cortex-M3 (no FPU)", "m4f": "Cortex-M4F", "m7": "Cortex-M7", "m33": "Cortex-M33", "m55": "Cortex-M55"}
+MODELS = {"nqvm": "RK4", "nqvm_euler": "explicit Euler"}
+LEVELS = ("-O2", "-Os")
+# What the project promises of the RK4 step on the Cortex-M4F; a figure above fails, whatever was kept.
+LIMITS = {"nqvm m4f -O2 instructions": 18_000, "nqvm m4f -Os text": 1536, "nqvm m4f -Os stack": 400, "nqvm m4f static RAM": 0}
+
+
+def hostile_inputs() -> np.ndarray:
+    """Road heights that a constant-time step must not notice: a chirp, noise of all sizes, subnormals, zeros, NaN, Inf."""
+    draw = np.random.default_rng(1)
+    chirp = 0.02 * np.sin(np.arange(300) ** 2 * 1e-3)
+    noise = draw.standard_normal(600) * 10.0 ** draw.uniform(-45, 3, 600)
+    special = draw.choice([0.0, -0.0, np.nan, -np.nan, np.inf, -np.inf, 1e-45, -1e-39, 3e38, -3e38], 300)
+    mixed = np.concatenate([chirp, noise, special])
+    return np.concatenate([chirp, draw.permutation(mixed)]).astype(np.float32)[:, None]
+
+
+def exchange(model: penode_gen.Model, at: int) -> list[Call]:
+    """Select another set for sample `at`, hold a few samples, go on."""
+    other = [name for name in model.sets if name != "default"][0]
+    return [Call(at, "select", set=other), Call(at + 20, "hold", on=True), Call(at + 30, "hold", on=False)]
+
+
+def step_size(model: penode_gen.Model, level: str, folder: Path) -> dict[str, int]:
+    """Bytes of the step alone, with all it calls and without weights: linked from NAME_step with unused parts dropped."""
+    cc = [str(ROOT / "port" / "cortex-m" / "cc"), MACHINES["m4f"]]
+    source = ROOT / "gen" / "nqvm" / "c"
+    objects = []
+    for path in [*(ROOT / "src").glob("*.c"), source / f"{model.name}.c"]:
+        objects.append(str(folder / f"{path.stem}.o"))
+        subprocess.run([*cc, "-std=c99", level, f"-I{source}", "-c", str(path), "-o", objects[-1]], check=True)
+    elf = str(folder / "step.elf")
+    core = ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]
+    subprocess.run(
+        ["arm-none-eabi-gcc", *core, "-nostdlib", "-Wl,--gc-sections", f"-Wl,-e,{model.name}_step", "-o", elf, *objects, "-lgcc"], check=True
+    )
+    sections = subprocess.run(["arm-none-eabi-size", "-A", elf], check=True, capture_output=True, text=True).stdout
+    sizes = {m[1]: int(m[2]) for m in re.finditer(r"^\.(\w+)\S*\s+(\d+)", sections, re.M)}
+    return {"text": sizes.get("text", 0), "rodata": sizes.get("rodata", 0), "static RAM": sizes.get("data", 0) + sizes.get("bss", 0)}
+
+
+def sizes_of(model: penode_gen.Model, folder: Path) -> dict[str, int]:
+    """Bytes of RAM that an application gives: the instance and, for staging, the banks."""
+    probe = folder / "probe.c"
+    probe.write_text(f'#include "{model.name}.h"\nchar instance[sizeof({model.name}_t)];\nchar banks[sizeof({model.name}_banks_t)];\n')
+    cc = [str(ROOT / "port" / "cortex-m" / "cc"), MACHINES["m4f"]]
+    subprocess.run([*cc, f"-I{ROOT}/gen/nqvm/c", "-c", str(probe), "-o", str(folder / "probe.o")], check=True)
+    lines = subprocess.run(["arm-none-eabi-nm", "-S", str(folder / "probe.o")], check=True, capture_output=True, text=True).stdout
+    return {line.split()[3]: int(line.split()[1], 16) for line in lines.splitlines()}
+
+
+def measure() -> dict[str, int]:
+    """All figures by name."""
+    figures: dict[str, int] = {}
+    u = hostile_inputs()
+    for name in MODELS:
+        model = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml")
+        for core in CORES:
+            for level in LEVELS if core == "m4f" else LEVELS[:1]:
+                run = Pil(model, core, ROOT / "gen" / "nqvm" / "c", level).run(u, exchange(model, 400))
+                at = f"{name} {core} {level}"
+                figures[f"{at} instructions"] = run.cost["normal"].most
+                figures[f"{at} instructions, least"] = run.cost["normal"].least
+                figures[f"{at} instructions, adopting a set"] = max(run.cost[k].most for k in run.cost)
+                figures[f"{at} stack"] = run.stack
+        with tempfile.TemporaryDirectory() as folder:
+            for level in LEVELS:
+                for kind, size in step_size(model, level, Path(folder)).items():
+                    figures[f"{name} m4f {kind}" if kind == "static RAM" else f"{name} m4f {level} {kind}"] = size
+            for kind, size in sizes_of(model, Path(folder)).items():
+                figures[f"{name} {kind} bytes"] = size
+        figures[f"{name} set bytes"] = 4 * len(penode_gen.set_values(model, "default"))
+    return figures
+
+
+def table(figures: dict[str, int]) -> str:
+    """The figures as the tables of README.md."""
+    rows = ["| instructions a step (-O2) | " + " | ".join(MODELS.values()) + " |", "|---|---|---|"]
+    for core, title in CORES.items():
+        cells = []
+        for name in MODELS:
+            most, least = (figures[f"{name} {core} -O2 instructions{k}"] for k in ("", ", least"))
+            cells.append(f"{most:,}".replace(",", " ") + ("" if most == least else f" at most ({least:,} at least: soft float)".replace(",", " ")))
+        rows.append(f"| {title} | " + " | ".join(cells) + " |")
+    rows += ["", "| bytes on a Cortex-M4F | -O2 | -Os |", "|---|---|---|"]
+    for kind, title in (("text", "code of the whole RK4 step"), ("rodata", "its constants, without weights"), ("stack", "its stack")):
+        rows.append(f"| {title} | " + " | ".join(str(figures[f"nqvm m4f {level} {kind}"]) for level in LEVELS) + " |")
+    rows += [
+        f"| an instance | {figures['nqvm instance bytes']} | {figures['nqvm instance bytes']} |",
+        f"| a parameter set (flash, or RAM of the caller; two for staging) | {figures['nqvm set bytes']} | {figures['nqvm set bytes']} |",
+        f"| other RAM | {figures['nqvm m4f static RAM']} | {figures['nqvm m4f static RAM']} |",
+    ]
+    return "\n".join(rows)
+
+
+def problems(new: dict[str, int], kept: dict[str, int]) -> list[str]:
+    """What is worse than it was, or than it may be."""
+    found = [f"{k}: {new[k]} is above the promised {limit}" for k, limit in LIMITS.items() if new[k] > limit]
+    found += [f"{k}: {new.get(k)} instead of {v}, more than 2 % worse" for k, v in kept.items() if k not in new or new[k] > 1.02 * v]
+    found += [
+        f"{k}: {v} to {new[k]} instructions: the step's cost depends on its input"
+        for k, v in ((k.removesuffix(", least"), v) for k, v in new.items() if k.endswith(", least") and " m3 " not in k)
+        if new[k] != v
+    ]
+    return found
+
+
+def main() -> int:
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--check", action="store_true", help="compare with what is kept, write nothing")
+    check = arguments.parse_args().check
+    new = measure()
+    kept = json.loads(KEPT.read_text()) if KEPT.exists() else {}
+    found = problems(new, kept if check else {})
+    block = re.compile(r"(<!-- figures -->\n).*?(\n<!-- end of figures -->)", re.S)
+    text = README.read_text() if README.exists() else ""
+    if check:
+        shown = block.search(text)
+        if not shown or shown[0] != f"<!-- figures -->\n{table(kept)}\n<!-- end of figures -->":
+            found.append("README.md: its table is not that of figures.json; run make figures")
+    else:
+        KEPT.write_text(json.dumps(new, indent=1) + "\n")
+        if text:
+            README.write_text(block.sub(lambda m: m[1] + table(new) + m[2], text))
+        print(table(new))
+    for line in found:
+        print(line, file=sys.stderr)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

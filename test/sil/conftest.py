@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What the tests of sil/ share: models, and the published case study where it exists."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+for folder in ("gen", "sil"):
+    sys.path.insert(0, str(ROOT / folder))
+sys.path.insert(0, str(HERE))
+
+import penode_gen  # noqa: E402  (needs the path above)
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder with the published numbers; tests that need it skip where it is not."""
+    folder = Path(os.environ.get("PENODE_SHARED", ROOT.parent / "shared")) / "nqvm-published"
+    if not (folder / "chirp_reference.csv").exists():
+        pytest.skip(f"the published numbers are not at {folder}; set PENODE_SHARED to their folder to run this")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def published(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., object]:
+    """published(method=, input=, substeps=) loads the case study; its set "altered" has half the damper network."""
+    folder = tmp_path_factory.mktemp("published")
+    for name in ("spring", "damper"):
+        shutil.copy(shared / f"{name}.json", folder / f"{name}.json")
+    altered = json.loads((folder / "damper.json").read_text())
+    last = altered["layers"][-1]
+    last["weights"] = [[0.5 * w for w in row] for row in last["weights"]]
+    (folder / "altered.json").write_text(json.dumps(altered))
+    text = (HERE / "models" / "published.toml").read_text()
+
+    def load(method: str = "rk4", input: str = "linear", substeps: int = 1) -> object:
+        path = folder / f"{method}_{input}_{substeps}.toml"
+        path.write_text(
+            text.replace('method = "rk4"', f'method = "{method}"')
+            .replace('input = "linear"', f'input = "{input}"')
+            .replace("substeps = 1", f"substeps = {substeps}")
+        )
+        return penode_gen.load(path)
+
+    return load
+
+
+@pytest.fixture(scope="session")
+def oscillator() -> object:
+    """Mass, spring, damper over a moving foot; sets "default" and "stiff"."""
+    return penode_gen.load(HERE / "models" / "oscillator.toml")
+
+
+@pytest.fixture(scope="session")
+def nqvm() -> object:
+    """The project's own model."""
+    return penode_gen.load(ROOT / "gen" / "nqvm" / "nqvm.toml")
+
+
+@pytest.fixture
+def show(capsys: pytest.CaptureFixture[str]) -> Callable[[str], None]:
+    """Print a measured figure although pytest captures output."""
+
+    def line(text: str) -> None:
+        with capsys.disabled():
+            print(f"\n    {text}", end="")
+
+    return line
