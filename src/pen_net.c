@@ -138,10 +138,11 @@ void pen_dense_tangent(size_t n_out, size_t n_in, const pen_real_t w[], const pe
     fours(n_out, n_in, w, t, y, false, false);
     for (size_t row = n_out - (n_out % 4U); row < n_out; row++) {
         const pen_real_t *const stream = &w[row * (n_in + 1U)];
-        y[row] = ZERO;
-        for (size_t i = 0U; i < n_in; i++) {
-            y[row] += stream[i + 1U] * t[i];
+        pen_real_t a = stream[1] * t[0];
+        for (size_t i = 1U; i < n_in; i++) {
+            a += stream[i + 1U] * t[i];
         }
+        y[row] = a;
     }
 }
 

@@ -24,6 +24,9 @@
 #if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD != 0) && (FLT_EVAL_METHOD != 16) /* 16: half floats in hardware */
 #error "penode: intermediate results wider than their type break bit-identity; on x86 use -mfpmath=sse"
 #endif
+#if defined(__ARM_FEATURE_MVE) && ((__ARM_FEATURE_MVE & 2) != 0)
+#error "penode: float vectors (MVE) flush subnormal numbers, which breaks bit-identity; compile with -mcpu=cortex-m55+nomve.fp"
+#endif
 
 #ifdef PEN_REAL_DOUBLE
 typedef double pen_real_t;

@@ -21,7 +21,7 @@ void board_print_hex(uint32_t value);     /* 0x and 8 digits  */
 
 /* ---- the program's surroundings ---- */
 
-/** Copy a word of the command line; 1 is the first after the program's name. False if there is none or it does not fit. */
+/** Copy a word of the command line; 1 is the first after the program's name. False if it is missing or does not fit. */
 bool board_argument(uint32_t index, char text[], uint32_t size);
 
 /** End the program; the code arrives in the shell. Does not return. */
@@ -43,9 +43,9 @@ void board_close(int32_t file);
 /* ---- measuring ---- */
 
 /**
- * Count the instructions between the two calls, without those of the calls themselves. Exact on an emulated machine whose
- * clock goes by instructions (see port/cortex-m/run) as long as they are fewer than 4 million, or than fit a period of the timer;
- * 0 where nothing can be counted.
+ * Count the instructions between the two calls, without those of the calls themselves. Exact on an emulated machine
+ * whose clock goes by instructions (see port/cortex-m/run) as long as they are fewer than 4 million, or than fit a
+ * period of the timer; 0 where nothing can be counted.
  */
 void     board_count_start(void);
 uint32_t board_count_stop(void);
@@ -53,7 +53,7 @@ uint32_t board_count_stop(void);
 /** Paint the free part of the stack. */
 void board_stack_paint(void);
 
-/** @return bytes of stack below the caller of board_stack_paint() that were used since; 0 where it cannot be measured */
+/** @return bytes of stack below the caller of board_stack_paint() that were used since; 0 where it is not measured */
 uint32_t board_stack_used(void);
 
 /* ---- a periodic interrupt ---- */

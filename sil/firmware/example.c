@@ -124,12 +124,16 @@ static pen_status_t break_off(void)
 /* Wait for the next step and say which set runs since when. */
 static bool report_adoption(const char *how, uint32_t expected)
 {
+    pen_set_head_t running = { 0U, 0U, 0U, 0U };
+    bool good;
+
     wait(2U);
-    print_pair("set ", nqvm_tune_running(&model).id);
+    good = (nqvm_tune_running(&model, &running) == PEN_OK);
+    print_pair("set ", running.id);
     board_print(how);
     print_pair(" at sample ", adopted_at);
     board_print("\n");
-    return (nqvm_tune_running(&model).id == expected) && (adopted_at != NEVER);
+    return good && (running.id == expected) && (adopted_at != NEVER);
 }
 
 /* What an observer does between two samples: correct the state, and ask how the next step depends on it. */

@@ -318,7 +318,9 @@ class SilInstance:
         return self.sil.function("tune_hold")(self._self, ctypes.c_bool(on))
 
     def running(self) -> Head:
-        return self.sil.function("tune_running", Head)(self._self)
+        head = Head()
+        self.sil.function("tune_running")(self._self, ctypes.byref(head))
+        return head
 
     def call(self, call: Call) -> int:
         """Make one scheduled call."""

@@ -85,7 +85,7 @@ def measure() -> dict[str, int]:
     for name in MODELS:
         model = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml")
         for core in CORES:
-            for level in LEVELS if core == "m4f" else LEVELS[:1]:
+            for level in LEVELS:
                 run = Pil(model, core, ROOT / "gen" / "nqvm" / "c", level).run(u, exchange(model, 400))
                 at = f"{name} {core} {level}"
                 figures[f"{at} instructions"] = run.cost["normal"].most
@@ -104,22 +104,35 @@ def measure() -> dict[str, int]:
 
 def table(figures: dict[str, int]) -> str:
     """The figures as the tables of README.md."""
-    rows = ["| instructions a step (-O2) | " + " | ".join(MODELS.values()) + " |", "|---|---|---|"]
+    columns = [(name, level) for name in MODELS for level in LEVELS]
+    rows = ["| instructions a step | " + " | ".join(f"{MODELS[name]} {level}" for name, level in columns) + " |", "|---" * 5 + "|"]
     for core, title in CORES.items():
         cells = []
-        for name in MODELS:
-            most, least = (figures[f"{name} {core} -O2 instructions{k}"] for k in ("", ", least"))
-            cells.append(f"{most:,}".replace(",", " ") + ("" if most == least else f" at most ({least:,} at least: soft float)".replace(",", " ")))
+        for name, level in columns:
+            most, least = (f"{figures[f'{name} {core} {level} instructions{k}']:,}".replace(",", " ") for k in ("", ", least"))
+            cells.append(most if most == least else f"{least} .. {most}")
         rows.append(f"| {title} | " + " | ".join(cells) + " |")
-    rows += ["", "| bytes on a Cortex-M4F | -O2 | -Os |", "|---|---|---|"]
-    for kind, title in (("text", "code of the whole RK4 step"), ("rodata", "its constants, without weights"), ("stack", "its stack")):
+    rows += ["", "| bytes on a Cortex-M4F, RK4 | -O2 | -Os |", "|---|---|---|"]
+    for kind, title in (("text", "code of the whole step"), ("rodata", "its constants, without weights"), ("stack", "its stack")):
         rows.append(f"| {title} | " + " | ".join(str(figures[f"nqvm m4f {level} {kind}"]) for level in LEVELS) + " |")
     rows += [
         f"| an instance | {figures['nqvm instance bytes']} | {figures['nqvm instance bytes']} |",
-        f"| a parameter set (flash, or RAM of the caller; two for staging) | {figures['nqvm set bytes']} | {figures['nqvm set bytes']} |",
+        f"| a parameter set, in flash or in RAM of the caller | {figures['nqvm set bytes']} | {figures['nqvm set bytes']} |",
         f"| other RAM | {figures['nqvm m4f static RAM']} | {figures['nqvm m4f static RAM']} |",
     ]
     return "\n".join(rows)
+
+
+def run_text() -> str:
+    """What `make run` prints."""
+    done = subprocess.run(["make", "run"], cwd=ROOT, check=True, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    return f"```\n{done.stdout.strip()}\n```"
+
+
+def with_block(text: str, name: str, content: str) -> str:
+    """README with the text between <!-- name --> and <!-- end of name --> replaced."""
+    block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end of {name} -->)", re.S)
+    return block.sub(lambda m: f"{m[1]}{content}\n{m[2]}", text)
 
 
 def problems(new: dict[str, int], kept: dict[str, int]) -> list[str]:
@@ -139,18 +152,15 @@ def main() -> int:
     arguments.add_argument("--check", action="store_true", help="compare with what is kept, write nothing")
     check = arguments.parse_args().check
     new = measure()
-    kept = json.loads(KEPT.read_text()) if KEPT.exists() else {}
-    found = problems(new, kept if check else {})
-    block = re.compile(r"(<!-- figures -->\n).*?(\n<!-- end of figures -->)", re.S)
-    text = README.read_text() if README.exists() else ""
-    if check:
-        shown = block.search(text)
-        if not shown or shown[0] != f"<!-- figures -->\n{table(kept)}\n<!-- end of figures -->":
-            found.append("README.md: its table is not that of figures.json; run make figures")
-    else:
+    kept = json.loads(KEPT.read_text()) if check else new
+    found = problems(new, kept)
+    text = README.read_text()
+    shown = with_block(with_block(text, "figures", table(kept)), "run", run_text())
+    if check and shown != text:
+        found.append("README.md: what it shows is not what make run and make figures give; run make figures")
+    elif not check:
         KEPT.write_text(json.dumps(new, indent=1) + "\n")
-        if text:
-            README.write_text(block.sub(lambda m: m[1] + table(new) + m[2], text))
+        README.write_text(shown)
         print(table(new))
     for line in found:
         print(line, file=sys.stderr)

@@ -5,6 +5,8 @@
 #ifndef UNITY_CONFIG_H
 #define UNITY_CONFIG_H
 
+#include <stddef.h> /* Unity's macros use NULL */
+
 #define UNITY_INCLUDE_DOUBLE
 #define UNITY_SUPPORT_64
 #define UNITY_OUTPUT_CHAR(character) unity_output(character)

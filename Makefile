@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+#
+# `make help` lists what there is; V=1 shows the commands.
+
+SHELL     := bash
+MAKEFLAGS += --no-print-directory
+Q         := $(if $(V),,@)
+PYTHON    := build/venv/bin/python
+PENODE    := build/venv/bin/penode
+EXPERIMENT := gen/nqvm/nqvm.toml --scenario sil/scenarios/recalibration.toml
+
+help: ## Show this text
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup: $(addprefix build/setup/,tools python unity cmock) ## Install what is missing; every other target that needs it calls it
+
+run: setup ## The main job: recalibration while it runs, on the host and on an emulated Cortex-M4F, with a picture
+	$(Q)mkdir -p build/run
+	$(Q)$(PENODE) simulate $(EXPERIMENT) --on sil -o build/run/sil.csv --plot build/run/recalibration.png
+	$(Q)$(PENODE) simulate $(EXPERIMENT) --on pil:m4f -o build/run/pil.csv
+	$(Q)cmp build/run/sil.csv build/run/pil.csv
+	@echo "host and Cortex-M4F agree to the bit; the picture is build/run/recalibration.png"
+
+test: setup ## All checks; the last line adds them up
+	$(Q)$(PYTHON) test/tally.py $(SUITES)
+
+figures: setup ## Measure what a step costs; rewrite the table of README.md
+	$(Q)$(PYTHON) test/bench/figures.py
+
+clean: ## Remove all that was built (the set-up too)
+	rm -rf build
+
+.PHONY: help setup run test figures clean
+
+build/setup/tools: test/setup.sh
+build/setup/python: requirements.txt pyproject.toml build/setup/tools
+build/setup/unity build/setup/cmock: build/setup/tools
+build/setup/%:
+	$(Q)test/setup.sh $*
+
+include test/test.mk

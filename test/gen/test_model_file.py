@@ -1,0 +1,344 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Broken model files: one line for each fault, with file, line and remedy; nothing but ModelError, whatever the file says."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from pathlib import Path
+
+import models
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import penode_gen
+from penode_gen import expressions, units
+
+GOOD = """[model]
+name = "good"
+description = "mass on a moving foot"
+sample_time = "1 ms"
+method = "rk4"
+substeps = 2
+input = "linear"
+outside = "fade"
+fade_width = 0.5
+
+[parameters]
+m = { value = 2, unit = "kg", tunable = true }
+k = { value = 0.05, unit = "N/mm" }
+tau = { value = 50, unit = "ms", tolerance = 0.1 }
+
+[inputs]
+F = { unit = "N", min = -5, max = 5, noise = 0.1 }
+z = { unit = "m" }
+
+[bodies]
+mass = { mass = "m", position = "q", velocity = "w", start_position = "10 mm" }
+
+[elements]
+foot = { between = ["mass", "z"], law = "linear_spring", stiffness = "k" }
+damp = { between = ["mass", "z"], law = "linear_damper", damping = "3 N*s/m" }
+net = { between = ["mass", "ground"], law = "network", network = "net2", inputs = ["deflection", "rate"] }
+push = { between = ["mass", "ground"], law = "expression", force = "F_lag - F" }
+
+[states]
+F_lag = { unit = "N", start = 0.5 }
+
+[variables]
+g = { unit = "N" }
+
+[equations]
+lag = "der(F_lag)*tau = g - F_lag"
+loop = "2*g - F = 0.5*g + 0.3*F_foot"
+
+[networks]
+net2 = { inputs = ["m", "m/s"], output = "N" }
+
+[outputs]
+q = { value = "q", unit = "mm" }
+a = { value = "der(w)", unit = "m/s^2" }
+
+[sensors]
+load = { value = "F_foot", unit = "N", noise = 0.1 }
+
+[sets.default]
+net2 = "net2.json"
+
+[sets.heavy]
+m = "4 kg"
+"""
+
+
+def at(text: str) -> dict[str, str]:
+    """The first line to be reported holds this text; else it is the line of the edit."""
+    return {"at": text}
+
+
+# What stands in the good file, what stands there instead, and a text for each line that is reported, in which " .. " stands
+# for any words; further pairs are further edits.
+FAULTS = [
+    # keys and sections
+    ("method =", "metod =", "model.metod: unknown key; did you mean 'method'?"),
+    ("noise = 0.1 }\nz", "nois = 0.1 }\nz", "inputs.F.nois: unknown key; did you mean 'noise'?"),
+    ("[sensors]", "[sensor]", "sensor: unknown section; did you mean [sensors]?"),
+    ("[sensors]", "[[sensors]]", "sensors: is not a table"),
+    ("[elements]", "[[elements]]", "elements: is not a table"),
+    ("[equations]", "[[equations]]", "equations: is not a table"),
+    ("[sets.heavy]", "[[sets.heavy]]", "sets.heavy: is not a table"),
+    ('foot = { between = ["mass", "z"], law = "linear_spring", stiffness = "k" }', "foot = 3", "elements.foot: is not a table"),
+    ('z = { unit = "m" }', 'z = "m"', "inputs.z: is not a table"),
+    ('name = "good"\n', "\n", "model: 'name' is missing", at("[model]")),
+    ('sample_time = "1 ms"\n', "\n", "model: 'sample_time' is missing", at("[model]")),
+    ('{ value = 2, unit = "kg",', '{ unit = "kg",', "parameters.m: 'value' is missing"),
+    ('k = { value = 0.05, unit = "N/mm" }', "k = { value = 0.05 }", "parameters.k: 'unit' is missing"),
+    ('z = { unit = "m" }', "z = {}", "inputs.z: 'unit' is missing"),
+    ('mass = "m", position', "position", "bodies.mass: 'mass' is missing"),
+    ('position = "q", ', "", "bodies.mass: 'position' is missing"),
+    (', stiffness = "k"', "", "elements.foot: 'stiffness' is missing"),
+    ('between = ["mass", "z"], law = "linear_damper"', 'law = "linear_damper"', "elements.damp: 'between' is missing"),
+    ('law = "linear_damper", ', "", "elements.damp: 'law' is missing"),
+    ('network = "net2", ', "", "elements.net: 'network' is missing"),
+    (', force = "F_lag - F"', "", "elements.push: 'force' is missing"),
+    (', output = "N"', "", "networks.net2: 'output' is missing"),
+    ('inputs = ["m", "m/s"], ', "", "networks.net2: 'inputs' is missing"),
+    ('value = "q", ', "", "outputs.q: 'value' is missing"),
+    ('net2 = "net2.json"', "", "sets.default: 'net2' is missing", at("[sets.default]")),
+    ("[sets.default]", "[sets.other]", "sets: there is no set 'default'", at("[model]")),
+    # types
+    ("substeps = 2", "substeps = true", "model.substeps: True has the wrong type; give a whole number"),
+    ("substeps = 2", "substeps = 2.0", "model.substeps: 2.0 has the wrong type"),
+    ("substeps = 2", "substeps = 0", "model.substeps: 0 is out of range"),
+    ("substeps = 2", "substeps = 1001", "model.substeps: 1001 is out of range"),
+    ('sample_time = "1 ms"', "sample_time = 1e-3", "model.sample_time: 0.001 has the wrong type; give a text"),
+    ("value = 2,", 'value = "2 kg",', "parameters.m.value: '2 kg' has the wrong type; give a number"),
+    ("tunable = true", "tunable = 1", "parameters.m.tunable: 1 has the wrong type; give true or false"),
+    ("tunable = true", "tunable = 2020-01-01", "has the wrong type"),
+    ('between = ["mass", "z"], law = "linear_spring"', 'between = "mass", law = "linear_spring"', "elements.foot.between: .. a list"),
+    ('law = "linear_spring"', 'law = ["linear_spring"]', "elements.foot.law: .. wrong type; give a text"),
+    ('inputs = ["deflection", "rate"]', 'inputs = [["deflection"], "rate"]', "elements.net.inputs: .. neither deflection nor rate"),
+    ('inputs = ["m", "m/s"]', "inputs = [1, 2]", "networks.net2.inputs: must list the unit of each input"),
+    ('net2 = "net2.json"', "net2 = 3", "sets.default.net2: 3 has the wrong type; give a text or a table"),
+    ('description = "mass on a moving foot"', "description = 0x" + "f" * 5000, "a huge number has the wrong type"),
+    ('description = "mass on a moving foot"', 'description = "ends here */ int x;"', "model.description: cannot be a comment in C"),
+    ('description = "mass on a moving foot"', 'description = "two\\nlines"', "cannot be a comment in C"),
+    # names
+    ('name = "good"', 'name = "Good"', "model.name: 'Good' cannot prefix C names"),
+    ('name = "good"', 'name = "good\\n"', "cannot prefix C names"),
+    ('name = "good"', 'name = "stdint"', "has a meaning of its own in C"),
+    ('name = "good"', 'name = "uint32"', "has a meaning of its own in C"),
+    ('g = { unit = "N" }', 'while = { unit = "N" }', "variables.while: .. meaning of its own"),
+    ("F_lag = {", '"F lag" = {', "'F lag' cannot be a name"),
+    ('load = { value = "F_foot"', 'pen_load = { value = "F_foot"', "sensors.pen_load: .. meaning of its own"),
+    ('load = { value = "F_foot"', 'H = { value = "F_foot"', "sensors.H: .. meaning of its own"),
+    ('load = { value = "F_foot"', 'load_ = { value = "F_foot"', "sensors.load_: .. cannot be a name"),
+    ('load = { value = "F_foot"', 'INT8_MAX = { value = "F_foot"', "sensors.INT8_MAX: .. meaning of its own"),
+    ('load = { value = "F_foot"', 'größe = { value = "F_foot"', "is not valid TOML"),
+    ('load = { value = "F_foot"', '"größe" = { value = "F_foot"', "'größe' cannot be a name"),
+    ('load = { value = "F_foot"', "l" * 41 + ' = { value = "F_foot"', "cannot be a name"),
+    ('position = "q"', 'position = "int"', "bodies.mass.position: .. meaning of its own"),
+    ('position = "q"', 'position = "exp"', "bodies.mass.position: .. meaning of its own"),
+    ("push = {", '"pu*/sh" = {', "'pu*/sh' cannot be a name"),
+    ('lag = "der', '"l*/ag" = "der', "'l*/ag' cannot be a name"),
+    ("[sets.heavy]", '[sets."a b"]', "'a b' cannot be a name"),
+    ("[sets.heavy]", "[sets.Default]", "differs from the set 'default' by case only"),
+    ("tau = {", "m = {", "is not valid TOML (Cannot overwrite a value)"),
+    ('g = { unit = "N" }', 'F = { unit = "N" }', "variables.F: 'F' is already the name of a input"),
+    ('g = { unit = "N" }', 'F_foot = { unit = "N" }', "'F_foot' is already the name of a variable", at("foot =")),
+    ('velocity = "w"', 'velocity = "q"', "bodies.mass.velocity: 'q' is already the name of a position"),
+    ("F_lag = {", "z = {", "'z' is already the name of a input"),
+    ("[elements]", '[bodies.F]\nmass = "1 kg"\nposition = "q2"\nvelocity = "w2"\n[elements]', "'F' is already the name of a body", at("F = {")),
+    ("tau = {", 'K = { value = 1, unit = "1" }\ntau = {', "parameters.K: its C constant GOOD_K is already taken"),
+    ("tau = {", 'k_inverse = { value = 1, unit = "1" }\ntau = {', "parameters.k_inverse: its C constant GOOD_K_INVERSE"),
+    ("tau = {", 'set_length = { value = 1, unit = "1" }\ntau = {', "GOOD_SET_LENGTH is already taken"),
+    ("tau = {", 'damp_damping = { value = 1, unit = "1" }\ntau = {', "'damp_damping', which there is already", at("damp =")),
+    ('load = { value = "F_foot"', 'q = { value = "F_foot"', "sensors.q: 'q' is already the name of another quantity"),
+    # units
+    ('unit = "N/mm"', 'unit = "N/mn"', "parameters.k: unknown unit 'N/mn'; write it like"),
+    ('unit = "N/mm"', 'unit = "N/mm^9^9^9^9"', "unknown unit"),
+    ('unit = "N/mm"', 'unit = "N/mm; import os"', "unknown unit"),
+    ('unit = "N/mm"', 'unit = "3 N/mm"', "unknown unit"),
+    ('unit = "N/mm"', 'unit = "N*s/mm"', "elements.foot.stiffness: 'k' is in N*s/mm, needed is N/m", at("foot =")),
+    ('unit = "kg"', 'unit = "g*m"', "bodies.mass.mass: 'm' is in g*m, needed is kg", at("mass ="), "sets.heavy.m: '4 kg' is not measured in g*m"),
+    ('damping = "3 N*s/m"', 'damping = "3 N/m"', "elements.damp.damping: '3 N/m' is not measured in N*s/m"),
+    ('damping = "3 N*s/m"', 'damping = "3"', "'3' is not measured in N*s/m"),
+    ('damping = "3 N*s/m"', 'damping = "three N*s/m"', "'three N*s/m' is not a number with a unit"),
+    ('damping = "3 N*s/m"', 'damping = "nan N*s/m"', "is not a number with a unit"),
+    ('sample_time = "1 ms"', 'sample_time = "1 mm"', "model.sample_time: '1 mm' is not measured in s"),
+    ('start_position = "10 mm"', 'start_position = "10 mm/s"', "bodies.mass.start_position: '10 mm/s' is not measured in m"),
+    ('z = { unit = "m" }', 'z = { unit = "kg" }', "elements.foot.between: input 'z' is in kg, an end needs a position", at("foot ="), "elements.damp.between: input 'z' is in kg"),
+    ('F_lag = { unit = "N"', 'F_lag = { unit = "Pa"', "elements.push: .. combines m^-1*kg*s^-2 with m*kg*s^-2", at("push ="), "equations.lag: .. combines"),
+    ('tau = { value = 50, unit = "ms"', 'tau = { value = 50, unit = "mm"', "equations.lag: m^2*kg*s^-3 is set equal to m*kg*s^-2", at("lag =")),
+    ('inputs = ["m", "m/s"]', 'inputs = ["m", "N"]', "elements.net.inputs: the network takes N, but rate is in m/s", at("net =")),
+    ('inputs = ["m", "m/s"]', 'inputs = ["mm", "m/s"]', "networks.net2: a network in mm .. declare m"),
+    ('inputs = ["m", "m/s"], output = "N"', 'inputs = ["m", "m/s"], output = "m"', "network 'net2' gives m, an element needs a force", at("net =")),
+    ('value = "q", unit = "mm"', 'value = "q", unit = "mm/s"', "outputs.q: m*s^-1 is set equal to m"),
+    ('value = "q", unit = "mm"', 'value = "q + 1", unit = "mm"', "outputs.q: 'q + 1' combines"),
+    ('value = "F_foot", unit = "N"', 'value = "exp(F_foot)", unit = "1"', "the argument has the unit m*kg*s^-2"),
+    ('value = "F_foot", unit = "N"', 'value = "where(F > q, F, F)", unit = "N"', "combines"),
+    ('F_lag = { unit = "N"', 'F_lag = { unit = "degC"', "states.F_lag: unit 'degC' has an offset; use kelvin .. write"),
+    # numbers
+    ("value = 2,", "value = 0,", "bodies.mass: mass 'm' is not above zero", at("mass =")),
+    ("value = 2,", "value = -2,", "bodies.mass: mass 'm' is not above zero", at("mass =")),
+    ('mass = "m"', 'mass = "-2 kg"', "bodies.mass: mass '-2 kg' is not above zero", ('m = "4 kg"', "")),
+    ('m = "4 kg"', 'm = "0 kg"', "sets.heavy.m: mass '0 kg' is not above zero"),
+    ('m = "4 kg"', 'm = "4 m"', "sets.heavy.m: '4 m' is not measured in kg"),
+    ('m = "4 kg"', 'm = "1e39 kg"', "sets.heavy.m: '1e39 kg' is no number that a float can hold"),
+    ("value = 0.05,", "value = nan,", "parameters.k.value: nan is no number that a float can hold"),
+    ("value = 0.05,", "value = inf,", "inf is no number that a float can hold"),
+    ("value = 0.05,", "value = 1e36,", "1e+36 is no number that a float can hold"),  # 1e39 N/m
+    ("value = 0.05,", "value = 1e-42,", "1e-42 is no number that a float can hold"),
+    ("value = 0.05,", f"value = {10**400},", "is no number that a float can hold"),
+    ("value = 0.05,", f"value = 1{'0' * 5000},", "is not valid TOML"),
+    ("value = 50,", "value = 0,", "divides by 'tau', which is zero", at("lag =")),
+    ("tolerance = 0.1", "tolerance = 1.5", "tolerance 1.5 is not a share"),
+    ("start = 0.5", "start = 1e39", "states.F_lag.start: 1e+39 is no number that a float can hold"),
+    ('start_position = "10 mm"', 'start_position = "1e999 m"', "'1e999 m' is no number that a float can hold"),
+    ("min = -5", "min = 5", "inputs.F: min is not below max"),
+    ("min = -5", "min = nan", "inputs.F.min: nan is no number"),
+    ("noise = 0.1 }\nz", "noise = -1 }\nz", "inputs.F.noise: -1 is below zero"),
+    ('sample_time = "1 ms"', 'sample_time = "0 s"', "model.sample_time: 0 s is out of range"),
+    ('sample_time = "1 ms"', 'sample_time = "-1 ms"', "model.sample_time: -1 ms is out of range"),
+    ('sample_time = "1 ms"', 'sample_time = "3 years"', "model.sample_time: 3 years is out of range"),
+    ('sample_time = "1 ms"', 'sample_time = "1e-30 s"', "model.sample_time: 1e-30 s is out of range"),
+    ("fade_width = 0.5", "fade_width = 0", "model.fade_width: is out of range"),
+    ("fade_width = 0.5", "fade_width = nan", "model.fade_width: is out of range"),
+    ('method = "rk4"', 'method = "rk5"', "model.method: 'rk5' is unknown; choose one of euler, heun"),
+    ('input = "linear"', 'input = "cubic"', "model.input: 'cubic' is unknown"),
+    ('outside = "fade"', 'outside = "explode"', "model.outside: 'explode' is unknown"),
+    # elements and networks
+    ('law = "linear_damper"', 'law = "linear_dampr"', "elements.damp.law: law 'linear_dampr' is unknown; did you mean 'linear_damper'?"),
+    ('stiffness = "k"', 'stiffnes = "k"', "unknown key; did you mean 'stiffness'?", "'stiffness' is missing"),
+    ('stiffness = "k"', 'stiffness = "kk"', "'kk' is no parameter; did you mean 'k'?"),
+    ('["mass", "z"], law = "linear_spring"', '["mess", "z"], law = "linear_spring"', "end 'mess' is no body, input or ground; did you mean 'mass'?"),
+    ('["mass", "z"], law = "linear_spring"', '["mass", "mass"], law = "linear_spring"', "does not name two different ends"),
+    ('["mass", "z"], law = "linear_spring"', '["mass"], law = "linear_spring"', "does not name two different ends"),
+    ('network = "net2"', 'network = "net3"', "network 'net3' is not declared; did you mean 'net2'?"),
+    ('inputs = ["deflection", "rate"]', 'inputs = ["deflection"]', "elements.net.inputs: 1 inputs for a network of 2"),
+    ('inputs = ["deflection", "rate"]', 'inputs = ["position", "rate"]', "'position' is neither deflection nor rate"),
+    ('net2 = "net2.json"', 'net2 = "net3.json"', "sets.default.net2: .. net3.json: No such file or directory"),
+    ('net2 = "net2.json"', 'net2 = "net\\u00002.json"', "sets.default.net2: .. cannot be read"),
+    ('net2 = "net2.json"', 'net2 = "net2.h5"', "unknown suffix '.h5'"),
+    ('net2 = "net2.json"', 'net2 = "broken.json"', "not JSON that can be read"),
+    ('net2 = "net2.json"', 'net2 = "broken.onnx"', "sets.default.net2: .. broken.onnx"),
+    ('net2 = "net2.json"', 'net2 = "one.json"', "one.json has 1 input(s) and 1 output(s), declared are 2 and 1"),
+    ('net2 = "net2.json"', 'net2 = "large.json"', "large.json has a number that a float cannot hold"),
+    ('net2 = "net2.json"', 'net2 = { file = "net2.json", min = [0] , max = [1] }', "needs 2 minima and maxima, has 1 and 1"),
+    ('net2 = "net2.json"', 'net2 = { file = "net2.json", min = ["a", "b"] }', "sets.default.net2.min: is not a list of numbers"),
+    ('net2 = "net2.json"', 'net2 = { file = "net2.json", min = [0, nan] }', "sets.default.net2.min: is not a list of numbers"),
+    ('net2 = "net2.json"', 'net2 = { file = "net2.json", min = [1, 1], max = [1.00000001, 2] }', "narrower than a float can tell"),
+    ('net2 = "net2.json"', 'net2 = { fil = "net2.json" }', "unknown key; did you mean 'file'?", "'file' is missing"),
+    ('m = "4 kg"', 'net2 = "wide.json"', "sets.heavy.net2: has another architecture than in the set 'default'"),
+    ('m = "4 kg"', 'net3 = "wide.json"', "sets.heavy.net3: unknown key; did you mean 'net2'?"),
+    ('m = "4 kg"', 'k = "4 N/m"', "sets.heavy.k: unknown key"),
+    # equations
+    ('lag = "der(F_lag)*tau = g - F_lag"', 'lag = "der(F_lag)*tau - g + F_lag"', "equations.lag: is not one equation"),
+    ('lag = "der(F_lag)*tau = g - F_lag"', 'lag = "der(F_lag)*tau = g = F_lag"', "equations.lag: is not one equation"),
+    ('lag = "der(F_lag)*tau = g - F_lag"', 'lag = "der(F_lag)*tau == g - F_lag"', "equations.lag: is not one equation"),
+    ('lag = "der(F_lag)*tau = g - F_lag"', "lag = 3", "equations.lag: is not one equation"),
+    ("g - F_lag", "g - F_leg", "equations.lag: 'g - F_leg' uses 'F_leg'"),
+    ("g - F_lag", "g - F_lag)", "cannot be read as an expression (unmatched ')')"),
+    ("g - F_lag", "sin(g) - F_lag", "calls 'sin'; known are abs"),
+    ("g - F_lag", "max(g) - F_lag", "max with 1 argument(s); it takes 2"),
+    ("g - F_lag", "net2(q) - F_lag", "net2 with 1 argument(s); it takes 2"),
+    ("g - F_lag", "g - F_lag^0.5", "has the power '0.5'; whole powers up to 8"),
+    ("g - F_lag", "g - F_lag^q", "has the power 'q'"),
+    ("g - F_lag", "g - 9^9^9^9*F_lag", "whole powers up to 8"),
+    ("g - F_lag", "g - 1e99*F_lag", "number that a float cannot hold"),
+    ("g - F_lag", "g - F_lag/0", "divides by zero"),
+    ("g - F_lag", "__import__('os').system('true')", "is no part of an expression"),
+    ("g - F_lag", "__import__('os')", "calls '__import__'; known are"),
+    ("g - F_lag", "g.real", "contains 'g.real', which is no part of an expression"),
+    ("g - F_lag", "(lambda: g)()", "is no part of an expression"),
+    ("g - F_lag", "'g'", "contains ''g'', which is no part of an expression"),
+    ("g - F_lag", "[g for g in (1, 2)]", "is no part of an expression"),
+    ("g - F_lag", "where(0 < g < 1, g, F)", "has a 'where' that is not where(a < b, x, y)"),
+    ("g - F_lag", "g if g else F", "is no part of an expression"),
+    ("g - F_lag", "g - True", "contains 'True'"),
+    ("g - F_lag", "1j*g", "contains '1j'"),
+    ("g - F_lag", "(" * 300 + "g" + ")" * 300, "too many nested parentheses"),
+    ("g - F_lag", "g" + "+g" * 950, "nested too deeply"),
+    ("g - F_lag", "g" + "+g" * 9000, "more than 2000"),
+    ("g - F_lag", "der(g) - F_lag", "uses der(g), but 'g' is no state or input"),
+    ("g - F_lag", "der(m) - F_lag", "uses der(m), but 'm' is no state or input"),
+    ("g - F_lag", "der(q + q) - F_lag", "has a 'der' that is not der(name)"),
+    ('value = "der(w)"', 'value = "der(k)"', "outputs.a: 'der(k)' uses der(k)"),
+    ('value = "der(w)"', 'value = "net2(q, w)"', "outputs.a: calls a network", ('unit = "m/s^2"', 'unit = "N"')),
+    ('value = "der(w)"', 'value = "w^0.5"', "outputs.a: 'w^0.5' has the power"),
+    ('input = "linear"', 'input = "held"', "model.input: the model uses the rate of an input, which is not defined for a held input"),
+    ("2*g - F = 0.5*g", "2*g - F = g*g/F", "'loop' form an algebraic loop that is not linear in g"),
+    ("2*g - F = 0.5*g", "2*g - F = abs(g)", "'loop' form an algebraic loop that is not linear in g"),
+    ("2*g - F = 0.5*g", "2*g - F = where(g > F, 1, 2)*F", "not linear in g"),
+    ('g = { unit = "N" }', 'g = { unit = "N" }\nh = { unit = "N" }', "equations 'loop', 'more' have no unique solution for .. check", at("loop ="), ("loop = \"2*g - F = 0.5*g", "more = \"2*g + 2*h = F\"\nloop = \"h - F = -g")),
+    ('g = { unit = "N" }', 'g = { unit = "N" }\nh = { unit = "N" }', "variables.h: no equation determines h; add one to [equations]", at("h =")),
+    ("loop =", 'more = "g = F"\nloop =', "equations.loop: nothing is left that this equation could determine", at("loop =")),
+    ("F_lag - F", "F_lag - s", "elements.push: .. combines"),
+    ("F_lag - F", "F*(1 - v*s)", "elements.push: 'v' is the rate of this element, and a name of the model", ('velocity = "w"', 'velocity = "v"'), ("der(w)", "der(v)")),
+    # TOML
+    ('name = "good"', "name = good", "is not valid TOML (Invalid value); mend the syntax there"),
+    ('name = "good"', 'name = "good', "is not valid TOML"),
+    ("[sets.heavy]", "[sets.heavy", "is not valid TOML"),
+    ('net2 = "net2.json"', f"net2 = {'[' * 3000}", "is not valid TOML"),
+]
+
+
+def network_json(path: Path, sizes: list[int], bias: float = 0.0) -> None:
+    """A network that gives its bias."""
+    layers = [{"activation": "relu", "weights": [[0.0] * m] * n, "bias": [0.0] * n} for m, n in zip(sizes, sizes[1:])]
+    layers[-1]["bias"] = [bias] * sizes[-1]
+    path.write_text(json.dumps({"layers": layers, "trained_range": {"min": [-1.0] * sizes[0], "max": [1.0] * sizes[0]}}))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    found = tmp_path_factory.mktemp("model_file")
+    models.network_file(found / "net2.json", [2, 3, 1], ["tanh", "identity"], 1)
+    network_json(found / "wide.json", [2, 4, 1])
+    network_json(found / "one.json", [1, 4, 1])
+    network_json(found / "large.json", [2, 3, 1], 1e39)
+    (found / "broken.json").write_text('{"layers": [')
+    (found / "broken.onnx").write_bytes(b"\x08\x01 this is no protocol buffer \xff\xff")
+    return found
+
+
+def problems(path: Path) -> list[str]:
+    """What is wrong with a model file."""
+    with pytest.raises(penode_gen.ModelError) as caught:
+        penode_gen.load(path)
+    assert str(caught.value) == "\n".join(caught.value.problems)
+    return caught.value.problems
+
+
+def test_the_good_file_is_good(folder):
+    (folder / "good.toml").write_text(GOOD)
+    model = penode_gen.load(folder / "good.toml")
+    assert model.parameters["k"].value == 50.0 and model.parameters["tau"].value == 0.05  # N/mm and ms in SI
+    assert model.start == (0.01, 0.0, 0.5) and model.sample_time == 1e-3
+    assert model.sets["heavy"].parameters == {"m": 4.0} and set(model.sets["heavy"].networks) == {"net2"}
+
+
+def applied(case: tuple) -> tuple[str, int, list[str]]:
+    """Text, line of the first report and patterns of a case of FAULTS."""
+    old, new, *rest = case
+    text = GOOD
+    for a, b in [(old, new), *(r for r in rest if isinstance(r, tuple))]:
+        assert text.count(a) == 1, a
+        text = text.replace(a, b)
+    anchor = next((text.index("\n" + r["at"]) + 1 if text.index(r["at"]) else 0 for r in rest if isinstance(r, dict)), GOOD.index(old))
+    return text, text.count("\n", 0, anchor) + 1, [".*".join(map(re.escape, r.split(" .. "))) for r in rest if isinstance(r, str)]
+
+
+@pytest.mark.parametrize("case", FAULTS, ids=lambda c: re.sub(r"\W+", " ", f"{c[1][:40]} {c[2][:30]}"))
+def test_fault(folder, case):
+    text, line, patterns = applied(case)
+    path = folder / "bad.toml"
+    path.write_text(text, encoding="utf-8")
+    found = problems(path)
+    assert re.match(rf"{re.escape(str(path))}:{line}: ", found[0])
+    assert all(any(re.search(pattern, problem) for problem in found) for pattern in patterns)
+    assert len(found) == len(patterns)
+    assert all(p.isprintable() and "; " in p and len(p) < 500 for p in found)  # one line each, with a remedy

@@ -1,0 +1,129 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+#
+# setup.sh tools|python|unity|cmock: one part of the set-up each; the Makefile calls it, once. All goes into build/ but
+# the Debian packages of `tools`. Quiet where there is nothing to do; one line that names the remedy where it cannot.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+CMOCK_URL=https://github.com/ThrowTheSwitch/CMock
+CMOCK_TAG=v2.7.0
+CMOCK_COMMIT=6ea503340b1d3fdc0f2bcaf69273ba0160ec83af
+
+give_up() # WHAT
+{
+    echo "setup: $1" >&2
+    exit 1
+}
+
+# Print the command that runs apt-get as root; fails where there is none.
+as_root()
+{
+    if [ "$(id -u)" = 0 ]; then
+        echo "env"
+    elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
+        echo "sudo env"
+    else
+        return 1
+    fi
+}
+
+# Print the Debian packages that are missing, found by what they bring, so that other systems pass as well.
+missing_packages()
+{
+    command -v gcc >/dev/null || echo gcc
+    echo '#include <stdio.h>' | gcc -E - >/dev/null 2>&1 || echo libc6-dev
+    command -v arm-none-eabi-gcc >/dev/null || echo gcc-arm-none-eabi
+    [ "$(arm-none-eabi-gcc -print-file-name=libc.a 2>/dev/null || true)" != libc.a ] &&
+        command -v arm-none-eabi-gcc >/dev/null || echo libnewlib-arm-none-eabi
+    command -v qemu-system-arm >/dev/null || echo qemu-system-arm
+    command -v ruby >/dev/null || echo ruby
+    command -v git >/dev/null || echo git
+    command -v clang-19 >/dev/null || echo clang-19
+    ls /usr/lib/llvm-19/lib/clang/19/lib/linux/libclang_rt.asan* >/dev/null 2>&1 || echo libclang-rt-19-dev
+    python3 -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv
+}
+
+tools()
+{
+    local missing root
+    missing=$(missing_packages | tr '\n' ' ')
+    if [ -n "$missing" ]; then
+        echo "setup: installing $missing"
+        root=$(as_root) || give_up "cannot install packages here; run as root: apt-get install $missing"
+        { $root apt-get update -qq &&
+            $root DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $missing; } \
+            >build/setup/tools.log 2>&1 || give_up "apt-get failed, see build/setup/tools.log; needed: $missing"
+        missing=$(missing_packages | tr '\n' ' ')
+        [ -z "$missing" ] || give_up "still missing after apt-get: $missing"
+    fi
+}
+
+python()
+{
+    echo "setup: Python packages into build/venv"
+    python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' || give_up "python3 is older than 3.11; install a newer one"
+    rm -rf build/venv
+    python3 -m venv build/venv
+    { build/venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt &&
+        build/venv/bin/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .; } \
+        >build/setup/python.log 2>&1 || give_up "pip failed, see build/setup/python.log; is the package index reachable?"
+}
+
+# Print the Debian archive's own entries (not those of third parties) as entries for source packages.
+# Sets `suffix` by the format found, which apt tells by the name of the file.
+debian_sources()
+{
+    local codename
+    codename=$(. /etc/os-release && echo "${VERSION_CODENAME:-}")
+    if ls /etc/apt/sources.list.d/*.sources >/dev/null 2>&1 &&
+        cat /etc/apt/sources.list.d/*.sources | grep -q "^Suites:.*\b$codename\b"; then
+        for file in /etc/apt/sources.list.d/*.sources; do
+            awk -v name="$codename" 'BEGIN { RS = ""; ORS = "\n\n" }
+                 $0 ~ ("Suites:([^\n]* )?" name "([ \n]|$)") { sub(/Types:[^\n]*/, "Types: deb-src"); print }' "$file"
+        done >build/unity/debian.sources
+        echo build/unity/debian.sources
+    else
+        sed -n "s/^deb \(.* $codename .*\)/deb-src \1/p" /etc/apt/sources.list >build/unity/debian.list
+        echo build/unity/debian.list
+    fi
+}
+
+# Unity comes inside Debian's source package of cJSON. apt-get works on lists of its own; the system's stay as they are.
+unity()
+{
+    local entries options
+    echo "setup: Unity into build/unity"
+    rm -rf build/unity
+    mkdir -p build/unity/lists/partial
+    entries=$(debian_sources)
+    options="-qq -o Dir::Etc::sourcelist=$PWD/$entries -o Dir::Etc::sourceparts=/dev/null
+        -o Dir::State::Lists=$PWD/build/unity/lists -o Dir::Cache::pkgcache= -o Dir::Cache::srcpkgcache=
+        -o APT::Get::List-Cleanup=0"
+    { apt-get $options update && (cd build/unity && apt-get $options source --download-only cjson) &&
+        tar xzf build/unity/cjson_*.orig.tar.gz -C build/unity --strip-components=3 --wildcards '*/tests/unity'; } \
+        >build/setup/unity.log 2>&1 || give_up "no Unity, see build/setup/unity.log; is the Debian archive reachable?"
+    rm -rf build/unity/lists build/unity/cjson_* build/unity/debian.*
+}
+
+# CMock is in no package archive. Without it its tests are skipped, and say so.
+cmock()
+{
+    if [ -z "${CMOCK_DIR:-}" ]; then
+        echo "setup: CMock $CMOCK_TAG into build/cmock"
+        rm -rf build/cmock
+        timeout 20 git -c advice.detachedHead=false clone --quiet --depth 1 --branch "$CMOCK_TAG" "$CMOCK_URL" build/cmock \
+            >build/setup/cmock.log 2>&1 </dev/null || rm -rf build/cmock
+        if [ ! -d build/cmock ]; then
+            echo "setup: $CMOCK_URL cannot be reached, so the CMock tests will be skipped; CMOCK_DIR may name a checkout"
+        elif [ "$(git -C build/cmock rev-parse HEAD)" != "$CMOCK_COMMIT" ]; then
+            rm -rf build/cmock
+            give_up "$CMOCK_URL: $CMOCK_TAG is no longer the commit it was; check it and correct test/setup.sh"
+        fi
+    fi
+}
+
+mkdir -p build/setup
+"$1"
+touch "build/setup/$1"

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+#
+# The suites of `make test`, each also a target of its own. What a suite prints is what test/tally.py counts.
+
+SUITES   := warnings symbols misra gen-check unit board cmock accuracy python figures-check
+MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
+RUNTIME  := $(wildcard src/*.c)
+MODEL    := $(wildcard gen/nqvm/c/*.c)
+MODELS   := $(patsubst gen/nqvm/c/%.h,%,$(wildcard gen/nqvm/c/*.h))
+LIBRARY  := $(RUNTIME) $(MODEL)
+INCLUDE  := -Igen/nqvm/c
+
+.SECONDARY:
+.PHONY: $(SUITES)
+# A suite can also be called on its own; python is the last part of the set-up that one needs, unity aside.
+READY := build/setup/python
+
+# A compiler here is a command of the ports: all take the same options.
+COMPILERS := gcc clang $(MACHINES)
+CC.gcc    := port/host/cc gcc
+CC.clang  := port/host/cc clang-19
+$(foreach m,$(MACHINES),$(eval CC.$m := port/cortex-m/cc $m))
+
+# -- no warning from any compiler, in float and in double -------------------------------------------------------------
+
+WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wmissing-prototypes \
+            -Wstrict-prototypes -Wfloat-equal -Wcast-qual -Wcast-align -Wundef -Wswitch-enum -Wvla -Wredundant-decls \
+            -Wwrite-strings -Werror
+FIRMWARE := $(if $(MODEL),$(wildcard sil/firmware/*.c))
+TOLD     := '-DMODEL_HEADER="nqvm.h"' '-DMODEL(name)=nqvm_\#\#name' '-DMODEL_SIZE(name)=NQVM_\#\#name' \
+            '-DMODEL_SETS=&nqvm_set_default' -DBOARD_TICK_MHZ=25U
+BOARD.gcc   := $(wildcard port/host/*.c)
+BOARD.clang := $(BOARD.gcc)
+$(foreach m,$(MACHINES),$(eval BOARD.$m := $(wildcard port/cortex-m/*.c)))
+
+warnings: $(COMPILERS:%=warnings-%-float) $(COMPILERS:%=warnings-%-double) warnings-everything ## Every compiler, strict, must be content
+
+REAL.float  :=
+REAL.double := -DPEN_REAL_DOUBLE -Wno-double-promotion
+
+# (1) compiler, (2) float or double
+define warnings
+.PHONY: warnings-$(1)-$(2)
+warnings-$(1)-$(2): | $(READY)
+	@test/check "warnings $(1) $(2)" test/each $(CC.$(1)) -std=c99 -O2 $(WARNINGS) $(REAL.$(2)) $(INCLUDE) $(TOLD) \
+	    -c -o /dev/null -- $(RUNTIME) $(MODEL) $(FIRMWARE) $(BOARD.$(1))
+endef
+$(foreach c,$(COMPILERS),$(foreach r,float double,$(eval $(call warnings,$c,$r))))
+
+# All that clang can say about library and model, but for its opinions on C99, padding, comments and plain arrays.
+.PHONY: warnings-everything
+warnings-everything: | $(READY)
+	@test/check "warnings clang -Weverything" test/each $(CC.clang) -std=c99 -O2 -Weverything -Werror -Wno-padded \
+	    -Wno-documentation -Wno-declaration-after-statement -Wno-unsafe-buffer-usage $(INCLUDE) -c -o /dev/null -- $(LIBRARY)
+
+# -- no symbol from outside; on a core without FPU the compiler's own soft float --------------------------------------
+
+ALLOWED.mps2-an385 := __aeabi_(f[a-z0-9]*|u?i2f)
+LEVELS := -O2 -Os -O3
+
+symbols: $(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),symbols-$c$l)) ## Library and model must need nothing from outside
+
+# (1) compiler, (2) optimisation; the port for bare metal keeps gcc from calling memcpy, here it may try
+define symbols
+.PHONY: symbols-$(1)$(2)
+symbols-$(1)$(2): | $(READY)
+	@test/check "symbols $(1) $(2)" test/symbols '$(ALLOWED.$(1))' $(CC.$(1)) -std=c99 $(2) \
+	    $(if $(filter $(1),$(MACHINES)),-ftree-loop-distribute-patterns) $(INCLUDE) $(LIBRARY)
+endef
+$(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),$(eval $(call symbols,$c,$l))))
+
+# -- MISRA C:2012, as far as cppcheck's addon goes --------------------------------------------------------------------
+
+# Each model with the runtime is a program; the example firmware belongs to the first.
+PROGRAM.nqvm := $(wildcard sil/firmware/example.c)
+HEADERS      := $(wildcard inc/penode/*.h) port/template/pen_port_target.h sil/firmware/board.h
+
+misra: $(MODELS:%=misra-plain-%) $(MODELS:%=misra-gnuc-%) misra-canary ## cppcheck with its MISRA addon: nothing in the library, much in a bad file
+
+build/misra/%.c: gen/nqvm/c/%.h $(HEADERS) test/misra/every_entry
+	@mkdir -p $(@D)
+	$(Q)test/misra/every_entry $(filter %.h,$^) >$@
+
+sources_of = build/misra/$(1).c $(RUNTIME) gen/nqvm/c/$(1).c gen/nqvm/c/$(1)_params.c $(PROGRAM.$(1))
+misra-plain-%: build/misra/%.c | $(READY)
+	@test/check "misra $*" test/misra/check clean $(call sources_of,$*)
+misra-gnuc-%: build/misra/%.c | $(READY) # the branches that only GCC and clang see
+	@OPTIONS=-D__GNUC__ test/check "misra $* -D__GNUC__" test/misra/check clean $(call sources_of,$*)
+misra-canary: | $(READY)
+	@test/check "misra canary" test/misra/check canary test/misra/canary.c
+
+# -- the committed C is what the generator prints ---------------------------------------------------------------------
+
+gen-check: | $(READY) ## The committed C must be, to the byte, what the generator makes of the model file
+	@rm -rf build/gen-check
+	@for model in $(MODELS); do \
+	    test/check "gen-check $$model" $(PENODE) generate gen/nqvm/$$model.toml -o build/gen-check || exit; done
+	@test/check "gen-check compare" diff -r build/gen-check gen/nqvm/c
+
+# -- Unity: every test/unit/test_*.c is a program, built and run in every variant -------------------------------------
+
+# A variant is a compiler with options, and the way to run what it makes.
+VARIANTS    := $(COMPILERS) sanitize double
+CC.sanitize := port/host/cc gcc -fsanitize=address,undefined -fno-sanitize-recover=all
+CC.double   := port/host/cc gcc -DPEN_REAL_DOUBLE
+$(foreach v,gcc clang sanitize double,$(eval RUN.$v := port/host/run gcc))
+$(foreach m,$(MACHINES),$(eval RUN.$m := port/cortex-m/run $m))
+$(foreach m,$(MACHINES),$(eval LIBS.$m := -lc)) # Unity's setjmp
+
+UNITS   := $(patsubst test/unit/%.c,%,$(wildcard test/unit/test_*.c))
+needs    = $(shell sed -n 's|.*needs: \(.*\) \*/.*|\1|p' test/unit/$(1).c)
+objects  = $(patsubst %.c,build/unit/$(1)/%.o,$(2))
+UNIT_CFLAGS := -std=c99 -O2 -g -Wall -Wextra $(INCLUDE) -Itest/unit -Ibuild/unity/src -include unity_config.h
+
+unit: $(foreach v,$(VARIANTS),$(UNITS:%=unit-$v-%)) ## The C unit tests, on this machine and on the emulated ones
+
+build/unit/runner/%.c: test/unit/%.c build/setup/unity
+	@mkdir -p $(@D)
+	$(Q)ruby build/unity/auto/generate_test_runner.rb $< $@
+
+# (1) variant
+define objects_of_variant
+build/unit/$(1)/%.o: %.c build/setup/unity
+	@mkdir -p $$(@D)
+	$(Q)$(CC.$(1)) $(UNIT_CFLAGS) -MMD -c -o $$@ $$<
+endef
+
+# (1) variant, (2) test
+define unit
+build/unit/$(1)/$(2): $(call objects,$(1),build/unit/runner/$(2).c test/unit/$(2).c test/unit/unity_output.c \
+                                          build/unity/src/unity.c $(RUNTIME) $(call needs,$(2)))
+	$(Q)$(CC.$(1)) -O2 -o $$@ $$^ $(LIBS.$(1))
+.PHONY: unit-$(1)-$(2)
+unit-$(1)-$(2): build/unit/$(1)/$(2)
+	@test/unit/show $(2) $(1) $(RUN.$(1)) $$<
+endef
+
+$(foreach v,$(VARIANTS),$(eval $(call objects_of_variant,$v)))
+$(foreach v,$(VARIANTS),$(foreach t,$(UNITS),$(eval $(call unit,$v,$t))))
+-include $(shell find build/unit -name '*.d' 2>/dev/null)
+
+# -- the ports themselves ---------------------------------------------------------------------------------------------
+
+board: $(MACHINES:%=board-%) ## Each emulated machine: counts, stack, files, interrupt, fault reports
+board-%: | $(READY)
+	@test/board/check.sh $*
+
+# -- the port mocked --------------------------------------------------------------------------------------------------
+
+cmock: build/setup/unity build/setup/cmock ## The order in which the library uses the port
+	@test/cmock/run
+
+# -- elementary functions against wider arithmetic --------------------------------------------------------------------
+
+STRIDE := 64 # 1: all 2^32 floats, five minutes
+ACCURACY := -std=c99 -O2 -ffp-contract=off -Iinc -Iport/gnu
+
+accuracy: accuracy-float accuracy-double accuracy-source ## Error of exp, tanh, sigmoid, softplus; STRIDE=1 takes all floats
+
+build/accuracy:
+	@mkdir -p $@
+.PHONY: accuracy-float accuracy-double accuracy-source
+accuracy-float: | build/accuracy $(READY)
+	$(Q)gcc $(ACCURACY) -pthread -o build/accuracy/float test/accuracy/pen_math_accuracy.c src/pen_math.c -lm
+	@test/check "accuracy float, every $(strip $(STRIDE)). number" build/accuracy/float $(STRIDE) 2
+accuracy-double: | build/accuracy $(READY)
+	$(Q)gcc $(ACCURACY) -DPEN_REAL_DOUBLE -shared -fPIC -o build/accuracy/double.so src/pen_math.c
+	@test/check "accuracy double, dense sample" $(PYTHON) test/accuracy/double_error.py build/accuracy/double.so
+accuracy-source: | $(READY)
+	@test/check "accuracy coefficients are the derived ones" $(PYTHON) test/accuracy/coefficients.py --check src/pen_math.c
+
+# -- Python: generator, simulation, and this tally --------------------------------------------------------------------
+
+python: $(patsubst test/%,python-%,$(wildcard test/gen test/sil test/tools)) ## The Python tests
+python-%: | $(READY)
+	@HYPOTHESIS_STORAGE_DIRECTORY=build/hypothesis $(PYTHON) -m pytest -q test/$*
+
+# -- the price ----------------------------------------------------------------------------------------------------------
+
+figures-check: | $(READY) ## No figure of the price table may be 2 % worse than the kept one
+	@test/check "figures" $(PYTHON) test/bench/figures.py --check
