@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,11 +23,15 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "gen"), str(ROOT / "sil")]
 
 import penode_gen  # noqa: E402
+from penode_sil import mil  # noqa: E402
+from penode_sil.scenario import Instance  # noqa: E402
 from penode_sil.schedule import Call  # noqa: E402
-from penode_sil.targets import MACHINES, Pil  # noqa: E402
+from penode_sil.signals import VelocityChirp  # noqa: E402
+from penode_sil.targets import MACHINES, Pil, Sil  # noqa: E402
 
 KEPT = Path(__file__).with_name("figures.json")
 README = ROOT / "README.md"
+PICTURE = ROOT / "sil" / "recalibration.png"  # in README.md
 CORES = {"m3": "Cortex-M3 (no FPU)", "m4f": "Cortex-M4F", "m7": "Cortex-M7", "m33": "Cortex-M33", "m55": "Cortex-M55"}
 MODELS = {"nqvm": "RK4", "nqvm_euler": "explicit Euler"}
 LEVELS = ("-O2", "-Os")
@@ -78,12 +83,25 @@ def sizes_of(model: penode_gen.Model, folder: Path) -> dict[str, int]:
     return {line.split()[3]: int(line.split()[1], 16) for line in lines.splitlines()}
 
 
+def accuracy(models: dict[str, penode_gen.Model]) -> dict[str, int]:
+    """Distance of the float C from the exact solution [nm] over 10 s of the published chirp: largest and RMS of z_b, z_w."""
+    chirp, times = VelocityChirp(0.15, 1.0, 0.25, np.pi / 2), np.arange(10_001) * 1e-3
+    first = models["nqvm"]
+    exact = mil.solve(first, Instance("", "default"), {"z_road": chirp}, times[-1], times, len(penode_gen.set_values(first, "default"))).y
+    found = {}
+    for name, model in models.items():
+        error = Sil(model, source=ROOT / "gen" / "nqvm" / "c").run(chirp.value(times)[:, None]).y - exact
+        found[f"{name} error nm, largest"] = round(1e9 * float(np.abs(error).max()))
+        found[f"{name} error nm, RMS"] = round(1e9 * float(np.sqrt((error**2).mean(axis=0)).max()))
+    return found
+
+
 def measure() -> dict[str, int]:
     """All figures by name."""
     figures: dict[str, int] = {}
     u = hostile_inputs()
-    for name in MODELS:
-        model = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml")
+    models = {name: penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml") for name in MODELS}
+    for name, model in models.items():
         for core in CORES:
             for level in LEVELS:
                 run = Pil(model, core, ROOT / "gen" / "nqvm" / "c", level).run(u, exchange(model, 400))
@@ -99,7 +117,7 @@ def measure() -> dict[str, int]:
             for kind, size in sizes_of(model, Path(folder)).items():
                 figures[f"{name} {kind} bytes"] = size
         figures[f"{name} set bytes"] = 4 * len(penode_gen.set_values(model, "default"))
-    return figures
+    return figures | accuracy(models)
 
 
 def table(figures: dict[str, int]) -> str:
@@ -120,7 +138,14 @@ def table(figures: dict[str, int]) -> str:
         f"| a parameter set, in flash or in RAM of the caller | {figures['nqvm set bytes']} | {figures['nqvm set bytes']} |",
         f"| other RAM | {figures['nqvm m4f static RAM']} | {figures['nqvm m4f static RAM']} |",
     ]
+    rows += ["", "| float C at 1 ms against the exact solution, 10 s of a chirp | " + " | ".join(MODELS.values()) + " |", "|---|---|---|"]
+    for kind, title in (("largest", "largest error of z_b, z_w"), ("RMS", "RMS error")):
+        rows.append(f"| {title} | " + " | ".join(_micrometres(figures[f"{name} error nm, {kind}"]) for name in MODELS) + " |")
     return "\n".join(rows)
+
+
+def _micrometres(nanometres: int) -> str:
+    return f"{nanometres / 1000:.3g} µm" if nanometres < 1e6 else f"{nanometres / 1e6:.3g} mm"
 
 
 def run_text() -> str:
@@ -161,6 +186,7 @@ def main() -> int:
     elif not check:
         KEPT.write_text(json.dumps(new, indent=1) + "\n")
         README.write_text(shown)
+        shutil.copy(ROOT / "build" / "run" / "recalibration.png", PICTURE)
         print(table(new))
     for line in found:
         print(line, file=sys.stderr)
