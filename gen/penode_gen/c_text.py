@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import textwrap
 from typing import Callable
 
 import numpy as np
@@ -46,12 +48,60 @@ def _decimal(text: str) -> str:
     return f"{digits if '.' in digits else digits + '.0'}e{int(exponent)}"
 
 
+def fold(text: str, width: int = 120) -> str:
+    """C with lines of up to `width` columns, as far as comments and expressions can be broken."""
+    found: list[str] = []
+    comment = False  # does the line start within one?
+    for line in map(str.rstrip, text.split("\n")):
+        if len(line) <= width:
+            found.append(line)
+        else:
+            found += _fold_comment(line, width) if comment or line.lstrip().startswith("/*") else _fold_code(line, width)
+        comment = line.rfind("/*") > line.rfind("*/") or (comment and "*/" not in line)
+    return "\n".join(found)
+
+
+def _fold_comment(line: str, width: int) -> list[str]:
+    """A line of a comment, or a comment on one line, broken between words."""
+    mark = re.match(r"\s*(/\*\*? |\* *)?", line)[0]
+    indent = mark[: len(mark) - len(mark.lstrip())]
+    hang = {"/** ": f"{indent} * ", "/* ": f"{indent}   ", "* ": mark}.get(mark.lstrip(), f"{mark}  ")
+    words = line[len(mark) :].replace(" */", "\0*/")  # the end stays with its last word
+    folded = textwrap.wrap(words, width, initial_indent=mark, subsequent_indent=hang, break_long_words=False, break_on_hyphens=False)
+    return [part.replace("\0*/", " */") for part in folded]
+
+
+def _fold_code(line: str, width: int) -> list[str]:
+    """A statement broken where the fewest parentheses are open; a comment behind it goes above."""
+    indent = line[: len(line) - len(line.lstrip())]
+    if remark := re.fullmatch(r"\s*(.*\S)\s*(/\*.*\*/)", line):
+        above, code = indent + remark[2], indent + remark[1]
+        return [*(_fold_comment(above, width) if len(above) > width else [above]), *_fold_code(code, width)]
+    hang = indent if re.match(r"\s*(\(pen_real_t\))?-?\d", line) else f"{indent}    "  # rows of numbers, and all else
+    folded: list[str] = []
+    while len(line) > width and (at := _break(line, width)):
+        folded.append(line[:at])
+        line = hang + line[at + 1 :]
+    return [*folded, line]
+
+
+def _break(line: str, width: int) -> int:
+    """The last space at which a line may be broken with the fewest parentheses open, 0 if there is none."""
+    best, depth, found = 0, 0, 0
+    for at, c in enumerate(line[: width + 1]):
+        depth += (c in "([{") - (c in ")]}")
+        may = c == " " and (line[at - 1] == "," or re.match(r" (?:[-+*/?:]|&&|\|\|) ", line[at:]))
+        if may and at >= width // 3 and (not found or depth <= best):
+            best, found = depth, at
+    return 0 if line.startswith("#") else found
+
+
 class Printer:
     """Prints SymPy expressions; `name` gives the C text of a symbol."""
 
     _calls = {
-        sp.exp: "pen_exp", sp.tanh: "pen_tanh", ex.Sigmoid: "pen_sigmoid", ex.Softplus: "pen_softplus", sp.Abs: "pen_port_abs",
-        sp.sign: "pen_sign", sp.Heaviside: "pen_heaviside", sp.Max: "pen_max", sp.Min: "pen_min",
+        sp.exp: "pen_exp", sp.tanh: "pen_tanh", ex.Sigmoid: "pen_sigmoid", ex.Softplus: "pen_softplus", ex.Absolute: "pen_port_abs",
+        ex.Sign: "pen_sign", sp.Heaviside: "pen_heaviside", sp.Max: "pen_max", sp.Min: "pen_min",
     }  # fmt: skip
 
     def __init__(self, name: Callable[[sp.Symbol], str]):
@@ -78,12 +128,13 @@ class Printer:
             return text
         if expr.func in self._calls:
             return f"{self._calls[expr.func]}({self(expr.args[0])})"
+        if expr.is_Relational:
+            return f"{self.inner(expr.args[0])} {expr.rel_op} {self.inner(expr.args[1])}"
         if isinstance(expr, sp.Piecewise):
             (yes, condition), *rest = expr.args
             if condition == sp.true:
                 return self(yes)
-            relation = f"{self.inner(condition.args[0])} {condition.rel_op} {self.inner(condition.args[1])}"
-            return f"({relation}) ? {self.inner(yes)} : {self.inner(sp.Piecewise(*rest))}"
+            return f"{self.inner(condition)} ? {self.inner(yes)} : {self.inner(sp.Piecewise(*rest))}"
         raise ValueError(f"no C for {expr.func.__name__} in {expr}")
 
     def inner(self, expr: sp.Expr) -> str:

@@ -13,7 +13,8 @@ from functools import cached_property
 from typing import Iterable
 
 import sympy as sp
-from sympy.core.function import AppliedUndef
+from sympy.core.function import Application, AppliedUndef
+from sympy.core.relational import Relational
 
 from . import expressions as ex
 from . import units
@@ -40,6 +41,7 @@ class Step:
     network: str = ""
     arguments: tuple[sp.Expr, ...] = ()
     comment: str = ""
+    where: tuple[str, ...] = ("model",)
 
     @property
     def reads(self) -> set[sp.Symbol]:
@@ -110,12 +112,13 @@ def causalise(model: Model) -> Causal:
     kinematic, unit_of = _kinematics(model)
     unit_of |= {f"F_{e.name}": "N" for e in model.elements}
     names = set(unit_of)
+    moving = {*model.states, *(i.name for i in model.inputs)}
 
     def parse(where: tuple[str, ...], text: str, extra: set[str] = frozenset()) -> sp.Expr:
         try:
-            return ex.parse(text, names | extra, ports)
+            return ex.parse(text, names | extra, ports, moving)
         except ex.ExpressionError as error:
-            problems.append((where, str(error), "use names of the model"))
+            problems.append((where, str(error), "mend the expression"))
             return sp.Integer(0)
 
     equations = list(kinematic)
@@ -130,9 +133,13 @@ def causalise(model: Model) -> Causal:
             comment = f"force of {e.name}: network {e.network}"
         else:
             text = e.expression if e.law == "expression" else LAWS[e.law].force
-            arguments = {} if e.law == "expression" else e.arguments
-            value = parse(where, text, {"s", "v", *arguments})
-            value = value.subs({ex.symbol("s"): s, ex.symbol("v"): v} | {ex.symbol(k): ex.symbol(p) for k, p in arguments.items()})
+            value = parse(where, text, {"s", "v", *e.arguments})
+            meant = {"s": s, "v": v} | {k: ex.symbol(p) for k, p in e.arguments.items()}
+            if e.law == "expression":
+                for name in sorted({"s", "v"} & names & {a.name for a in value.free_symbols}):
+                    what = f"'{name}' is the {'deflection' if name == 's' else 'rate'} of this element, and a name of the model"
+                    problems.append((where, what, f"write {name}_{e.name} for the element's, or rename the other"))
+            value = value.xreplace({ex.symbol(k): to for k, to in meant.items()})
             comment = f"force of {e.name}"
         equations.append(_Equation(where, force, value, comment))
     for b in model.bodies:
@@ -141,15 +148,17 @@ def causalise(model: Model) -> Causal:
             _Equation(("bodies", b.name), ex.derivative(b.velocity), pull / ex.symbol(b.mass), f"acceleration of {b.name}")
         )
     for q in model.equations:
-        left, right = (parse(("equations", q.name), side) for side in q.text.split("="))
+        left, right = (parse(("equations", q.name), side) for side in ex.sides(q.text))
         equations.append(_Equation(("equations", q.name), left, right, q.name))
     signals = {
         section: [parse((section, s.name), s.expression) for s in getattr(model, section)] for section in ("outputs", "sensors")
     }
     alias = {f"{k}_{e.name}": f"{k}_{shared[e.name]}" for e in model.elements for k in "sv"}
     rename = {ex.symbol(a): ex.symbol(b) for a, b in alias.items() if a != b}
-    equations = [replace(q, left=q.left.subs(rename), right=q.right.subs(rename)) for q in equations if q.left not in rename]
-    signals = {section: [s.subs(rename) for s in found] for section, found in signals.items()}
+    equations = [q for q in equations if q.left not in rename]
+    meant = rename | {ex.derivative(b.position): ex.symbol(b.velocity) for b in model.bodies}
+    equations = [replace(q, left=q.left.xreplace(meant), right=q.right.xreplace(meant)) for q in equations]
+    signals = {section: [s.xreplace(meant) for s in found] for section, found in signals.items()}
 
     problems += _check_units(model, equations, signals, unit_of)
     if problems:
@@ -162,7 +171,7 @@ def causalise(model: Model) -> Causal:
     states = tuple(ex.symbol(n) for n in model.states)
     velocities = {b.position: ex.symbol(b.velocity) for b in model.bodies}
     causal = Causal(
-        model, states, tuple(ex.symbol(i.name) for i in model.inputs), tuple(_hoist(steps)),
+        model, states, tuple(ex.symbol(i.name) for i in model.inputs), tuple(_hoist(steps, names)),
         tuple(velocities.get(n, ex.derivative(n)) for n in model.states), tuple(signals["outputs"]), tuple(signals["sensors"]),
     )  # fmt: skip
     _check_result(causal)
@@ -262,10 +271,19 @@ def _check_result(causal: Causal) -> None:
     everything = [*causal.rates, *causal.outputs, *causal.sensors]
     if model.interpolation == "held" and causal.uses(everything, causal.input_rates):
         problems.append((("model", "input"), "the model uses the rate of an input, which is not defined for a held input", 'write input = "linear"'))
-    for step in causal.steps:
-        for power in (step.value or sp.Integer(0)).atoms(sp.Pow):
-            if not (power.exp.is_Integer and abs(int(power.exp)) <= 8):
-                problems.append((("model",), f"'{power}': the C has whole powers up to 8 only", "write it with products, exp or a network"))
+    constants = {ex.symbol(p.name): sp.Float(p.value, 17) for p in model.parameters.values() if not p.tunable}
+    parts = [(step.where, part) for step in causal.steps for part in (step.arguments if step.network else (step.value,))]
+    for section, found in (("outputs", causal.outputs), ("sensors", causal.sensors)):
+        parts += [((section, signal.name), value) for signal, value in zip(getattr(model, section), found)]
+    for where, part in parts:
+        for base in sorted({p.base for p in part.atoms(sp.Pow) if p.exp.is_negative}, key=str):
+            if base.xreplace(constants).is_zero:
+                problems.append((where, f"divides by '{base}', which is zero", "change the parameters or the equation"))
+        if part.has(sp.zoo, sp.nan) or not all(ex.in_range(n) for n in part.atoms(sp.Number)):
+            problems.append((where, "its solution holds a number that a float cannot hold", "scale the equation"))
+    locals_ = {f"{s.target.name}{end}" for s in causal.steps if s.network for end in ("_in", "_slope", "_bend")}
+    for name in sorted(locals_ & {*model.states, *model.parameters, *(i.name for i in model.inputs), *(v.name for v in model.variables)}):
+        problems.append((("model",), f"the code needs the name '{name}' for a network call", f"rename '{name}'"))
     known = {*causal.states, *causal.inputs, *causal.input_rates, *(s.target for s in causal.steps)}
     known |= {ex.symbol(p) for p in model.parameters}
     for section, found in (("outputs", causal.outputs), ("sensors", causal.sensors)):
@@ -294,24 +312,48 @@ def _solve(equations: list[_Equation], unknowns: list[sp.Symbol]) -> list[Step]:
         targets = [unknowns[match[q]] for q in block]
         first = equations[block[0]]
         if len(block) == 1 and first.left == targets[0] and targets[0] not in first.right.free_symbols:
-            steps.append(Step(targets[0], first.right, comment=first.comment))
+            steps.append(Step(targets[0], first.right, comment=first.comment, where=first.where))
             continue
-        residuals = [equations[q].residual for q in block]
         names = ", ".join(f"'{equations[q].where[-1]}'" for q in block)
-        try:
-            a, b = sp.linear_eq_to_matrix(residuals, targets)
-            solution = a.LUsolve(b)
-        except (sp.solvers.solveset.NonlinearError, ValueError):
-            unknown = ", ".join(t.name for t in targets)
+        unknown = ", ".join(t.name for t in targets)
+        system = _linear([equations[q].residual for q in block], targets)
+        if system is None:
             problems.append((first.where, f"equations {names} form an algebraic loop that is not linear in {unknown}", "break it with a state, or write it solved"))
             continue
-        if any(not set(e.free_symbols).isdisjoint(targets) or e.has(sp.nan, sp.zoo) for e in solution):
-            problems.append((first.where, f"equations {names} have no unique solution for {', '.join(t.name for t in targets)}", "check for an equation said twice"))
+        try:
+            solution = system[0].LUsolve(system[1], iszerofunc=lambda e: _tidy(e).is_zero)
+        except ValueError:  # a pivot is zero
+            problems.append((first.where, f"equations {names} have no unique solution for {unknown}", "check for an equation said twice"))
             continue
-        steps += [Step(t, sp.simplify(e), comment=equations[q].comment) for t, e, q in zip(targets, solution, block)]
+        steps += [Step(t, _tidy(e), comment=equations[q].comment, where=equations[q].where) for t, e, q in zip(targets, solution, block)]
     if problems:
         raise CausaliseError(problems)
     return steps
+
+
+def _linear(residuals: list[sp.Expr], targets: list[sp.Symbol]) -> tuple[sp.Matrix, sp.Matrix] | None:
+    """(A, b) with residuals = A targets - b; None if they are not linear."""
+    unknown = set(targets)
+    curved = [f for r in residuals for f in r.atoms(Application, Relational) if not isinstance(f, sp.Piecewise)]
+    if any(f.free_symbols & unknown for f in curved):
+        return None
+    a = sp.Matrix([[r.diff(t) for t in targets] for r in residuals])
+    b = sp.Matrix([-r.xreplace(dict.fromkeys(targets, sp.Integer(0))) for r in residuals])
+    return None if a.free_symbols & unknown else (a, b)
+
+
+def _tidy(expr: sp.Expr) -> sp.Expr:
+    """A quotient in lowest terms; what is not made of + - * / stays as it is."""
+    whole = {f: sp.Dummy(f"f{i}") for i, f in enumerate(sorted(_functions(expr), key=sp.default_sort_key))}
+    back = {d: f for f, d in whole.items()}
+    return sp.cancel(expr.xreplace(whole)).xreplace(back)
+
+
+def _functions(expr: sp.Expr) -> set[sp.Expr]:
+    """The outermost parts of an expression that are neither symbols nor numbers nor made of + - * / and whole powers."""
+    if isinstance(expr, (sp.Add, sp.Mul)) or (expr.is_Pow and expr.exp.is_Integer):
+        return set().union(*(_functions(a) for a in expr.args))
+    return set() if expr.is_Symbol or expr.is_Number else {expr}
 
 
 def _match(equations: list[_Equation], unknowns: list[sp.Symbol], reads: list[set[int]]) -> dict[int, int]:
@@ -333,7 +375,7 @@ def _match(equations: list[_Equation], unknowns: list[sp.Symbol], reads: list[se
         if not place(q, set()):
             problems.append((equation.where, "nothing is left that this equation could determine", "remove it, or add a variable"))
     for u, unknown in enumerate(unknowns):
-        if u not in owner and not problems:
+        if u not in owner:
             name = unknown.name[4:-1] if unknown.name.startswith("der(") else unknown.name
             section = "states" if unknown.name.startswith("der(") else "variables"
             problems.append(((section, name), f"no equation determines {unknown.name}", "add one to [equations]"))
@@ -370,18 +412,21 @@ def _blocks(needs: dict[int, list[int]]) -> list[list[int]]:
     return blocks
 
 
-def _hoist(steps: list[Step]) -> Iterable[Step]:
-    """Give each network call a step of its own."""
+def _hoist(steps: list[Step], names: set[str]) -> Iterable[Step]:
+    """Give each network call a step of its own; no step takes one of `names`."""
     count = 0
     for step in steps:
-        if isinstance(step.value, AppliedUndef):
-            yield Step(step.target, None, step.value.func.__name__, step.value.args, step.comment)
-            continue
+        own = isinstance(step.value, AppliedUndef)  # the call is the step
         value = step.value
-        while calls := sorted(value.atoms(AppliedUndef), key=lambda c: (c.has(AppliedUndef) and len(c.atoms(AppliedUndef)), str(c))):
+        while calls := sorted(value.atoms(AppliedUndef) - ({value} if own else set()), key=lambda c: (len(c.atoms(AppliedUndef)), str(c))):
+            inner = calls[0]  # has no call within
             count += 1
-            inner = calls[0]
+            while f"{inner.func.__name__}_{count}" in names:
+                count += 1
             target = ex.symbol(f"{inner.func.__name__}_{count}")
-            yield Step(target, None, inner.func.__name__, inner.args, f"network {inner.func.__name__}")
-            value = value.subs(inner, target)
-        yield replace(step, value=value)
+            yield Step(target, None, inner.func.__name__, inner.args, f"network {inner.func.__name__}", step.where)
+            value = value.xreplace({inner: target})
+        if own:
+            yield Step(step.target, None, value.func.__name__, value.args, step.comment, step.where)
+        else:
+            yield replace(step, value=value)

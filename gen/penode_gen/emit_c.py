@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from dataclasses import dataclass
@@ -13,10 +14,10 @@ import sympy as sp
 
 from . import expressions as ex
 from . import sets, units
-from .c_text import Printer, literal, real
+from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
 from .jacobian import Derivatives
-from .model import Model, ModelError
+from .model import Model
 from .networks import Affine, Dense, Layer, Network
 
 VERSION = "0.1.0"
@@ -27,7 +28,6 @@ _TEMPLATES = jinja2.Environment(
 
 # Runge-Kutta methods in which every stage builds on the one before: nodes, weights and the divisor of the weights.
 _RUNGE_KUTTA = {
-    "euler": ((0.0,), (1.0,), 1.0),
     "heun": ((0.0, 1.0), (1.0, 1.0), 2.0),
     "rk4": ((0.0, 0.5, 0.5, 1.0), (1.0, 2.0, 2.0, 1.0), 6.0),
 }
@@ -48,14 +48,17 @@ def render(model: Model) -> dict[str, str]:
     """File name -> text of the C of a model. Pure: no clock, no path beyond the model file's name."""
     context = _Emitter(model).context()
     names = {"model.h.j2": f"{model.name}.h", "model.c.j2": f"{model.name}.c", "params.c.j2": f"{model.name}_params.c"}
-    return {name: _TEMPLATES.get_template(template).render(context) for template, name in names.items()}
+    return {name: fold(_TEMPLATES.get_template(template).render(context)) for template, name in names.items()}
 
 
 def generate(model: Model, directory: str | Path) -> list[Path]:
-    """Write the C of a model into `directory`: all files, or none."""
+    """Write the C of a model into `directory`: all files, or none. Raises OSError."""
     texts = render(model)
     directory = Path(directory)
     directory.mkdir(parents=True, exist_ok=True)
+    for path in (directory / name for name in texts):
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     written: list[tuple[str, Path]] = []
     try:
         for name, text in texts.items():
@@ -111,15 +114,6 @@ class _Emitter:
         self.networks = self._network_code()
         self.function_of = {user: code.name for code in self.networks for user in code.users}
         self.constants: dict[str, sp.Symbol] = {}
-        problems = []
-        upper: dict[str, str] = {}
-        for p in model.parameters:
-            if upper.setdefault(p.upper(), p) != p or p.upper() in ("N_X", "N_U", "N_Y", "N_SENSORS", "LAYOUT", "H", "READY"):
-                problems.append(f"{model.path}: parameters.{p}: its C constant {self.prefix}_{p.upper()} is already taken; rename it")
-        if not model.inputs or not model.outputs:
-            problems.append(f"{model.path}: the C needs at least one input and one output; add [inputs] or [outputs]")
-        if problems:
-            raise ModelError(problems)
 
     # -- what the templates see -----------------------------------------------------------------------------------
 
@@ -128,7 +122,7 @@ class _Emitter:
         rosenbrock = model.method.startswith("ros")
         nodes, weights, divisor = _RUNGE_KUTTA.get(model.method, ((), (), 1.0))
         functions = {
-            "rates": self._function(causal.rates, "dx"),
+            "rates": self._function(causal.rates, "dx") if model.method != "ros1" else None,
             "rates_jacobian": self._function(causal.rates, "dx", ("fx", "fu")),
             "outputs": self._function(causal.outputs, "y"),
             "outputs_jacobian": self._function(causal.outputs, "y", ("yx", "yu"), values=False),
@@ -144,12 +138,14 @@ class _Emitter:
             "functions": functions, "constants": self._constants(), "networks": self.networks,
             "network_lines": {c.name: self._network_lines(c) for c in self.networks},
             "bend_lines": {c.name: self._bend_lines(c) for c in self.networks if self._bent(c, functions)},
+            "called": {f"{c.name}{part}" for c in self.networks for part in ("", "_slope") if self._mentions(functions, (f" {c.name}{part}(",))},
             "slope_lines": {c.name: self._slope_lines(c) for c in self.networks},
             "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),
             "set_length": len(sets.set_values(model, "default")), "offsets": self._offset_lines(),
             "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
-            "sample_time": real(model.sample_time), "literal": literal, "real": real, "columns": len(model.states) + 2 * len(model.inputs),
+            "sample_time": real(model.sample_time), "literal": literal, "real": real, "si": units.si,
+            "columns": len(model.states) + 2 * len(model.inputs),
             "needs_math": self._mentions(functions, _MATH), "needs_abs": self._mentions(functions, ("pen_port_abs",)),
         }  # fmt: skip
 
@@ -168,7 +164,7 @@ class _Emitter:
         for b in self.model.bodies:
             if state in (b.position, b.velocity):
                 return "m" if state == b.position else "m/s"
-        return next(s.unit for s in self.model.extra_states if s.name == state)
+        return next(units.si(s.unit) for s in self.model.extra_states if s.name == state)
 
     # -- expressions and functions --------------------------------------------------------------------------------
 
@@ -245,7 +241,7 @@ class _Emitter:
                 lines.append(f"const pen_real_t {self._c_name(s)} = u[{i}];")
         for p in model.tunable:
             if ex.symbol(p.name) in used:
-                lines.append(f"const pen_real_t {self._c_name(ex.symbol(p.name))} = p[{self.at[p.name]}]; /* {p.unit} */")
+                lines.append(f"const pen_real_t {self._c_name(ex.symbol(p.name))} = p[{self.at[p.name]}]; /* {units.si(p.unit)} */")
         if lines and steps:
             lines.append("")
         calls = uses_p = False
@@ -254,12 +250,12 @@ class _Emitter:
                 bend = step.target in needs_bend
                 slope = step.target in needs_slope
                 value = slope or step.target in used or not bend
-                lines += self._call(step, value, slope, bend)
+                lines += self._call(step, value, slope, bend, used)
                 calls = calls or value
                 uses_p = True
             else:
                 lines += _remarked(f"const pen_real_t {self._c_name(step.target)} = {self._print(step.value)};", step)
-        lines += [f"const pen_real_t {t.name} = {self._print(e)};" for t, e in temporaries]
+        lines += [f"const {'bool' if e.is_Relational else 'pen_real_t'} {t.name} = {self._print(e)};" for t, e in temporaries]
         if lines and wanted:
             lines.append("")
         lines += [f"{name} = {self._print(e)};" for name, e in wanted]
@@ -268,12 +264,13 @@ class _Emitter:
             "uses_x": any(s in used for s in causal.states), "uses_u": any(s in used for s in self.drive),
         }  # fmt: skip
 
-    def _call(self, step: Step, value: bool, slope: bool, bend: bool) -> list[str]:
+    def _call(self, step: Step, value: bool, slope: bool, bend: bool, used: set[sp.Symbol]) -> list[str]:
         name = self._c_name(step.target)
         function = self.function_of[step.network]
         values = f"&p[{self.prefix}_AT_{step.network.upper()}]"
         lines = []
-        if len(step.arguments) == 1 and step.arguments[0].is_Symbol:
+        constants = {ex.symbol(p.name) for p in self.model.parameters.values() if not p.tunable}  # macros have no address
+        if len(step.arguments) == 1 and step.arguments[0].is_Symbol and step.arguments[0] not in constants:
             argument = f"&{self._c_name(step.arguments[0])}"
         else:
             argument = f"{name}_in"
@@ -285,7 +282,7 @@ class _Emitter:
             lines.append(f"pen_real_t {name}_slope[{len(step.arguments)}];")
             lines.append(f"status |= {function}_slope({values}, {argument}, &{name}, {name}_slope);")
             for i, s in enumerate(self.derivatives.slopes[step.target]):
-                lines.append(f"const pen_real_t {s.name} = {name}_slope[{i}];")
+                lines += [f"const pen_real_t {s.name} = {name}_slope[{i}];"] if s in used else []
         elif value:
             lines.append(f"status |= {function}({values}, {argument}, &{name});")
         if bend:
@@ -293,7 +290,7 @@ class _Emitter:
             lines.append(f"pen_real_t {name}_bend[{n}][{n}];")
             lines.append(f"{function}_bend({values}, {argument}, {name}_bend);")
             for i, row in enumerate(self.derivatives.bends[step.target]):
-                lines += [f"const pen_real_t {s.name} = {name}_bend[{i}][{j}];" for j, s in enumerate(row) if j >= i]
+                lines += [f"const pen_real_t {s.name} = {name}_bend[{i}][{j}];" for j, s in enumerate(row) if j >= i and s in used]
         return lines
 
     # -- networks -------------------------------------------------------------------------------------------------
@@ -442,7 +439,7 @@ class _Emitter:
         found = []
         for name, at in self.at.items():
             if name in tunable:
-                remark = f"{tunable[name].unit}, in SI" + (f": {tunable[name].description}" if tunable[name].description else "")
+                remark = units.si(tunable[name].unit) + (f": {tunable[name].description}" if tunable[name].description else "")
             else:
                 remark = f"network {name}"
             found.append({"name": f"{self.prefix}_AT_{name.upper()}", "at": f"{at}U", "remark": remark})

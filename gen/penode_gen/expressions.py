@@ -19,6 +19,10 @@ class ExpressionError(ValueError):
     """A text that is no expression of the model; the message says what and where."""
 
 
+class UnknownFunction(ExpressionError):
+    """A call of what is neither a function nor a network."""
+
+
 class Softplus(sp.Function):
     """log(1 + e^x), kept whole so that the C calls pen_softplus."""
 
@@ -48,6 +52,39 @@ class Sigmoid(sp.Function):
         return (1 / (1 + sp.exp(-self.args[0])))._eval_evalf(prec)
 
 
+class Sign(sp.Function):
+    """-1, 0 or 1 of a real number, flat on both sides (SymPy's own knows complex numbers, which its derivatives show)."""
+
+    nargs = 1
+    is_extended_real = True
+
+    @classmethod
+    def eval(cls, x: sp.Expr) -> sp.Expr | None:
+        if x.is_Number:
+            return sp.sign(x)
+        return -cls(-x) if x.could_extract_minus_sign() else None
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        return sp.Integer(0)
+
+
+class Absolute(sp.Function):
+    """Size of a real number; its slope is Sign."""
+
+    nargs = 1
+    is_extended_real = True
+    is_nonnegative = True
+
+    @classmethod
+    def eval(cls, x: sp.Expr) -> sp.Expr | None:
+        if x.is_Number:
+            return abs(x)
+        return cls(-x) if x.could_extract_minus_sign() else None
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        return Sign(self.args[0])
+
+
 def symbol(name: str) -> sp.Symbol:
     """The one real symbol of that name."""
     return sp.Symbol(name, real=True)
@@ -68,8 +105,8 @@ FUNCTIONS = {
     "tanh": (1, sp.tanh),
     "sigmoid": (1, Sigmoid),
     "softplus": (1, Softplus),
-    "abs": (1, sp.Abs),
-    "sign": (1, sp.sign),
+    "abs": (1, Absolute),
+    "sign": (1, Sign),
     "min": (2, sp.Min),
     "max": (2, sp.Max),
 }
@@ -81,9 +118,13 @@ def sides(text: str) -> list[str]:
     return re.split(r"(?<![<>=!])=(?!=)", text)
 
 
-def in_range(value: float) -> bool:
+def in_range(value: float | sp.Number) -> bool:
     """Is it zero or a number that a float holds with all its digits? False for NaN."""
-    return value == 0.0 or _LEAST <= abs(value) <= _LARGEST
+    try:
+        size = abs(float(value))
+    except OverflowError:
+        return False
+    return size == 0.0 or _LEAST <= size <= _LARGEST
 
 
 def parse(text: str, names: Collection[str], networks: dict[str, int], moving: Collection[str] = ()) -> sp.Expr:
@@ -91,6 +132,7 @@ def parse(text: str, names: Collection[str], networks: dict[str, int], moving: C
     Parse `text`. Known: numbers, `names`, + - * / ^, der(name) of `moving` names, where(a < b, x, y), FUNCTIONS, and
     `networks` with their number of inputs. Raises ExpressionError.
     """
+    text = text.strip()
     shown = text if len(text) <= 60 else f"{text[:57]}..."
 
     def refuse(what: str) -> ExpressionError:
@@ -100,10 +142,11 @@ def parse(text: str, names: Collection[str], networks: dict[str, int], moving: C
         found = build(node)
         if found.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
             raise refuse(f"divides by zero in '{ast.unparse(node)}'")
-        if found.is_number and not found.is_Rational:
+        if found.is_number and not found.is_Rational:  # exp(1), tanh(2)
             found = sp.Float(found.evalf(17), 17)
-        if found.is_Number and not (in_range(found) and (not found.is_Rational or found.q < 10**40)):
-            raise refuse("holds a number that a float cannot hold")
+        for number in found.atoms(sp.Number):
+            if not in_range(number):
+                raise refuse("holds a number that a float cannot hold")
         return found
 
     def build(node: ast.AST) -> sp.Expr:
@@ -111,6 +154,8 @@ def parse(text: str, names: Collection[str], networks: dict[str, int], moving: C
             case ast.Constant(value=bool()):
                 pass
             case ast.Constant(value=int() | float() as value):
+                if not in_range(value):
+                    raise refuse("holds a number that a float cannot hold")
                 return sp.Integer(value) if isinstance(value, int) else sp.Float(value, 17)
             case ast.Name(id=name):
                 if name not in names:
@@ -142,11 +187,13 @@ def parse(text: str, names: Collection[str], networks: dict[str, int], moving: C
                 if name not in moving:
                     raise refuse(f"uses der({name}), but '{name}' is no state or input")
                 return derivative(name)
-            case ast.Call(func=ast.Name(id="where"), args=arguments):
+            case ast.Call(func=ast.Name(id="where"), args=arguments, keywords=keywords):
                 match arguments:
-                    case [ast.Compare(left, [relation], [right]), yes, no] if type(relation) in _RELATIONS:
-                        condition = _RELATIONS[type(relation)](walk(left), walk(right))
-                        return sp.Piecewise((walk(yes), condition), (walk(no), True))
+                    case [ast.Compare(left, [relation], [right]), yes, no] if type(relation) in _RELATIONS and not keywords:
+                        a, b = walk(left), walk(right)
+                        if a.has(sp.Piecewise) or b.has(sp.Piecewise):
+                            raise refuse("compares the result of a 'where'; give that a variable of its own")
+                        return sp.Piecewise((walk(yes), _RELATIONS[type(relation)](a, b)), (walk(no), True))
                 raise refuse("has a 'where' that is not where(a < b, x, y)")
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                 count, function = FUNCTIONS.get(name, (None, None))
@@ -154,7 +201,7 @@ def parse(text: str, names: Collection[str], networks: dict[str, int], moving: C
                     count, function = networks[name], network(name)
                 if function is None:
                     known = ", ".join(sorted([*FUNCTIONS, *networks, "der", "where"]))
-                    raise refuse(f"calls '{name}'; known are {known}")
+                    raise UnknownFunction(f"'{shown}' calls '{name}'; known are {known}")
                 if len(arguments) != count:
                     raise refuse(f"has {name} with {len(arguments)} argument(s); it takes {count}")
                 return function(*map(walk, arguments))
@@ -165,7 +212,7 @@ def parse(text: str, names: Collection[str], networks: dict[str, int], moving: C
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Python's remarks on its own syntax
-            tree = ast.parse(text.replace("^", "**").strip(), mode="eval")
+            tree = ast.parse(text.replace("^", "**"), mode="eval")
         return walk(tree.body)
     except SyntaxError as error:
         raise refuse(f"cannot be read as an expression ({error.msg})") from error

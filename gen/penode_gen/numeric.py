@@ -12,7 +12,7 @@ from .causalise import Causal, causalise
 from .model import Model
 
 _NUMPY = [
-    {"Softplus": lambda x: np.logaddexp(0.0, x), "Sigmoid": lambda x: 1.0 / (1.0 + np.exp(-x))},
+    {"Softplus": lambda x: np.logaddexp(0.0, x), "Sigmoid": lambda x: 1.0 / (1.0 + np.exp(-x)), "Sign": np.sign, "Absolute": np.abs},
     "numpy",
 ]
 
@@ -75,7 +75,7 @@ class Numeric:
     def _lambdify(self, known: list[sp.Symbol], parts: list[sp.Expr] | tuple[sp.Expr, ...]) -> Callable[..., list[float]]:
         names = [sp.Symbol(f"a{i}", real=True) for i in range(len(known))]
         swap = dict(zip(known, names))
-        return sp.lambdify(names, [p.subs(self._values).subs(swap) for p in parts], modules=_NUMPY, cse=True)
+        return sp.lambdify(names, [p.xreplace(self._values).xreplace(swap) for p in parts], modules=_NUMPY, cse=True)
 
 
 def numeric(model: Model, set_name: str = "default") -> Numeric:

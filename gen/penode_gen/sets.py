@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import units
 from .model import Model, ParameterSet
 from .networks import Affine, Dense, Network
 
@@ -89,7 +90,7 @@ def pieces(model: Model, chosen: ParameterSet) -> list[Piece]:
     """All values of a set with comments, in order."""
     at = offsets(model)
     found = [
-        Piece(at[p.name], np.array([chosen.parameters[p.name]]), f"{p.name} [{p.unit}], in SI{': ' + p.description if p.description else ''}")
+        Piece(at[p.name], np.array([chosen.parameters[p.name]]), f"{p.name} [{units.si(p.unit)}]{': ' + p.description if p.description else ''}")
         for p in model.tunable
     ]
     for name, network in chosen.networks.items():

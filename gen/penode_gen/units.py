@@ -9,6 +9,8 @@ from typing import Callable
 import pint
 import sympy as sp
 
+from . import expressions as ex
+
 _registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=False)
 Dimension = pint.util.UnitsContainer
 NONE: Dimension = _registry.dimensionless.dimensionality
@@ -17,7 +19,7 @@ NONE: Dimension = _registry.dimensionless.dimensionality
 _POWER = r"(?:\s*(?:\^|\*\*)\s*-?\d(?:\.\d{1,2})?|[\u00b2\u00b3])?"
 _NAMED = rf"(?:[^\W\d][^\W\d]*|[%°]){_POWER}"
 _GROUP = rf"(?:{_NAMED}|\(\s*{_NAMED}(?:\s*[*/·]\s*{_NAMED})*\s*\){_POWER})"
-_UNIT = re.compile(rf"\s*(?:1|1\s*/\s*{_GROUP}|{_GROUP})?(?:\s*[*/·]\s*{_GROUP})*\s*")
+_UNIT = re.compile(rf"\s*(?:1|1\s*/\s*{_GROUP}|{_GROUP})?(?:(?:\s*[*/·]\s*|\s+){_GROUP})*\s*")
 _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
 
@@ -46,7 +48,7 @@ def factor(text: str) -> float:
 
 def si(text: str) -> str:
     """The SI unit of what `text` measures: `text` itself if it is one, 'm' for 'mm'."""
-    return text if factor(text) == 1.0 else describe(dimension(text)).replace("no unit", "1")
+    return text.strip() or "1" if factor(text) == 1.0 else describe(dimension(text)).replace("no unit", "1")
 
 
 def dimension(text: str) -> Dimension:
@@ -107,9 +109,9 @@ def dimension_of(expr: sp.Expr, of: Callable[[sp.Basic], Dimension]) -> Dimensio
                 raise UnitError(f"'{expr}': a power with a variable exponent needs numbers without unit")
             return NONE
         return (parts[0] or NONE) ** float(exponent)
-    if isinstance(expr, sp.Abs):
+    if isinstance(expr, ex.Absolute):
         return parts[0]
-    if isinstance(expr, sp.sign):
+    if isinstance(expr, ex.Sign):
         return NONE
     for part in parts:  # exp, tanh, ...
         if part:

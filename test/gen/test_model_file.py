@@ -147,11 +147,11 @@ FAULTS = [
     ("[sets.heavy]", '[sets."a b"]', "'a b' cannot be a name"),
     ("[sets.heavy]", "[sets.Default]", "differs from the set 'default' by case only"),
     ("tau = {", "m = {", "is not valid TOML (Cannot overwrite a value)"),
-    ('g = { unit = "N" }', 'F = { unit = "N" }', "variables.F: 'F' is already the name of a input"),
-    ('g = { unit = "N" }', 'F_foot = { unit = "N" }', "'F_foot' is already the name of a variable", at("foot =")),
-    ('velocity = "w"', 'velocity = "q"', "bodies.mass.velocity: 'q' is already the name of a position"),
-    ("F_lag = {", "z = {", "'z' is already the name of a input"),
-    ("[elements]", '[bodies.F]\nmass = "1 kg"\nposition = "q2"\nvelocity = "w2"\n[elements]', "'F' is already the name of a body", at("F = {")),
+    ('g = { unit = "N" }', 'F = { unit = "N" }', "variables.F: 'F' is taken by the input of that name"),
+    ('g = { unit = "N" }', 'F_foot = { unit = "N" }', "'F_foot' is taken by the variable of that name", at("foot =")),
+    ('velocity = "w"', 'velocity = "q"', "bodies.mass.velocity: 'q' is taken by the position of that name"),
+    ("F_lag = {", "z = {", "'z' is taken by the input of that name"),
+    ("[elements]", '[bodies.F]\nmass = "1 kg"\nposition = "q2"\nvelocity = "w2"\n[elements]', "'F' is taken by the body of that name", at("F = {")),
     ("tau = {", 'K = { value = 1, unit = "1" }\ntau = {', "parameters.K: its C constant GOOD_K is already taken"),
     ("tau = {", 'k_inverse = { value = 1, unit = "1" }\ntau = {', "parameters.k_inverse: its C constant GOOD_K_INVERSE"),
     ("tau = {", 'set_length = { value = 1, unit = "1" }\ntau = {', "GOOD_SET_LENGTH is already taken"),
@@ -177,9 +177,9 @@ FAULTS = [
     ('inputs = ["m", "m/s"]', 'inputs = ["mm", "m/s"]', "networks.net2: a network in mm .. declare m"),
     ('inputs = ["m", "m/s"], output = "N"', 'inputs = ["m", "m/s"], output = "m"', "network 'net2' gives m, an element needs a force", at("net =")),
     ('value = "q", unit = "mm"', 'value = "q", unit = "mm/s"', "outputs.q: m*s^-1 is set equal to m"),
-    ('value = "q", unit = "mm"', 'value = "q + 1", unit = "mm"', "outputs.q: 'q + 1' combines"),
+    ('value = "F_foot", unit = "N"', 'value = "q + 1", unit = "m"', "sensors.load: 'q + 1' combines"),
     ('value = "F_foot", unit = "N"', 'value = "exp(F_foot)", unit = "1"', "the argument has the unit m*kg*s^-2"),
-    ('value = "F_foot", unit = "N"', 'value = "where(F > q, F, F)", unit = "N"', "combines"),
+    ('value = "F_foot", unit = "N"', 'value = "where(F > q, F, F_foot)", unit = "N"', "combines"),
     ('F_lag = { unit = "N"', 'F_lag = { unit = "degC"', "states.F_lag: unit 'degC' has an offset; use kelvin .. write"),
     # numbers
     ("value = 2,", "value = 0,", "bodies.mass: mass 'm' is not above zero", at("mass =")),
@@ -193,7 +193,7 @@ FAULTS = [
     ("value = 0.05,", "value = 1e36,", "1e+36 is no number that a float can hold"),  # 1e39 N/m
     ("value = 0.05,", "value = 1e-42,", "1e-42 is no number that a float can hold"),
     ("value = 0.05,", f"value = {10**400},", "is no number that a float can hold"),
-    ("value = 0.05,", f"value = 1{'0' * 5000},", "is not valid TOML"),
+    ("value = 0.05,", f"value = 1{'0' * 5000},", "is not valid TOML (a number", at('m = "4 kg')),
     ("value = 50,", "value = 0,", "divides by 'tau', which is zero", at("lag =")),
     ("tolerance = 0.1", "tolerance = 1.5", "tolerance 1.5 is not a share"),
     ("start = 0.5", "start = 1e39", "states.F_lag.start: 1e+39 is no number that a float can hold"),
@@ -221,7 +221,7 @@ FAULTS = [
     ('inputs = ["deflection", "rate"]', 'inputs = ["deflection"]', "elements.net.inputs: 1 inputs for a network of 2"),
     ('inputs = ["deflection", "rate"]', 'inputs = ["position", "rate"]', "'position' is neither deflection nor rate"),
     ('net2 = "net2.json"', 'net2 = "net3.json"', "sets.default.net2: .. net3.json: No such file or directory"),
-    ('net2 = "net2.json"', 'net2 = "net\\u00002.json"', "sets.default.net2: .. cannot be read"),
+    ('net2 = "net2.json"', 'net2 = "net\\u00002.json"', "sets.default.net2: .. embedded null byte"),
     ('net2 = "net2.json"', 'net2 = "net2.h5"', "unknown suffix '.h5'"),
     ('net2 = "net2.json"', 'net2 = "broken.json"', "not JSON that can be read"),
     ('net2 = "net2.json"', 'net2 = "broken.onnx"', "sets.default.net2: .. broken.onnx"),
@@ -273,16 +273,16 @@ FAULTS = [
     ("2*g - F = 0.5*g", "2*g - F = g*g/F", "'loop' form an algebraic loop that is not linear in g"),
     ("2*g - F = 0.5*g", "2*g - F = abs(g)", "'loop' form an algebraic loop that is not linear in g"),
     ("2*g - F = 0.5*g", "2*g - F = where(g > F, 1, 2)*F", "not linear in g"),
-    ('g = { unit = "N" }', 'g = { unit = "N" }\nh = { unit = "N" }', "equations 'loop', 'more' have no unique solution for .. check", at("loop ="), ("loop = \"2*g - F = 0.5*g", "more = \"2*g + 2*h = F\"\nloop = \"h - F = -g")),
+    ('g = { unit = "N" }', 'g = { unit = "N" }\nh = { unit = "N" }', "equations 'more', 'loop' have no unique solution for h, g; check", at("more ="), ("loop = \"2*g - F = 0.5*g", "more = \"2*g + 2*h = F\"\nloop = \"h - F = -g")),
     ('g = { unit = "N" }', 'g = { unit = "N" }\nh = { unit = "N" }', "variables.h: no equation determines h; add one to [equations]", at("h =")),
     ("loop =", 'more = "g = F"\nloop =', "equations.loop: nothing is left that this equation could determine", at("loop =")),
     ("F_lag - F", "F_lag - s", "elements.push: .. combines"),
-    ("F_lag - F", "F*(1 - v*s)", "elements.push: 'v' is the rate of this element, and a name of the model", ('velocity = "w"', 'velocity = "v"'), ("der(w)", "der(v)")),
+    ("F_lag - F", "where(v < 0, F_lag, F)", "elements.push: 'v' is the rate of this element, and a name of the model", ('velocity = "w"', 'velocity = "v"'), ("der(w)", "der(v)")),
     # TOML
     ('name = "good"', "name = good", "is not valid TOML (Invalid value); mend the syntax there"),
     ('name = "good"', 'name = "good', "is not valid TOML"),
     ("[sets.heavy]", "[sets.heavy", "is not valid TOML"),
-    ('net2 = "net2.json"', f"net2 = {'[' * 3000}", "is not valid TOML"),
+    ('net2 = "net2.json"', f"net2 = {'[' * 3000}", "is not valid TOML", at('m = "4 kg')),
 ]
 
 
@@ -342,3 +342,238 @@ def test_fault(folder, case):
     assert all(any(re.search(pattern, problem) for problem in found) for pattern in patterns)
     assert len(found) == len(patterns)
     assert all(p.isprintable() and "; " in p and len(p) < 500 for p in found)  # one line each, with a remedy
+
+
+def test_all_faults_at_once(folder):
+    """Ten faults in ten places, each reported once, in any order."""
+    edits = [
+        ("method =", "metod ="), ("substeps = 2", "substeps = 0"), ('unit = "N/mm"', 'unit = "N/mn"'), ("min = -5", "min = 6"),
+        ('start_position = "10 mm"', 'start_position = "10 s"'), ('"linear_damper"', '"linear_dumper"'), ("start = 0.5", "start = inf"),
+        ('unit = "m/s^2"', 'unit = "m/s^^2"'), ('net2 = "net2.json"', 'net2 = "gone.json"'), ("2*g - F =", "2*g - F/0 ="),
+    ]  # fmt: skip
+    text = GOOD
+    for old, new in edits:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    (folder / "bad.toml").write_text(text)
+    found = problems(folder / "bad.toml")
+    lines = sorted(int(p.removeprefix(f"{folder / 'bad.toml'}:").partition(":")[0]) for p in found)
+    assert lines == sorted(GOOD[: GOOD.index(old)].count("\n") + 1 for old, _ in edits)
+
+
+@pytest.mark.parametrize("section", ["inputs", "outputs"])
+def test_no_inputs_or_outputs(folder, section):
+    text = re.sub(rf"\[{section}\][^[]*\n(?=\[)", "", models.BARE.format(outside="clamp", inputs="u = { unit = '1' }", units="['1']", names="u"))
+    text = text.replace("net(u)", "net(0.5)") if section == "inputs" else text
+    (folder / "net.json").write_text((folder / "one.json").read_text())
+    (folder / "bad.toml").write_text(text)
+    assert problems(folder / "bad.toml") == [f"{folder}/bad.toml:1: {section}: the model has no {section}; add [{section}]: the C needs at least one"]
+
+
+def test_no_states(folder):
+    """A model of outputs alone is fine, and one of nothing is not."""
+    (folder / "net.json").write_text((folder / "one.json").read_text())
+    (folder / "bare.toml").write_text(models.BARE.format(outside="clamp", inputs="u = { unit = '1' }", units="['1']", names="u"))
+    assert penode_gen.load(folder / "bare.toml").states == ()
+    (folder / "bad.toml").write_text("# nothing\n")
+    assert problems(folder / "bad.toml") == [f"{folder}/bad.toml:1: says nothing; write a model with [model], [inputs] and [outputs]"]
+
+
+def test_files_that_are_none(folder):
+    (folder / "latin.toml").write_bytes(GOOD.replace("moving", "m\xf6ving").encode("latin-1"))
+    (folder / "loop.toml").symlink_to("loop.toml")
+    for name, words in (
+        ("gone.toml", "gone.toml: cannot be read (No such file or directory); give the path of a model file"),
+        ("", ": cannot be read (Is a directory); give the path"),
+        ("loop.toml", "loop.toml: cannot be read ("),  # as a file that may not be read; who runs the tests may perhaps read all
+        ("good.toml/x", "cannot be read (Not a directory)"),
+        ("good\0.toml", "cannot be read (embedded null byte)"),
+        ("latin.toml", "latin.toml:3: is not UTF-8 text"),
+    ):
+        found = problems(folder / name)
+        assert len(found) == 1 and words in found[0] and found[0].isprintable()
+
+
+def test_extends(folder):
+    """An extended file changes entries of its base; files of networks stand beside the file that names them."""
+    (folder / "sub").mkdir()
+    (folder / "good.toml").write_text(GOOD)
+    extended = folder / "sub" / "extended.toml"
+
+    def write(body: str, head: str = "") -> Path:
+        extended.write_text(f'[model]\nextends = "../good.toml"\n{head}\n{body}')
+        return extended
+
+    base = penode_gen.load(folder / "good.toml")
+    model = penode_gen.load(write('[parameters]\nk = { value = 70, unit = "N/m" }', 'name = "better"'))
+    assert (model.name, model.parameters["k"].value, model.sample_time) == ("better", 70.0, 1e-3)
+    assert model.sets.keys() == base.sets.keys() and model.digest != base.digest
+    assert base.digest == penode_gen.load(folder / "good.toml").digest
+
+    assert "extended.toml:5: parameters.k.valu" in problems(write('[parameters]\nk = { valu = 70, unit = "N/m" }'))[0]
+    (folder / "good.toml").write_text(GOOD.replace("start = 0.5", "strat = 0.5"))
+    found = problems(write('[parameters]\nk = { valu = 70, unit = "N/m" }'))
+    assert "extended.toml:5: parameters.k.valu" in found[0] and "good.toml:30: states.F_lag.strat" in found[-1]
+    (folder / "good.toml").write_text(GOOD.replace("F_lag - F", "F_lag - q"))
+    assert "good.toml:27: elements.push: " in problems(write(""))[0]
+    (folder / "good.toml").write_text(GOOD.replace('name = "good"', "name = good"))
+    assert "good.toml:2: is not valid TOML" in problems(write(""))[0]
+    (folder / "good.toml").write_text('[model]\nextends = "other.toml"\n')
+    assert "extended.toml:2: model.extends: " in problems(write(""))[0] and "itself extends a file; extend that one" in problems(write(""))[0]
+    (folder / "good.toml").unlink()
+    found = problems(write(""))
+    assert len(found) == 1 and "extended.toml:2: model.extends: " in found[0] and "good.toml: cannot be read (No such file" in found[0]
+    (folder / "good.toml").write_text(GOOD)
+
+
+def test_lines_are_found_in_any_layout(folder):
+    """Keys in lists over several lines, strings that look like headers, quoted keys, dotted keys, sub-tables, CRLF."""
+    text = GOOD.replace('"mass on a moving foot"', '"""\\\n[parameters]\\\n"""').replace(
+        'm = { value = 2, unit = "kg", tunable = true }', '[parameters.m]\nvalue = 2\nunit = "kg" # [x]\ntunable = true\n[parameters]'
+    ).replace('tau = { value = 50, unit = "ms", tolerance = 0.1 }', 'tau.value = 50\n"tau".unit = "ms"\ntau."tolerance" = 2')
+    text = text.replace('["m", "m/s"]', '[\n  "m",\n  "mm/s", # ]\n]')
+    text = text.replace("[parameters]\n[parameters.m]", "[parameters.m]").replace("[parameters]\nk =", "[parameters]\nk =")
+    for newline in ("\n", "\r\n"):
+        path = folder / "layout.toml"
+        path.write_bytes(text.replace("\n", newline).encode())
+        found = [p.removeprefix(f"{path}:") for p in problems(path)]
+        rows = text.split("\n")
+        expected = [rows.index('tau.value = 50') + 1, next(i for i, r in enumerate(rows, 1) if r.startswith("net2 = { inputs"))]
+        assert [int(p.partition(":")[0]) for p in found] == expected, found
+
+
+def test_command_says_it_in_lines(folder, monkeypatch, capsys):
+    """Exit code 2, a line for each problem on stderr, nothing on stdout, nothing written."""
+    from penode_sil import cli
+
+    (folder / "bad.toml").write_text(GOOD.replace("min = -5", "min = 6").replace("start = 0.5", "start = inf"))
+    monkeypatch.setattr(sys, "argv", ["penode", "generate", str(folder / "bad.toml"), "-o", str(folder / "out")])
+    with pytest.raises(SystemExit) as caught:
+        cli.main()
+    output = capsys.readouterr()
+    assert caught.value.code == 2 and output.out == "" and not (folder / "out").exists()
+    assert [line.startswith(f"penode: {folder}/bad.toml:") for line in output.err.splitlines()] == [True, True]
+
+
+# -- whatever a file says: a model or a ModelError --------------------------------------------------------------------
+
+FUZZ = settings(derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+PIECES = {  # stretches of the good file that an edit takes away, and what may come in their place
+    "text": (r'(?<=")[^"\n]*(?=")', ["", "nan", "-1", "0 kg", "1e400 m", "9" * 30, "é", "der(q)", "der(z)", "where(q < z, q, z)", "net2(q, w)", "exp(1)",
+                                    "*/", "x", "s", "v", "1/s", "degC", "\\u0000", "net2(net2(q, w), w)", "a = b", "g = F", "../x.onnx", "."]),
+    "number": (r"(?<= )-?\d[\d.]*(?=[ ,\n])", ["0", "-1", "nan", "inf", "1e400", "9" * 30, "true", "1e-50", "[]", "{}", "2020-01-01", '"1"', "1_0", "0xF"]),
+    "name": (r"(?m)^[\w]+(?= =)|(?<=, )\w+(?= =)|(?<=\{ )\w+(?= =)", ["x", "s", "v", "p", "t1", "int", "H", "extends", '"a b"', "a.b", "status", "F_lag_in"]),
+    "line": (r"(?m)^.+$", ["", "x = 1", "[x]", "[[model]]", "[model]", "[sets.x]", "{", "é = 1"]),
+    "token": (r"[\w./*^-]+|\S|\n", ['"', "=", "{", "]", "\\", "\0", "\x7f", "#", "\ud800"]),
+}  # fmt: skip
+
+
+@st.composite
+def edited(draw) -> str:
+    """The good file with one to three stretches replaced, by others of their kind or by odd ones."""
+    text = GOOD
+    for kind in draw(st.lists(st.sampled_from(["text", "text", "number", "name", "line", "token"]), min_size=1, max_size=3)):
+        pattern, odd = PIECES[kind]
+        found = list(re.finditer(pattern, text))
+        if found:
+            old = draw(st.sampled_from(found))
+            new = draw(st.one_of(st.sampled_from(odd), st.sampled_from([m[0] for m in found])))
+            text = text[: old.start()] + new + text[old.end() :]
+    return text
+
+
+@settings(FUZZ, max_examples=400)
+@given(edited())
+def test_edited_files(folder, text):
+    path = folder / "fuzz.toml"
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+    try:
+        model = penode_gen.load(path)
+    except penode_gen.ModelError as error:
+        assert error.problems and all(p.isprintable() and "; " in p for p in error.problems)
+    else:
+        penode_gen.render(model)
+
+
+UNARY = [name for name, (count, _) in expressions.FUNCTIONS.items() if count == 1]
+EXPRESSIONS = st.recursive(
+    st.sampled_from(["q", "w", "F", "z", "k", "m", "F_lag", "F_foot", "g", "0", "1", "2.5", "-3", "1e-3", "(T*der(F))", "(T*der(w))", "(T*der(q))"]),
+    lambda inner: st.one_of(
+        st.tuples(inner, st.sampled_from(["+", "-", "*", "/"]), inner).map(lambda t: f"({t[0]} {t[1]} {t[2]})"),
+        st.tuples(inner, st.sampled_from(["2", "3", "-1", "-2", "8"])).map(lambda t: f"({t[0]})^{t[1]}"),
+        st.tuples(st.sampled_from([*UNARY, "one"]), inner).map(lambda t: f"{t[0]}({t[1]})"),
+        st.tuples(st.sampled_from(["min", "max", "net2"]), inner, inner).map(lambda t: f"{t[0]}({t[1]}, {t[2]})"),
+        st.tuples(inner, st.sampled_from(["<", "<=", ">", ">="]), inner, inner, inner).map(lambda t: f"where({t[0]} {t[1]} {t[2]}, {t[3]}, {t[4]})"),
+    ),
+    max_leaves=7,
+)  # fmt: skip
+
+
+@settings(FUZZ, max_examples=150)
+@given(*[EXPRESSIONS] * 4, st.sampled_from(["rk4", "ros1", "ros2"]))
+def test_any_expression(folder, a, b, c, d, method):
+    """Equations, an output and a sensor of random expressions become C, or are refused."""
+    text = f"""
+[model]
+name = "fuzz"
+sample_time = "1 ms"
+method = "{method}"
+[parameters]
+k = {{ value = 2, unit = "1" }}
+m = {{ value = 3, unit = "1", tunable = true }}
+T = {{ value = 1, unit = "s" }}
+[inputs]
+F = {{ unit = "1" }}
+z = {{ unit = "1" }}
+[states]
+q = {{ unit = "1" }}
+w = {{ unit = "1" }}
+F_lag = {{ unit = "1" }}
+[variables]
+g = {{ unit = "1" }}
+h = {{ unit = "1" }}
+F_foot = {{ unit = "1" }}
+[networks]
+one = {{ inputs = ["1"], output = "1" }}
+net2 = {{ inputs = ["1", "1"], output = "1" }}
+[equations]
+e1 = "der(q)*T = w"
+e2 = "der(w)*T + g = {a}"
+e3 = "der(F_lag)*T = {b}"
+e4 = "g = {c}"
+e5 = "h + g = F + q"
+e6 = "F_foot = F - q"
+[outputs]
+y = {{ value = "{d}", unit = "1" }}
+[sets.default]
+one = "one.json"
+net2 = "net2.json"
+"""
+    path = folder / "expressions.toml"
+    path.write_text(text)
+    try:
+        model = penode_gen.load(path)
+    except penode_gen.ModelError as error:
+        assert error.problems and all(p.isprintable() and "; " in p for p in error.problems)
+    else:
+        for text in penode_gen.render(model).values():
+            assert not re.search(r"\b(nan|zoo|oo|inf|DiracDelta|Derivative|Subs)\b", text)
+
+
+@settings(FUZZ, max_examples=1000)
+@given(st.text(alphabet="msN kg/*^·²³1230.-()%°µ_e", max_size=14))
+def test_any_unit(text):
+    try:
+        assert isinstance(units.factor(text), float) and units.si(text)
+        units.quantity(f"1 {text}")
+    except units.UnitError as error:
+        assert str(error)
+
+
+@settings(FUZZ, max_examples=1000)
+@given(st.text(alphabet="qwz0129.eE+-*/^(),<>= ij'\"\\#:;{}[]lambdxpn_\n\0", max_size=24))
+def test_any_text_as_an_expression(text):
+    try:
+        expressions.parse(text, {"q", "w", "z"}, {"n": 1}, {"q"})
+    except expressions.ExpressionError as error:
+        assert str(error)

@@ -260,8 +260,8 @@ static pen_status_t integrate(const pen_real_t p[], const pen_real_t u0[], pen_r
 }
 
 /* the same, to the bit, with the derivative d of x along each column: x(k-1), u(k-1), u(k) */
-static pen_status_t integrate_jacobian(const pen_real_t p[], const pen_real_t u0[], pen_real_t x[],
-    pen_real_t d[N_X][N_COLUMNS])
+static pen_status_t integrate_jacobian(const pen_real_t p[], const pen_real_t u0[],
+    pen_real_t x[], pen_real_t d[N_X][N_COLUMNS])
 {
     pen_status_t status = PEN_OK;
 

@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The printed C: the same bytes every time, 120 columns, no warning, nothing half-written, exact literals."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import models
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import penode_gen
+from penode_gen import c_text, emit_c, expressions, sets
+from penode_gen.causalise import causalise
+
+ROOT = Path(__file__).resolve().parents[2]
+NQVM = sorted((ROOT / "gen" / "nqvm").glob("*.toml"))
+STRICT = (
+    "-std=c99 -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wmissing-prototypes -Wstrict-prototypes "
+    "-Wfloat-equal -Wcast-qual -Wcast-align -Wundef -Wswitch-enum -Wvla -Wredundant-decls -Wwrite-strings -Werror -fsyntax-only "
+    f"-ffp-contract=off -I{ROOT}/inc -I{ROOT}/port/gnu"
+).split()
+REALS = ([], ["-DPEN_REAL_DOUBLE", "-Wno-double-promotion"])
+COMPILERS = [c for c in ("gcc", "clang-19") if shutil.which(c)]
+METHODS, INPUTS, OUTSIDE, SUBSTEPS = ("euler", "heun", "rk4", "ros1", "ros2"), ("held", "linear"), ("extrapolate", "clamp", "fade"), (1, 3)
+
+
+def complaints(folder: Path, name: str, reals: tuple[list[str], ...] = REALS) -> list[str]:
+    """What the compilers say about the C of a model."""
+    sources = [str(folder / f"{name}.c"), str(folder / f"{name}_params.c")]
+    found = []
+    for compiler, real in itertools.product(COMPILERS, reals):
+        result = subprocess.run([compiler, *STRICT, *real, f"-I{folder}", *sources], capture_output=True, text=True)
+        found += [f"{compiler} {real}: {result.stderr[:2000]}"] if result.returncode or result.stderr else []
+    return found
+
+
+# -- bytes ------------------------------------------------------------------------------------------------------------
+
+
+def test_the_same_bytes_in_every_process_and_folder(tmp_path):
+    """Hash seeds and folders differ, bytes do not; no path but the model file's own name is printed."""
+    script = "import sys, penode_gen; penode_gen.generate(penode_gen.load(sys.argv[1]), sys.argv[2])"
+    results = []
+    for seed in ("1", "4711"):
+        folder = tmp_path / f"folder_of_seed_{seed}"
+        folder.mkdir()
+        model = models.rich(folder, "ros2", outside="fade", substeps=3)
+        for path, out in ((model, "rich"), (NQVM[0], "nqvm")):
+            environment = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT / "gen")}
+            subprocess.run([sys.executable, "-c", script, str(path), str(folder / out)], check=True, env=environment)
+        files = sorted(p for p in folder.rglob("*.[ch]"))
+        assert len(files) == 6
+        results.append({p.relative_to(folder): p.read_bytes() for p in files})
+    assert results[0] == results[1]
+    for text in results[0].values():
+        assert b"folder_of_seed" not in text and str(ROOT).encode() not in text and b"\r" not in text
+
+
+def test_provenance_names_all_files(tmp_path):
+    """The digest changes with the model file and with a weight, and not with time or place."""
+    first = penode_gen.load(models.rich(tmp_path)).digest
+    assert penode_gen.load(models.rich(tmp_path)).digest == first
+    net = tmp_path / "n2.json"
+    net.write_text(net.read_text().replace('"min": [0.5]', '"min": [0.625]'))
+    assert penode_gen.load(next(tmp_path.glob("rich*.toml"))).digest != first
+
+
+def rendered(folder: Path) -> dict[str, dict[str, str]]:
+    """The C of the committed models and of the rich model in many variants."""
+    found = {path.stem: penode_gen.render(penode_gen.load(path)) for path in NQVM}
+    for method, outside, activation in (("ros2", "fade", "tanh"), ("ros1", "clamp", "relu"), ("heun", "extrapolate", "sigmoid")):
+        found[method] = penode_gen.render(penode_gen.load(models.rich(folder, method, outside=outside, substeps=3, activation=activation)))
+    return found
+
+
+def test_lines_fit(tmp_path):
+    """120 columns, no blanks at the end, no tabs, one newline at the end."""
+    for name, files in rendered(tmp_path).items():
+        for file, text in files.items():
+            long = [f"{name} {file}:{i}: {line}" for i, line in enumerate(text.split("\n"), 1) if len(line) > 120]
+            assert not long
+            assert not re.search(r"[ \t]$|\t", text, re.MULTILINE) and text.endswith("\n") and not text.endswith("\n\n")
+
+
+@pytest.mark.parametrize("line", [
+    "    const pen_real_t a = " + " + ".join(f"(word{i} * word{i})" for i in range(12)) + "; /* a remark that goes above */",
+    "    f(" + ", ".join(f"argument_{i}" for i in range(20)) + ");",
+    "/* " + "word " * 40 + "*/",
+    "/** " + "word " * 40 + "*/",
+    "#define A_CONSTANT 1.0F /* " + "word " * 30 + "*/",
+    "    " + ", ".join(["-0.123456789F"] * 12) + ",",
+    "x = " + "a" * 150 + ";",  # cannot be broken
+])  # fmt: skip
+def test_folded_lines_say_the_same(line):
+    """Only white space changes, and the place of a remark; comments stay comments."""
+    folded = c_text.fold(line)
+    assert all(len(part) <= 120 for part in folded.split("\n")) or "a" * 150 in line
+
+    def words(text: str, comment: bool) -> list[str]:
+        remarks = "".join(re.findall(r"/\*.*?\*/", text, re.DOTALL))
+        return re.sub(r"/\*\*?|\*/|^ \* ", " ", remarks, flags=re.MULTILINE).split() if comment else re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).split()
+
+    assert words(folded, True) == words(line, True) and words(folded, False) == words(line, False)
+
+
+# -- compilers --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_warnings(tmp_path, method):
+    """All policies, inputs and substeps, in float and double, by every compiler that is installed."""
+    assert COMPILERS
+    folders = []
+    for input, outside, substeps in itertools.product(INPUTS, OUTSIDE, SUBSTEPS):
+        model = penode_gen.load(models.rich(tmp_path, method, input=input, outside=outside, substeps=substeps))
+        folders.append(tmp_path / f"{input}_{outside}_{substeps}")
+        penode_gen.generate(model, folders[-1])
+    with ThreadPoolExecutor(2) as pool:
+        assert not [c for found in pool.map(lambda f: complaints(f, "rich"), folders) for c in found]
+
+
+SPARSE = {
+    "constant rate": ('der(T)*t = 1', "T"), "input only": ("der(T)*t = u", "u"), "state only": ("der(T)*t = -T", "2*T + 1"),
+    "tunable": ("der(T)*t = k*T", "k"), "constant output": ("der(T)*t = T", "0.5"), "network of state": ("der(T)*t = n(T)", "T"),
+    "network of input": ("der(T)*t = n(u)", "u*T"), "network of a parameter": ("der(T)*t = n(k)*T", "T"),
+    "network of a constant": ("der(T)*t = n(c)*n(1)*T", "T"), "kinks": ("der(T)*t = abs(max(T, u)) + min(T, 0)", "sign(T)"),
+    "branches": ("der(T)*t = where(T < u, T*u, T - u)", "where(T < u, T, u)"), "curved": ("der(T)*t = exp(T*u) + tanh(T)*softplus(u)*sigmoid(T)", "T^2*u"),
+    "names": ("der(T)*t = x*p*u*h + status", "x + y + fx + node + rates + t1"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_warnings_where_little_is_used(tmp_path, method):
+    """Models that need only some of state, input, parameters and networks leave nothing unused; any name is fine."""
+    models.network_file(tmp_path / "n.json", [1, 4, 1], ["tanh", "identity"], 2)
+    folders = []
+    for (name, (equation, output)), input in itertools.product(SPARSE.items(), INPUTS):
+        own = "".join(f'{n} = {{ unit = "1" }}\n' for n in ("x", "y", "p", "fx", "node", "rates", "status", "h", "t1")) if name == "names" else ""
+        equations = "".join(f'e{i} = "{n} = {i}*T"\n' for i, n in enumerate(re.findall(r"^\w+", own, re.MULTILINE)))
+        path = tmp_path / "sparse.toml"
+        path.write_text(f"""
+[model]
+name = "sparse"
+sample_time = "1 ms"
+method = "{method}"
+input = "{input}"
+[parameters]
+t = {{ value = 1, unit = "s" }}
+k = {{ value = 3, unit = "1", tunable = true }}
+c = {{ value = 2, unit = "1" }}
+[inputs]
+u = {{ unit = "1" }}
+[states]
+T = {{ unit = "1" }}
+[variables]
+{own}
+[equations]
+only = "{equation}"
+{equations}
+[networks]
+n = {{ inputs = ["1"], output = "1" }}
+[outputs]
+out = {{ value = "{output}", unit = "1" }}
+[sets.default]
+n = "n.json"
+""")
+        folders.append(tmp_path / f"{name} {input}".replace(" ", "_"))
+        penode_gen.generate(penode_gen.load(path), folders[-1])
+    with ThreadPoolExecutor(2) as pool:
+        assert not [c for found in pool.map(lambda f: complaints(f, "sparse", REALS[:1]), folders) for c in found]
+
+
+def test_another_abi_is_refused_at_compile_time(tmp_path, monkeypatch):
+    """A model printed for another runtime does not compile, and says why."""
+    monkeypatch.setattr(sets, "ABI", sets.ABI + 1)
+    penode_gen.generate(penode_gen.load(models.rich(tmp_path)), tmp_path / "c")
+    said = complaints(tmp_path / "c", "rich")
+    assert len(said) == 2 * len(COMPILERS)
+    assert all(f"rich was generated for runtime ABI {sets.ABI}: generate it again" in text for text in said)
+
+
+# -- files ------------------------------------------------------------------------------------------------------------
+
+
+def test_all_files_or_none(tmp_path, monkeypatch):
+    model = penode_gen.load(models.rich(tmp_path))
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "rich.h").write_text("old")
+
+    (out / "rich_params.c").mkdir()  # one of them cannot be written
+    with pytest.raises(OSError, match="rich_params.c"):
+        penode_gen.generate(model, out)
+    (out / "rich_params.c").rmdir()
+
+    count = itertools.count()
+
+    def full(*args: object) -> None:
+        if next(count) == 2:
+            raise OSError(28, "No space left on device", "rich_params.c")
+
+    with monkeypatch.context() as patch, pytest.raises(OSError, match="No space left"):
+        patch.setattr(emit_c.os, "chmod", full)
+        penode_gen.generate(model, out)
+    assert [p.name for p in out.iterdir()] == ["rich.h"] and (out / "rich.h").read_text() == "old"
+
+    with pytest.raises(OSError):
+        penode_gen.generate(model, tmp_path / "n2.json" / "below a file")
+    assert [p.name for p in penode_gen.generate(model, out)] == ["rich.h", "rich.c", "rich_params.c"]
+    assert sorted(p.name for p in out.iterdir()) == ["rich.c", "rich.h", "rich_params.c"]
+    assert all(p.stat().st_mode & 0o777 == 0o644 for p in out.iterdir())
+
+
+@pytest.mark.parametrize("where", ["n2.json/c", "taken", "no/such/folder", "blocked"])
+def test_command_says_where_it_cannot_write(tmp_path, monkeypatch, capsys, where):
+    from penode_sil import cli
+
+    path = models.rich(tmp_path)
+    (tmp_path / "taken").write_text("")
+    (tmp_path / "blocked" / "rich.c").mkdir(parents=True)
+    monkeypatch.setattr(sys, "argv", ["penode", "generate", str(path), "-o", str(tmp_path / where)])
+    with pytest.raises(SystemExit) as caught:
+        cli.main()
+    output = capsys.readouterr()
+    assert caught.value.code == 2 and output.out == "" and len(output.err.splitlines()) == 1
+    assert output.err.startswith(f"penode: {tmp_path}") and "; " in output.err
+    assert [p.name for p in (tmp_path / "blocked").iterdir()] == ["rich.c"]
+
+
+# -- numbers ----------------------------------------------------------------------------------------------------------
+
+LITERAL = re.compile(r"(\(pen_real_t\))?(-?\d+(\.\d+|\.\d+e-?\d+|e-?\d+))(F?)")
+
+
+def value_of(text: str) -> float:
+    """What C makes of a literal, in double: an F rounds to float, a cast leaves the double."""
+    cast, digits, _, suffix = LITERAL.fullmatch(text).groups()
+    assert bool(cast) != bool(suffix)
+    return float(np.float32(digits)) if suffix else float(digits)
+
+
+@settings(derandomize=True, deadline=None, database=None, max_examples=500)
+@given(st.one_of(st.floats(allow_nan=False, allow_infinity=False), st.floats(width=32, allow_nan=False, allow_infinity=False), st.integers(-(10**9), 10**9)))
+def test_literals_are_exact(value):
+    """The double comes back to the bit (a zero may lose its sign), and F stands only where a float holds it all."""
+    for text in (c_text.literal(value), c_text.real(value)):
+        assert value_of(text) == float(value)
+    with np.errstate(over="ignore"):
+        assert c_text.literal(value).endswith("F") == (float(np.float32(value)) == float(value))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_no_literal_for_what_is_no_number(value):
+    with pytest.raises(ValueError, match="has no C literal"):
+        c_text.literal(value)
+
+
+def test_weights_arrive_in_c_as_they_were(tmp_path):
+    """All values of all sets read back from the text; the checksum printed is theirs."""
+    model = penode_gen.load(NQVM[0])
+    text = penode_gen.render(model)[f"{model.name}_params.c"]
+    for name in model.sets:
+        body = re.search(rf"{name}_value\[.*?\] = \{{(.*?)\}};", text, re.DOTALL)[1]
+        printed = [value_of(v.strip()) for v in re.sub(r"/\*.*?\*/", "", body, flags=re.DOTALL).split(",") if v.strip()]
+        assert np.array_equal(np.array(printed), penode_gen.set_values(model, name, np.float64))
+        assert f"CHECKSUM_{name.upper()} 0x{penode_gen.set_head(model, name)[3]:08x}U" in text
+
+
+def test_every_expression_means_what_it_says(tmp_path):
+    """The printer's text, read back by Python as C would read it, is the expression: precedence, signs, divisions."""
+    a, b, c = (sp.Symbol(n, real=True) for n in "abc")
+    cases = [
+        a - (b - c), a - (b + c), -(a + b), -a * b, a / (b * c), a / b / c, a / (b / c), 1 / a, a**-2, (a + b) ** 2, -(a**2), (-a) ** 3, 2 * a / 3,
+        sp.Rational(1, 3) * a, a * (b + c) / (a - b), -a / b, -(a - b) / c, a - b * c + 1, sp.Max(a, b, c), sp.Min(a, -b), expressions.Absolute(a - b),
+        sp.Piecewise((a, a < b), (b, True)) * c - 1, sp.Piecewise((a, b < 0), (sp.Piecewise((b, a >= 1), (c, True)), True)), a * sp.Float("1e-9"), a - sp.Float(-2.5),
+        -sp.exp(-a) * sp.tanh(-b), (a / b) ** 3, a / (2 * b), 3 / (a + 1) ** 2,
+    ]  # fmt: skip
+    scope = {"pen_max": max, "pen_min": min, "pen_port_abs": abs, "pen_exp": np.exp, "pen_tanh": np.tanh}
+    draw = np.random.default_rng(1)
+    for expr in cases:
+        text = c_text.Printer(lambda s: s.name)(expr)
+        python = text.replace("(pen_real_t)", "")
+        while "?" in python:  # innermost first: x ? y : z with x, y, z in parentheses, names or numbers
+            python, n = re.subn(r"(\([^?:()]*(?:\([^?:()]*\)[^?:()]*)*\)) \? (\((?:[^?:()]|\([^?:]*\))*\)|[\w.]+) : (\((?:[^?:()]|\([^?:]*\))*\)|[\w.]+)", r"(\2 if \1 else \3)", python)
+            assert n, python
+        for values in draw.normal(size=(5, 3)):
+            names = dict(zip("abc", values))
+            expected = float(expr.subs({a: names["a"], b: names["b"], c: names["c"]}))
+            np.testing.assert_allclose(eval(python, scope, names), expected, rtol=1e-12, atol=1e-12)  # a few roundings, some cancellation
+
+
+def test_steps_come_in_the_order_in_which_they_are_needed(tmp_path):
+    """No step reads what a later one computes."""
+    causal = causalise(penode_gen.load(models.rich(tmp_path)))
+    known = {*causal.states, *causal.inputs, *causal.input_rates, *(sp.Symbol(n, real=True) for n in causal.model.parameters)}
+    for step in causal.steps:
+        assert step.reads <= known
+        known.add(step.target)
+    assert set().union(*(r.free_symbols for r in causal.rates)) <= known
