@@ -21,7 +21,7 @@ typedef uint32_t pen_status_t;
 /* Raised by a step. */
 #define PEN_INPUT_NONFINITE UINT32_C(0x0001) /* an input is NaN or Inf; state and outputs held                      */
 #define PEN_STATE_NONFINITE UINT32_C(0x0002) /* the state was NaN or Inf; the last good state is back, outputs held */
-#define PEN_STEP_NONFINITE  UINT32_C(0x0004) /* NaN or Inf arose inside (from input, weight, overflow); held            */
+#define PEN_STEP_NONFINITE  UINT32_C(0x0004) /* NaN or Inf arose inside (weight, overflow); state and outputs held  */
 #define PEN_SINGULAR        UINT32_C(0x0008) /* a linear solve met a singular matrix; state and outputs held        */
 #define PEN_OUTSIDE         UINT32_C(0x0010) /* a network input left its trust envelope; treated as the model says  */
 #define PEN_HELD            UINT32_C(0x0020) /* no step taken, as told by the tuning context                        */

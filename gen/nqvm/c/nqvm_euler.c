@@ -343,7 +343,8 @@ static pen_status_t finish(nqvm_euler_t *self, const sample_t *sample, const pen
     const pen_real_t *const output[2] = { self->y, sample->y };
     const pen_status_t finite_x = pen_finite(N_X, x) ? PEN_OK : PEN_STEP_NONFINITE;
     const pen_status_t finite_y = pen_finite(NQVM_EULER_N_Y, sample->y) ? PEN_OK : PEN_STEP_NONFINITE;
-    const pen_status_t result = status | finite_x | finite_y;
+    const pen_status_t follows = (status << 2U) | (status << 1U); /* from a bad input or state: not said twice */
+    const pen_status_t result = status | ((finite_x | finite_y) & ~follows);
     const size_t good = pen_advanced(result) ? 1U : 0U;
     const size_t received = ((result & PEN_INPUT_NONFINITE) == PEN_OK) ? 1U : 0U;
 
