@@ -77,6 +77,141 @@ void pen_dense16_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[], p
     y[15] = a15;
 }
 
+#ifdef __OPTIMIZE_SIZE__ /* the same bits from the kernels that are there anyway */
+
+void pen_dense16_pair(const pen_real_t w[], pen_real_t x, pen_real_t y[])
+{
+    pen_dense16_scalar(w, x, y);
+    pen_dense16_relu(16U, &w[32], y, y);
+}
+
+pen_real_t pen_dense16_last(size_t n_in, const pen_real_t w[], pen_real_t x[])
+{
+    pen_dense16_relu(n_in, w, x, x);
+    return pen_dense1_relu(16U, &w[16U * (n_in + 1U)], x);
+}
+
+#else
+
+void pen_dense16_pair(const pen_real_t w[], pen_real_t x, pen_real_t y[])
+{
+    pen_real_t a0 = w[32];
+    pen_real_t a1 = w[33];
+    pen_real_t a2 = w[34];
+    pen_real_t a3 = w[35];
+    pen_real_t a4 = w[36];
+    pen_real_t a5 = w[37];
+    pen_real_t a6 = w[38];
+    pen_real_t a7 = w[39];
+    pen_real_t a8 = w[40];
+    pen_real_t a9 = w[41];
+    pen_real_t a10 = w[42];
+    pen_real_t a11 = w[43];
+    pen_real_t a12 = w[44];
+    pen_real_t a13 = w[45];
+    pen_real_t a14 = w[46];
+    pen_real_t a15 = w[47];
+
+    for (size_t i = 0U; i < 16U; i++) {
+        const pen_real_t *const column = &w[(16U * i) + 48U];
+        const pen_real_t xi = rectified(w[i] + (w[i + 16U] * x));
+        a0 += column[0] * xi;
+        a1 += column[1] * xi;
+        a2 += column[2] * xi;
+        a3 += column[3] * xi;
+        a4 += column[4] * xi;
+        a5 += column[5] * xi;
+        a6 += column[6] * xi;
+        a7 += column[7] * xi;
+        a8 += column[8] * xi;
+        a9 += column[9] * xi;
+        a10 += column[10] * xi;
+        a11 += column[11] * xi;
+        a12 += column[12] * xi;
+        a13 += column[13] * xi;
+        a14 += column[14] * xi;
+        a15 += column[15] * xi;
+    }
+    y[0] = a0;
+    y[1] = a1;
+    y[2] = a2;
+    y[3] = a3;
+    y[4] = a4;
+    y[5] = a5;
+    y[6] = a6;
+    y[7] = a7;
+    y[8] = a8;
+    y[9] = a9;
+    y[10] = a10;
+    y[11] = a11;
+    y[12] = a12;
+    y[13] = a13;
+    y[14] = a14;
+    y[15] = a15;
+}
+
+pen_real_t pen_dense16_last(size_t n_in, const pen_real_t w[], pen_real_t x[])
+{
+    const pen_real_t *const last = &w[16U * (n_in + 1U)];
+    pen_real_t twice = last[0] + last[0]; /* see pen_dense1_relu */
+    pen_real_t a0 = w[0];
+    pen_real_t a1 = w[1];
+    pen_real_t a2 = w[2];
+    pen_real_t a3 = w[3];
+    pen_real_t a4 = w[4];
+    pen_real_t a5 = w[5];
+    pen_real_t a6 = w[6];
+    pen_real_t a7 = w[7];
+    pen_real_t a8 = w[8];
+    pen_real_t a9 = w[9];
+    pen_real_t a10 = w[10];
+    pen_real_t a11 = w[11];
+    pen_real_t a12 = w[12];
+    pen_real_t a13 = w[13];
+    pen_real_t a14 = w[14];
+    pen_real_t a15 = w[15];
+
+    for (size_t i = 0U; i < n_in; i++) {
+        const pen_real_t *const column = &w[(16U * i) + 16U];
+        const pen_real_t xi = rectified(x[i]);
+        a0 += column[0] * xi;
+        a1 += column[1] * xi;
+        a2 += column[2] * xi;
+        a3 += column[3] * xi;
+        a4 += column[4] * xi;
+        a5 += column[5] * xi;
+        a6 += column[6] * xi;
+        a7 += column[7] * xi;
+        a8 += column[8] * xi;
+        a9 += column[9] * xi;
+        a10 += column[10] * xi;
+        a11 += column[11] * xi;
+        a12 += column[12] * xi;
+        a13 += column[13] * xi;
+        a14 += column[14] * xi;
+        a15 += column[15] * xi;
+    }
+    twice += last[1] * (a0 + pen_port_abs(a0));
+    twice += last[2] * (a1 + pen_port_abs(a1));
+    twice += last[3] * (a2 + pen_port_abs(a2));
+    twice += last[4] * (a3 + pen_port_abs(a3));
+    twice += last[5] * (a4 + pen_port_abs(a4));
+    twice += last[6] * (a5 + pen_port_abs(a5));
+    twice += last[7] * (a6 + pen_port_abs(a6));
+    twice += last[8] * (a7 + pen_port_abs(a7));
+    twice += last[9] * (a8 + pen_port_abs(a8));
+    twice += last[10] * (a9 + pen_port_abs(a9));
+    twice += last[11] * (a10 + pen_port_abs(a10));
+    twice += last[12] * (a11 + pen_port_abs(a11));
+    twice += last[13] * (a12 + pen_port_abs(a12));
+    twice += last[14] * (a13 + pen_port_abs(a13));
+    twice += last[15] * (a14 + pen_port_abs(a14));
+    twice += last[16] * (a15 + pen_port_abs(a15));
+    return HALF * twice;
+}
+
+#endif
+
 /* Rows r .. r + 3 of a block that has `rows` of them; without its bias, the tangent. */
 static void four_rows(size_t rows, size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[], bool bias, bool relu)
 {

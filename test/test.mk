@@ -101,10 +101,11 @@ gen-check: | $(READY) ## The committed C must be, to the byte, what the generato
 # -- Unity: every test/unit/test_*.c is a program, built and run in every variant -------------------------------------
 
 # A variant is a compiler with options, and the way to run what it makes.
-VARIANTS    := $(COMPILERS) sanitize double
-CC.sanitize := port/host/cc gcc -fsanitize=address,undefined -fno-sanitize-recover=all
+VARIANTS    := $(COMPILERS) sanitize double small
+CC.sanitize := port/host/cc gcc -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 CC.double   := port/host/cc gcc -DPEN_REAL_DOUBLE
-$(foreach v,gcc clang sanitize double,$(eval RUN.$v := port/host/run gcc))
+CC.small    := port/host/cc gcc -D__OPTIMIZE_SIZE__ # the kernels of a size build
+$(foreach v,gcc clang sanitize double small,$(eval RUN.$v := port/host/run gcc))
 $(foreach m,$(MACHINES),$(eval RUN.$m := port/cortex-m/run $m))
 $(foreach m,$(MACHINES),$(eval LIBS.$m := -lc)) # Unity's setjmp
 

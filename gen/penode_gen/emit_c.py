@@ -313,9 +313,18 @@ class _Emitter:
         if self.model.outside == "clamp":
             lines.append(f"pen_clamp({code.n}U, &p[0], in, h);")
             here = "h"
-        for layer, at in code.layers():
+        layers = code.layers()
+        while layers:
+            (layer, at), *layers = layers
             fresh = "h" if here == "in" else here  # where a layer that reads all before it writes may put its result
-            if isinstance(layer, Affine):
+            after = _shape(layers[0][0]) if layers and _relu(layer) else None
+            if not relu and _shape(layer) == (1, 16) and after == (16, 16):
+                lines.append(f"pen_dense16_pair({at}, {here}[0], {fresh});")
+                (layer, _), *layers = layers
+            elif relu and _shape(layer)[1:] == (16,) and after == (16, 1):
+                lines.append(f"{fresh}[0] = pen_dense16_last({layer.n_in}U, {at}, {here});")
+                (layer, _), *layers = layers
+            elif isinstance(layer, Affine):
                 lines += [f"pen_act_relu({layer.n_out}U, {here});"] if relu else []
                 lines.append(_affine(layer, at, here, fresh))
             elif layer.n_out == 1:
@@ -487,6 +496,11 @@ def _affine(layer: Affine, at: str, here: str, there: str) -> str:
     if layer.form == "centre":
         return f"{there}[0] = ({here}[0] - p[{first}]) * p[{first + 1}];"
     return f"{there}[0] = ({here}[0] * p[{first}]) + p[{first + 1}];"
+
+
+def _shape(layer: Layer) -> tuple[int, ...]:
+    """(inputs, outputs) of a dense layer."""
+    return (layer.n_in, layer.n_out) if isinstance(layer, Dense) else ()
 
 
 def _relu(layer: Layer) -> str:

@@ -33,6 +33,15 @@ void pen_dense16_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[], p
 /** 16 rows of a single input. @param w [32]; @param y [16] */
 void pen_dense16_scalar(const pen_real_t w[], pen_real_t x, pen_real_t y[]);
 
+/** Two layers at once, the first of a single input: y = W2 max(0, w1 x + b1) + b2. @param w [32 + 272]; @param y [16] */
+void pen_dense16_pair(const pen_real_t w[], pen_real_t x, pen_real_t y[]);
+
+/**
+ * Two layers at once, the second of one row: w2 max(0, W1 max(0, x) + b1) + b2.
+ * @param w [16 * (n_in + 1) + 17]; @param x [16 or n_in, the larger]; undefined afterwards
+ */
+pen_real_t pen_dense16_last(size_t n_in, const pen_real_t w[], pen_real_t x[]);
+
 /** One row. @param w [1 + n_in]; @param x [n_in] */
 pen_real_t pen_dense1(size_t n_in, const pen_real_t w[], const pen_real_t x[]);
 pen_real_t pen_dense1_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[]);

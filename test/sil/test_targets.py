@@ -96,8 +96,7 @@ def test_every_step_costs_the_same(nqvm, machine, show):
         + f", stack {run.stack} B"
     )
     assert set(run.cost) == {"normal", "adopting", "holding"}
-    # gcc makes a branch of one selection on the M7, and an instruction of difference with it
-    assert run.cost["normal"].most - run.cost["normal"].least <= (1 if machine == "m7" else 0)
+    assert run.cost["normal"].most - run.cost["normal"].least == 0
     # adopting is a branch that bad data cannot take: two stores and two barriers more
     assert run.cost["adopting"].most - run.cost["normal"].most < 100
     if machine == "m4f":

@@ -133,6 +133,40 @@ void test_dense16_relu_may_write_over_its_input(void)
     expect_rows(16U, 16U, 1, 1);
 }
 
+/* Two layers at once give the bits of one after the other, also where sums are not exact. */
+void test_two_layers_at_once(void)
+{
+    pen_real_t both[(16U * 17U) + (16U * 17U) + 17U];
+    pen_real_t one[16];
+    const pen_real_t third = (pen_real_t)1 / (pen_real_t)3;
+    size_t at = 0U;
+
+    make(16U, 1U); /* 1 -> 16, 16 -> 16, 16 -> 1 in one stream */
+    for (size_t i = 0U; i < 32U; i++, at++) {
+        both[at] = stream[i] * third;
+    }
+    make(16U, 16U);
+    for (size_t i = 0U; i < 272U; i++, at++) {
+        both[at] = stream[i] * third;
+    }
+    make(1U, 16U);
+    for (size_t i = 0U; i < 17U; i++, at++) {
+        both[at] = stream[i] * third;
+    }
+    for (int k = -20; k <= 20; k++) {
+        const pen_real_t v = (pen_real_t)k * (pen_real_t)0.07F;
+        pen_dense16_scalar(both, v, one);
+        pen_dense16_relu(16U, &both[32], one, one);
+        pen_dense16_pair(both, v, y);
+        for (size_t r = 0U; r < 16U; r++) {
+            TEST_ASSERT_TRUE(y[r] == one[r]);
+        }
+        pen_dense16_scalar(both, v, one);
+        pen_dense16_relu(16U, &both[32], one, y);
+        TEST_ASSERT_TRUE(pen_dense16_last(16U, &both[32], one) == pen_dense1_relu(16U, &both[304], y));
+    }
+}
+
 /* Neither NaN nor either Inf may vanish in a layer, wherever it stands: this is what the step's one check rests on. */
 static void expect_nonfinite(size_t n, const pen_real_t value[])
 {

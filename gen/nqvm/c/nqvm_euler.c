@@ -22,10 +22,8 @@ static pen_status_t network(const pen_real_t p[], const pen_real_t in[1], pen_re
     pen_real_t h[16];
 
     h[0] = (in[0] - p[2]) * p[3];
-    pen_dense16_scalar(&p[4], h[0], h);
-    pen_dense16_relu(16U, &p[36], h, h);
-    pen_dense16_relu(16U, &p[308], h, h);
-    h[0] = pen_dense1_relu(16U, &p[580], h);
+    pen_dense16_pair(&p[4], h[0], h);
+    h[0] = pen_dense16_last(16U, &p[308], h);
     h[0] = (h[0] * p[597]) + p[598];
     *out = h[0];
     return ((in[0] >= p[0]) ? PEN_OK : PEN_OUTSIDE) | ((in[0] <= p[1]) ? PEN_OK : PEN_OUTSIDE);
