@@ -34,7 +34,7 @@ _RUNGE_KUTTA = {
 # Names of the templates inside functions that also hold names of the model; the model's get a _ there.
 _TAKEN = frozenset(
     "p x u y z dx fx fu yx yu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
-    "inner along drive copy begin finish usable unit zero solve integrate node".split()
+    "inner along drive copy begin finish usable unit solve integrate node".split()
 )
 _MATH = ("pen_exp", "pen_tanh", "pen_sigmoid", "pen_softplus", "pen_sign", "pen_heaviside", "pen_max", "pen_min")
 _AFFINE = {"centre": "pen_centre", "rescale": "pen_rescale"}
@@ -67,12 +67,28 @@ def generate(model: Model, directory: str | Path) -> list[Path]:
             with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
                 file.write(text)
             os.chmod(temporary, 0o644)
-        for temporary, path in written:
-            os.replace(temporary, path)
+        _replace_all(written)
     finally:
         for temporary, _ in written:
             Path(temporary).unlink(missing_ok=True)
     return [path for _, path in written]
+
+
+def _replace_all(written: list[tuple[str, Path]]) -> None:
+    """Put every file in its place; if one cannot be, all places are as they were. Raises OSError."""
+    before = {path: path.read_bytes() if path.exists() else None for _, path in written}
+    done: list[Path] = []
+    try:
+        for temporary, path in written:
+            os.replace(temporary, path)
+            done.append(path)
+    except OSError:
+        for path in done:
+            if before[path] is None:
+                path.unlink()
+            else:
+                path.write_bytes(before[path])
+        raise
 
 
 @dataclass(frozen=True)
@@ -144,7 +160,7 @@ class _Emitter:
             "set_length": len(sets.set_values(model, "default")), "offsets": self._offset_lines(),
             "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
-            "sample_time": real(model.sample_time), "literal": literal, "real": real, "si": units.si,
+            "sample_time": real(model.sample_time), "real": real, "si": units.si,
             "columns": len(model.states) + 2 * len(model.inputs),
             "needs_math": self._mentions(functions, _MATH), "needs_abs": self._mentions(functions, ("pen_port_abs",)),
         }  # fmt: skip

@@ -61,7 +61,7 @@ def note(text: str) -> None:
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option("0.1.0", prog_name="penode")
+@click.version_option(penode_gen.VERSION, prog_name="penode")
 def cli() -> None:
     """Physics-enhanced neural ODEs: from a model file to checked C, in the loop on host and Cortex-M."""
 

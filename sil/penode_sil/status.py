@@ -12,9 +12,6 @@ FLAGS = (
     "set_busy", "set_closed", "set_range", "set_short", "set_checksum", "set_nonfinite", "set_layout", "set_no_previous",
 )  # fmt: skip
 BIT = {name: 1 << n for n, name in enumerate(FLAGS)}
-HOLDING = sum(
-    BIT[name] for name in ("input_nonfinite", "state_nonfinite", "step_nonfinite", "singular", "held", "badarg")
-)
 
 
 def names(status: int) -> list[str]:

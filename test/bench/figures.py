@@ -19,16 +19,14 @@ from pathlib import Path
 
 import numpy as np
 
+import penode_gen
+from penode_sil import mil
+from penode_sil.scenario import Instance
+from penode_sil.schedule import Call
+from penode_sil.signals import VelocityChirp
+from penode_sil.targets import MACHINES, Pil, Sil
+
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "gen"), str(ROOT / "sil")]
-
-import penode_gen  # noqa: E402
-from penode_sil import mil  # noqa: E402
-from penode_sil.scenario import Instance  # noqa: E402
-from penode_sil.schedule import Call  # noqa: E402
-from penode_sil.signals import VelocityChirp  # noqa: E402
-from penode_sil.targets import MACHINES, Pil, Sil  # noqa: E402
-
 KEPT = Path(__file__).with_name("figures.json")
 README = ROOT / "README.md"
 PICTURE = ROOT / "sil" / "recalibration.png"  # in README.md

@@ -309,3 +309,35 @@ def test_steps_come_in_the_order_in_which_they_are_needed(tmp_path):
         assert step.reads <= known
         known.add(step.target)
     assert set().union(*(r.free_symbols for r in causal.rates)) <= known
+
+
+# -- all files or none, one version -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("failing", [0, 1, 2])
+@pytest.mark.parametrize("earlier", [True, False])
+def test_a_file_that_cannot_be_replaced_leaves_all_as_they_were(tmp_path, monkeypatch, failing, earlier):
+    model = penode_gen.load(NQVM[0])
+    names = list(emit_c.render(model))
+    if earlier:
+        for name in names:
+            (tmp_path / name).write_text(f"earlier {name}")
+    replace, calls = os.replace, itertools.count()
+
+    def fail(source, target):
+        if next(calls) == failing:
+            raise OSError("disk")
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(OSError, match="disk"):
+        penode_gen.generate(model, tmp_path)
+    kept = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    assert kept == ({name: f"earlier {name}" for name in names} if earlier else {})
+
+
+def test_one_version_and_one_abi_everywhere():
+    header = (ROOT / "inc" / "penode" / "pen_real.h").read_text()
+    assert re.search(r'#define PEN_VERSION "(.*)"', header)[1] == penode_gen.VERSION
+    assert int(re.search(r"#define PEN_ABI (\d+)", header)[1]) == sets.ABI
+    assert f'\nversion = "{penode_gen.VERSION}"\n' in (ROOT / "pyproject.toml").read_text()

@@ -13,13 +13,11 @@ from pathlib import Path
 
 import pytest
 
+import penode_gen
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
-for folder in ("gen", "sil"):
-    sys.path.insert(0, str(ROOT / folder))
 sys.path.insert(0, str(HERE))
-
-import penode_gen  # noqa: E402  (needs the path above)
 
 
 @pytest.fixture(scope="session")
@@ -65,14 +63,3 @@ def oscillator() -> object:
 def nqvm() -> object:
     """The project's own model."""
     return penode_gen.load(ROOT / "gen" / "nqvm" / "nqvm.toml")
-
-
-@pytest.fixture
-def show(capsys: pytest.CaptureFixture[str]) -> Callable[[str], None]:
-    """Print a measured figure although pytest captures output."""
-
-    def line(text: str) -> None:
-        with capsys.disabled():
-            print(f"\n    {text}", end="")
-
-    return line

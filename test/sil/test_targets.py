@@ -17,7 +17,7 @@ from penode_sil.errors import UserError
 from penode_sil.schedule import Call, exchange_calls
 from penode_sil.scenario import Exchange
 from penode_sil.signals import VelocityChirp
-from penode_sil.status import FLAGS, HOLDING, counts
+from penode_sil.status import FLAGS, counts
 from penode_sil.targets import MACHINES, Pil, Sil
 
 BOARDS = [name for name, board in MACHINES.items() if board]
@@ -123,8 +123,6 @@ def test_flags_are_those_of_the_header():
         int(value, 16): name.lower() for name, value in re.findall(r"#define PEN_(\w+)\s+UINT32_C\(0x(\w+)\)", text)
     }
     assert [flags[1 << n] for n in range(len(FLAGS))] == list(FLAGS)
-    holding = re.search(r"#define PEN_HOLDING[\s\\]*\((.*)\)", text)[1].split(" | ")
-    assert HOLDING == sum(1 << FLAGS.index(name.removeprefix("PEN_").lower()) for name in holding)
 
 
 def test_missing_compiler_is_said(nqvm, tmp_path, monkeypatch):
