@@ -3,6 +3,7 @@
 
 #include "penode/pen_set.h"
 
+#include "penode/pen_math.h"
 #include "penode/pen_port.h"
 
 #define YES 1U
@@ -29,8 +30,7 @@ uint32_t pen_set_checksum(const pen_real_t value[], uint32_t n)
     return crc ^ UINT32_MAX;
 }
 
-/* The slot that belongs to the tuning context; stable while nothing is pending. */
-static uint32_t inactive(const pen_tuning_t *tuning)
+uint32_t pen_tuning_spare(const pen_tuning_t *tuning)
 {
     return (pen_port_load(&tuning->active) & 1U) ^ 1U;
 }
@@ -44,10 +44,13 @@ static bool settled(const pen_tuning_t *tuning)
     return done;
 }
 
-/* Hand the inactive slot to the step; what runs now becomes the way back. */
-static void announce(pen_tuning_t *tuning)
+/* What runs now becomes the way back. */
+void pen_tuning_announce(pen_tuning_t *tuning, const pen_set_t *ready)
 {
-    tuning->previous = tuning->slot[inactive(tuning) ^ 1U];
+    const uint32_t spare = pen_tuning_spare(tuning);
+
+    tuning->slot[spare] = *ready;
+    tuning->previous = tuning->slot[spare ^ 1U];
     tuning->open = NO;
     pen_port_barrier();
     pen_port_store(&tuning->pending, YES);
@@ -69,7 +72,7 @@ static pen_status_t check_values(const pen_set_t *set)
 
 static pen_status_t check_head(const pen_tuning_t *tuning, const pen_set_head_t *head)
 {
-    const pen_set_head_t *const running = &tuning->slot[inactive(tuning) ^ 1U].head;
+    const pen_set_head_t *const running = &tuning->slot[pen_tuning_spare(tuning) ^ 1U].head;
     const bool fits = (head->layout == running->layout) && (head->length == running->length);
 
     return fits ? PEN_OK : PEN_SET_LAYOUT;
@@ -98,7 +101,7 @@ pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t len
         tuning->fill = 0U;
         tuning->active = 0U;
         tuning->pending = NO;
-        tuning->hold = NO;
+        tuning->hold = PEN_OK;
     }
     return status;
 }
@@ -115,7 +118,7 @@ pen_status_t pen_tuning_begin(pen_tuning_t *tuning, const pen_set_head_t *head)
         status = check_head(tuning, head);
     }
     if (status == PEN_OK) {
-        const uint32_t free_slot = inactive(tuning);
+        const uint32_t free_slot = pen_tuning_spare(tuning);
         const pen_real_t *const running = tuning->slot[free_slot ^ 1U].value;
         /* the bank that is neither running nor the way back; the way back is given up if it must be */
         const bool first = (tuning->bank[0] != running) &&
@@ -135,7 +138,7 @@ pen_status_t pen_tuning_begin(pen_tuning_t *tuning, const pen_set_head_t *head)
 
 pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t offset, const pen_real_t value[], uint32_t n)
 {
-    const uint32_t length = tuning->slot[inactive(tuning)].head.length;
+    const uint32_t length = tuning->slot[pen_tuning_spare(tuning)].head.length;
     pen_status_t status;
 
     if (tuning->open != YES) {
@@ -154,19 +157,20 @@ pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t offset, const pen_r
     return status;
 }
 
-pen_status_t pen_tuning_commit(pen_tuning_t *tuning)
+pen_status_t pen_tuning_commit(const pen_tuning_t *tuning, pen_set_t *ready)
 {
+    const pen_set_t *const set = &tuning->slot[pen_tuning_spare(tuning)];
     pen_status_t status;
 
     if (tuning->open != YES) {
         status = PEN_SET_CLOSED;
-    } else if (tuning->fill != tuning->slot[inactive(tuning)].head.length) {
+    } else if (tuning->fill != set->head.length) {
         status = PEN_SET_SHORT;
     } else {
-        status = check_values(&tuning->slot[inactive(tuning)]);
+        status = check_values(set);
     }
     if (status == PEN_OK) {
-        announce(tuning);
+        *ready = *set;
     }
     return status;
 }
@@ -179,7 +183,7 @@ pen_status_t pen_tuning_abort(pen_tuning_t *tuning)
     return status;
 }
 
-pen_status_t pen_tuning_select(pen_tuning_t *tuning, const pen_set_t *set)
+pen_status_t pen_tuning_select(const pen_tuning_t *tuning, const pen_set_t *set, pen_set_t *ready)
 {
     pen_status_t status;
 
@@ -192,13 +196,12 @@ pen_status_t pen_tuning_select(pen_tuning_t *tuning, const pen_set_t *set)
         status = (status == PEN_OK) ? check_values(set) : status;
     }
     if (status == PEN_OK) {
-        tuning->slot[inactive(tuning)] = *set;
-        announce(tuning);
+        *ready = *set;
     }
     return status;
 }
 
-pen_status_t pen_tuning_rollback(pen_tuning_t *tuning)
+pen_status_t pen_tuning_rollback(const pen_tuning_t *tuning, pen_set_t *ready)
 {
     pen_status_t status;
 
@@ -207,8 +210,7 @@ pen_status_t pen_tuning_rollback(pen_tuning_t *tuning)
     } else if (tuning->previous.value == NULL) {
         status = PEN_SET_NO_PREVIOUS;
     } else {
-        tuning->slot[inactive(tuning)] = tuning->previous;
-        announce(tuning);
+        *ready = tuning->previous;
         status = PEN_OK;
     }
     return status;
@@ -216,7 +218,7 @@ pen_status_t pen_tuning_rollback(pen_tuning_t *tuning)
 
 void pen_tuning_hold(pen_tuning_t *tuning, bool hold)
 {
-    pen_port_store(&tuning->hold, hold ? YES : NO);
+    pen_port_store(&tuning->hold, hold ? PEN_HELD : PEN_OK);
 }
 
 pen_set_head_t pen_tuning_running(const pen_tuning_t *tuning)
@@ -224,10 +226,10 @@ pen_set_head_t pen_tuning_running(const pen_tuning_t *tuning)
     return tuning->slot[pen_port_load(&tuning->active) & 1U].head;
 }
 
-pen_status_t pen_tuning_adopt(pen_tuning_t *tuning, const pen_real_t **value)
+pen_status_t pen_tuning_adopt(pen_tuning_t *tuning, uint32_t *slot)
 {
     uint32_t active = pen_port_load(&tuning->active) & 1U; /* ours alone to write */
-    pen_status_t status = (pen_port_load(&tuning->hold) == NO) ? PEN_OK : PEN_HELD;
+    pen_status_t status = pen_port_load(&tuning->hold) & PEN_HELD;
 
     if (pen_port_load(&tuning->pending) == YES) {
         pen_port_barrier(); /* what was announced is now seen whole ...                         */
@@ -237,6 +239,6 @@ pen_status_t pen_tuning_adopt(pen_tuning_t *tuning, const pen_real_t **value)
         pen_port_store(&tuning->pending, NO);
         status |= PEN_ADOPTED;
     }
-    *value = tuning->slot[active].value;
+    *slot = active;
     return status;
 }

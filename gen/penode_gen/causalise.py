@@ -133,8 +133,13 @@ def causalise(model: Model) -> Causal:
             comment = f"force of {e.name}: network {e.network}"
         else:
             text = e.expression if e.law == "expression" else LAWS[e.law].force
-            value = parse(where, text, {"s", "v", *e.arguments})
+            own = LAWS[e.law].states if e.law in LAWS else {}
             meant = {"s": s, "v": v} | {k: ex.symbol(p) for k, p in e.arguments.items()}
+            meant |= {k: ex.symbol(e.state(k)) for k in own}
+            value = parse(where, text, set(meant))
+            for name, state in own.items():
+                rate = parse(where, state.rate, set(meant)).xreplace({ex.symbol(k): to for k, to in meant.items()})
+                equations.append(_Equation(where, ex.derivative(e.state(name)), rate, f"{name} of {e.name}"))
             if e.law == "expression":
                 for name in sorted({"s", "v"} & names & {a.name for a in value.free_symbols}):
                     what = f"'{name}' is the {'deflection' if name == 's' else 'rate'} of this element, and a name of the model"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from . import expressions as ex
 from . import sets, units
 from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
+from .fold import foldable
 from .jacobian import Derivatives
 from .model import Model
 from .networks import Affine, Dense, Layer, Network
@@ -34,7 +36,7 @@ _RUNGE_KUTTA = {
 # Names of the templates inside functions that also hold names of the model; the model's get a _ there.
 _TAKEN = frozenset(
     "p x u y z dx fx fu yx yu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
-    "inner along drive copy begin finish usable unit solve integrate node".split()
+    "inner along drive advance fold f x0 copy begin finish usable unit solve integrate node".split()
 )
 _MATH = ("pen_exp", "pen_tanh", "pen_sigmoid", "pen_softplus", "pen_sign", "pen_heaviside", "pen_max", "pen_min")
 _AFFINE = {"centre": "pen_centre", "rescale": "pen_rescale"}
@@ -99,6 +101,7 @@ class _NetworkCode:
     shape: str
     users: tuple[str, ...]
     network: Network
+    folded: bool
 
     @property
     def n(self) -> int:
@@ -109,6 +112,19 @@ class _NetworkCode:
     def width(self) -> int:
         """Values of the widest layer."""
         return max(self.n, *(layer.n_out for layer in self.network.layers))
+
+    def chain(self) -> list[str]:
+        """The layers, as pen_fold() wants them."""
+        kinds = {"identity": "DENSE", "relu": "RELU"}
+        return [
+            f"{{ PEN_LAYER_{layer.form.upper() if isinstance(layer, Affine) else kinds[layer.activation]}, {layer.n_in}U, {layer.n_out}U }}"
+            for layer in self.network.layers
+        ]
+
+    @property
+    def neurons(self) -> int:
+        """Of all ReLU layers."""
+        return sum(layer.n_out for layer in self.network.layers if _relu(layer))
 
     def layers(self) -> list[tuple[Layer, str]]:
         """Each layer with the C text of where its values begin."""
@@ -128,7 +144,7 @@ class _Emitter:
         self.uses_input_rate = self.causal.uses(everything, self.causal.input_rates)
         self.drive = self.causal.inputs + (self.causal.input_rates if self.uses_input_rate else ())
         self.networks = self._network_code()
-        self.function_of = {user: code.name for code in self.networks for user in code.users}
+        self.code_of = {user: code for code in self.networks for user in code.users}
         self.constants: dict[str, sp.Symbol] = {}
 
     # -- what the templates see -----------------------------------------------------------------------------------
@@ -153,16 +169,17 @@ class _Emitter:
             "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
             "functions": functions, "constants": self._constants(), "networks": self.networks,
             "network_lines": {c.name: self._network_lines(c) for c in self.networks},
-            "bend_lines": {c.name: self._bend_lines(c) for c in self.networks if self._bent(c, functions)},
-            "called": {f"{c.name}{part}" for c in self.networks for part in ("", "_slope") if self._mentions(functions, (f" {c.name}{part}(",))},
-            "slope_lines": {c.name: self._slope_lines(c) for c in self.networks},
+            "bend_lines": {c.name: _by_value(c, self._bend_lines(c)) for c in self.networks if self._bent(c, functions)},
+            "called": {f"{c.name}{part}" for c in self.networks for part in ("", "_slope", "_or_pieces", "_or_pieces_slope") if self._mentions(functions, (f" {c.name}{part}(", f"){c.name}{part}("))},
+            "slope_lines": {c.name: _by_value(c, self._slope_lines(c)) for c in self.networks},
             "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),
             "set_length": len(sets.set_values(model, "default")), "offsets": self._offset_lines(),
             "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
+            "folded": [(name, code) for code in self.networks if code.folded for name in code.users],
+            "uses_p": any(f["uses_p"] for f in functions.values() if f), "uses_f": any(f["uses_f"] for f in functions.values() if f),
             "sample_time": real(model.sample_time), "real": real, "si": units.si,
             "columns": len(model.states) + 2 * len(model.inputs),
-            "needs_math": self._mentions(functions, _MATH), "needs_abs": self._mentions(functions, ("pen_port_abs",)),
         }  # fmt: skip
 
     @staticmethod
@@ -260,7 +277,7 @@ class _Emitter:
                 lines.append(f"const pen_real_t {self._c_name(ex.symbol(p.name))} = p[{self.at[p.name]}]; /* {units.si(p.unit)} */")
         if lines and steps:
             lines.append("")
-        calls = uses_p = False
+        calls = uses_p = uses_f = False
         for step in steps:
             if step.network:
                 bend = step.target in needs_bend
@@ -268,7 +285,9 @@ class _Emitter:
                 value = slope or step.target in used or not bend
                 lines += self._call(step, value, slope, bend, used)
                 calls = calls or value
-                uses_p = True
+                folded = self.code_of[step.network].folded
+                uses_f |= folded
+                uses_p |= not folded or model.more_pieces == "layers"
             else:
                 lines += _remarked(f"const pen_real_t {self._c_name(step.target)} = {self._print(step.value)};", step)
         lines += [f"const {'bool' if e.is_Relational else 'pen_real_t'} {t.name} = {self._print(e)};" for t, e in temporaries]
@@ -276,37 +295,54 @@ class _Emitter:
             lines.append("")
         lines += [f"{name} = {self._print(e)};" for name, e in wanted]
         return {
-            "lines": lines, "calls": calls, "uses_p": uses_p or any(ex.symbol(p.name) in used for p in model.tunable),
+            "lines": lines, "calls": calls, "uses_p": uses_p or any(ex.symbol(p.name) in used for p in model.tunable), "uses_f": uses_f,
             "uses_x": any(s in used for s in causal.states), "uses_u": any(s in used for s in self.drive),
         }  # fmt: skip
 
     def _call(self, step: Step, value: bool, slope: bool, bend: bool, used: set[sp.Symbol]) -> list[str]:
         name = self._c_name(step.target)
-        function = self.function_of[step.network]
-        values = f"&p[{self.prefix}_AT_{step.network.upper()}]"
+        code = self.code_of[step.network]
+        function, values = code.name, f"&p[{self.prefix}_AT_{step.network.upper()}]"
         lines = []
-        constants = {ex.symbol(p.name) for p in self.model.parameters.values() if not p.tunable}  # macros have no address
-        if len(step.arguments) == 1 and step.arguments[0].is_Symbol and step.arguments[0] not in constants:
-            argument = f"&{self._c_name(step.arguments[0])}"
+        if len(step.arguments) == 1:
+            argument = self._print(step.arguments[0])
         else:
             argument = f"{name}_in"
             parts = ", ".join(self._print(a) for a in step.arguments)
             lines.append(f"const pen_real_t {argument}[{len(step.arguments)}] = {{ {parts} }};")
-        if value:
-            lines += _remarked(f"pen_real_t {name};", step)
+        if code.folded and self.model.more_pieces == "layers":
+            function, values = f"{code.name}_or_pieces", f"{values}, f->{step.network}"
+        elif code.folded:
+            return [*lines, *self._lookup(step, name, argument, slope, used)]
         if slope:
             lines.append(f"pen_real_t {name}_slope[{len(step.arguments)}];")
-            lines.append(f"status |= {function}_slope({values}, {argument}, &{name}, {name}_slope);")
+            result = f"const pen_real_t {name} =" if step.target in used else "(void)"
+            lines += _remarked(f"{result} {function}_slope({values}, {argument}, {name}_slope, &status);".replace("(void) ", "(void)"), step)
             for i, s in enumerate(self.derivatives.slopes[step.target]):
                 lines += [f"const pen_real_t {s.name} = {name}_slope[{i}];"] if s in used else []
         elif value:
-            lines.append(f"status |= {function}({values}, {argument}, &{name});")
+            lines += _remarked(f"const pen_real_t {name} = {function}({values}, {argument}, &status);", step)
         if bend:
             n = len(step.arguments)
             lines.append(f"pen_real_t {name}_bend[{n}][{n}];")
             lines.append(f"{function}_bend({values}, {argument}, {name}_bend);")
             for i, row in enumerate(self.derivatives.bends[step.target]):
                 lines += [f"const pen_real_t {s.name} = {name}_bend[{i}][{j}];" for j, s in enumerate(row) if j >= i and s in used]
+        return lines
+
+    def _lookup(self, step: Step, name: str, argument: str, slope: bool, used: set[sp.Symbol]) -> list[str]:
+        """A folded network: find the piece, then a line."""
+        pieces, lines = f"f->{step.network}", []
+        if not argument.isidentifier():
+            lines.append(f"const pen_real_t {name}_in = {argument};")
+            argument = f"{name}_in"
+        lines.append(f"const pen_piece_t *const {name}_piece = pen_fold_find({self.prefix}_PIECES, {pieces}, {argument});")
+        if step.target in used:
+            lines += _remarked(f"const pen_real_t {name} = pen_fold_value({pieces}, {name}_piece, {argument}, &status);", step)
+        else:
+            lines.append(f"status |= {name}_piece->status;")
+        if slope and self.derivatives.slopes[step.target][0] in used:
+            lines.append(f"const pen_real_t {self.derivatives.slopes[step.target][0].name} = {name}_piece->slope;")
         return lines
 
     # -- networks -------------------------------------------------------------------------------------------------
@@ -320,7 +356,7 @@ class _Emitter:
         for i, users in enumerate(groups.values()):
             name = f"network_{chr(ord('a') + i)}" if len(groups) > 1 else "network"
             sizes = [users[0][1].n_inputs] + [la.n_out for la in users[0][1].layers if isinstance(la, Dense)]
-            found.append(_NetworkCode(name, " -> ".join(map(str, sizes)), tuple(n for n, _ in users), users[0][1]))
+            found.append(_NetworkCode(name, " -> ".join(map(str, sizes)), tuple(n for n, _ in users), users[0][1], self.model.pieces > 0 and foldable(users[0][1])))
         return found
 
     def _network_lines(self, code: _NetworkCode) -> dict[str, Any]:
@@ -355,9 +391,11 @@ class _Emitter:
             lines += _activation(layer, fresh)
             here, relu = fresh, _relu(layer)
         lines += [f"pen_act_relu(1U, {here});"] if relu else []
-        lines.append(f"*out = {here}[0];")
         if self.model.outside == "fade":
-            lines.append(f"*out *= pen_fade({code.n}U, &p[0], {real(self.model.fade_width)}, in);")
+            lines.append(f"return {here}[0] * pen_fade({code.n}U, &p[0], {real(self.model.fade_width)}, in);")
+        else:
+            lines.append(f"return {here}[0];")
+        lines = _by_value(code, lines)
         return {"lines": lines, "buffers": [b for b in "hg" if any(f"{b}[" in t or f" {b})" in t or f" {b}," in t for t in lines)]}
 
     def _slope_lines(self, code: _NetworkCode) -> list[str]:
@@ -391,11 +429,12 @@ class _Emitter:
             h, g, t, s, relu = g, h, s, t, _relu(layer)
         lines += [f"pen_act_relu(1U, {h});"] if relu else []
         each(f"slope[@] = {t}[@][0];")
-        lines.append(f"*out = {h}[0];")
         if self.model.outside == "fade":
             lines.append(f"const pen_real_t trust = pen_fade({n}U, &p[0], {fade}, in);")
-            each(f"slope[@] = (trust * slope[@]) + (*out * pen_fade_slope({n}U, &p[0], {fade}, in, @U));")
-            lines.append("*out *= trust;")
+            each(f"slope[@] = (trust * slope[@]) + ({h}[0] * pen_fade_slope({n}U, &p[0], {fade}, in, @U));")
+            lines.append(f"return {h}[0] * trust;")
+        else:
+            lines.append(f"return {h}[0];")
         return lines
 
     def _bend_lines(self, code: _NetworkCode) -> list[str]:
@@ -489,6 +528,13 @@ class _Emitter:
             "name": name, "id": chosen.id, "pieces": pieces,
             "checksum_float": sets.set_head(self.model, name)[3], "checksum_double": sets.set_head(self.model, name, float)[3],
         }  # fmt: skip
+
+
+def _by_value(code: _NetworkCode, lines: list[str]) -> list[str]:
+    """A single input is a number, not a row of one."""
+    if code.n > 1:
+        return lines
+    return [re.sub(r"([ (])in([,)])", r"\1&in\2", line.replace(" in[0]", " in").replace("(in[0]", "(in")) for line in lines]
 
 
 def _loops(statement: str, n: int) -> list[str]:

@@ -5,15 +5,24 @@ pulls the two ends together. An extension found from data is one more element wi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class LawState:
+    """A state that a law brings along, 0 at the start: its unit, and its rate in terms of s, v, arguments and states."""
+
+    unit: str
+    rate: str
 
 
 @dataclass(frozen=True)
 class Law:
-    """`force` in terms of s, v and the arguments; `arguments` maps each to its unit."""
+    """`force` in terms of s, v, the arguments and the law's own states; `arguments` maps each to its unit."""
 
     force: str
     arguments: dict[str, str]
+    states: dict[str, LawState] = field(default_factory=dict)
 
 
 LAWS: dict[str, Law] = {
@@ -23,16 +32,47 @@ LAWS: dict[str, Law] = {
     "cubic_spring": Law("cubic*s^3", {"cubic": "N/m^3"}),
     # quadratic in the distance to the point of zero stiffness, as in the published case study
     "progressive_spring": Law("(root*(s + lead))^2 - (root*lead)^2", {"root": "N^0.5/m", "lead": "m"}),
+    "quadratic_spring": Law("quadratic*s^2", {"quadratic": "N/m^2"}),
+    # extra stiffness of the stretched side
+    "asymmetric_spring": Law("stiffness*max(s, 0)", {"stiffness": "N/m"}),
     "bump_stop": Law("stiffness*max(s - gap, 0)", {"stiffness": "N/m", "gap": "m"}),
     "rebound_stop": Law("stiffness*min(s + gap, 0)", {"stiffness": "N/m", "gap": "m"}),
+    # takes a parallel spring of that stiffness away: within the play altogether, beyond it a constant force is missing
+    "backlash": Law("stiffness*(max(s - gap, 0) + min(s + gap, 0) - s)", {"stiffness": "N/m", "gap": "m"}),
+    # takes a parallel spring away where it would pull: a tyre stretched by more than its static load pressed it in
+    "liftoff": Law("-stiffness*max(s - static, 0)", {"stiffness": "N/m", "static": "m"}),
     "quadratic_damper": Law("coefficient*v*abs(v)", {"coefficient": "N*s^2/m^2"}),
     # extra damping on one side only: rebound is v > 0
     "rebound_damper": Law("damping*max(v, 0)", {"damping": "N*s/m"}),
     "compression_damper": Law("damping*min(v, 0)", {"damping": "N*s/m"}),
+    # takes a parallel damper away at rates far above the knee
+    "degressive_damper": Law("-damping*v*abs(v)/(knee + abs(v))", {"damping": "N*s/m", "knee": "m/s"}),
+    # come with time, or with the work done: damping below zero is a damper that fades
+    "fading_damper": Law("damping*faded*v", {"damping": "N*s/m", "time": "s"}, {"faded": LawState("1", "(1 - faded)/time")}),
+    "heating_damper": Law("damping*warm*v", {"damping": "N*s/m", "work": "m^2/s"}, {"warm": LawState("1", "(1 - warm)*v^2/work")}),
     "coulomb_friction": Law("force*tanh(v/transition)", {"force": "N", "transition": "m/s"}),
     # Modelica.Mechanics.Translational friction in its smooth form: breakaway peak at `breakaway_rate`, then Coulomb
     "stribeck_friction": Law(
         "2.3316439815971242*(breakaway - coulomb)*exp(-(v/stribeck)^2)*v/stribeck + coulomb*tanh(v/transition)",
         {"breakaway": "N", "coulomb": "N", "stribeck": "m/s", "transition": "m/s"},
+    ),
+    # hysteresis of Bouc and Wen with exponent 2: stiff (force/presliding) after each reversal, at last the constant force
+    "bouc_wen": Law(
+        "force*slip", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - (v*slip^2 + abs(v)*slip*abs(slip))/2)/presliding")}
+    ),
+    # hysteresis of Dahl: ever softer after a reversal
+    "dahl_friction": Law("force*slip", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - abs(v)*slip)/presliding")}),
+    # spring and damper in series, relaxation = damping/stiffness
+    "maxwell_bushing": Law(
+        "pull", {"stiffness": "N/m", "relaxation": "s"}, {"pull": LawState("N", "stiffness*v - pull/relaxation")}
+    ),
+    # a mass that hangs on the first end by spring and damper; the second end is ground
+    "absorber": Law(
+        "stiffness*(s - position) + damping*(v - rate)",
+        {"mass": "kg", "stiffness": "N/m", "damping": "N*s/m"},
+        {
+            "position": LawState("m", "rate"),
+            "rate": LawState("m/s", "(stiffness*(s - position) + damping*(v - rate))/mass"),
+        },
     ),
 }

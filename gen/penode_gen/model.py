@@ -10,6 +10,7 @@ from .networks import Network
 METHODS = ("euler", "heun", "rk4", "ros1", "ros2")
 INTERPOLATIONS = ("held", "linear")
 OUTSIDE = ("extrapolate", "clamp", "fade")
+MORE_PIECES = ("refuse", "layers")
 GROUND = "ground"
 
 
@@ -68,10 +69,14 @@ class Element:
     network_inputs: tuple[str, ...] = ()
     expression: str = ""
 
+    def state(self, name: str) -> str:
+        """The model's name for a state of this element's law."""
+        return f"{self.name}_{name}"
+
 
 @dataclass(frozen=True)
 class State:
-    """A state that is not mechanical; its equation gives der(name)."""
+    """A state that is not mechanical; an equation, or the law of an element, gives der(name)."""
 
     name: str
     unit: str
@@ -138,6 +143,8 @@ class Model:
     interpolation: str
     outside: str
     fade_width: float
+    pieces: int  # room for the straight pieces of a folded network; 0: evaluate layer by layer
+    more_pieces: str
     parameters: dict[str, Parameter]
     inputs: tuple[Input, ...]
     bodies: tuple[Body, ...]

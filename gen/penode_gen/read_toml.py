@@ -19,6 +19,7 @@ from . import units
 from .causalise import check
 from .laws import LAWS
 from .networks import Network, NetworkError, read_network
+from .fold import foldable, pieces, room
 from .sets import network_pieces
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -62,7 +63,7 @@ _REQUIRED = {
 }
 _MODEL = {
     "extends": str, "name": str, "description": str, "sample_time": str, "method": str, "substeps": int, "input": str, "outside": str,
-    "fade_width": (int, float),
+    "fade_width": (int, float), "pieces": int, "more_pieces": str,
 }  # fmt: skip
 
 
@@ -289,25 +290,28 @@ class _Reader:
         sample_time = self.quantity(("model", "sample_time"), head.get("sample_time", "1 s"), "s")
         if sample_time < 1e-9 or sample_time > 86400.0:
             self.problem(("model", "sample_time"), f"{head['sample_time']} is out of range", "give a time from 1 ns to 1 day, such as '1 ms'")
-        for key, default, choices in (("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS), ("outside", "extrapolate", m.OUTSIDE)):
+        for key, default, choices in (("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS), ("outside", "extrapolate", m.OUTSIDE), ("more_pieces", "refuse", m.MORE_PIECES)):
             if head.setdefault(key, default) not in choices:
                 self.problem(("model", key), f"'{head[key]}' is unknown", f"choose one of {', '.join(choices)}")
         if not 1 <= head.setdefault("substeps", 1) <= 1000:
             self.problem(("model", "substeps"), f"{head['substeps']} is out of range", "give 1 to 1000")
         if not 1e-6 <= head.setdefault("fade_width", 0.1) <= 100.0:
             self.problem(("model", "fade_width"), "is out of range", "give the fading distance in widths of the envelope, 1e-6 to 100")
+        if head.setdefault("pieces", 0) != 0 and not 4 <= head["pieces"] <= 4096:
+            self.problem(("model", "pieces"), f"{head['pieces']} is out of range", "give room for 4 to 4096 pieces, or 0 to evaluate layer by layer")
 
         parameters = self.parameters()
         inputs = tuple(self.inputs())
         bodies = tuple(self.bodies(parameters))
         networks = dict(self.networks())
         elements = tuple(self.elements(parameters, inputs, bodies, networks))
-        states = tuple(self.states())
+        states = (*self.states(), *_law_states(elements))
         variables = tuple(self.variables())
         equations = tuple(self.equations())
         outputs = tuple(self.signals("outputs"))
         sensors = tuple(self.signals("sensors"))
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
+        self.folds(head, sets)
         self.unique(parameters, inputs, bodies, elements, states, variables, networks)
         self.shown((*outputs, *sensors), {*(i.name for i in inputs), *(s.name for s in states), *(b.position for b in bodies), *(b.velocity for b in bodies)}, len(outputs))
         self.macros(parameters, networks, name)
@@ -320,7 +324,7 @@ class _Reader:
         return m.Model(
             name=head["name"], description=head.get("description", ""), sample_time=sample_time, method=head["method"],
             substeps=head["substeps"], interpolation=head["input"], outside=head["outside"], fade_width=float(head["fade_width"]),
-            parameters=parameters, inputs=inputs, bodies=bodies, elements=elements, extra_states=states, variables=variables,
+            pieces=room(head["pieces"]), more_pieces=head["more_pieces"], parameters=parameters, inputs=inputs, bodies=bodies, elements=elements, extra_states=states, variables=variables,
             equations=equations, networks=networks, outputs=outputs, sensors=sensors, sets=sets, path=self.path,
             digest=self.digest.hexdigest(),
         )  # fmt: skip
@@ -518,6 +522,23 @@ class _Reader:
             noise = self.noise((section, name), entry, scale)
             yield m.Signal(name, entry.get("value", ""), entry.get("unit", _UNKNOWN), noise, entry.get("description", ""))
 
+    def folds(self, head: dict[str, Any], sets: dict[str, m.ParameterSet]) -> None:
+        """Check that there is something to fold, and room for it."""
+        where, given = ("model", "pieces"), room(head["pieces"])
+        if given == 0 or not sets:
+            return
+        if head["outside"] == "fade":
+            self.problem(where, "a network that fades is not made of straight pieces", "choose outside = 'extrapolate' or 'clamp', or leave pieces out")
+        elif not any(foldable(net) for net in sets["default"].networks.values()) and len(sets["default"].networks) == len(self.data.get("networks", {})):
+            self.problem(where, "no network has one input and only ReLU activations", "leave pieces out")
+        elif head["more_pieces"] == "refuse":
+            for chosen in sets.values():
+                for name, net in chosen.networks.items():
+                    need = pieces(net, head["outside"] == "clamp") if foldable(net) else 0
+                    if need > given:
+                        remedy = f"give room for {need} or more, or choose more_pieces = 'layers'"
+                        self.problem(where, f"{name} of set '{chosen.name}' has {need} straight pieces", remedy)
+
     def sets(self, parameters: dict[str, m.Parameter], networks: dict[str, m.NetworkPort], masses: set[str]) -> dict[str, m.ParameterSet]:
         tunable = {p.name: p for p in parameters.values() if p.tunable}
         entries = self.entries("sets")
@@ -603,7 +624,8 @@ class _Reader:
         named += [("input", i.name, ("inputs", i.name)) for i in inputs]
         for key in ("position", "velocity"):
             named += [(key, getattr(b, key), ("bodies", b.name, key)) for b in bodies]
-        named += [("state", s.name, ("states", s.name)) for s in states] + [("variable", v.name, ("variables", v.name)) for v in variables]
+        of_laws = {s.name: ("elements", e.name) for e in elements for s in _law_states([e])}
+        named += [("state", s.name, of_laws.get(s.name, ("states", s.name))) for s in states] + [("variable", v.name, ("variables", v.name)) for v in variables]
         named += [("network", n, ("networks", n)) for n in networks]
         for e in elements:
             where = ("elements", e.name)
@@ -647,6 +669,13 @@ class _Reader:
                     where = self.made.get(n, ("parameters" if n in parameters else "networks", n))
                     self.problem(where, f"its C constant {model.upper()}_{name.upper()} is already taken", "rename it")
                     break
+
+
+def _law_states(elements: Iterable[m.Element]) -> Iterable[m.State]:
+    """The states that the laws of elements bring along."""
+    for e in elements:
+        for name, state in LAWS[e.law].states.items() if e.law in LAWS else ():
+            yield m.State(e.state(name), state.unit, description=f"{name} of {e.name}")
 
 
 def _same(a: str, b: str) -> bool:

@@ -24,12 +24,30 @@
 #ifndef PEN_MATH_H
 #define PEN_MATH_H
 
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "penode/pen_port.h"
 #include "penode/pen_real.h"
 
 pen_real_t pen_exp(pen_real_t x);      /* e^x; +Inf above log(PEN_REAL_MAX), gradual underflow to 0 below            */
 pen_real_t pen_tanh(pen_real_t x);     /* odd: pen_tanh(-x) == -pen_tanh(x)                                          */
 pen_real_t pen_sigmoid(pen_real_t x);  /* 1 / (1 + e^-x)                                                             */
 pen_real_t pen_softplus(pen_real_t x); /* log(1 + e^x); never overflows for finite x                                 */
+
+/**
+ * True if all n values are finite. No branch on the data: 0 * v is NaN for NaN and Inf alike, and NaN stays in the sum.
+ * Cost: one multiplication and one addition a value.
+ */
+static inline bool pen_finite(size_t n, const pen_real_t value[])
+{
+    pen_real_t sum = (pen_real_t)0;
+    PEN_PORT_UNROLL
+    for (size_t i = 0U; i < n; i++) {
+        sum += (pen_real_t)0 * value[i];
+    }
+    return sum >= (pen_real_t)0; /* false for NaN; -0 >= 0 is true */
+}
 
 /* Kinks. NaN, and an Inf that the result would hide, come out as NaN. */
 

@@ -12,8 +12,6 @@
 #define PEN_REAL_H
 
 #include <float.h>
-#include <stdbool.h>
-#include <stddef.h>
 
 #define PEN_VERSION "0.1.0"
 #define PEN_ABI 1 /* generated code names the ABI it was written for and stops the compiler on another one */
@@ -30,23 +28,14 @@
 
 #ifdef PEN_REAL_DOUBLE
 typedef double pen_real_t;
-#define PEN_REAL_MAX DBL_MAX
+#define PEN_REAL_MAX     DBL_MAX
+#define PEN_REAL_MIN     DBL_MIN
+#define PEN_REAL_EPSILON DBL_EPSILON
 #else
 typedef float pen_real_t;
-#define PEN_REAL_MAX FLT_MAX
+#define PEN_REAL_MAX     FLT_MAX
+#define PEN_REAL_MIN     FLT_MIN
+#define PEN_REAL_EPSILON FLT_EPSILON
 #endif
-
-/**
- * True if all n values are finite. No branch on the data: 0 * v is NaN for NaN and Inf alike, and NaN stays in the sum.
- * Cost: one multiplication and one addition a value.
- */
-static inline bool pen_finite(size_t n, const pen_real_t value[])
-{
-    pen_real_t sum = (pen_real_t)0;
-    for (size_t i = 0U; i < n; i++) {
-        sum += (pen_real_t)0 * value[i];
-    }
-    return sum >= (pen_real_t)0; /* false for NaN; -0 >= 0 is true */
-}
 
 #endif

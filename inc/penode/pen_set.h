@@ -7,7 +7,8 @@
  *   tuning context                      step
  *   begin  -> a bank that is not read
  *   write, write, ...
- *   commit -> checks, barrier, pending=1
+ *   commit   -> checks
+ *   announce -> barrier, pending=1
  *                                       pending? barrier, active ^= 1, barrier, pending=0
  *   begin / select / rollback again     (everything else of this struct is the tuning context's own)
  *
@@ -46,7 +47,7 @@ typedef struct {
     pen_set_t         slot[2];  /* slot[active] is read by the step, the other belongs to the tuning context */
     volatile uint32_t active;   /* 0 or 1; written by the step only                                          */
     volatile uint32_t pending;  /* 1: the other slot waits for the next step                                 */
-    volatile uint32_t hold;     /* 1: the step keeps the state                                               */
+    volatile uint32_t hold;     /* PEN_HELD: the step keeps the state                                        */
     pen_set_t         previous; /* what rollback returns to; value is NULL if it is gone                     */
     pen_real_t       *bank[2];  /* [length] each; NULL if the model runs from selected sets only             */
     pen_real_t       *staging;  /* the bank being filled                                                     */
@@ -77,24 +78,32 @@ pen_status_t pen_tuning_begin(pen_tuning_t *tuning, const pen_set_head_t *head);
  */
 pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t offset, const pen_real_t value[], uint32_t n);
 
+/* Three ways to a new set. Each checks one and gives it out as `ready`; nothing changes until it is announced. In between,
+ * what is derived from the set is made for the slot that it will take. Cost: about 10 operations per byte of the set. */
+
 /**
- * Check the open set and hand it to the next step. A refused set stays open: send the wrong part again, or abort.
+ * The open set. A refused one stays open: send the wrong part again, or abort.
  * @return PEN_OK; PEN_SET_CLOSED; PEN_SET_SHORT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE
- * Cost: about 10 operations per byte of the set; the slow context pays it.
  */
-pen_status_t pen_tuning_commit(pen_tuning_t *tuning);
+pen_status_t pen_tuning_commit(const pen_tuning_t *tuning, pen_set_t *ready);
+
+/**
+ * A whole set (in flash, say), without copying it; an open set is dropped.
+ * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE; PEN_BADARG
+ */
+pen_status_t pen_tuning_select(const pen_tuning_t *tuning, const pen_set_t *set, pen_set_t *ready);
+
+/** The set that ran before; an open set is dropped. @return PEN_OK; PEN_SET_BUSY; PEN_SET_NO_PREVIOUS */
+pen_status_t pen_tuning_rollback(const pen_tuning_t *tuning, pen_set_t *ready);
+
+/** The slot that the next set will take: what belongs to it may be written. Stable while nothing is pending. */
+uint32_t pen_tuning_spare(const pen_tuning_t *tuning);
+
+/** Hand a ready set to the next step. */
+void pen_tuning_announce(pen_tuning_t *tuning, const pen_set_t *ready);
 
 /** Drop the open set. @return PEN_OK; PEN_SET_CLOSED */
 pen_status_t pen_tuning_abort(pen_tuning_t *tuning);
-
-/**
- * Let the next step take a whole set (in flash, say) without copying it; an open set is dropped.
- * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE; PEN_BADARG
- */
-pen_status_t pen_tuning_select(pen_tuning_t *tuning, const pen_set_t *set);
-
-/** Let the next step return to the set that ran before; an open set is dropped. @return PEN_OK; PEN_SET_BUSY; PEN_SET_NO_PREVIOUS */
-pen_status_t pen_tuning_rollback(pen_tuning_t *tuning);
 
 /** Tell the step to hold state and outputs (true), or to go on from them (false). */
 void pen_tuning_hold(pen_tuning_t *tuning, bool hold);
@@ -107,10 +116,10 @@ uint32_t pen_set_checksum(const pen_real_t value[], uint32_t n);
 
 /**
  * For the step: adopt what is pending and say what to run with.
- * @param value  the values of the set now in force
+ * @param slot  0 or 1: the slot of the set now in force
  * @return PEN_OK, PEN_ADOPTED, PEN_HELD, or both
  * Cost: constant but for the adoption itself, which adds two stores and two barriers.
  */
-pen_status_t pen_tuning_adopt(pen_tuning_t *tuning, const pen_real_t **value);
+pen_status_t pen_tuning_adopt(pen_tuning_t *tuning, uint32_t *slot);
 
 #endif

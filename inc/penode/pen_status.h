@@ -37,8 +37,9 @@ typedef uint32_t pen_status_t;
 #define PEN_SET_NONFINITE   UINT32_C(0x2000) /* a value is NaN or Inf                                               */
 #define PEN_SET_LAYOUT      UINT32_C(0x4000) /* made for another model, layout version or real type                 */
 #define PEN_SET_NO_PREVIOUS UINT32_C(0x8000) /* rollback: the previous set is gone                                  */
+#define PEN_SET_PIECES     UINT32_C(0x10000) /* a network has more pieces than there is room for                    */
 
-#define PEN_STATUS_FLAGS 16U /* flags above, and counters                                                  */
+#define PEN_STATUS_FLAGS 17U /* flags above, and counters                                                  */
 #define PEN_STATUS_STEP   8U /* the first 8 flags are a step's, the others a tuning call's                  */
 #define PEN_HOLDING \
     (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE | PEN_STEP_NONFINITE | PEN_SINGULAR | PEN_HELD | PEN_BADARG)

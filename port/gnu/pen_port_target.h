@@ -11,6 +11,13 @@
 #ifndef PEN_PORT_TARGET_H
 #define PEN_PORT_TARGET_H
 
+/* Before a short loop of constant length: write it out. GCC only; and never when optimising for size. */
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__OPTIMIZE_SIZE__)
+#define PEN_PORT_UNROLL _Pragma("GCC unroll 16")
+#else
+#define PEN_PORT_UNROLL
+#endif
+
 /* One or two instructions each: never worth a call, not even when optimising for size. */
 #define PEN_PORT_INLINE static inline __attribute__((always_inline))
 

@@ -177,7 +177,7 @@ class Head(ctypes.Structure):
 class Report(ctypes.Structure):
     """pen_status_report_t"""
 
-    _fields_ = [("flags", ctypes.c_uint32), ("times", ctypes.c_uint32 * 16)]
+    _fields_ = [("flags", ctypes.c_uint32), ("times", ctypes.c_uint32 * 17)]
 
 
 class Set(ctypes.Structure):

@@ -9,6 +9,8 @@
 
 #include "penode/pen_real.h"
 
+#define PEN_PORT_UNROLL
+
 uint32_t   pen_port_load(const volatile uint32_t *word);
 void       pen_port_store(volatile uint32_t *word, uint32_t value);
 void       pen_port_barrier(void);

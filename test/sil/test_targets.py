@@ -61,9 +61,11 @@ def every_call(model):
     return u, calls
 
 
+@pytest.mark.parametrize("name", ["nqvm", "nqvm_folded"])
 @pytest.mark.parametrize("machine", list(MACHINES))
-def test_sil_and_pil_agree_to_the_bit_in_every_sample(nqvm, machine):
+def test_sil_and_pil_agree_to_the_bit_in_every_sample(name, machine):
     need("gcc", *(["qemu-system-arm", "arm-none-eabi-gcc"] if MACHINES[machine] else []))
+    nqvm = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml")
     u, calls = every_call(nqvm)
     sil, pil = Sil(nqvm).run(u, calls), Pil(nqvm, machine).run(u, calls)
     for name in ("x", "y", "z", "status"):
@@ -74,20 +76,23 @@ def test_sil_and_pil_agree_to_the_bit_in_every_sample(nqvm, machine):
     assert any(status for _, status in sil.calls)
 
 
-def test_hundred_thousand_steps_are_the_same_everywhere(nqvm, show):
+@pytest.mark.parametrize("name", ["nqvm", "nqvm_folded"])
+def test_hundred_thousand_steps_are_the_same_everywhere(name, show):
     need("gcc", "clang-19", "qemu-system-arm", "arm-none-eabi-gcc")
-    u = chirp(100_000)
+    nqvm, u = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml"), chirp(100_000)
     digests = {" ".join(compiler): Sil(nqvm, compiler=compiler).run(u).digest for compiler in COMPILERS}
     with ThreadPoolExecutor(2) as pool:  # the work is done by other processes
         digests |= zip(BOARDS, pool.map(lambda machine: Pil(nqvm, machine).run(u).digest, BOARDS))
-    show(f"hash of 100 000 steps: {digests['gcc -O2'][:16]} on {', '.join(digests)}")
+    show(f"{name}, hash of 100 000 steps: {digests['gcc -O2'][:16]} on {', '.join(digests)}")
     assert len(set(digests.values())) == 1, digests
 
 
+@pytest.mark.parametrize("name", ["nqvm", "nqvm_folded"])
 @pytest.mark.parametrize("machine", HARD_FLOAT)
-def test_every_step_costs_the_same(nqvm, machine, show):
+def test_every_step_costs_the_same(name, machine, show):
     """Held, bad, adopting and normal steps, any input: one number, because no branch depends on data."""
     need("qemu-system-arm", "arm-none-eabi-gcc")
+    nqvm = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml")
     u, calls = every_call(nqvm)
     run = Pil(nqvm, machine).run(u, calls)
     show(

@@ -9,7 +9,7 @@
 
 #define ALL UINT32_C(0xffffffff)
 #define STEP_FLAGS UINT32_C(0x00ff)
-#define TUNE_FLAGS UINT32_C(0xff00)
+#define TUNE_FLAGS UINT32_C(0x1ff00)
 
 static pen_status_log_t    status_log;
 static pen_status_report_t report;

@@ -2,7 +2,9 @@
 
 #include "nqvm.h"
 
+#include "penode/pen_math.h"
 #include "penode/pen_net.h"
+#include "penode/pen_port.h"
 
 #define NQVM_M_B_INVERSE ((pen_real_t)(1.0 / 350.0)) /* 1 / m_b */
 #define NQVM_M_W_INVERSE ((pen_real_t)(1.0 / 90.0)) /* 1 / m_w */
@@ -10,6 +12,7 @@
 #define NQVM_D ((pen_real_t)800.0) /* N*s/m, suspension damper */
 #define NQVM_C_T ((pen_real_t)300000.0) /* N/m, tyre spring */
 
+#define N_LAST 6U /* states and outputs */
 #define N_DRIVE 1U /* inputs */
 #define N_X NQVM_N_X
 #define N_COLUMNS 6U /* of derivatives: state, input before, input now */
@@ -17,28 +20,31 @@
 #define H (NQVM_SAMPLE_TIME)
 
 /* 1 -> 16 -> 16 -> 16 -> 1: spring_net, damper_net */
-static pen_status_t network(const pen_real_t p[], const pen_real_t in[1], pen_real_t *out)
+static pen_real_t network(const pen_real_t p[], const pen_real_t in, pen_status_t *status)
 {
     pen_real_t h[16];
 
-    h[0] = (in[0] - p[2]) * p[3];
+    *status |= (in >= p[0]) ? PEN_OK : PEN_OUTSIDE;
+    *status |= (in <= p[1]) ? PEN_OK : PEN_OUTSIDE;
+    h[0] = (in - p[2]) * p[3];
     pen_dense16_pair(&p[4], h[0], h);
     h[0] = pen_dense16_last(16U, &p[308], h);
     h[0] = (h[0] * p[597]) + p[598];
-    *out = h[0];
-    return ((in[0] >= p[0]) ? PEN_OK : PEN_OUTSIDE) | ((in[0] <= p[1]) ? PEN_OK : PEN_OUTSIDE);
+    return h[0];
 }
 
 /* the same, and its derivative along each input: h is the value, t[i] its change with input i */
-static pen_status_t network_slope(const pen_real_t p[], const pen_real_t in[1], pen_real_t *out,
-    pen_real_t slope[1])
+static pen_real_t network_slope(const pen_real_t p[], const pen_real_t in, pen_real_t slope[1],
+    pen_status_t *status)
 {
     pen_real_t h[16];
     pen_real_t g[16];
     pen_real_t t[1][16];
     pen_real_t s[1][16];
 
-    h[0] = in[0];
+    *status |= (in >= p[0]) ? PEN_OK : PEN_OUTSIDE;
+    *status |= (in <= p[1]) ? PEN_OK : PEN_OUTSIDE;
+    h[0] = in;
     t[0][0] = (pen_real_t)1;
     h[0] = (h[0] - p[2]) * p[3];
     pen_centre_tangent(1U, &p[2], t[0]);
@@ -56,8 +62,7 @@ static pen_status_t network_slope(const pen_real_t p[], const pen_real_t in[1], 
     h[0] = (h[0] * p[597]) + p[598];
     pen_rescale_tangent(1U, &p[597], t[0]);
     slope[0] = t[0][0];
-    *out = h[0];
-    return ((in[0] >= p[0]) ? PEN_OK : PEN_OUTSIDE) | ((in[0] <= p[1]) ? PEN_OK : PEN_OUTSIDE);
+    return h[0];
 }
 
 /* time derivatives of the states */
@@ -75,10 +80,10 @@ static pen_status_t rates(const pen_real_t p[], const pen_real_t x[], const pen_
     const pen_real_t s_tyre = z_w - z_road; /* deflection between wheel and z_road */
     const pen_real_t F_spring = NQVM_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_D * v_spring; /* force of damper */
-    pen_real_t F_spring_nn; /* force of spring_nn: network spring_net */
-    status |= network(&p[NQVM_AT_SPRING_NET], &s_spring, &F_spring_nn);
-    pen_real_t F_damper_nn; /* force of damper_nn: network damper_net */
-    status |= network(&p[NQVM_AT_DAMPER_NET], &v_spring, &F_damper_nn);
+    /* force of spring_nn: network spring_net */
+    const pen_real_t F_spring_nn = network(&p[NQVM_AT_SPRING_NET], s_spring, &status);
+    /* force of damper_nn: network damper_net */
+    const pen_real_t F_damper_nn = network(&p[NQVM_AT_DAMPER_NET], v_spring, &status);
     const pen_real_t F_tyre = NQVM_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
     const pen_real_t der_v_b = NQVM_M_B_INVERSE * (-(F_damper + F_damper_nn + F_spring + F_spring_nn));
@@ -108,13 +113,13 @@ static pen_status_t rates_jacobian(const pen_real_t p[], const pen_real_t x[], c
     const pen_real_t s_tyre = z_w - z_road; /* deflection between wheel and z_road */
     const pen_real_t F_spring = NQVM_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_D * v_spring; /* force of damper */
-    pen_real_t F_spring_nn; /* force of spring_nn: network spring_net */
     pen_real_t F_spring_nn_slope[1];
-    status |= network_slope(&p[NQVM_AT_SPRING_NET], &s_spring, &F_spring_nn, F_spring_nn_slope);
+    /* force of spring_nn: network spring_net */
+    const pen_real_t F_spring_nn = network_slope(&p[NQVM_AT_SPRING_NET], s_spring, F_spring_nn_slope, &status);
     const pen_real_t slope_F_spring_nn = F_spring_nn_slope[0];
-    pen_real_t F_damper_nn; /* force of damper_nn: network damper_net */
     pen_real_t F_damper_nn_slope[1];
-    status |= network_slope(&p[NQVM_AT_DAMPER_NET], &v_spring, &F_damper_nn, F_damper_nn_slope);
+    /* force of damper_nn: network damper_net */
+    const pen_real_t F_damper_nn = network_slope(&p[NQVM_AT_DAMPER_NET], v_spring, F_damper_nn_slope, &status);
     const pen_real_t slope_F_damper_nn = F_damper_nn_slope[0];
     const pen_real_t F_tyre = NQVM_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
@@ -191,10 +196,10 @@ static pen_status_t sensors(const pen_real_t p[], const pen_real_t x[], const pe
     const pen_real_t s_tyre = z_w - z_road; /* deflection between wheel and z_road */
     const pen_real_t F_spring = NQVM_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_D * v_spring; /* force of damper */
-    pen_real_t F_spring_nn; /* force of spring_nn: network spring_net */
-    status |= network(&p[NQVM_AT_SPRING_NET], &s_spring, &F_spring_nn);
-    pen_real_t F_damper_nn; /* force of damper_nn: network damper_net */
-    status |= network(&p[NQVM_AT_DAMPER_NET], &v_spring, &F_damper_nn);
+    /* force of spring_nn: network spring_net */
+    const pen_real_t F_spring_nn = network(&p[NQVM_AT_SPRING_NET], s_spring, &status);
+    /* force of damper_nn: network damper_net */
+    const pen_real_t F_damper_nn = network(&p[NQVM_AT_DAMPER_NET], v_spring, &status);
     const pen_real_t F_tyre = NQVM_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
     const pen_real_t der_v_b = NQVM_M_B_INVERSE * (-(F_damper + F_damper_nn + F_spring + F_spring_nn));
@@ -253,25 +258,28 @@ static pen_real_t along(const pen_real_t fx[], const pen_real_t fu[], pen_real_t
 /* where in the step each stage stands, as a share of it; a stage starts from the slope of the one before */
 static const pen_real_t node[4] = { (pen_real_t)0.0, (pen_real_t)0.5, (pen_real_t)0.5, (pen_real_t)1.0 };
 
-/* from t(k-1) to t(k): Runge-Kutta of order 4 */
-static pen_status_t integrate(const pen_real_t p[], const pen_real_t u0[], const pen_real_t u1[], pen_real_t x[])
+/* from t(k-1) to t(k): Runge-Kutta of order 4; advance is 1, or 0 for a sample that stays where it is */
+static pen_status_t integrate(const pen_real_t p[], const pen_real_t u0[], const pen_real_t u1[], pen_real_t advance,
+    const pen_real_t x0[], pen_real_t x[])
 {
     pen_status_t status = PEN_OK;
 
     for (size_t i = 0U; i < SUBSTEPS; i++) {
         pen_real_t k[4][N_X];
         for (size_t s = 0U; s < 4U; s++) {
-            const pen_real_t *const slope = (s == 0U) ? x : k[s - 1U]; /* node[0] is 0 */
+            const pen_real_t *const slope = (s == 0U) ? x0 : k[s - 1U]; /* node[0] is 0 */
             pen_real_t xs[N_X];
             pen_real_t us[N_DRIVE];
             drive(node[s], u0, u1, us);
+            PEN_PORT_UNROLL
             for (size_t n = 0U; n < N_X; n++) {
-                xs[n] = x[n] + ((H * node[s]) * slope[n]);
+                xs[n] = x0[n] + ((H * node[s]) * slope[n]);
             }
             status |= rates(p, xs, us, k[s]);
         }
+        PEN_PORT_UNROLL
         for (size_t n = 0U; n < N_X; n++) {
-            x[n] += (H / (pen_real_t)6.0)
+            x[n] = x0[n] + (advance * (H / (pen_real_t)6.0))
                 * (k[0][n] + ((pen_real_t)2.0 * k[1][n]) + ((pen_real_t)2.0 * k[2][n]) + k[3][n]);
         }
     }
@@ -280,7 +288,8 @@ static pen_status_t integrate(const pen_real_t p[], const pen_real_t u0[], const
 
 /* the same, to the bit, with the derivative d of x along each column: x(k-1), u(k-1), u(k) */
 static pen_status_t integrate_jacobian(const pen_real_t p[], const pen_real_t u0[], const pen_real_t u1[],
-    pen_real_t x[], pen_real_t d[N_X][N_COLUMNS])
+    pen_real_t advance,
+    const pen_real_t x0[], pen_real_t x[], pen_real_t d[N_X][N_COLUMNS])
 {
     pen_status_t status = PEN_OK;
 
@@ -289,7 +298,7 @@ static pen_status_t integrate_jacobian(const pen_real_t p[], const pen_real_t u0
         pen_real_t dk[4][N_X][N_COLUMNS];
         for (size_t s = 0U; s < 4U; s++) {
             const size_t before = (s == 0U) ? 0U : (s - 1U);
-            const pen_real_t *const slope = (s == 0U) ? x : k[before];
+            const pen_real_t *const slope = (s == 0U) ? x0 : k[before];
             pen_real_t xs[N_X];
             pen_real_t ds[N_X][N_COLUMNS];
             pen_real_t fx[N_X][N_X];
@@ -298,7 +307,7 @@ static pen_status_t integrate_jacobian(const pen_real_t p[], const pen_real_t u0
             pen_real_t us[N_DRIVE];
             drive(share, u0, u1, us);
             for (size_t n = 0U; n < N_X; n++) {
-                xs[n] = x[n] + ((H * node[s]) * slope[n]);
+                xs[n] = x0[n] + ((H * node[s]) * slope[n]);
                 for (size_t c = 0U; c < N_COLUMNS; c++) {
                     ds[n][c] = (s == 0U) ? d[n][c] : (d[n][c] + ((H * node[s]) * dk[before][n][c]));
                 }
@@ -311,10 +320,10 @@ static pen_status_t integrate_jacobian(const pen_real_t p[], const pen_real_t u0
             }
         }
         for (size_t n = 0U; n < N_X; n++) {
-            x[n] += (H / (pen_real_t)6.0)
+            x[n] = x0[n] + (advance * (H / (pen_real_t)6.0))
                 * (k[0][n] + ((pen_real_t)2.0 * k[1][n]) + ((pen_real_t)2.0 * k[2][n]) + k[3][n]);
             for (size_t c = 0U; c < N_COLUMNS; c++) {
-                d[n][c] += (H / (pen_real_t)6.0)
+                d[n][c] += (advance * (H / (pen_real_t)6.0))
                     * (dk[0][n][c] + ((pen_real_t)2.0 * dk[1][n][c]) + ((pen_real_t)2.0 * dk[2][n][c]) + dk[3][n][c]);
             }
         }
@@ -326,10 +335,8 @@ static pen_status_t integrate_jacobian(const pen_real_t p[], const pen_real_t u0
 typedef struct {
     const pen_real_t *p;  /* the set in force */
     const pen_real_t *u0; /* input before */
-    const pen_real_t *x0; /* state before */
-    pen_real_t x[4];      /* state now */
     pen_real_t u[1];      /* drive now */
-    pen_real_t y[2];      /* outputs now */
+    pen_real_t now[6];    /* state, then outputs */
 } sample_t;
 
 static bool usable(const nqvm_t *self)
@@ -349,44 +356,54 @@ static void unit(pen_real_t d[N_X][N_COLUMNS])
 
 static void copy(size_t n, const pen_real_t from[], pen_real_t to[])
 {
+    PEN_PORT_UNROLL
     for (size_t i = 0U; i < n; i++) {
         to[i] = from[i];
     }
 }
 
-/* take over what is pending, and start from a state that is known to be finite */
+static pen_status_t check(size_t n, const pen_real_t value[], pen_status_t flag)
+{
+    return pen_finite(n, value) ? PEN_OK : flag;
+}
+
+/* take over what is pending, and see what there is to start from */
 static pen_status_t begin(nqvm_t *self, sample_t *sample)
 {
-    pen_status_t status = pen_tuning_adopt(&self->tuning, &sample->p);
-    const pen_real_t *const state[2] = { self->kept, self->x };
-    const size_t whole = pen_finite(N_X, self->x) ? 1U : 0U;
-    const pen_real_t *const input[2] = { sample->u, self->u };
+    const pen_real_t *const before[2] = { sample->u, self->u };
+    uint32_t slot;
+    pen_status_t status = pen_tuning_adopt(&self->tuning, &slot);
 
-    sample->u0 = input[self->running & 1U];
-    status |= pen_finite(NQVM_N_U, sample->u) ? PEN_OK : PEN_INPUT_NONFINITE;
-    status |= (whole == 1U) ? PEN_OK : PEN_STATE_NONFINITE;
-    sample->x0 = state[whole];
-    copy(N_X, sample->x0, sample->x);
+    sample->p = self->tuning.slot[slot].value;
+    sample->u0 = before[self->running & 1U];
+    status |= check(NQVM_N_U, sample->u, PEN_INPUT_NONFINITE);
+    status |= check(N_LAST, self->last, PEN_STATE_NONFINITE);
     return status;
 }
 
-/* keep the new state and outputs if they are good, else the old ones: picked from a pair, the same work either way */
-static pen_status_t finish(nqvm_t *self, const sample_t *sample, const pen_real_t x[], pen_status_t status)
+/* how much of a sample to integrate: all of it, but nothing for the first one, which only gives outputs */
+static pen_real_t advance(const nqvm_t *self)
 {
-    const pen_real_t *const state[2] = { sample->x0, x };
+    const uint32_t running = self->running & 1U;
+
+    return (pen_real_t)running;
+}
+
+/* keep what is new if it is good, else what was there, else the second copy: picked by number, the same work each
+   way */
+static pen_status_t finish(nqvm_t *self, const sample_t *sample, pen_status_t status)
+{
+    const pen_real_t *const candidate[3] = { self->kept, self->last, sample->now };
     const pen_real_t *const drive_now[2] = { self->u, sample->u };
-    const pen_real_t *const output[2] = { self->y, sample->y };
-    const pen_status_t finite_x = pen_finite(N_X, x) ? PEN_OK : PEN_STEP_NONFINITE;
-    const pen_status_t finite_y = pen_finite(NQVM_N_Y, sample->y) ? PEN_OK : PEN_STEP_NONFINITE;
     const pen_status_t follows = (status << 2U) | (status << 1U); /* from a bad input or state: not said twice */
-    const pen_status_t result = status | ((finite_x | finite_y) & ~follows);
+    const pen_status_t result = status | (check(N_LAST, sample->now, PEN_STEP_NONFINITE) & ~follows);
     const size_t good = pen_advanced(result) ? 1U : 0U;
+    const size_t whole = ((result & PEN_STATE_NONFINITE) == PEN_OK) ? 1U : 0U;
     const size_t received = ((result & PEN_INPUT_NONFINITE) == PEN_OK) ? 1U : 0U;
 
-    copy(N_X, state[good], self->x);
-    copy(N_X, self->x, self->kept);
+    copy(N_LAST, candidate[good + whole], self->last);
+    copy(N_LAST, self->last, self->kept);
     copy(N_DRIVE, drive_now[received], self->u);
-    copy(NQVM_N_Y, output[good], self->y);
     self->running |= (uint32_t)good;
     pen_status_note_step(&self->log, result);
     return result;
@@ -402,14 +419,11 @@ pen_status_t nqvm_init(nqvm_t *self, const pen_set_t *set, nqvm_banks_t *banks)
                                  (banks == NULL) ? NULL : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
     }
     if (status == PEN_OK) {
-        static const pen_real_t start[N_X] = { 0.0F, 0.0F, 0.0F, 0.0F };
-        copy(N_X, start, self->x);
-        copy(N_X, start, self->kept);
+        static const pen_real_t start[N_LAST] = { 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F };
+        copy(N_LAST, start, self->last);
+        copy(N_LAST, start, self->kept);
         for (size_t i = 0U; i < N_DRIVE; i++) {
             self->u[i] = (pen_real_t)0;
-        }
-        for (size_t i = 0U; i < NQVM_N_Y; i++) {
-            self->y[i] = (pen_real_t)0;
         }
         self->running = 0U;
         pen_status_clear(&self->log);
@@ -426,13 +440,11 @@ pen_status_t nqvm_step(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y)
         sample_t sample;
         sample.u[0] = u->z_road;
         status = begin(self, &sample);
-        const pen_real_t *const state[2] = { sample.x0, sample.x };
-        const pen_real_t *const x = state[self->running & 1U]; /* the first sample does not integrate */
-        status |= integrate(sample.p, sample.u0, sample.u, sample.x);
-        outputs(x, sample.y);
-        status = finish(self, &sample, x, status);
-        y->z_b = self->y[0];
-        y->z_w = self->y[1];
+        status |= integrate(sample.p, sample.u0, sample.u, advance(self), self->last, sample.now);
+        outputs(sample.now, &sample.now[N_X]);
+        status = finish(self, &sample, status);
+        y->z_b = self->last[4];
+        y->z_w = self->last[5];
     }
     return status;
 }
@@ -445,21 +457,16 @@ pen_status_t nqvm_step_jacobian(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y, nq
         sample_t sample;
         sample.u[0] = u->z_road;
         status = begin(self, &sample);
-        const bool first = ((self->running & 1U) == 0U);
-        const pen_real_t *const x = first ? sample.x0 : sample.x;
         pen_real_t d[N_X][N_COLUMNS];
         pen_real_t yx[NQVM_N_Y][N_X];
         pen_real_t yu[NQVM_N_Y][N_DRIVE];
         unit(d);
-        status |= integrate_jacobian(sample.p, sample.u0, sample.u, sample.x, d);
-        if (first) { /* the first sample does not integrate */
-            unit(d);
-        }
-        outputs(x, sample.y);
+        status |= integrate_jacobian(sample.p, sample.u0, sample.u, advance(self), self->last, sample.now, d);
+        outputs(sample.now, &sample.now[N_X]);
         outputs_jacobian(yx, yu);
-        status = finish(self, &sample, x, status);
-        y->z_b = self->y[0];
-        y->z_w = self->y[1];
+        status = finish(self, &sample, status);
+        y->z_b = self->last[4];
+        y->z_w = self->last[5];
         if (pen_advanced(status)) {
             for (size_t n = 0U; n < N_X; n++) {
                 copy(N_X, d[n], j->x_x[n]);
@@ -480,10 +487,10 @@ pen_status_t nqvm_get_state(const nqvm_t *self, nqvm_x_t *x)
     const bool good = usable(self) && (x != NULL);
 
     if (good) {
-        x->z_b = self->x[0];
-        x->z_w = self->x[1];
-        x->v_b = self->x[2];
-        x->v_w = self->x[3];
+        x->z_b = self->last[0];
+        x->z_w = self->last[1];
+        x->v_b = self->last[2];
+        x->v_w = self->last[3];
     }
     return good ? PEN_OK : PEN_BADARG;
 }
@@ -496,8 +503,8 @@ pen_status_t nqvm_set_state(nqvm_t *self, const nqvm_x_t *x)
         const pen_real_t state[N_X] = { x->z_b, x->z_w, x->v_b, x->v_w };
         const bool finite = pen_finite(N_X, state);
         status = finite ? PEN_OK : PEN_STATE_NONFINITE;
-        copy(N_X, finite ? state : self->x, self->x);
-        copy(N_X, self->x, self->kept);
+        copy(N_X, finite ? state : self->last, self->last);
+        copy(N_X, self->last, self->kept);
         pen_status_note_step(&self->log, status);
     }
     return status;
@@ -511,7 +518,7 @@ pen_status_t nqvm_sensors(const nqvm_t *self, nqvm_z_t *z)
         const pen_real_t *const p = self->tuning.slot[self->tuning.active & 1U].value;
         pen_real_t value[NQVM_N_SENSORS];
         status = PEN_OK;
-        status |= sensors(p, self->x, self->u, value);
+        status |= sensors(p, self->last, self->u, value);
         if (pen_finite(NQVM_N_SENSORS, value)) {
             z->a_body = value[0];
             z->a_wheel = value[1];
@@ -555,17 +562,6 @@ pen_status_t nqvm_tune_write(nqvm_t *self, uint32_t offset, const pen_real_t val
     return status;
 }
 
-pen_status_t nqvm_tune_commit(nqvm_t *self)
-{
-    pen_status_t status = PEN_BADARG;
-
-    if (usable(self)) {
-        status = pen_tuning_commit(&self->tuning);
-        pen_status_note_tune(&self->log, status);
-    }
-    return status;
-}
-
 pen_status_t nqvm_tune_abort(nqvm_t *self)
 {
     pen_status_t status = PEN_BADARG;
@@ -577,13 +573,38 @@ pen_status_t nqvm_tune_abort(nqvm_t *self)
     return status;
 }
 
+/* let the next step take a set that was found good */
+static pen_status_t announce(nqvm_t *self, const pen_set_t *ready, pen_status_t found)
+{
+    pen_status_t status = found;
+
+    if (status == PEN_OK) {
+        pen_tuning_announce(&self->tuning, ready);
+    }
+    pen_status_note_tune(&self->log, status);
+    return status;
+}
+
+pen_status_t nqvm_tune_commit(nqvm_t *self)
+{
+    pen_status_t status = PEN_BADARG;
+
+    if (usable(self)) {
+        pen_set_t ready;
+        status = pen_tuning_commit(&self->tuning, &ready);
+        status = announce(self, &ready, status);
+    }
+    return status;
+}
+
 pen_status_t nqvm_tune_select(nqvm_t *self, const pen_set_t *set)
 {
     pen_status_t status = PEN_BADARG;
 
     if (usable(self)) {
-        status = pen_tuning_select(&self->tuning, set);
-        pen_status_note_tune(&self->log, status);
+        pen_set_t ready;
+        status = pen_tuning_select(&self->tuning, set, &ready);
+        status = announce(self, &ready, status);
     }
     return status;
 }
@@ -593,8 +614,9 @@ pen_status_t nqvm_tune_rollback(nqvm_t *self)
     pen_status_t status = PEN_BADARG;
 
     if (usable(self)) {
-        status = pen_tuning_rollback(&self->tuning);
-        pen_status_note_tune(&self->log, status);
+        pen_set_t ready;
+        status = pen_tuning_rollback(&self->tuning, &ready);
+        status = announce(self, &ready, status);
     }
     return status;
 }

@@ -82,10 +82,9 @@ typedef struct {
 
 /** One instance. Owned by the caller; use it only through the functions below. */
 typedef struct {
-    pen_real_t       x[4];    /* state at the last sample */
-    pen_real_t       kept[4]; /* a second copy, in case the first is damaged */
+    pen_real_t       last[6]; /* state, then outputs, of the last sample that went well */
+    pen_real_t       kept[6]; /* a second copy, in case the first is damaged */
     pen_real_t       u[1];    /* input at the last sample */
-    pen_real_t       y[2];    /* outputs of the last sample that went well */
     uint32_t         ready;   /* NQVM_EULER_LAYOUT once initialised */
     uint32_t         running; /* 1 after the first sample that went well */
     pen_tuning_t     tuning;

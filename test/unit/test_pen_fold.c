@@ -1,0 +1,192 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "penode/pen_fold.h"
+#include "penode/pen_net.h"
+#include "unity.h"
+
+#define ROOM 96U
+
+static pen_piece_t piece[ROOM];
+static pen_real_t  line[4U * 16U];
+static bool        active[48];
+static uint32_t    seed = 1U;
+
+void setUp(void) {}
+void tearDown(void) {}
+
+/* A number from -1 to 1. */
+static pen_real_t draw(void)
+{
+    seed = (1664525U * seed) + 1013904223U;
+    return ((pen_real_t)(seed >> 8U) / (pen_real_t)8388608) - (pen_real_t)1;
+}
+
+static pen_real_t value(size_t capacity, pen_real_t x, pen_status_t *status)
+{
+    *status = PEN_OK;
+    return pen_fold_value(piece, pen_fold_find(capacity, piece, x), x, status);
+}
+
+/* max(0, x + 1) - 2 max(0, x) + max(0, x - 1): a tent from -1 to 1 of height 1. Then envelope and layers. */
+static const pen_layer_t tent_layer[2] = { { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_DENSE, 3U, 1U } };
+static const pen_chain_t tent = { tent_layer, 2U, 3U, 3U };
+static const pen_real_t tent_value[12] = {
+    (pen_real_t)-3, (pen_real_t)2,                  /* envelope */
+    (pen_real_t)1, (pen_real_t)1,                   /* one row at a time: bias, weight */
+    (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)1,
+    (pen_real_t)0, (pen_real_t)1, (pen_real_t)-2, (pen_real_t)1,
+};
+
+/* Whole numbers and halves: no rounding, so the result is exact. */
+void test_a_tent(void)
+{
+    static const pen_real_t x[9] = {
+        (pen_real_t)-5, (pen_real_t)-3, (pen_real_t)-1, (pen_real_t)-0.5F, (pen_real_t)0, (pen_real_t)0.25F, (pen_real_t)1, (pen_real_t)2, (pen_real_t)7
+    };
+    static const pen_real_t expected[9] = {
+        (pen_real_t)0, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0.5F, (pen_real_t)1, (pen_real_t)0.75F, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0
+    };
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, tent_value, false, line, active, 12U, piece));
+    TEST_ASSERT_TRUE(!(piece[0].start > (pen_real_t)-0.5F) && !(piece[0].start < (pen_real_t)-0.5F)); /* the centre */
+    for (size_t i = 0U; i < 9U; i++) {
+        pen_status_t status;
+        const pen_real_t y = value(12U, x[i], &status);
+        TEST_ASSERT_TRUE(!(y > expected[i]) && !(y < expected[i]));
+        TEST_ASSERT_EQUAL_HEX32(((i == 0U) || (i == 8U)) ? PEN_OUTSIDE : PEN_OK, status);
+    }
+}
+
+void test_clamped_outside_of_the_envelope(void)
+{
+    pen_real_t p[12];
+    pen_status_t status;
+    pen_real_t y;
+
+    for (size_t i = 0U; i < 12U; i++) {
+        p[i] = tent_value[i];
+    }
+    p[0] = (pen_real_t)-0.5F;
+    p[1] = (pen_real_t)0.75F;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, true, line, active, 8U, piece));
+    y = value(8U, (pen_real_t)-9, &status);
+    TEST_ASSERT_TRUE(!(y > (pen_real_t)0.5F) && !(y < (pen_real_t)0.5F));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, status);
+    y = value(8U, (pen_real_t)1, &status);
+    TEST_ASSERT_TRUE(!(y > (pen_real_t)0.25F) && !(y < (pen_real_t)0.25F));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, status);
+}
+
+/* The smallest number above the highest trained input is outside, that input is not: for numbers of every size and sign.
+ * A network that only passes its input on; going up by bits is going up by numbers. */
+void test_the_envelope_ends_at_the_last_number(void)
+{
+    static const pen_layer_t pass_layer[1] = { { PEN_LAYER_DENSE, 1U, 1U } };
+    static const pen_chain_t pass = { pass_layer, 1U, 1U, 0U };
+
+    for (uint32_t i = 0U; i < 2000U; i++) {
+        pen_real_t high = draw();
+        pen_real_t step;
+        pen_real_t p[4] = { (pen_real_t)0, (pen_real_t)0, (pen_real_t)0, (pen_real_t)1 };
+        pen_status_t status;
+        for (uint32_t k = 0U; k < (i % 120U); k++) {
+            high *= ((i & 1U) == 0U) ? (pen_real_t)2 : (pen_real_t)0.5F;
+        }
+        p[0] = (high < (pen_real_t)0) ? (high * (pen_real_t)4) : -high;
+        p[1] = high;
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&pass, p, false, line, active, 4U, piece));
+        (void)value(4U, high, &status);
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, status);
+        step = pen_port_abs(high) * PEN_REAL_EPSILON; /* 1 to 2 numbers up, halved until adding it does nothing */
+        while ((high + (step * (pen_real_t)0.5F)) > high) {
+            step *= (pen_real_t)0.5F;
+        }
+        (void)value(4U, high + step, &status);
+        TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, status);
+    }
+}
+
+void test_too_many_pieces(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_PIECES, pen_fold(&tent, tent_value, false, line, active, 4U, piece));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_PIECES, pen_fold(&tent, tent_value, false, line, active, 6U, piece));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, tent_value, false, line, active, 8U, piece)); /* 4, 2 edges, the centre */
+}
+
+/* The look-up against going through the table, for every capacity it is made for. */
+void test_find(void)
+{
+    static const size_t capacity[8] = { 4U, 6U, 8U, 12U, 16U, 48U, 64U, 96U };
+
+    for (size_t c = 0U; c < 8U; c++) {
+        for (size_t i = 0U; i < capacity[c]; i++) {
+            piece[i].start = (pen_real_t)i;
+        }
+        for (size_t i = 0U; i <= (2U * capacity[c]); i++) {
+            const pen_real_t x = ((pen_real_t)i * (pen_real_t)0.5F) - (pen_real_t)0.5F;
+            size_t expected = 0U;
+            while (((expected + 1U) < capacity[c]) && !(x < piece[expected + 1U].start)) {
+                expected++;
+            }
+            TEST_ASSERT_EQUAL_PTR(&piece[expected], pen_fold_find(capacity[c], piece, x));
+        }
+    }
+}
+
+void test_nan_stays_nan(void)
+{
+    const pen_real_t zero = tent_value[4];
+    pen_status_t status;
+    pen_real_t y;
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, tent_value, false, line, active, 12U, piece));
+    y = value(12U, zero / zero, &status);
+    TEST_ASSERT_FALSE(y <= PEN_REAL_MAX);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, status);
+    y = value(12U, (pen_real_t)1 / zero, &status);
+    TEST_ASSERT_FALSE(y <= PEN_REAL_MAX);
+}
+
+/* 1-16-16-16-1 with random weights, some dead and some the same: against layer by layer. Sums of 17 terms of size 1 in three
+ * layers: rounding errors are below 200 of the largest output's last digit; typically 2. */
+void test_random_networks_against_their_layers(void)
+{
+    static const pen_layer_t layer[4] = {
+        { PEN_LAYER_RELU, 1U, 16U }, { PEN_LAYER_RELU, 16U, 16U }, { PEN_LAYER_RELU, 16U, 16U }, { PEN_LAYER_DENSE, 16U, 1U }
+    };
+    static const pen_chain_t chain = { layer, 4U, 16U, 48U };
+    uint32_t folded = 0U;
+
+    for (uint32_t n = 0U; n < 40U; n++) {
+        pen_real_t p[2U + 32U + 272U + 272U + 17U];
+        for (size_t i = 2U; i < 595U; i++) {
+            p[i] = draw() * (pen_real_t)0.5F;
+        }
+        p[3] = p[2]; /* twins */
+        p[19] = p[18];
+        p[20] = (pen_real_t)0; /* dead */
+        p[0] = (pen_real_t)-1;
+        p[1] = (pen_real_t)1;
+        if (pen_fold(&chain, p, false, line, active, ROOM, piece) == PEN_OK) {
+            folded++;
+            for (uint32_t i = 0U; i < 100U; i++) {
+                const pen_real_t x = draw() * (pen_real_t)3;
+                pen_real_t h[16];
+                pen_real_t g[16];
+                pen_status_t status;
+                const pen_real_t y = value(ROOM, x, &status);
+                pen_dense(16U, 1U, &p[2], &x, h);
+                pen_dense_relu(16U, 16U, &p[34], h, g);
+                pen_dense_relu(16U, 16U, &p[306], g, h);
+                pen_dense_relu(1U, 16U, &p[578], h, g);
+                TEST_ASSERT_TRUE(pen_port_abs(y - g[0]) <= ((pen_real_t)200 * PEN_REAL_EPSILON));
+            }
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(30U, folded);
+}
