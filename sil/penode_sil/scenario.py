@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import UserError, hint
-from .recording import read_csv
+from .recording import pick, read
 from .signals import ROAD_CLASSES, Bump, Chirp, Constant, Ramp, Road, Samples, Signal, Sum, VelocityChirp
 from .units import UnitError, quantity
 
@@ -215,7 +215,7 @@ def _recording(table: _Table, unit: str, duration: float) -> Signal:
     file, channel = table.text("file"), table.text("channel", table.key.split(".")[-1].split("[")[0])
     if file:
         try:
-            recording = read_csv(table.path.parent / file)
+            recording = pick(read(table.path.parent / file, [channel, "time"]), channel, unit)
             time, level = recording.time(), recording.channel(channel, unit)
         except UserError as exc:
             table.problems.extend(exc.problems)
