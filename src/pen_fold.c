@@ -100,8 +100,7 @@ static view_t look(const walk_t *walk, pen_real_t x, pen_real_t way, bool begin)
         } else {
             pen_real_t *const h_before = h;
             pen_real_t *const t_before = t;
-            pen_dense(n, layer->n_in, p, h, y);
-            pen_dense_tangent(n, layer->n_in, p, t, s);
+            pen_dense_dual(n, layer->n_in, p, h, t, y, s);
             p = &p[n * (layer->n_in + 1U)];
             if (layer->kind == PEN_LAYER_RELU) {
                 if (begin) {

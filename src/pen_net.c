@@ -6,6 +6,7 @@
 #include <stdbool.h>
 
 #include "penode/pen_math.h"
+#include "penode/pen_net16.h"
 #include "penode/pen_port.h"
 
 #define ZERO ((pen_real_t)0)
@@ -13,204 +14,17 @@
 #define ONE  ((pen_real_t)1)
 #define TWO  ((pen_real_t)2)
 
-/* max(0, x). Two instructions cheaper than a comparison, and -Inf + Inf is NaN: an overflow cannot hide behind the kink. */
-static inline pen_real_t rectified(pen_real_t x)
+/* A block of 16 rows. y may be x: nothing is written before all is read. */
+static void dense16_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[])
 {
-    return HALF * (x + pen_port_abs(x));
-}
+    pen_rows_t a;
 
-/* Named accumulators, because only those stay in registers at every optimisation level. */
-void pen_dense16_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[])
-{
-    pen_real_t a0 = w[0];
-    pen_real_t a1 = w[1];
-    pen_real_t a2 = w[2];
-    pen_real_t a3 = w[3];
-    pen_real_t a4 = w[4];
-    pen_real_t a5 = w[5];
-    pen_real_t a6 = w[6];
-    pen_real_t a7 = w[7];
-    pen_real_t a8 = w[8];
-    pen_real_t a9 = w[9];
-    pen_real_t a10 = w[10];
-    pen_real_t a11 = w[11];
-    pen_real_t a12 = w[12];
-    pen_real_t a13 = w[13];
-    pen_real_t a14 = w[14];
-    pen_real_t a15 = w[15];
-
+    pen_rows_begin(&a, w);
     for (size_t i = 0U; i < n_in; i++) {
-        const pen_real_t *const column = &w[(16U * i) + 16U];
-        const pen_real_t xi = rectified(x[i]);
-        a0 += column[0] * xi;
-        a1 += column[1] * xi;
-        a2 += column[2] * xi;
-        a3 += column[3] * xi;
-        a4 += column[4] * xi;
-        a5 += column[5] * xi;
-        a6 += column[6] * xi;
-        a7 += column[7] * xi;
-        a8 += column[8] * xi;
-        a9 += column[9] * xi;
-        a10 += column[10] * xi;
-        a11 += column[11] * xi;
-        a12 += column[12] * xi;
-        a13 += column[13] * xi;
-        a14 += column[14] * xi;
-        a15 += column[15] * xi;
+        pen_rows_add(&a, &w[(16U * i) + 16U], pen_rectified(x[i]));
     }
-    y[0] = a0;
-    y[1] = a1;
-    y[2] = a2;
-    y[3] = a3;
-    y[4] = a4;
-    y[5] = a5;
-    y[6] = a6;
-    y[7] = a7;
-    y[8] = a8;
-    y[9] = a9;
-    y[10] = a10;
-    y[11] = a11;
-    y[12] = a12;
-    y[13] = a13;
-    y[14] = a14;
-    y[15] = a15;
+    pen_rows_end(&a, y);
 }
-
-#ifdef __OPTIMIZE_SIZE__ /* the same bits from the kernels that are there anyway */
-
-void pen_dense16_pair(const pen_real_t w[], pen_real_t x, pen_real_t y[])
-{
-    pen_dense16_scalar(w, x, y);
-    pen_dense16_relu(16U, &w[32], y, y);
-}
-
-pen_real_t pen_dense16_last(size_t n_in, const pen_real_t w[], pen_real_t x[])
-{
-    pen_dense16_relu(n_in, w, x, x);
-    return pen_dense1_relu(16U, &w[16U * (n_in + 1U)], x);
-}
-
-#else
-
-void pen_dense16_pair(const pen_real_t w[], pen_real_t x, pen_real_t y[])
-{
-    pen_real_t a0 = w[32];
-    pen_real_t a1 = w[33];
-    pen_real_t a2 = w[34];
-    pen_real_t a3 = w[35];
-    pen_real_t a4 = w[36];
-    pen_real_t a5 = w[37];
-    pen_real_t a6 = w[38];
-    pen_real_t a7 = w[39];
-    pen_real_t a8 = w[40];
-    pen_real_t a9 = w[41];
-    pen_real_t a10 = w[42];
-    pen_real_t a11 = w[43];
-    pen_real_t a12 = w[44];
-    pen_real_t a13 = w[45];
-    pen_real_t a14 = w[46];
-    pen_real_t a15 = w[47];
-
-    for (size_t i = 0U; i < 16U; i++) {
-        const pen_real_t *const column = &w[(16U * i) + 48U];
-        const pen_real_t xi = rectified(w[i] + (w[i + 16U] * x));
-        a0 += column[0] * xi;
-        a1 += column[1] * xi;
-        a2 += column[2] * xi;
-        a3 += column[3] * xi;
-        a4 += column[4] * xi;
-        a5 += column[5] * xi;
-        a6 += column[6] * xi;
-        a7 += column[7] * xi;
-        a8 += column[8] * xi;
-        a9 += column[9] * xi;
-        a10 += column[10] * xi;
-        a11 += column[11] * xi;
-        a12 += column[12] * xi;
-        a13 += column[13] * xi;
-        a14 += column[14] * xi;
-        a15 += column[15] * xi;
-    }
-    y[0] = a0;
-    y[1] = a1;
-    y[2] = a2;
-    y[3] = a3;
-    y[4] = a4;
-    y[5] = a5;
-    y[6] = a6;
-    y[7] = a7;
-    y[8] = a8;
-    y[9] = a9;
-    y[10] = a10;
-    y[11] = a11;
-    y[12] = a12;
-    y[13] = a13;
-    y[14] = a14;
-    y[15] = a15;
-}
-
-pen_real_t pen_dense16_last(size_t n_in, const pen_real_t w[], pen_real_t x[])
-{
-    const pen_real_t *const last = &w[16U * (n_in + 1U)];
-    pen_real_t twice = last[0] + last[0]; /* see pen_dense1_relu */
-    pen_real_t a0 = w[0];
-    pen_real_t a1 = w[1];
-    pen_real_t a2 = w[2];
-    pen_real_t a3 = w[3];
-    pen_real_t a4 = w[4];
-    pen_real_t a5 = w[5];
-    pen_real_t a6 = w[6];
-    pen_real_t a7 = w[7];
-    pen_real_t a8 = w[8];
-    pen_real_t a9 = w[9];
-    pen_real_t a10 = w[10];
-    pen_real_t a11 = w[11];
-    pen_real_t a12 = w[12];
-    pen_real_t a13 = w[13];
-    pen_real_t a14 = w[14];
-    pen_real_t a15 = w[15];
-
-    for (size_t i = 0U; i < n_in; i++) {
-        const pen_real_t *const column = &w[(16U * i) + 16U];
-        const pen_real_t xi = rectified(x[i]);
-        a0 += column[0] * xi;
-        a1 += column[1] * xi;
-        a2 += column[2] * xi;
-        a3 += column[3] * xi;
-        a4 += column[4] * xi;
-        a5 += column[5] * xi;
-        a6 += column[6] * xi;
-        a7 += column[7] * xi;
-        a8 += column[8] * xi;
-        a9 += column[9] * xi;
-        a10 += column[10] * xi;
-        a11 += column[11] * xi;
-        a12 += column[12] * xi;
-        a13 += column[13] * xi;
-        a14 += column[14] * xi;
-        a15 += column[15] * xi;
-    }
-    twice += last[1] * (a0 + pen_port_abs(a0));
-    twice += last[2] * (a1 + pen_port_abs(a1));
-    twice += last[3] * (a2 + pen_port_abs(a2));
-    twice += last[4] * (a3 + pen_port_abs(a3));
-    twice += last[5] * (a4 + pen_port_abs(a4));
-    twice += last[6] * (a5 + pen_port_abs(a5));
-    twice += last[7] * (a6 + pen_port_abs(a6));
-    twice += last[8] * (a7 + pen_port_abs(a7));
-    twice += last[9] * (a8 + pen_port_abs(a8));
-    twice += last[10] * (a9 + pen_port_abs(a9));
-    twice += last[11] * (a10 + pen_port_abs(a10));
-    twice += last[12] * (a11 + pen_port_abs(a11));
-    twice += last[13] * (a12 + pen_port_abs(a12));
-    twice += last[14] * (a13 + pen_port_abs(a13));
-    twice += last[15] * (a14 + pen_port_abs(a14));
-    twice += last[16] * (a15 + pen_port_abs(a15));
-    return HALF * twice;
-}
-
-#endif
 
 /* Rows r .. r + 3 of a block that has `rows` of them; without its bias, the tangent. */
 static void four_rows(size_t rows, size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[], bool bias, bool relu)
@@ -222,7 +36,7 @@ static void four_rows(size_t rows, size_t n_in, const pen_real_t w[], const pen_
 
     for (size_t i = 0U; i < n_in; i++) {
         const pen_real_t *const column = &w[rows * (i + 1U)];
-        const pen_real_t xi = relu ? rectified(x[i]) : x[i];
+        const pen_real_t xi = relu ? pen_rectified(x[i]) : x[i];
         a0 += column[0] * xi;
         a1 += column[1] * xi;
         a2 += column[2] * xi;
@@ -260,12 +74,53 @@ void pen_dense_relu(size_t n_out, size_t n_in, const pen_real_t w[], const pen_r
     const size_t wide = n_out - (n_out % 16U);
 
     for (size_t row = 0U; row < wide; row += 16U) {
-        pen_dense16_relu(n_in, &w[row * (n_in + 1U)], x, &y[row]);
+        dense16_relu(n_in, &w[row * (n_in + 1U)], x, &y[row]);
     }
     fours(n_out - wide, n_in, &w[wide * (n_in + 1U)], x, &y[wide], true, true);
     for (size_t row = n_out - (n_out % 4U); row < n_out; row++) {
         y[row] = pen_dense1_relu(n_in, &w[row * (n_in + 1U)], x);
     }
+}
+
+/* Eight rows of a block of sixteen. */
+static void eight_duals(size_t n_in, const pen_real_t w[], const pen_real_t x[], const pen_real_t t[], pen_real_t y[], pen_real_t s[])
+{
+    pen_duals_t a;
+
+    pen_duals_begin(&a, w, &w[16], x[0], t[0]);
+    for (size_t i = 1U; i < n_in; i++) {
+        pen_duals_add(&a, &w[(16U * i) + 16U], x[i], t[i]);
+    }
+    y[0] = a.r0;
+    y[1] = a.r1;
+    y[2] = a.r2;
+    y[3] = a.r3;
+    y[4] = a.r4;
+    y[5] = a.r5;
+    y[6] = a.r6;
+    y[7] = a.r7;
+    s[0] = a.d0;
+    s[1] = a.d1;
+    s[2] = a.d2;
+    s[3] = a.d3;
+    s[4] = a.d4;
+    s[5] = a.d5;
+    s[6] = a.d6;
+    s[7] = a.d7;
+}
+
+void pen_dense_dual(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], const pen_real_t t[],
+                    pen_real_t y[], pen_real_t s[])
+{
+    const size_t wide = n_out - (n_out % 16U);
+
+    for (size_t row = 0U; row < wide; row += 16U) {
+        const pen_real_t *const block = &w[row * (n_in + 1U)];
+        eight_duals(n_in, &block[0], x, t, &y[row], &s[row]);
+        eight_duals(n_in, &block[8], x, t, &y[row + 8U], &s[row + 8U]);
+    }
+    pen_dense(n_out - wide, n_in, &w[wide * (n_in + 1U)], x, &y[wide]);
+    pen_dense_tangent(n_out - wide, n_in, &w[wide * (n_in + 1U)], t, &s[wide]);
 }
 
 void pen_dense_tangent(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t t[], pen_real_t y[])
@@ -278,13 +133,6 @@ void pen_dense_tangent(size_t n_out, size_t n_in, const pen_real_t w[], const pe
             a += stream[i + 1U] * t[i];
         }
         y[row] = a;
-    }
-}
-
-void pen_dense16_scalar(const pen_real_t w[], pen_real_t x, pen_real_t y[])
-{
-    for (size_t row = 0U; row < 16U; row++) {
-        y[row] = w[row] + (w[row + 16U] * x);
     }
 }
 
@@ -314,7 +162,7 @@ pen_real_t pen_dense1_relu(size_t n_in, const pen_real_t w[], const pen_real_t x
 void pen_act_relu(size_t n, pen_real_t h[])
 {
     for (size_t i = 0U; i < n; i++) {
-        h[i] = rectified(h[i]);
+        h[i] = pen_rectified(h[i]);
     }
 }
 

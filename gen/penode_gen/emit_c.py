@@ -36,7 +36,7 @@ _RUNGE_KUTTA = {
 # Names of the templates inside functions that also hold names of the model; the model's get a _ there.
 _TAKEN = frozenset(
     "p x u y z dx fx fu yx yu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
-    "inner along drive advance fold f x0 copy begin finish usable unit solve integrate node".split()
+    "inner along drive before advance fold f x0 copy begin finish usable unit solve integrate node".split()
 )
 _MATH = ("pen_exp", "pen_tanh", "pen_sigmoid", "pen_softplus", "pen_sign", "pen_heaviside", "pen_max", "pen_min")
 _AFFINE = {"centre": "pen_centre", "rescale": "pen_rescale"}
@@ -176,6 +176,7 @@ class _Emitter:
             "set_length": len(sets.set_values(model, "default")), "offsets": self._offset_lines(),
             "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
+            "uses_net16": any(_hidden16(list(c.network.layers[i:])) for c in self.networks for i in range(len(c.network.layers))),
             "folded": [(name, code) for code in self.networks if code.folded for name in code.users],
             "uses_p": any(f["uses_p"] for f in functions.values() if f), "uses_f": any(f["uses_f"] for f in functions.values() if f),
             "sample_time": real(model.sample_time), "real": real, "si": units.si,
@@ -307,7 +308,7 @@ class _Emitter:
         if len(step.arguments) == 1:
             argument = self._print(step.arguments[0])
         else:
-            argument = f"{name}_in"
+            argument = f"inputs_of_{name}"
             parts = ", ".join(self._print(a) for a in step.arguments)
             lines.append(f"const pen_real_t {argument}[{len(step.arguments)}] = {{ {parts} }};")
         if code.folded and self.model.more_pieces == "layers":
@@ -315,34 +316,34 @@ class _Emitter:
         elif code.folded:
             return [*lines, *self._lookup(step, name, argument, slope, used)]
         if slope:
-            lines.append(f"pen_real_t {name}_slope[{len(step.arguments)}];")
+            lines.append(f"pen_real_t slopes_of_{name}[{len(step.arguments)}];")
             result = f"const pen_real_t {name} =" if step.target in used else "(void)"
-            lines += _remarked(f"{result} {function}_slope({values}, {argument}, {name}_slope, &status);".replace("(void) ", "(void)"), step)
+            lines += _remarked(f"{result} {function}_slope({values}, {argument}, slopes_of_{name}, &status);".replace("(void) ", "(void)"), step)
             for i, s in enumerate(self.derivatives.slopes[step.target]):
-                lines += [f"const pen_real_t {s.name} = {name}_slope[{i}];"] if s in used else []
+                lines += [f"const pen_real_t {s.name} = slopes_of_{name}[{i}];"] if s in used else []
         elif value:
             lines += _remarked(f"const pen_real_t {name} = {function}({values}, {argument}, &status);", step)
         if bend:
             n = len(step.arguments)
-            lines.append(f"pen_real_t {name}_bend[{n}][{n}];")
-            lines.append(f"{function}_bend({values}, {argument}, {name}_bend);")
+            lines.append(f"pen_real_t bends_of_{name}[{n}][{n}];")
+            lines.append(f"{function}_bend({values}, {argument}, bends_of_{name});")
             for i, row in enumerate(self.derivatives.bends[step.target]):
-                lines += [f"const pen_real_t {s.name} = {name}_bend[{i}][{j}];" for j, s in enumerate(row) if j >= i and s in used]
+                lines += [f"const pen_real_t {s.name} = bends_of_{name}[{i}][{j}];" for j, s in enumerate(row) if j >= i and s in used]
         return lines
 
     def _lookup(self, step: Step, name: str, argument: str, slope: bool, used: set[sp.Symbol]) -> list[str]:
         """A folded network: find the piece, then a line."""
         pieces, lines = f"f->{step.network}", []
         if not argument.isidentifier():
-            lines.append(f"const pen_real_t {name}_in = {argument};")
-            argument = f"{name}_in"
-        lines.append(f"const pen_piece_t *const {name}_piece = pen_fold_find({self.prefix}_PIECES, {pieces}, {argument});")
+            lines.append(f"const pen_real_t inputs_of_{name} = {argument};")
+            argument = f"inputs_of_{name}"
+        lines.append(f"const pen_piece_t *const piece_of_{name} = pen_fold_find({self.prefix}_PIECES, {pieces}, {argument});")
         if step.target in used:
-            lines += _remarked(f"const pen_real_t {name} = pen_fold_value({pieces}, {name}_piece, {argument}, &status);", step)
+            lines += _remarked(f"const pen_real_t {name} = pen_fold_value({pieces}, piece_of_{name}, {argument}, &status);", step)
         else:
-            lines.append(f"status |= {name}_piece->status;")
+            lines.append(f"status |= piece_of_{name}->status;")
         if slope and self.derivatives.slopes[step.target][0] in used:
-            lines.append(f"const pen_real_t {self.derivatives.slopes[step.target][0].name} = {name}_piece->slope;")
+            lines.append(f"const pen_real_t {self.derivatives.slopes[step.target][0].name} = piece_of_{name}->slope;")
         return lines
 
     # -- networks -------------------------------------------------------------------------------------------------
@@ -360,7 +361,7 @@ class _Emitter:
         return found
 
     def _network_lines(self, code: _NetworkCode) -> dict[str, Any]:
-        """Statements that take a network from `in` to `*out`, and the buffers they need."""
+        """Statements that take a network from `in` to its output, and the buffers they need."""
         lines, here, relu = [], "in", ""  # relu: the activation of the layer before is still to be applied
         if self.model.outside == "clamp":
             lines.append(f"pen_clamp({code.n}U, &p[0], in, h);")
@@ -369,22 +370,15 @@ class _Emitter:
         while layers:
             (layer, at), *layers = layers
             fresh = "h" if here == "in" else here  # where a layer that reads all before it writes may put its result
-            after = _shape(layers[0][0]) if layers and _relu(layer) else None
-            if not relu and _shape(layer) == (1, 16) and after == (16, 16):
-                lines.append(f"pen_dense16_pair({at}, {here}[0], {fresh});")
-                (layer, _), *layers = layers
-            elif relu and _shape(layer)[1:] == (16,) and after == (16, 1):
-                lines.append(f"{fresh}[0] = pen_dense16_last({layer.n_in}U, {at}, {here});")
-                (layer, _), *layers = layers
+            hidden = 0 if relu else _hidden16([layer, *(la for la, _ in layers)])
+            if hidden:
+                lines.append(f"{fresh}[0] = pen_net16({hidden}U, {at}, {here}[0]);")
+                layer, layers = layers[hidden][0], layers[hidden + 1 :]
             elif isinstance(layer, Affine):
                 lines += [f"pen_act_relu({layer.n_out}U, {here});"] if relu else []
                 lines.append(_affine(layer, at, here, fresh))
             elif layer.n_out == 1:
                 lines.append(f"{fresh}[0] = pen_dense1{relu}({layer.n_in}U, {at}, {here});")
-            elif layer.n_out == 16 and layer.n_in == 1 and not relu:
-                lines.append(f"pen_dense16_scalar({at}, {here}[0], {fresh});")
-            elif layer.n_out == 16 and relu:
-                lines.append(f"pen_dense16_relu({layer.n_in}U, {at}, {here}, {fresh});")
             else:
                 fresh = "g" if here == "h" else "h"
                 lines.append(f"pen_dense{relu}({layer.n_out}U, {layer.n_in}U, {at}, {here}, {fresh});")
@@ -414,7 +408,18 @@ class _Emitter:
             start = "(pen_real_t)1"
         each(f"t[@][%] = {start};" if n == 1 else f"t[@][%] = (@ == %) ? {start} : (pen_real_t)0;")
         h, g, t, s, relu = "h", "g", "t", "s", ""
-        for layer, at in code.layers():
+        layers = code.layers()
+        while layers:
+            (layer, at), *layers = layers
+            hidden = 0 if relu else _hidden16([layer, *(la for la, _ in layers)])
+            if hidden:
+                layer, layers = layers[hidden][0], layers[hidden + 1 :]
+                lines += [f"{g}[0] = pen_net16_slope({hidden}U, {at}, {h}[0], {s}[0]);", f"{s}[0][0] *= {t}[0][0];"]
+                lines += _activation(layer, g)
+                if layer.activation != "identity":
+                    lines.append(f"pen_slope_{layer.activation}(1U, {g}, {s}[0]);")
+                h, g, t, s, relu = g, h, s, t, _relu(layer)
+                continue
             if isinstance(layer, Affine):
                 lines += [f"pen_act_relu({layer.n_out}U, {h});"] if relu else []
                 lines.append(_affine(layer, at, h, h))
@@ -534,7 +539,7 @@ def _by_value(code: _NetworkCode, lines: list[str]) -> list[str]:
     """A single input is a number, not a row of one."""
     if code.n > 1:
         return lines
-    return [re.sub(r"([ (])in([,)])", r"\1&in\2", line.replace(" in[0]", " in").replace("(in[0]", "(in")) for line in lines]
+    return [re.sub(r"\bin\[0\]", "in", re.sub(r"\bin([,)])", r"&in\1", line)) for line in lines]
 
 
 def _loops(statement: str, n: int) -> list[str]:
@@ -563,6 +568,15 @@ def _affine(layer: Affine, at: str, here: str, there: str) -> str:
 def _shape(layer: Layer) -> tuple[int, ...]:
     """(inputs, outputs) of a dense layer."""
     return (layer.n_in, layer.n_out) if isinstance(layer, Dense) else ()
+
+
+def _hidden16(layers: list[Layer]) -> int:
+    """How many layers 16 -> 16 a network 1-16-...-16-1 that begins here has; 0 if it is none with at least one."""
+    n = 0
+    while len(layers) > n + 1 and _shape(layers[n + 1]) == (16, 16) and _relu(layers[n + 1]):
+        n += 1
+    begins = _shape(layers[0]) == (1, 16) and bool(_relu(layers[0]))
+    return n if begins and len(layers) > n + 1 and _shape(layers[n + 1]) == (16, 1) else 0
 
 
 def _relu(layer: Layer) -> str:

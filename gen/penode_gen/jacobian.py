@@ -20,13 +20,13 @@ class Derivatives:
         self._causal = causal
         self._kinematics = {ex.derivative(q.name): v for q, v in causal.kinematics.items()}
         self.slopes: dict[sp.Symbol, tuple[sp.Symbol, ...]] = {
-            step.target: tuple(ex.symbol(f"slope_{step.target.name}_{i + 1}") for i in range(len(step.arguments)))
+            step.target: tuple(ex.symbol(f"slope_{i + 1}_{step.target.name}") for i in range(len(step.arguments)))
             for step in causal.steps
             if step.network
         }
         self.slopes = {t: (ex.symbol(f"slope_{t.name}"),) if len(s) == 1 else s for t, s in self.slopes.items()}
         self.bends: dict[sp.Symbol, list[list[sp.Symbol]]] = {
-            t: [[ex.symbol(f"bend_{t.name}_{min(i, j) + 1}{max(i, j) + 1}") for j in range(len(s))] for i in range(len(s))]
+            t: [[ex.symbol(f"bend_{min(i, j) + 1}{max(i, j) + 1}_{t.name}") for j in range(len(s))] for i in range(len(s))]
             for t, s in self.slopes.items()
             if self._steps[t].network not in straight
         }

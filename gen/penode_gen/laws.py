@@ -62,6 +62,10 @@ LAWS: dict[str, Law] = {
     ),
     # hysteresis of Dahl: ever softer after a reversal
     "dahl_friction": Law("force*slip", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - abs(v)*slip)/presliding")}),
+    # hysteresis behind a play: without force for about 1.4 times the presliding after a reversal
+    "slack_friction": Law(
+        "force*slip^5", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - (v*slip^2 + abs(v)*slip*abs(slip))/2)/presliding")}
+    ),
     # spring and damper in series, relaxation = damping/stiffness
     "maxwell_bushing": Law(
         "pull", {"stiffness": "N/m", "relaxation": "s"}, {"pull": LawState("N", "stiffness*v - pull/relaxation")}

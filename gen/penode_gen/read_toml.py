@@ -32,7 +32,7 @@ _C_WORDS = set(
 )
 _C_PATTERN = re.compile(r"u?int\w*_t|U?INT\w*_(MAX|MIN|C)|(SIZE|PTRDIFF|WCHAR|SIG_ATOMIC|WINT)_(MAX|MIN)")
 _RESERVED = {*ex.FUNCTIONS, "der", "where", m.GROUND}
-_PREFIXES = ("pen_", "PEN_", "slope_", "bend_", "der_", "network_")  # of names that the generated code makes
+_PREFIXES = ("pen_", "PEN_", "slope_", "bend_", "inputs_of_", "slopes_of_", "bends_of_", "piece_of_", "der_", "network_")  # of names that the generated code makes
 # A model of that name would have a header or a type that others have already.
 _MODEL_WORDS = set(
     "assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdarg stdbool stddef stdint "

@@ -27,27 +27,16 @@
 void pen_dense(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[]);
 void pen_dense_relu(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[]);
 
-/** One block of 16 rows. y may be x: nothing is written before all is read. */
-void pen_dense16_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[]);
-
-/** 16 rows of a single input. @param w [32]; @param y [16] */
-void pen_dense16_scalar(const pen_real_t w[], pen_real_t x, pen_real_t y[]);
-
-/** Two layers at once, the first of a single input: y = W2 max(0, w1 x + b1) + b2. @param w [32 + 272]; @param y [16] */
-void pen_dense16_pair(const pen_real_t w[], pen_real_t x, pen_real_t y[]);
-
-/**
- * Two layers at once, the second of one row: w2 max(0, W1 max(0, x) + b1) + b2.
- * @param w [16 * (n_in + 1) + 17]; @param x [16 or n_in, the larger]; undefined afterwards
- */
-pen_real_t pen_dense16_last(size_t n_in, const pen_real_t w[], pen_real_t x[]);
-
 /** One row. @param w [1 + n_in]; @param x [n_in] */
 pen_real_t pen_dense1(size_t n_in, const pen_real_t w[], const pen_real_t x[]);
 pen_real_t pen_dense1_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[]);
 
 /** y = W t, without the bias: how a small change t of the input changes the output. */
 void pen_dense_tangent(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t t[], pen_real_t y[]);
+
+/** Both at once: y = W x + b and s = W t. The outputs may not overlap the inputs. */
+void pen_dense_dual(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], const pen_real_t t[],
+                    pen_real_t y[], pen_real_t s[]);
 
 /* ---- activations, in place on h[n] ---- */
 

@@ -11,7 +11,8 @@
  *   pen_real_t pen_port_abs(pen_real_t x)   |x|; NaN stays NaN, -0 becomes +0; one instruction where the core has one
  *   uint32_t   pen_port_cycles(void)        free-running counter for measurements; wraps; 0 where there is none
  *
- * and the macro PEN_PORT_UNROLL, which stands before a loop whose length is a small constant and may ask the compiler to
+ * and two macros: PEN_PORT_INLINE for `static inline`, and stronger where a compiler might still make a call of it;
+ * PEN_PORT_UNROLL, which stands before a loop whose length is a small constant and may ask the compiler to
  * write it out where speed counts more than size.
  *
  * Cost on a Cortex-M with FPU: load, store, abs one instruction each, barrier one (DMB).

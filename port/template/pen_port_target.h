@@ -9,6 +9,7 @@
 #ifndef PEN_PORT_TARGET_H
 #define PEN_PORT_TARGET_H
 
+#define PEN_PORT_INLINE static inline /* and the compiler's word for: always */
 #define PEN_PORT_UNROLL /* the compiler's pragma that writes out a short loop of constant length */
 
 static inline uint32_t pen_port_load(const volatile uint32_t *word)

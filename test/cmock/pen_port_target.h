@@ -9,6 +9,7 @@
 
 #include "penode/pen_real.h"
 
+#define PEN_PORT_INLINE static inline
 #define PEN_PORT_UNROLL
 
 uint32_t   pen_port_load(const volatile uint32_t *word);

@@ -341,3 +341,31 @@ def test_one_version_and_one_abi_everywhere():
     assert re.search(r'#define PEN_VERSION "(.*)"', header)[1] == penode_gen.VERSION
     assert int(re.search(r"#define PEN_ABI (\d+)", header)[1]) == sets.ABI
     assert f'\nversion = "{penode_gen.VERSION}"\n' in (ROOT / "pyproject.toml").read_text()
+
+
+def test_names_that_look_like_those_of_the_generated_code(tmp_path):
+    """Elements called net, net_1, net_in, net_slope: a network of two inputs among them."""
+    text = (
+        models.RICH.format(method="rk4", h=1e-3, input="held", outside="extrapolate", substeps=1, foot_damper="")
+        .replace('net = { between', 'net_1 = { between = ["mass", "ground"], law = "network", network = "n1" }\nnet_in = { between = ["mass", "ground"], law = "linear_spring", stiffness = "k" }\nnet_slope = { between = ["mass", "ground"], law = "linear_damper", damping = "3 N*s/m" }\nnet = { between')
+        .replace('output = "N" }\n', 'output = "N" }\nn1 = { inputs = ["m"], output = "N" }\n', 1)
+        .replace('n2 = "n2.json"', 'n2 = "n2.json"\nn1 = "n1.json"')
+    )  # fmt: skip
+    models.network_file(tmp_path / "n2.json", [2, 5, 1], ["tanh", "identity"], 5)
+    models.network_file(tmp_path / "n1.json", [1, 5, 1], ["relu", "identity"], 6)
+    (tmp_path / "names.toml").write_text(text)
+    made = penode_gen.load(tmp_path / "names.toml")
+    folder = tmp_path / "c"
+    penode_gen.generate(made, folder)
+    assert complaints(folder, "rich") == []
+
+
+@pytest.mark.parametrize("more", ["refuse", "layers"])
+def test_no_warnings_when_folded(tmp_path, more):
+    """Every method of the quarter vehicle, folded."""
+    base = ROOT / "gen" / "nqvm" / "nqvm.toml"
+    for method in METHODS:
+        path = tmp_path / f"{method}.toml"
+        path.write_text(f'[model]\nextends = "{os.path.relpath(base, tmp_path)}"\nname = "{method}"\nmethod = "{method}"\npieces = 96\nmore_pieces = "{more}"\n')
+        penode_gen.generate(penode_gen.load(path), tmp_path / method)
+        assert complaints(tmp_path / method, method) == []

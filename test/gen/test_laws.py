@@ -75,6 +75,7 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
     ),
     "bouc_wen": ({"force": "9 N", "presliding": "10 mm"}, bouc_wen),
     "dahl_friction": ({"force": "9 N", "presliding": "10 mm"}, lambda s, v, own: (9.0 * own[0], [(v - abs(v) * own[0]) / 0.01])),
+    "slack_friction": ({"force": "9 N", "presliding": "10 mm"}, lambda s, v, own: (9.0 * own[0] ** 5, bouc_wen(s, v, own)[1])),
     "maxwell_bushing": ({"stiffness": "300 N/m", "relaxation": "60 ms"}, lambda s, v, own: (own[0], [300.0 * v - own[0] / 0.06])),
     "absorber": ({"mass": "0.4 kg", "stiffness": "90 N/m", "damping": "0.8 N*s/m"}, absorber),
 }  # fmt: skip

@@ -182,7 +182,7 @@ void test_damaged_state_comes_back_from_its_copy(void)
             nqvm_x_t       after;
             pen_status_t   status;
 
-            model.last[i] = bad[b];
+            model.row[1][i] = bad[b];
             u.z_road = road(WARM);
             status = nqvm_step(&model, &u, &y);
             TEST_ASSERT_EQUAL_HEX32(PEN_STATE_NONFINITE, status & PEN_STATE_NONFINITE);

@@ -6,6 +6,7 @@
 
 #include "penode/pen_math.h"
 #include "penode/pen_net.h"
+#include "penode/pen_net16.h"
 #include "unity.h"
 
 #define MAX_OUT 40U
@@ -107,14 +108,8 @@ void test_dense_of_every_shape_is_exact(void)
     }
 }
 
-void test_special_kernels_agree_with_the_general_one(void)
+void test_one_row(void)
 {
-    make(16U, 1U);
-    pen_dense16_scalar(stream, x[0], y);
-    expect_rows(16U, 1U, 1, 0);
-    make(16U, 16U);
-    pen_dense16_relu(16U, stream, x, y);
-    expect_rows(16U, 16U, 1, 1);
     make(1U, 16U);
     y[0] = pen_dense1(16U, stream, x);
     y[1] = POISON;
@@ -123,51 +118,90 @@ void test_special_kernels_agree_with_the_general_one(void)
     expect_rows(1U, 16U, 1, 1);
 }
 
-void test_dense16_relu_may_write_over_its_input(void)
+/* Value and derivative at once: each as from its own kernel, to the bit. */
+void test_dense_dual(void)
 {
-    make(16U, 16U);
-    for (size_t i = 0U; i < 16U; i++) {
-        y[i] = x[i];
-    }
-    pen_dense16_relu(16U, stream, y, y);
-    expect_rows(16U, 16U, 1, 1);
-}
+    pen_real_t t[MAX_IN];
+    pen_real_t s[MAX_OUT];
+    pen_real_t expected[MAX_OUT];
 
-/* Two layers at once give the bits of one after the other, also where sums are not exact. */
-void test_two_layers_at_once(void)
-{
-    pen_real_t both[(16U * 17U) + (16U * 17U) + 17U];
-    pen_real_t one[16];
-    const pen_real_t third = (pen_real_t)1 / (pen_real_t)3;
-    size_t at = 0U;
-
-    make(16U, 1U); /* 1 -> 16, 16 -> 16, 16 -> 1 in one stream */
-    for (size_t i = 0U; i < 32U; i++, at++) {
-        both[at] = stream[i] * third;
-    }
-    make(16U, 16U);
-    for (size_t i = 0U; i < 272U; i++, at++) {
-        both[at] = stream[i] * third;
-    }
-    make(1U, 16U);
-    for (size_t i = 0U; i < 17U; i++, at++) {
-        both[at] = stream[i] * third;
-    }
-    for (int k = -20; k <= 20; k++) {
-        const pen_real_t v = (pen_real_t)k * (pen_real_t)0.07F;
-        pen_dense16_scalar(both, v, one);
-        pen_dense16_relu(16U, &both[32], one, one);
-        pen_dense16_pair(both, v, y);
-        for (size_t r = 0U; r < 16U; r++) {
-            TEST_ASSERT_TRUE(y[r] == one[r]);
+    for (size_t n_out = 1U; n_out <= MAX_OUT; n_out++) {
+        for (size_t n_in = 1U; n_in <= MAX_IN; n_in += 3U) {
+            setUp();
+            make(n_out, n_in);
+            for (size_t i = 0U; i < n_in; i++) {
+                t[i] = eighth();
+            }
+            pen_dense_dual(n_out, n_in, stream, x, t, y, s);
+            expect_rows(n_out, n_in, 1, 0);
+            pen_dense_tangent(n_out, n_in, stream, t, expected);
+            for (size_t i = 0U; i < n_out; i++) {
+                TEST_ASSERT_TRUE(s[i] == expected[i]);
+            }
         }
-        pen_dense16_scalar(both, v, one);
-        pen_dense16_relu(16U, &both[32], one, y);
-        TEST_ASSERT_TRUE(pen_dense16_last(16U, &both[32], one) == pen_dense1_relu(16U, &both[304], y));
     }
 }
 
-/* Neither NaN nor either Inf may vanish in a layer, wherever it stands: this is what the step's one check rests on. */
+/* 1-16-...-16-1 in one piece gives the bits of layer by layer, also where sums are not exact; so does its slope's value.
+ * The slope against layer by layer: three sums of 16 terms, each rounding to the last digit of sums below 1000. */
+void test_net16(void)
+{
+    static pen_real_t w[32U + (3U * 272U) + 17U];
+    const pen_real_t third = (pen_real_t)1 / (pen_real_t)3;
+
+    for (size_t i = 0U; i < (sizeof(w) / sizeof(w[0])); i++) {
+        w[i] = eighth() * third;
+    }
+    for (size_t hidden = 1U; hidden <= 3U; hidden++) {
+        for (size_t k = 0U; k < 100U; k++) {
+            const pen_real_t in = eighth() * third;
+            pen_real_t h[2][16];
+            pen_real_t t[2][16];
+            pen_real_t slope;
+            pen_real_t expected;
+            pen_real_t size;
+            pen_dense(16U, 1U, w, &in, h[0]);
+            for (size_t i = 0U; i < 16U; i++) {
+                t[0][i] = w[i + 16U];
+            }
+            for (size_t layer = 0U; layer < hidden; layer++) {
+                const pen_real_t *const p = &w[32U + (272U * layer)];
+                pen_dense_relu(16U, 16U, p, h[layer & 1U], h[(layer + 1U) & 1U]);
+                pen_slope_relu(16U, h[layer & 1U], t[layer & 1U]);
+                pen_dense_tangent(16U, 16U, p, t[layer & 1U], t[(layer + 1U) & 1U]);
+            }
+            expected = pen_dense1_relu(16U, &w[32U + (272U * hidden)], h[hidden & 1U]);
+            TEST_ASSERT_TRUE(pen_net16(hidden, w, in) == expected);
+            TEST_ASSERT_TRUE(pen_net16_slope(hidden, w, in, &slope) == expected);
+            pen_slope_relu(16U, h[hidden & 1U], t[hidden & 1U]);
+            pen_dense_tangent(1U, 16U, &w[32U + (272U * hidden)], t[hidden & 1U], &expected);
+            size = (pen_real_t)1000 * PEN_REAL_EPSILON;
+            TEST_ASSERT_TRUE((slope - expected) <= size);
+            TEST_ASSERT_TRUE((expected - slope) <= size);
+        }
+    }
+}
+
+/* A NaN or Inf anywhere in a network in one piece comes out as NaN or Inf. */
+void test_net16_hides_nothing(void)
+{
+    static pen_real_t w[32U + 272U + 17U];
+    const pen_real_t bad[3] = { nan_value, inf_value, -inf_value };
+
+    for (size_t at = 0U; at < (sizeof(w) / sizeof(w[0])); at++) {
+        for (size_t b = 0U; b < 3U; b++) {
+            pen_real_t slope;
+            seed = 7U;
+            for (size_t i = 0U; i < (sizeof(w) / sizeof(w[0])); i++) {
+                w[i] = eighth() + ((pen_real_t)1 / (pen_real_t)16); /* never 0 */
+            }
+            w[at] = bad[b];
+            TEST_ASSERT_FALSE(pen_finite(1U, (const pen_real_t[1]){ pen_net16(1U, w, (pen_real_t)0.5F) }));
+            TEST_ASSERT_FALSE(pen_finite(1U, (const pen_real_t[1]){ pen_net16_slope(1U, w, (pen_real_t)0.5F, &slope) }));
+        }
+    }
+}
+
 static void expect_nonfinite(size_t n, const pen_real_t value[])
 {
     TEST_ASSERT_FALSE(pen_finite(n, value));

@@ -82,9 +82,8 @@ typedef struct {
 
 /** One instance. Owned by the caller; use it only through the functions below. */
 typedef struct {
-    pen_real_t       last[6]; /* state, then outputs, of the last sample that went well */
-    pen_real_t       kept[6]; /* a second copy, in case the first is damaged */
-    pen_real_t       u[1];    /* input at the last sample */
+    pen_real_t       row[3][6]; /* state, then outputs: a second copy, the last good ones, those being made */
+    pen_real_t       u[2][1];   /* input: of the last sample, of this one */
     uint32_t         ready;   /* NQVM_EULER_LAYOUT once initialised */
     uint32_t         running; /* 1 after the first sample that went well */
     pen_tuning_t     tuning;

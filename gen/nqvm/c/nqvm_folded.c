@@ -3,7 +3,7 @@
 #include "nqvm_folded.h"
 
 #include "penode/pen_math.h"
-#include "penode/pen_net.h"
+#include "penode/pen_net16.h"
 #include "penode/pen_port.h"
 
 #define NQVM_FOLDED_M_B_INVERSE ((pen_real_t)(1.0 / 350.0)) /* 1 / m_b */
@@ -34,12 +34,12 @@ static pen_status_t rates(const nqvm_folded_pieces_t *f, const pen_real_t x[], c
     const pen_real_t s_tyre = z_w - z_road; /* deflection between wheel and z_road */
     const pen_real_t F_spring = NQVM_FOLDED_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_FOLDED_D * v_spring; /* force of damper */
-    const pen_piece_t *const F_spring_nn_piece = pen_fold_find(NQVM_FOLDED_PIECES, f->spring_net, s_spring);
+    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->spring_net, s_spring);
     /* force of spring_nn: network spring_net */
-    const pen_real_t F_spring_nn = pen_fold_value(f->spring_net, F_spring_nn_piece, s_spring, &status);
-    const pen_piece_t *const F_damper_nn_piece = pen_fold_find(NQVM_FOLDED_PIECES, f->damper_net, v_spring);
+    const pen_real_t F_spring_nn = pen_fold_value(f->spring_net, piece_of_F_spring_nn, s_spring, &status);
+    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->damper_net, v_spring);
     /* force of damper_nn: network damper_net */
-    const pen_real_t F_damper_nn = pen_fold_value(f->damper_net, F_damper_nn_piece, v_spring, &status);
+    const pen_real_t F_damper_nn = pen_fold_value(f->damper_net, piece_of_F_damper_nn, v_spring, &status);
     const pen_real_t F_tyre = NQVM_FOLDED_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
     const pen_real_t der_v_b = NQVM_FOLDED_M_B_INVERSE * (-(F_damper + F_damper_nn + F_spring + F_spring_nn));
@@ -70,14 +70,14 @@ static pen_status_t rates_jacobian(const nqvm_folded_pieces_t *f, const pen_real
     const pen_real_t s_tyre = z_w - z_road; /* deflection between wheel and z_road */
     const pen_real_t F_spring = NQVM_FOLDED_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_FOLDED_D * v_spring; /* force of damper */
-    const pen_piece_t *const F_spring_nn_piece = pen_fold_find(NQVM_FOLDED_PIECES, f->spring_net, s_spring);
+    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->spring_net, s_spring);
     /* force of spring_nn: network spring_net */
-    const pen_real_t F_spring_nn = pen_fold_value(f->spring_net, F_spring_nn_piece, s_spring, &status);
-    const pen_real_t slope_F_spring_nn = F_spring_nn_piece->slope;
-    const pen_piece_t *const F_damper_nn_piece = pen_fold_find(NQVM_FOLDED_PIECES, f->damper_net, v_spring);
+    const pen_real_t F_spring_nn = pen_fold_value(f->spring_net, piece_of_F_spring_nn, s_spring, &status);
+    const pen_real_t slope_F_spring_nn = piece_of_F_spring_nn->slope;
+    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->damper_net, v_spring);
     /* force of damper_nn: network damper_net */
-    const pen_real_t F_damper_nn = pen_fold_value(f->damper_net, F_damper_nn_piece, v_spring, &status);
-    const pen_real_t slope_F_damper_nn = F_damper_nn_piece->slope;
+    const pen_real_t F_damper_nn = pen_fold_value(f->damper_net, piece_of_F_damper_nn, v_spring, &status);
+    const pen_real_t slope_F_damper_nn = piece_of_F_damper_nn->slope;
     const pen_real_t F_tyre = NQVM_FOLDED_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
     const pen_real_t der_v_b = NQVM_FOLDED_M_B_INVERSE * (-(F_damper + F_damper_nn + F_spring + F_spring_nn));
@@ -153,12 +153,12 @@ static pen_status_t sensors(const nqvm_folded_pieces_t *f, const pen_real_t x[],
     const pen_real_t s_tyre = z_w - z_road; /* deflection between wheel and z_road */
     const pen_real_t F_spring = NQVM_FOLDED_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_FOLDED_D * v_spring; /* force of damper */
-    const pen_piece_t *const F_spring_nn_piece = pen_fold_find(NQVM_FOLDED_PIECES, f->spring_net, s_spring);
+    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->spring_net, s_spring);
     /* force of spring_nn: network spring_net */
-    const pen_real_t F_spring_nn = pen_fold_value(f->spring_net, F_spring_nn_piece, s_spring, &status);
-    const pen_piece_t *const F_damper_nn_piece = pen_fold_find(NQVM_FOLDED_PIECES, f->damper_net, v_spring);
+    const pen_real_t F_spring_nn = pen_fold_value(f->spring_net, piece_of_F_spring_nn, s_spring, &status);
+    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->damper_net, v_spring);
     /* force of damper_nn: network damper_net */
-    const pen_real_t F_damper_nn = pen_fold_value(f->damper_net, F_damper_nn_piece, v_spring, &status);
+    const pen_real_t F_damper_nn = pen_fold_value(f->damper_net, piece_of_F_damper_nn, v_spring, &status);
     const pen_real_t F_tyre = NQVM_FOLDED_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
     const pen_real_t der_v_b = NQVM_FOLDED_M_B_INVERSE * (-(F_damper + F_damper_nn + F_spring + F_spring_nn));
@@ -222,25 +222,34 @@ static pen_status_t integrate(const nqvm_folded_pieces_t *f, const pen_real_t u0
     pen_real_t advance,
     const pen_real_t x0[], pen_real_t x[])
 {
+    static const pen_real_t weight[4] = { (pen_real_t)1.0, (pen_real_t)2.0, (pen_real_t)2.0, (pen_real_t)1.0 };
     pen_status_t status = PEN_OK;
 
     for (size_t i = 0U; i < SUBSTEPS; i++) {
-        pen_real_t k[4][N_X];
+        pen_real_t k[N_X];
+        pen_real_t sum[N_X];
+        PEN_PORT_UNROLL
+        for (size_t n = 0U; n < N_X; n++) {
+            k[n] = (pen_real_t)0;
+            sum[n] = (pen_real_t)0;
+        }
         for (size_t s = 0U; s < 4U; s++) {
-            const pen_real_t *const slope = (s == 0U) ? x0 : k[s - 1U]; /* node[0] is 0 */
             pen_real_t xs[N_X];
             pen_real_t us[N_DRIVE];
             drive(node[s], u0, u1, us);
             PEN_PORT_UNROLL
             for (size_t n = 0U; n < N_X; n++) {
-                xs[n] = x0[n] + ((H * node[s]) * slope[n]);
+                xs[n] = x0[n] + ((H * node[s]) * k[n]);
             }
-            status |= rates(f, xs, us, k[s]);
+            status |= rates(f, xs, us, k);
+            PEN_PORT_UNROLL
+            for (size_t n = 0U; n < N_X; n++) {
+                sum[n] += weight[s] * k[n];
+            }
         }
         PEN_PORT_UNROLL
         for (size_t n = 0U; n < N_X; n++) {
-            x[n] = x0[n] + (advance * (H / (pen_real_t)6.0))
-                * (k[0][n] + ((pen_real_t)2.0 * k[1][n]) + ((pen_real_t)2.0 * k[2][n]) + k[3][n]);
+            x[n] = x0[n] + ((advance * (H / (pen_real_t)6.0)) * sum[n]);
         }
     }
     return status;
@@ -291,13 +300,9 @@ static pen_status_t integrate_jacobian(const nqvm_folded_pieces_t *f, const pen_
     return status;
 }
 
-/* one sample on its way: nothing of the instance changes before all of it is known to be good */
-typedef struct {
-    const nqvm_folded_pieces_t *f; /* the set in force: networks, folded */
-    const pen_real_t *u0; /* input before */
-    pen_real_t u[1];      /* drive now */
-    pen_real_t now[6];    /* state, then outputs */
-} sample_t;
+#define KEPT 0U /* rows of the instance */
+#define LAST 1U
+#define NOW  2U
 
 static bool usable(const nqvm_folded_t *self)
 {
@@ -327,18 +332,10 @@ static pen_status_t check(size_t n, const pen_real_t value[], pen_status_t flag)
     return pen_finite(n, value) ? PEN_OK : flag;
 }
 
-/* take over what is pending, and see what there is to start from */
-static pen_status_t begin(nqvm_folded_t *self, sample_t *sample)
+/* the input that the step starts from: for the first sample its own */
+static const pen_real_t *before(const nqvm_folded_t *self)
 {
-    const pen_real_t *const before[2] = { sample->u, self->u };
-    uint32_t slot;
-    pen_status_t status = pen_tuning_adopt(&self->tuning, &slot);
-
-    sample->f = &self->pieces[slot];
-    sample->u0 = before[self->running & 1U];
-    status |= check(NQVM_FOLDED_N_U, sample->u, PEN_INPUT_NONFINITE);
-    status |= check(N_LAST, self->last, PEN_STATE_NONFINITE);
-    return status;
+    return self->u[1U - (self->running & 1U)];
 }
 
 /* how much of a sample to integrate: all of it, but nothing for the first one, which only gives outputs */
@@ -349,22 +346,30 @@ static pen_real_t advance(const nqvm_folded_t *self)
     return (pen_real_t)running;
 }
 
+/* take over what is pending, and see what there is to start from */
+static pen_status_t begin(nqvm_folded_t *self, uint32_t *slot)
+{
+    pen_status_t status = pen_tuning_adopt(&self->tuning, slot);
+
+    status |= check(NQVM_FOLDED_N_U, self->u[1], PEN_INPUT_NONFINITE);
+    status |= check(N_LAST, self->row[LAST], PEN_STATE_NONFINITE);
+    return status;
+}
+
 /* keep what is new if it is good, else what was there, else the second copy: picked by number, the same work each
    way */
-static pen_status_t finish(nqvm_folded_t *self, const sample_t *sample, pen_status_t status)
+static pen_status_t finish(nqvm_folded_t *self, pen_status_t status)
 {
-    const pen_real_t *const candidate[3] = { self->kept, self->last, sample->now };
-    const pen_real_t *const drive_now[2] = { self->u, sample->u };
     const pen_status_t follows = (status << 2U) | (status << 1U); /* from a bad input or state: not said twice */
-    const pen_status_t result = status | (check(N_LAST, sample->now, PEN_STEP_NONFINITE) & ~follows);
-    const size_t good = pen_advanced(result) ? 1U : 0U;
-    const size_t whole = ((result & PEN_STATE_NONFINITE) == PEN_OK) ? 1U : 0U;
-    const size_t received = ((result & PEN_INPUT_NONFINITE) == PEN_OK) ? 1U : 0U;
+    const pen_status_t result = status | (check(N_LAST, self->row[NOW], PEN_STEP_NONFINITE) & ~follows);
+    const uint32_t good = pen_advanced(result) ? 1U : 0U;
+    const uint32_t whole = ((result & PEN_STATE_NONFINITE) == PEN_OK) ? 1U : 0U;
+    const uint32_t received = ((result & PEN_INPUT_NONFINITE) == PEN_OK) ? 1U : 0U;
 
-    copy(N_LAST, candidate[good + whole], self->last);
-    copy(N_LAST, self->last, self->kept);
-    copy(N_DRIVE, drive_now[received], self->u);
-    self->running |= (uint32_t)good;
+    copy(N_LAST, self->row[good + whole], self->row[LAST]);
+    copy(N_LAST, self->row[LAST], self->row[KEPT]);
+    copy(N_DRIVE, self->u[received], self->u[0]);
+    self->running |= good;
     pen_status_note_step(&self->log, result);
     return result;
 }
@@ -406,10 +411,10 @@ pen_status_t nqvm_folded_init(nqvm_folded_t *self, const pen_set_t *set, nqvm_fo
     }
     if (status == PEN_OK) {
         static const pen_real_t start[N_LAST] = { 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F };
-        copy(N_LAST, start, self->last);
-        copy(N_LAST, start, self->kept);
+        copy(N_LAST, start, self->row[LAST]);
+        copy(N_LAST, start, self->row[KEPT]);
         for (size_t i = 0U; i < N_DRIVE; i++) {
-            self->u[i] = (pen_real_t)0;
+            self->u[0][i] = (pen_real_t)0;
         }
         self->running = 0U;
         pen_status_clear(&self->log);
@@ -423,14 +428,15 @@ pen_status_t nqvm_folded_step(nqvm_folded_t *self, const nqvm_folded_u_t *u, nqv
     pen_status_t status = PEN_BADARG;
 
     if (usable(self) && (u != NULL) && (y != NULL)) {
-        sample_t sample;
-        sample.u[0] = u->z_road;
-        status = begin(self, &sample);
-        status |= integrate(sample.f, sample.u0, sample.u, advance(self), self->last, sample.now);
-        outputs(sample.now, &sample.now[N_X]);
-        status = finish(self, &sample, status);
-        y->z_b = self->last[4];
-        y->z_w = self->last[5];
+        uint32_t slot;
+        self->u[1][0] = u->z_road;
+        status = begin(self, &slot);
+        const nqvm_folded_pieces_t *const f = &self->pieces[slot];
+        status |= integrate(f, before(self), self->u[1], advance(self), self->row[LAST], self->row[NOW]);
+        outputs(self->row[NOW], &self->row[NOW][N_X]);
+        status = finish(self, status);
+        y->z_b = self->row[LAST][4];
+        y->z_w = self->row[LAST][5];
     }
     return status;
 }
@@ -441,19 +447,20 @@ pen_status_t nqvm_folded_step_jacobian(nqvm_folded_t *self, const nqvm_folded_u_
     pen_status_t status = PEN_BADARG;
 
     if (usable(self) && (u != NULL) && (y != NULL) && (j != NULL)) {
-        sample_t sample;
-        sample.u[0] = u->z_road;
-        status = begin(self, &sample);
+        uint32_t slot;
+        self->u[1][0] = u->z_road;
+        status = begin(self, &slot);
+        const nqvm_folded_pieces_t *const f = &self->pieces[slot];
         pen_real_t d[N_X][N_COLUMNS];
         pen_real_t yx[NQVM_FOLDED_N_Y][N_X];
         pen_real_t yu[NQVM_FOLDED_N_Y][N_DRIVE];
         unit(d);
-        status |= integrate_jacobian(sample.f, sample.u0, sample.u, advance(self), self->last, sample.now, d);
-        outputs(sample.now, &sample.now[N_X]);
+        status |= integrate_jacobian(f, before(self), self->u[1], advance(self), self->row[LAST], self->row[NOW], d);
+        outputs(self->row[NOW], &self->row[NOW][N_X]);
         outputs_jacobian(yx, yu);
-        status = finish(self, &sample, status);
-        y->z_b = self->last[4];
-        y->z_w = self->last[5];
+        status = finish(self, status);
+        y->z_b = self->row[LAST][4];
+        y->z_w = self->row[LAST][5];
         if (pen_advanced(status)) {
             for (size_t n = 0U; n < N_X; n++) {
                 copy(N_X, d[n], j->x_x[n]);
@@ -474,10 +481,10 @@ pen_status_t nqvm_folded_get_state(const nqvm_folded_t *self, nqvm_folded_x_t *x
     const bool good = usable(self) && (x != NULL);
 
     if (good) {
-        x->z_b = self->last[0];
-        x->z_w = self->last[1];
-        x->v_b = self->last[2];
-        x->v_w = self->last[3];
+        x->z_b = self->row[LAST][0];
+        x->z_w = self->row[LAST][1];
+        x->v_b = self->row[LAST][2];
+        x->v_w = self->row[LAST][3];
     }
     return good ? PEN_OK : PEN_BADARG;
 }
@@ -490,8 +497,8 @@ pen_status_t nqvm_folded_set_state(nqvm_folded_t *self, const nqvm_folded_x_t *x
         const pen_real_t state[N_X] = { x->z_b, x->z_w, x->v_b, x->v_w };
         const bool finite = pen_finite(N_X, state);
         status = finite ? PEN_OK : PEN_STATE_NONFINITE;
-        copy(N_X, finite ? state : self->last, self->last);
-        copy(N_X, self->last, self->kept);
+        copy(N_X, finite ? state : self->row[LAST], self->row[LAST]);
+        copy(N_X, self->row[LAST], self->row[KEPT]);
         pen_status_note_step(&self->log, status);
     }
     return status;
@@ -505,7 +512,7 @@ pen_status_t nqvm_folded_sensors(const nqvm_folded_t *self, nqvm_folded_z_t *z)
         const nqvm_folded_pieces_t *const f = &self->pieces[self->tuning.active & 1U];
         pen_real_t value[NQVM_FOLDED_N_SENSORS];
         status = PEN_OK;
-        status |= sensors(f, self->last, self->u, value);
+        status |= sensors(f, self->row[LAST], self->u[0], value);
         if (pen_finite(NQVM_FOLDED_N_SENSORS, value)) {
             z->a_body = value[0];
             z->a_wheel = value[1];
