@@ -1,0 +1,598 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+/**
+ * The runtime on lanes: one vector register holds the same quantity of several runs. For the host's batch library only.
+ *
+ * Each lane does what inc/penode/ does with one number, in the same order, so it gives the same bits; only selections
+ * differ: masks, where a single run picks from a pair. Vectors are those that GCC has on any processor; constants and
+ * polynomials of exp, tanh, sigmoid and softplus are those of src/pen_math.c. (A loop over the lanes in place of the
+ * vector operators costs two to five times the run time and the compile time: measured with gcc 12.)
+ */
+#ifndef PEN_LANES_H
+#define PEN_LANES_H
+
+#include <math.h> /* INFINITY */
+#include <stddef.h>
+#include <stdint.h>
+
+#include "pen_math.c"
+
+#if defined(__AVX512F__)
+#define LANES_BYTES 64
+#elif defined(__AVX__)
+#define LANES_BYTES 32
+#else
+#define LANES_BYTES 16
+#endif
+#define LANES (LANES_BYTES / sizeof(pen_real_t))
+#define LANES_INLINE static inline __attribute__((always_inline, unused))
+#define LANES_APART  static __attribute__((noinline)) /* one copy of what is long */
+
+#ifdef PEN_REAL_DOUBLE
+typedef int64_t integer_t; /* as wide as pen_real_t */
+#define SIGN_BIT INT64_MIN
+#define MANTISSA_BITS 52
+#define EXPONENT_ZERO 1023
+#define POWER_SPLIT 256 /* 2^k is the product of 2^(k mod 256) and the rest, as in pen_math.c */
+#else
+typedef int32_t integer_t;
+#define SIGN_BIT INT32_MIN
+#define MANTISSA_BITS 23
+#define EXPONENT_ZERO 127
+#define POWER_SPLIT 32
+#endif
+
+typedef pen_real_t lanes_t __attribute__((vector_size(LANES_BYTES)));
+typedef integer_t mask_t __attribute__((vector_size(LANES_BYTES))); /* -1: yes, 0: no */
+
+#ifdef WEIGHTS_PER_RUN
+typedef lanes_t weight_t __attribute__((aligned(sizeof(pen_real_t)))); /* as the caller has them */
+#else
+typedef pen_real_t weight_t; /* the same for all lanes */
+#endif
+
+/* ---- selection ---- */
+
+/** The same number in all lanes; -0 stays -0. */
+LANES_INLINE lanes_t lanes_wide(pen_real_t x)
+{
+    return x - (lanes_t){0};
+}
+
+LANES_INLINE lanes_t lanes_weight(weight_t w)
+{
+    return w - (lanes_t){0};
+}
+
+LANES_INLINE lanes_t lanes_pick(mask_t which, lanes_t yes, lanes_t no)
+{
+    return (lanes_t)((which & (mask_t)yes) | (~which & (mask_t)no));
+}
+
+LANES_INLINE bool lanes_all(mask_t mask)
+{
+    bool all = true;
+
+    for (size_t l = 0U; l < LANES; l++) {
+        all = all && (mask[l] != 0);
+    }
+    return all;
+}
+
+LANES_INLINE lanes_t lanes_abs(lanes_t x)
+{
+    return (lanes_t)((mask_t)x & ~SIGN_BIT);
+}
+
+/** pen_finite on lanes */
+LANES_INLINE mask_t lanes_finite(size_t n, const lanes_t value[])
+{
+    lanes_t sum = {0};
+
+    for (size_t i = 0U; i < n; i++) {
+        sum += ZERO * value[i];
+    }
+    return sum >= ZERO;
+}
+
+/* ---- pen_math ---- */
+
+/* A polynomial in each lane: straight-line code, which the compiler vectorises. */
+#define LANES_EACH(name) \
+    LANES_INLINE lanes_t lanes_##name(lanes_t x) \
+    { \
+        lanes_t y = {0}; \
+        for (size_t l = 0U; l < LANES; l++) { \
+            y[l] = name(x[l]); \
+        } \
+        return y; \
+    }
+LANES_EACH(expm1_tail)
+LANES_EACH(tanh_tail)
+LANES_EACH(softplus_tail)
+LANES_EACH(log1p_tail)
+
+/* e^x = (1 + p) * low * high */
+typedef struct {
+    lanes_t p;
+    lanes_t low;
+    lanes_t high;
+} lanes_power_t;
+
+LANES_INLINE lanes_power_t lanes_power(lanes_t x, pen_real_t low, pen_real_t high, pen_real_t bias)
+{
+    const lanes_t above = lanes_pick(x < low, lanes_wide(low), x);
+    const lanes_t c = lanes_pick(above > high, lanes_wide(high), above);
+    const lanes_t shifted = (c * LOG2_E) + (bias + HALF);
+    const mask_t k = __builtin_convertvector((lanes_t)((shifted > ZERO) & (mask_t)shifted), mask_t);
+    const lanes_t n = __builtin_convertvector(k, lanes_t) - bias;
+    const lanes_t r = (c - (n * LN2_HIGH)) - (n * LN2_LOW);
+    const mask_t rest = k & (POWER_SPLIT - 1);
+    const mask_t least = (k < POWER_SPLIT) & 1; /* the bits of 2^-BIAS, which is subnormal */
+    const mask_t exponent = (k - rest) - ((int)BIAS - EXPONENT_ZERO);
+    lanes_power_t e;
+
+    e.p = r + ((r * r) * lanes_expm1_tail(r));
+    e.low = (lanes_t)((rest + EXPONENT_ZERO) << MANTISSA_BITS);
+    e.high = (lanes_t)(((k >= POWER_SPLIT) & (exponent << MANTISSA_BITS)) | least);
+    return e;
+}
+
+LANES_INLINE lanes_t lanes_exp(lanes_t x)
+{
+    const lanes_power_t e = lanes_power(x, EXP_LOW, EXP_HIGH, BIAS);
+
+    return ((ONE + e.p) * e.low) * e.high;
+}
+
+LANES_INLINE lanes_t lanes_sigmoid(lanes_t x)
+{
+    const lanes_power_t e = lanes_power(-x, SIGMOID_LOW, -EXP_LOW, SIGMOID_BIAS);
+    const lanes_t scale = e.low * e.high;
+    const lanes_t sum = scale + SIGMOID_SCALE;
+    const lanes_t lost = SIGMOID_SCALE - (sum - scale);
+
+    return SIGMOID_SCALE / (sum + ((scale * e.p) + lost));
+}
+
+LANES_INLINE lanes_t lanes_tanh(lanes_t x)
+{
+    const lanes_t size = lanes_abs(x);
+    const lanes_t z = x * x;
+    const lanes_t inner = x + (x * (ZERO - (z * lanes_tanh_tail(z))));
+    const lanes_power_t e = lanes_power(size + size, ZERO, TANH_HIGH, BIAS);
+    const lanes_t scale = e.low * e.high;
+    const lanes_t outer = ONE - (TWO / ((ONE + scale) + (scale * e.p)));
+
+    return lanes_pick(size < TANH_NEAR, inner, lanes_pick(x > ZERO, outer, -outer));
+}
+
+LANES_INLINE lanes_t lanes_softplus(lanes_t x)
+{
+    const lanes_t size = lanes_abs(x);
+    const lanes_t z = x * x;
+    const lanes_t inner = LN2 + ((HALF * x) + (z * lanes_softplus_tail(z)));
+    const lanes_power_t w = lanes_power(-size, EXP_LOW, ZERO, BIAS);
+    const lanes_t e = ((ONE + w.p) * w.low) * w.high;
+    const lanes_t ramp = (lanes_t)((x > ZERO) & (mask_t)x);
+    const lanes_t outer = ramp + (e + ((e * e) * lanes_log1p_tail(e)));
+
+    return lanes_pick(size < ONE, inner, outer);
+}
+
+LANES_INLINE lanes_t lanes_max(lanes_t a, lanes_t b)
+{
+    return lanes_pick(a > b, a, b) + (ZERO * (a + b));
+}
+
+LANES_INLINE lanes_t lanes_min(lanes_t a, lanes_t b)
+{
+    return lanes_pick(a < b, a, b) + (ZERO * (a + b));
+}
+
+LANES_INLINE lanes_t lanes_heaviside(lanes_t x)
+{
+    return lanes_pick(x > ZERO, lanes_wide(ONE), lanes_wide(ZERO)) + (ZERO * x);
+}
+
+LANES_INLINE lanes_t lanes_sign(lanes_t x)
+{
+    const lanes_t above = lanes_pick(x > ZERO, lanes_wide(ONE), lanes_wide(ZERO));
+    const lanes_t below = lanes_pick(x < ZERO, lanes_wide(ONE), lanes_wide(ZERO));
+
+    return (above - below) + (ZERO * x);
+}
+
+/* ---- pen_solve: a x = b in place, rows exchanged lane by lane; the lanes that are not singular ---- */
+
+LANES_INLINE mask_t lanes_solve(size_t n, lanes_t a[], lanes_t b[])
+{
+    lanes_t inverse[n]; /* n is a constant where this is inlined */
+    lanes_t doubt = {0};
+
+    for (size_t k = 0U; k < n; k++) {
+        lanes_t largest = lanes_abs(a[(k * n) + k]);
+        mask_t row = (mask_t){0} + (int)k;
+        for (size_t i = k + 1U; i < n; i++) {
+            const lanes_t size = lanes_abs(a[(i * n) + k]);
+            const mask_t larger = size > largest;
+            row = (larger & (int)i) | (~larger & row);
+            largest = lanes_pick(larger, size, largest);
+        }
+        for (size_t i = k + 1U; i < n; i++) {
+            const mask_t here = (row == (int)i);
+            for (size_t j = k; j < n; j++) {
+                const lanes_t kept = a[(k * n) + j];
+                a[(k * n) + j] = lanes_pick(here, a[(i * n) + j], kept);
+                a[(i * n) + j] = lanes_pick(here, kept, a[(i * n) + j]);
+            }
+            const lanes_t kept = b[k];
+            b[k] = lanes_pick(here, b[i], kept);
+            b[i] = lanes_pick(here, kept, b[i]);
+        }
+        inverse[k] = ONE / a[(k * n) + k];
+        doubt += a[(k * n) + k] - a[(k * n) + k];
+        for (size_t i = k + 1U; i < n; i++) {
+            const lanes_t factor = a[(i * n) + k] * inverse[k];
+            for (size_t j = k + 1U; j < n; j++) {
+                a[(i * n) + j] -= factor * a[(k * n) + j];
+            }
+            b[i] -= factor * b[k];
+        }
+    }
+    for (size_t k = n; k > 0U; k--) {
+        lanes_t sum = b[k - 1U];
+        for (size_t j = k; j < n; j++) {
+            sum -= a[((k - 1U) * n) + j] * b[j];
+        }
+        b[k - 1U] = sum * inverse[k - 1U];
+        doubt += b[k - 1U] - b[k - 1U];
+    }
+    return doubt < ONE;
+}
+
+/* ---- pen_net: dense layers. Weights are stored as pen_net.h says. ---- */
+
+LANES_INLINE lanes_t lanes_rectified(lanes_t x)
+{
+    return HALF * (x + lanes_abs(x));
+}
+
+/**
+ * `rows` rows of one block; their accumulators stay in registers.
+ * @param bias  without it: the tangent
+ * @param relu  apply the activation
+ */
+LANES_INLINE void lanes_block(size_t rows, size_t n_in, const weight_t w[], const lanes_t x[], lanes_t y[],
+                              bool bias, bool relu)
+{
+    lanes_t a[16];
+
+#pragma GCC unroll 16
+    for (size_t r = 0U; r < rows; r++) {
+        a[r] = bias ? lanes_weight(w[r]) : lanes_wide(ZERO);
+    }
+    for (size_t i = 0U; i < n_in; i++) {
+        const lanes_t xi = x[i];
+#pragma GCC unroll 16
+        for (size_t r = 0U; r < rows; r++) {
+            a[r] += w[(rows * (i + 1U)) + r] * xi;
+        }
+    }
+#pragma GCC unroll 16
+    for (size_t r = 0U; r < rows; r++) {
+        y[r] = relu ? lanes_rectified(a[r]) : a[r];
+    }
+}
+
+/**
+ * y = W x + b
+ * @param after_relu  x comes from a ReLU: the last n_out % 4 rows are summed twice as large, as in pen_dense1_relu
+ * @param relu        apply the activation to y
+ */
+LANES_INLINE void lanes_dense(size_t n_out, size_t n_in, const weight_t w[], const lanes_t x[], lanes_t y[],
+                              bool after_relu, bool relu)
+{
+    size_t row = 0U;
+
+    for (; (row + 16U) <= n_out; row += 16U) {
+        lanes_block(16U, n_in, &w[row * (n_in + 1U)], x, &y[row], true, relu);
+    }
+    for (; (row + 4U) <= n_out; row += 4U) {
+        lanes_block(4U, n_in, &w[row * (n_in + 1U)], x, &y[row], true, relu);
+    }
+    for (; row < n_out; row++) {
+        const weight_t *const own = &w[row * (n_in + 1U)];
+        lanes_t a = after_relu ? lanes_weight(own[0] + own[0]) : lanes_weight(own[0]);
+        for (size_t i = 0U; i < n_in; i++) {
+            a += own[i + 1U] * (after_relu ? (x[i] + x[i]) : x[i]);
+        }
+        a = after_relu ? (HALF * a) : a;
+        y[row] = relu ? lanes_rectified(a) : a;
+    }
+}
+
+/** y = W t */
+LANES_INLINE void lanes_tangent(size_t n_out, size_t n_in, const weight_t w[], const lanes_t t[], lanes_t y[])
+{
+    size_t row = 0U;
+
+    for (; (row + 16U) <= n_out; row += 16U) {
+        lanes_block(16U, n_in, &w[row * (n_in + 1U)], t, &y[row], false, false);
+    }
+    for (; (row + 4U) <= n_out; row += 4U) {
+        lanes_block(4U, n_in, &w[row * (n_in + 1U)], t, &y[row], false, false);
+    }
+    for (; row < n_out; row++) {
+        const weight_t *const own = &w[row * (n_in + 1U)];
+        lanes_t a = own[1] * t[0];
+        for (size_t i = 1U; i < n_in; i++) {
+            a += own[i + 1U] * t[i];
+        }
+        y[row] = a;
+    }
+}
+
+/* ---- pen_net: the other activations in place, and t[i] *= act'(.) from the value after the activation ---- */
+
+LANES_INLINE void lanes_act_tanh(size_t n, lanes_t h[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        h[i] = lanes_tanh(h[i]) + (ZERO * h[i]);
+    }
+}
+
+LANES_INLINE void lanes_act_sigmoid(size_t n, lanes_t h[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        h[i] = lanes_sigmoid(h[i]) + (ZERO * h[i]);
+    }
+}
+
+LANES_INLINE void lanes_act_softplus(size_t n, lanes_t h[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        h[i] = lanes_softplus(h[i]) + (ZERO * h[i]);
+    }
+}
+
+LANES_INLINE void lanes_act_step(size_t n, lanes_t h[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        h[i] = lanes_pick(h[i] < ZERO, lanes_wide(ZERO), lanes_wide(ONE)) + (ZERO * h[i]);
+    }
+}
+
+LANES_INLINE void lanes_slope_relu(size_t n, const lanes_t h[], lanes_t t[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        t[i] = (lanes_t)((h[i] > ZERO) & (mask_t)t[i]);
+    }
+}
+
+LANES_INLINE void lanes_slope_tanh(size_t n, const lanes_t h[], lanes_t t[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        t[i] *= ONE - (h[i] * h[i]);
+    }
+}
+
+LANES_INLINE void lanes_slope_sigmoid(size_t n, const lanes_t h[], lanes_t t[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        t[i] *= h[i] * (ONE - h[i]);
+    }
+}
+
+LANES_INLINE void lanes_slope_softplus(size_t n, const lanes_t h[], lanes_t t[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        t[i] *= ONE - lanes_exp(-h[i]);
+    }
+}
+
+LANES_INLINE void lanes_slope_step(size_t n, const lanes_t h[], lanes_t t[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        t[i] = ZERO * h[i];
+    }
+}
+
+/* ---- pen_net: element-wise layers ---- */
+
+LANES_INLINE void lanes_centre(size_t n, const weight_t w[], const lanes_t x[], lanes_t y[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        y[i] = (x[i] - w[i]) * w[n + i];
+    }
+}
+
+LANES_INLINE void lanes_rescale(size_t n, const weight_t w[], const lanes_t x[], lanes_t y[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        y[i] = (x[i] * w[i]) + w[n + i];
+    }
+}
+
+LANES_INLINE void lanes_centre_tangent(size_t n, const weight_t w[], lanes_t t[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        t[i] *= w[n + i];
+    }
+}
+
+LANES_INLINE void lanes_rescale_tangent(size_t n, const weight_t w[], lanes_t t[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        t[i] *= w[i];
+    }
+}
+
+/* ---- pen_net: trust envelope ---- */
+
+/** Lanes in which any x[i] lies outside of its range, or is NaN. */
+LANES_INLINE mask_t lanes_outside(size_t n, const weight_t range[], const lanes_t x[])
+{
+    mask_t outside = {0};
+
+    for (size_t i = 0U; i < n; i++) {
+        outside |= ~(x[i] >= range[i]) | ~(x[i] <= range[n + i]);
+    }
+    return outside;
+}
+
+LANES_INLINE void lanes_clamp(size_t n, const weight_t range[], const lanes_t x[], lanes_t y[])
+{
+    for (size_t i = 0U; i < n; i++) {
+        const lanes_t raised = lanes_pick(x[i] < range[i], lanes_weight(range[i]), x[i]);
+        y[i] = lanes_pick(raised > range[n + i], lanes_weight(range[n + i]), raised);
+    }
+}
+
+LANES_INLINE lanes_t lanes_margin(size_t n, const weight_t range[], pen_real_t width, const lanes_t x[], size_t i)
+{
+    const weight_t span = width * (range[n + i] - range[i]);
+    const lanes_t below = x[i] - range[i];
+    const lanes_t above = range[n + i] - x[i];
+
+    return ONE + (lanes_pick(below < above, below, above) / span);
+}
+
+LANES_INLINE lanes_t lanes_fade(size_t n, const weight_t range[], pen_real_t width, const lanes_t x[])
+{
+    lanes_t trust = lanes_wide(ONE);
+
+    for (size_t i = 0U; i < n; i++) {
+        const lanes_t here = lanes_margin(n, range, width, x, i);
+        trust = lanes_pick(here < trust, here, trust) + (ZERO * here);
+    }
+    return lanes_pick(trust < ZERO, lanes_wide(ZERO), trust);
+}
+
+LANES_INLINE lanes_t lanes_clamp_slope(size_t n, const weight_t range[], const lanes_t x[], size_t i)
+{
+    const mask_t inside = (x[i] >= range[i]) & (x[i] <= range[n + i]);
+
+    return lanes_pick(inside, lanes_wide(ONE), lanes_wide(ZERO));
+}
+
+LANES_INLINE lanes_t lanes_fade_slope(size_t n, const weight_t range[], pen_real_t width, const lanes_t x[], size_t i)
+{
+    const lanes_t trust = lanes_fade(n, range, width, x);
+    const mask_t worst = ~(lanes_margin(n, range, width, x, i) > trust);
+    const mask_t fading = (trust > ZERO) & (trust < ONE) & worst;
+    const lanes_t steepness = lanes_weight(ONE / (width * (range[n + i] - range[i])));
+    const lanes_t slope = lanes_pick(x[i] < range[i], steepness, -steepness);
+
+    return lanes_pick(fading, slope, lanes_wide(ZERO));
+}
+
+/* ---- pen_fold. Before the inclusion, LANES_PIECES is defined as the room for pieces. ---- */
+
+#ifdef LANES_PIECES
+#include "penode/pen_fold.h"
+
+#ifdef WEIGHTS_PER_RUN
+
+typedef struct {
+    pen_piece_t piece[LANES][LANES_PIECES];
+    mask_t folded; /* the lanes whose pieces found room */
+} lanes_pieces_t;
+
+LANES_INLINE void lanes_fold(const pen_chain_t *chain, size_t length, const weight_t w[], bool clamp,
+                             pen_real_t line[], bool active[], lanes_pieces_t *f)
+{
+    for (size_t l = 0U; l < LANES; l++) {
+        pen_real_t own[length];
+        for (size_t i = 0U; i < length; i++) {
+            own[i] = w[i][l];
+        }
+        f->folded[l] = (pen_fold(chain, own, clamp, line, active, LANES_PIECES, f->piece[l]) == PEN_OK) ? -1 : 0;
+    }
+}
+
+LANES_INLINE mask_t lanes_find(const lanes_pieces_t *f, lanes_t x, lanes_t *y, lanes_t *slope)
+{
+    mask_t outside = {0};
+
+    for (size_t l = 0U; l < LANES; l++) {
+        pen_status_t status = PEN_OK;
+        const pen_piece_t *const at = pen_fold_find(LANES_PIECES, f->piece[l], x[l]);
+        (*y)[l] = pen_fold_value(f->piece[l], at, x[l], &status);
+        (*slope)[l] = at->slope;
+        outside[l] = (status == PEN_OK) ? 0 : -1;
+    }
+    return outside;
+}
+
+#else
+
+#define LANES_ROWS ((LANES_PIECES + LANES - 1U) / LANES)
+
+/** Piece c * LANES_ROWS + j stands in lane c of row j: found by its first row, then down its lane. */
+typedef struct {
+    lanes_t start[LANES_ROWS];
+    lanes_t offset[LANES_ROWS];
+    lanes_t slope[LANES_ROWS];
+    pen_real_t centre;
+    pen_real_t low;  /* outside of the trust envelope below this... */
+    pen_real_t high; /* ...and from this on, */
+    bool nan;        /* and so is NaN */
+    mask_t folded;   /* all lanes, if the pieces found room */
+} lanes_pieces_t;
+
+LANES_INLINE void lanes_fold(const pen_chain_t *chain, size_t length, const weight_t w[], bool clamp,
+                             pen_real_t line[], bool active[], lanes_pieces_t *f)
+{
+    pen_piece_t piece[LANES_PIECES];
+    const bool folded = (pen_fold(chain, w, clamp, line, active, LANES_PIECES, piece) == PEN_OK);
+
+    (void)length;
+    f->folded = (mask_t){0} - (integer_t)(folded ? 1 : 0);
+    if (folded) {
+        f->centre = piece[0].start;
+        f->low = -(pen_real_t)INFINITY;
+        f->high = (pen_real_t)INFINITY;
+        f->nan = (piece[LANES_PIECES - 1U].status != PEN_OK);
+        for (size_t i = 1U; i < LANES_PIECES; i++) {
+            const bool enters = (piece[i - 1U].status != PEN_OK) && (piece[i].status == PEN_OK);
+            const bool leaves = (piece[i - 1U].status == PEN_OK) && (piece[i].status != PEN_OK);
+            f->low = enters ? piece[i].start : f->low;
+            f->high = leaves ? piece[i].start : f->high;
+        }
+        for (size_t i = 0U; i < (LANES * LANES_ROWS); i++) {
+            const pen_piece_t *const from = &piece[(i < LANES_PIECES) ? i : (LANES_PIECES - 1U)];
+            f->start[i % LANES_ROWS][i / LANES_ROWS] = from->start;
+            f->offset[i % LANES_ROWS][i / LANES_ROWS] = from->offset;
+            f->slope[i % LANES_ROWS][i / LANES_ROWS] = from->slope;
+        }
+    }
+}
+
+/** pen_fold_find and pen_fold_value; the lanes outside of the trust envelope. Cost: LANES + LANES_ROWS comparisons. */
+LANES_INLINE mask_t lanes_find(const lanes_pieces_t *f, lanes_t x, lanes_t *y, lanes_t *slope)
+{
+    mask_t column = {0};
+    lanes_t offset;
+
+#pragma GCC unroll 16
+    for (size_t c = 1U; c < LANES; c++) {
+        column -= ~(x < f->start[0][c]);
+    }
+    offset = __builtin_shuffle(f->offset[0], column);
+    *slope = __builtin_shuffle(f->slope[0], column);
+#pragma GCC unroll 16
+    for (size_t j = 1U; j < LANES_ROWS; j++) {
+        const mask_t reached = ~(x < __builtin_shuffle(f->start[j], column));
+        offset = lanes_pick(reached, __builtin_shuffle(f->offset[j], column), offset);
+        *slope = lanes_pick(reached, __builtin_shuffle(f->slope[j], column), *slope);
+    }
+    *y = offset + (*slope * (x - f->centre));
+    return (x < f->low) | (x >= f->high) | (~(x == x) & (integer_t)(f->nan ? -1 : 0));
+}
+
+#endif
+#endif
+
+#endif

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Many runs of a model at once on the host: the generated step in the lanes of vector registers, one run a lane.
+
+Without variations each run has the bits of NAME_step. For identification, sweeps and large SiL campaigns.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import penode_gen
+from penode_gen.emit_batch import BatchCode, render_batch
+
+from .errors import UserError
+from .targets import FLAGS, ROOT, _digest, _files, build_directory, compile_program
+
+Array = NDArray[Any]
+OPTIMISE = ("-O3", "-march=native")
+
+
+@dataclass(frozen=True, eq=False)
+class BatchRun:
+    """What all runs did: states x, outputs y, sensors z [runs, n, .], those asked for in the order asked for.
+
+    The arrays are views: in memory run follows run, so z.transpose(1, 2, 0) costs nothing, and z.reshape a copy.
+    `first_bad` [runs] is the first sample that the step held (NaN, Inf, a singular solve: do not use what follows) or
+    whose sensors are not finite, `first_outside` the first in which a network left its trust envelope; -1 for none.
+    """
+
+    x: Array
+    y: Array
+    z: Array
+    first_bad: NDArray[np.int64]
+    first_outside: NDArray[np.int64]
+
+
+class _Job(ctypes.Structure):
+    """batch_t"""
+
+    _fields_ = [(name, ctypes.c_size_t) for name in ("samples", "runs", "input_runs")]
+    _fields_ += [(name, ctypes.c_void_p) for name in ("u", "p", "w")]
+    _fields_ += [("set_length", ctypes.c_size_t), ("start", ctypes.c_void_p), ("count", ctypes.c_size_t * 3)]
+    _fields_ += [("which", ctypes.c_void_p * 3), ("kept", ctypes.c_void_p * 3)]
+    _fields_ += [(name, ctypes.c_void_p) for name in ("first_bad", "first_outside")]
+
+
+class Batch:
+    """A model's batch library, compiled for this processor; `lanes` runs go at once."""
+
+    def __init__(self, model: penode_gen.Model, dtype: type = np.float64):
+        self.model, self.dtype = model, dtype
+        self._code = render_batch(model)
+        self._libraries: dict[bool, ctypes.CDLL] = {}
+        self.lanes = ctypes.c_size_t.in_dll(self._library(False), "batch_lanes").value
+
+    def run(
+        self,
+        u: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        set_name: str = "default",
+        sets: ArrayLike | None = None,
+        sensors: Sequence[str] | None = None,
+        outputs: Sequence[str] = (),
+        states: Sequence[str] = (),
+        threads: int = 1,
+    ) -> BatchRun:
+        """Step through the inputs from x0 (sample 0), all quantities in SI.
+
+        u [n, n_u], or [runs, n, n_u]; x0 [n_x] or [runs, n_x], the model's start if not given; a parameter's value, one
+        or [runs], replaces that of the model file or set; `sets` [set length] or [runs, set length] replaces the values
+        of the named set (see penode_gen.set_values). Kept are the named sensors (all if not said), outputs and states.
+        Raises UserError for unknown names, ValueError for shapes and a start that is not finite.
+        """
+        model, dtype = self.model, self.dtype
+        if set_name not in model.sets:
+            raise UserError(f"{model.path}: no set '{set_name}'; it has {', '.join(model.sets)}")
+        default = penode_gen.set_values(model, set_name, dtype)
+        values = np.ascontiguousarray(default if sets is None else sets, dtype=dtype)
+        given = {name: np.atleast_1d(np.asarray(value, dtype=float)) for name, value in (parameters or {}).items()}
+        start = np.asarray(model.start if x0 is None else x0, dtype=dtype)
+        u = np.ascontiguousarray(u, dtype=dtype)
+        runs = self._runs(u, start, given, values, default.size)
+        vectors = -(-runs // self.lanes)
+        padded, n = vectors * self.lanes, u.shape[-2]
+
+        p = self._parameters(given, values, padded)
+        start = self._spread(start.T if start.ndim == 2 else start[:, None], padded)
+        if u.ndim == 3:
+            u = self._spread(np.moveaxis(u, 0, -1), padded)
+        per_run = values.ndim == 2 and len(values) > 1
+        if per_run:
+            values = self._spread(values.T, padded).reshape(-1, vectors, self.lanes).swapaxes(0, 1).copy()
+        wanted = (
+            self._columns("state", states, model.states),
+            self._columns("output", outputs, [s.name for s in model.outputs]),
+            self._columns("sensor", sensors, [s.name for s in model.sensors]),
+        )
+        kept = [np.empty((n, len(columns), padded), dtype=dtype) for columns in wanted]
+        first = np.empty((2, padded), dtype=np.int64 if dtype == np.float64 else np.int32)
+        job = _Job(samples=n, runs=padded, input_runs=padded if u.ndim == 3 else 1, set_length=default.size)
+        job.u, job.p, job.w, job.start = (a.ctypes.data for a in (u, p, values, start))
+        job.first_bad, job.first_outside = (a.ctypes.data for a in first)
+        job.count = tuple(map(len, wanted))
+        job.which, job.kept = (tuple(a.ctypes.data for a in arrays) for arrays in (wanted, kept))
+        if not self._step(self._library(per_run), job, vectors, threads):
+            raise UserError(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
+        x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept)
+        return BatchRun(x, y, z, *first[:, :runs].astype(np.int64))
+
+    def _runs(self, u: Array, start: Array, given: Mapping[str, Array], values: Array, length: int) -> int:
+        """How many runs the arguments describe. Raises for what does not fit."""
+        n_u, n_x = len(self.model.inputs), len(self.model.states)
+        for name, value in given.items():
+            if name not in self.model.parameters:
+                known = ", ".join(self.model.parameters)
+                raise UserError(f"{self.model.path}: no parameter '{name}'; it has {known}")
+            if value.ndim != 1:
+                raise ValueError(f"parameter {name} has the shape {value.shape}; it must be one value or [runs]")
+        if u.ndim not in (2, 3) or u.shape[-1] != n_u:
+            raise ValueError(f"u has the shape {u.shape}; it must be [n, {n_u}] or [runs, n, {n_u}]")
+        if start.ndim not in (1, 2) or start.shape[-1] != n_x or not np.isfinite(start).all():
+            raise ValueError(f"x0 has the shape {start.shape}; it must be {n_x} finite states, or [runs, .] of them")
+        if values.ndim not in (1, 2) or values.shape[-1] != length or not np.isfinite(values).all():
+            raise ValueError(f"sets has the shape {values.shape}; it must be {length} finite values, or [runs, .]")
+        found = {len(value) for value in given.values()}
+        found |= {len(a) for a, n in ((u, 3), (start, 2), (values, 2)) if a.ndim == n}
+        runs = max(found, default=1)
+        if runs < 1 or not found <= {1, runs}:
+            raise ValueError(f"numbers of runs that do not agree: {', '.join(map(str, sorted(found)))}")
+        return runs
+
+    @staticmethod
+    def _step(library: ctypes.CDLL, job: _Job, vectors: int, threads: int) -> bool:
+        """All vectors of runs, shared among threads (ctypes releases the interpreter lock). False: set refused."""
+        edges = [vectors * i // threads for i in range(threads + 1)]
+        if threads == 1:
+            return library.batch_run(ctypes.byref(job), 0, vectors)
+        with ThreadPoolExecutor(threads) as pool:
+            return all(pool.map(lambda i: library.batch_run(ctypes.byref(job), edges[i], edges[i + 1]), range(threads)))
+
+    def _spread(self, values: Array, padded: int) -> Array:
+        """[..., 1 or runs] repeated to [..., padded], the last run in the lanes that are left over."""
+        width = [(0, 0)] * (values.ndim - 1) + [(0, padded - values.shape[-1])]
+        return np.ascontiguousarray(np.pad(values, width, mode="edge"), dtype=self.dtype)
+
+    def _parameters(self, given: Mapping[str, Array], values: Array, padded: int) -> Array:
+        """[n_p, padded]: value or reciprocal of each parameter the code takes; reciprocals of doubles, as in the C."""
+        tunable = [p.name for p in self.model.tunable]
+        found = np.empty((len(self._code.parameters), padded), dtype=self.dtype)
+        for row, (name, inverse) in zip(found, self._code.parameters):
+            if name in given:
+                value = given[name]
+            elif name in tunable:
+                value = np.atleast_1d(values[..., tunable.index(name)])
+            else:
+                value = np.array([self.model.parameters[name].value])
+            with np.errstate(divide="ignore", over="ignore"):
+                row[:] = self._spread((1.0 / value if inverse else value).astype(self.dtype), padded)
+        return found
+
+    def _columns(self, kind: str, wanted: Sequence[str] | None, known: Sequence[str]) -> Array:
+        for name in wanted or ():
+            if name not in known:
+                raise UserError(f"{self.model.path}: no {kind} '{name}'; it has {', '.join(known) or 'none'}")
+        return np.array([known.index(name) for name in (known if wanted is None else wanted)], dtype=np.uintp)
+
+    def _library(self, per_run: bool) -> ctypes.CDLL:
+        if per_run not in self._libraries:
+            library = ctypes.CDLL(str(_build(self.model.name, self._code, self.dtype, per_run)))
+            library.batch_run.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t)
+            library.batch_run.restype = ctypes.c_bool
+            self._libraries[per_run] = library
+        return self._libraries[per_run]
+
+
+@cache
+def _processor() -> bytes:
+    """What the compiler makes of -march=native here, and its version."""
+    try:
+        return subprocess.run(["gcc", *OPTIMISE, "-Q", "--help=target", "--version"], capture_output=True).stdout
+    except FileNotFoundError as exc:
+        raise UserError("gcc: this compiler is not installed; install it (make test does)") from exc
+
+
+def _build(name: str, code: BatchCode, dtype: type, per_run: bool) -> Path:
+    """The shared library of a batch code, compiled once; keyed by sources, compiler and processor."""
+    command = [
+        "gcc",
+        *OPTIMISE,
+        *FLAGS,
+        "-shared",
+        "-fPIC",
+        *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []),
+        *(["-DWEIGHTS_PER_RUN"] if per_run else []),
+        *(f"-I{ROOT}/{folder}" for folder in ("sil/firmware", "src", "inc", "port/gnu")),
+    ]
+    folding = [ROOT / "src" / name for name in ("pen_fold.c", "pen_net.c")] if "LANES_PIECES" in code.text else []
+    parts = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes.h"), ("src", "pen_math.c"))
+    stem = build_directory() / f"{name}-batch-{_digest([*command, _processor(), code.text, *folding, *parts])}"
+    library = stem.with_suffix(".so")
+    if not library.exists():
+        stem.parent.mkdir(parents=True, exist_ok=True)
+        source = stem.with_suffix(".c")
+        source.write_text(code.text)
+        compile_program([*command, str(source), *map(str, folding)], library)
+    return library
