@@ -28,10 +28,13 @@ test: setup ## All checks; the last line adds them up
 figures: setup ## Measure what a step costs; rewrite the table of README.md
 	$(Q)$(PYTHON) test/bench/figures.py
 
+bench: setup ## Measure steps of other tools beside ours (ten minutes); rewrite test/bench/table.md
+	$(Q)$(PYTHON) test/bench/bench.py
+
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test figures clean
+.PHONY: help setup run test figures bench clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

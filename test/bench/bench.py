@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""`make bench`: what a step costs, ours and that of other tools, measured anew; writes bench.json and table.md.
+
+bench.py            measures everything (some minutes), writes both, and the block "bench" of README.md
+bench.py --table    writes table and block from bench.json
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import cycles
+import peers
+import penode_gen
+import programs
+import report
+import worst_case
+from figures import CORES, README, hostile_inputs, with_block
+from programs import Program
+from reference import same_step
+
+HERE = Path(__file__).parent
+KEPT, TABLE = HERE / "bench.json", HERE / "table.md"
+
+# Rows of ours. Another model file of gen/nqvm or another method is another entry here.
+METHODS = {"RK4": "rk4", "Heun": "heun", "explicit Euler": "euler", "Rosenbrock 1": "ros1", "Rosenbrock 2": "ros2"}
+EVALUATORS = {"layered": "nqvm.toml", "folded": "nqvm_folded.toml"}
+REALS = {"float": (), "double": ("-DPEN_REAL_DOUBLE",)}
+DOUBLE_UNIT = {"m7": ("-mfpu=fpv5-d16",)}  # the M7 may have one, the M55 has it
+LEVELS = ("-O2", "-Os")
+CONTRACTIONS = (report.OFF, "-ffp-contract=fast")
+PEER_LEVELS = ("-Os", "-O2", "-O3")
+
+Figures = dict[str, Any]
+
+
+# -- running ----------------------------------------------------------------------------------------------------------
+
+
+def play(program: Program, u: NDArray, n_x: int = 4, rounds: int = 1) -> tuple[NDArray, NDArray, dict[str, int]]:
+    """Drive a program through u [n, n_u]: calls (cycles.CALL), states [n - 1, n_x], stack and SysTick's counts."""
+    with tempfile.TemporaryDirectory() as folder:
+        u.tofile(Path(folder, "u"))
+        with cycles.counting(program.elf, [program.step], program.machine == "m4f") as result:
+            programs.run(program, ["u", "x", str(rounds)], Path(folder))
+            calls = result().calls[program.step]
+        words = np.fromfile(Path(folder, "x"), dtype="<u4")
+    x = words[:-3].view(u.dtype).reshape(-1, n_x)
+    stack, least, most = (int(word) for word in words[-3:])
+    return calls, x, {"stack": stack - programs.own_frame(program.elf, "measured"), "least": least, "most": most}
+
+
+def between(elf: Path) -> int:
+    """Instructions of drive.c around its call of the step, between the calls that start and stop the count."""
+    code = programs.instructions_of(elf, "measured")
+    marks = [k for k, at in enumerate(code) if "<board_count_st" in at.text]
+    return marks[1] - marks[0] - 1
+
+
+def measured(program: Program, u: NDArray, n_x: int = 4, weights_inside: int = 0) -> Figures:
+    """All figures of one program; raises AssertionError where two ways to the same figure disagree."""
+    calls, _, seen = play(program, u, n_x)
+    count = calls["instructions"]
+    ticks = [seen["least"] - between(program.elf), seen["most"] - between(program.elf)]
+    if ticks != [count.min(), count.max()]:
+        raise AssertionError(f"{program.elf}: plugin {count.min()} .. {count.max()}, SysTick {ticks}")
+    bound = programs.stack_bound(program.elf, program.step)
+    if seen["stack"] > bound:
+        raise AssertionError(f"{program.elf}: {seen['stack']} B of stack used, bound {bound}")
+    found: Figures = {"instructions": [int(count.min()), int(count.max())]}
+    if program.machine == "m4f":
+        found["cycles"] = [int(calls["low"].max()), int(calls["high"].max())]
+    return found | programs.sizes(program, weights_inside) | {"stack": seen["stack"], "stack bound": bound}
+
+
+# -- ours -------------------------------------------------------------------------------------------------------------
+
+
+def our_models() -> dict[tuple[str, str], penode_gen.Model]:
+    """The quarter vehicle by method and evaluator."""
+    bases = {
+        evaluator: penode_gen.load(programs.ROOT / "gen" / "nqvm" / name) for evaluator, name in EVALUATORS.items()
+    }
+    return {
+        (method, evaluator): dataclasses.replace(base, name=f"bench_{key}_{evaluator}", method=key)
+        for evaluator, base in bases.items()
+        for method, key in METHODS.items()
+    }
+
+
+def our_figures(say: Callable[[str], None]) -> list[Figures]:
+    """One row for each method, evaluator, type, core and level."""
+    rows = []
+    for (method, evaluator), model in our_models().items():
+        for real, defines in REALS.items():
+            dtype = np.float64 if real == "double" else np.float32
+            u = np.repeat(hostile_inputs()[::12].astype(dtype), len(model.inputs), axis=1)
+            for machine in CORES:
+                say(f"{method}, {evaluator}, {real}, {machine}")
+                unit = DOUBLE_UNIT.get(machine, ()) if real == "double" else ()
+                for level in LEVELS:
+                    program = programs.our_program(model, machine, (level, *defines, *unit))
+                    row = {"method": method, "evaluator": evaluator, "real": real, "machine": machine, "level": level}
+                    rows.append(row | measured(program, u, len(model.states)))
+    return rows
+
+
+def memory_figures() -> list[Figures]:
+    """Bytes that the caller gives, on an Arm core: an instance, buffers for staging, a set, the stack of a commit."""
+    rows = []
+    for evaluator in EVALUATORS:
+        for real, defines in REALS.items():
+            model = our_models()["RK4", evaluator]
+            elf = programs.our_program(model, "m4f", ("-O2", *defines), HERE / "worst_case.c").elf
+            variables = {"instance": "model", "banks": "banks", "set": "staged"}
+            row = {"evaluator": evaluator, "real": real} | {k: programs.size_of(elf, v) for k, v in variables.items()}
+            rows.append(row | {"commit stack bound": programs.stack_bound(elf, f"{model.name}_tune_commit")})
+    return rows
+
+
+# -- peers ------------------------------------------------------------------------------------------------------------
+
+
+def chirp(samples: int) -> NDArray[np.float32]:
+    """Road height [m] that takes the networks through most of their range."""
+    return (0.1 * np.sin(np.arange(samples) ** 2 * 2e-5)).astype(np.float32)
+
+
+def peer_figures(case: peers.Case, say: Callable[[str], None]) -> list[Figures]:
+    """One row for each peer, level and contraction; raises AssertionError where a peer computes something else."""
+    rows = []
+    for make in peers.PEERS.values():
+        peer = make(case)
+        say(peer.name)
+        for level in PEER_LEVELS:
+            for contract in CONTRACTIONS:
+                program = programs.peer_program(peer, "m4f", (level, contract))
+                u = chirp(401)
+                _, x, _ = play(program, u)
+                share = same_step(case, x, u)
+                if not share <= 1:
+                    raise AssertionError(f"{peer.name} {level} {contract}: {share:.2g} times what rounding allows")
+                found = measured(program, hostile_inputs()[::12, 0].copy(), weights_inside=peer.weights_inside)
+                rows.append(
+                    {"name": peer.name, "level": level, "contract": contract, "rounding": round(share, 3)} | found
+                )
+    return rows
+
+
+# -- host -------------------------------------------------------------------------------------------------------------
+
+
+def host_ratios(case: peers.Case, say: Callable[[str], None]) -> list[Figures]:
+    """Time of a step on this machine in units of our layered RK4 step: one run, the best of several rounds each."""
+    say("host")
+    models = our_models()
+    made = {
+        f"**penode, {evaluator}**": programs.our_program(models["RK4", evaluator], "host", ("-O2",))
+        for evaluator in EVALUATORS
+    }
+    made |= {
+        (peer := make(case)).name: programs.peer_program(peer, "host", ("-O2", report.OFF))
+        for make in peers.PEERS.values()
+    }
+    best = dict.fromkeys(made, np.inf)
+    with tempfile.TemporaryDirectory() as folder:
+        chirp(1025).tofile(Path(folder, "u"))
+        for _ in range(7):
+            for name, program in made.items():
+                spent = []
+                for rounds in (1, 101):
+                    start = time.perf_counter()
+                    programs.run(program, ["u", "x", str(rounds)], Path(folder))
+                    spent.append(time.perf_counter() - start)
+                best[name] = min(best[name], spent[1] - spent[0])
+    unit = best["**penode, layered**"]
+    return [{"name": name, "ratio": round(value / unit, 2)} for name, value in best.items()]
+
+
+# -- the worst case ---------------------------------------------------------------------------------------------------
+
+
+def worst_figures(say: Callable[[str], None], steps: int = 10_000) -> list[Figures]:
+    """Fewest and most instructions by what the step had to do, over everything that may come."""
+    rows = []
+    for evaluator in EVALUATORS:
+        model = our_models()["RK4", evaluator]
+        for machine in CORES:
+            say(f"worst case, {evaluator}, {machine}")
+            soft = machine not in worst_case.FPU
+            for kind, calls in worst_case.measure(model, machine, 1000 if soft else steps).items():
+                row = {"evaluator": evaluator, "machine": machine, "kind": kind, "calls": len(calls)}
+                rows.append(
+                    row | {"instructions": [int(calls["instructions"].min()), int(calls["instructions"].max())]}
+                )
+                if machine == "m4f":
+                    rows[-1]["cycles"] = [int(calls[end].max()) for end in ("low", "high")]
+                    rows[-1]["constant cycles"] = bool(all(np.ptp(calls[end]) == 0 for end in ("low", "high")))
+    return rows
+
+
+# -- command ----------------------------------------------------------------------------------------------------------
+
+
+def measure() -> Figures:
+    """Everything."""
+
+    def say(text: str) -> None:
+        print(f"bench: {text}", file=sys.stderr, flush=True)
+
+    def first_line(*command: str) -> str:
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[0]
+
+    case = peers.the_case()
+    return {
+        "made with": [
+            {
+                "compiler": first_line("arm-none-eabi-gcc", "--version"),
+                "emulator": first_line("qemu-system-arm", "--version"),
+            }
+        ],
+        "ours": our_figures(say),
+        "memory": memory_figures(),
+        "peers": peer_figures(case, say),
+        "host": host_ratios(case, say),
+        "worst case": worst_figures(say),
+    }
+
+
+def written(figures: Figures) -> str:
+    """JSON with a line for each row."""
+    parts = []
+    for key, value in figures.items():
+        rows = [value] if isinstance(value, dict) else value
+        parts.append(f' "{key}": [\n' + ",\n".join(f"  {json.dumps(row)}" for row in rows) + "\n ]")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def main() -> int:
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("--table", action="store_true", help="only write what is made from bench.json")
+    if not arguments.parse_args().table:
+        KEPT.write_text(written(measure()))
+    figures = json.loads(KEPT.read_text())
+    TABLE.write_text(report.table(figures))
+    README.write_text(with_block(README.read_text(), "bench", report.summary(figures)))
+    print(report.summary(figures))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

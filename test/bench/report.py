@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""table.md and the block of README.md from the figures of bench.json."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from figures import CORES
+
+OFF = "-ffp-contract=off"
+# Not in a registry, so it cannot be measured here: measured once with the same counter, compiler and networks.
+ONNX2C = {
+    "name": "onnx2c (ea045cc), quoted",
+    "level": "-O3",
+    "contract": OFF,
+    "instructions": [17461, 17461],
+    "cycles": [22200, 24700],
+    "text": 5208,
+}
+
+Figures = dict[str, Any]
+
+
+def number(value: int | float) -> str:
+    return f"{value:,}".replace(",", " ")
+
+
+def span(pair: Sequence[int]) -> str:
+    """One number if both are the same."""
+    return number(pair[0]) if pair[0] == pair[1] else f"{number(pair[0])} .. {number(pair[1])}"
+
+
+def rows_of(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return "\n".join(f"| {' | '.join(row)} |" for row in [header, ["---"] * len(header), *rows])
+
+
+def kilo(pair: Sequence[int]) -> str:
+    """Low to high in thousands."""
+    return " to ".join(f"{n / 1000:.{1 if n >= 10_000 else 2}f}" for n in pair)
+
+
+def ours_at(figures: Figures, **keys: str) -> list[Figures]:
+    return [row for row in figures["ours"] if all(row[key] == value for key, value in keys.items())]
+
+
+def best_of_peers(figures: Figures) -> list[Figures]:
+    """Each peer without contraction at the flags that give it the fewest cycles (low), fewest first."""
+    best: dict[str, Figures] = {}
+    for row in [*figures["peers"], ONNX2C]:
+        if row["contract"] == OFF and (row["name"] not in best or row["cycles"] < best[row["name"]]["cycles"]):
+            best[row["name"]] = row
+    return sorted(best.values(), key=lambda row: row["cycles"])
+
+
+HOW = """\
+# What a step costs
+
+Made by `make bench`; all figures are in `bench.json`. The neural quarter vehicle of `gen/nqvm`: two networks of 593
+parameters, 1-16-16-16-1, each evaluated once in every stage, sample time 1 ms.
+Compiler: {compiler}. Emulator: {emulator}.
+
+* **instructions** of one call of the step, from its first to its return: exact, counted in QEMU by a plugin
+  (`count.c`), and for every row the same as by the emulated SysTick timer. Inputs: a chirp, noise of all sizes,
+  subnormals, NaN, Inf. Two numbers: the fewest and the most.
+* **modelled kilocycles** of a Cortex-M4 with FPU (`cortex_m4.py`), the most over the same inputs: from the low to the
+  high reading of the core's technical reference manual. A model, not checked on silicon. It has **no wait states**:
+  flash that is slower than the core adds to every row, most where much code or many weights are read once a stage; a
+  cache or a prefetch buffer takes some of it back. Whether a VLDR follows another load without a bubble is open: low
+  says yes, high says no. Other cores pair and overlap instructions, so for them only instructions are given.
+* **text**, **constants**, **RAM** [B] of the step linked alone with all it calls, libgcc and the C library too;
+  without the weights (4744 B, ours 4792 B with scaling and envelope), which every tool needs somewhere, and without
+  the state.
+* **stack** [B]: most that a call used (painted), and a bound from the machine code: the longest chain of calls. There
+  is no recursion and no call through a pointer: checked.
+
+Ours includes what the peers leave out: finite checks of input, state and result, trust envelope, adoption of a new
+set, status and counters."""
+
+SOFT = """\
+The M3 has no FPU, and for double only the M7 (fpv5-d16) and the M55 have one: libgcc's soft float takes a path that
+depends on the numbers, so no constant time can be promised there. Two numbers are what was seen."""
+
+MEMORY = """\
+An instance of a folded model holds the pieces of two sets. Without staging no buffers are needed; a set may lie in
+flash. The stack of a commit is its bound."""
+
+PEERS = """\
+All peers compute the same step: each step from its own state before is within what rounding in float can explain
+(derived in `reference.py`) of the same step in float64. They have the scaling of inputs and outputs worked into their
+weights.
+
+* textbook loop: three loops over layers, rows and columns.
+* CMSIS-DSP: `arm_mat_vec_mult_f32`; bias and ReLU by hand.
+* emlearn: its loadable networks, but with all digits of the weights (it prints 6 decimals). RAM: state of the C
+  library, too.
+* CasADi: generated C of the whole step with weights as an input. SX: every operation is a statement. MX: matrix
+  operations. "called": the rates as SX, called by each stage of an MX step, the best that we found. "fmaxf": its C
+  calls `fmax`, which computes in double; mended. RAM: work space; constants: zeros for inputs that are not given.
+* scalarised: every multiply-add a statement, as the 117 KB in the paper that the quarter vehicle comes from. With
+  literals the text holds the weights.
+* onnx2c is in no registry: its figures are quoted, measured once with the same networks, Runge-Kutta step, compiler,
+  way of counting and cycle model."""
+
+HOST = "Ratios of one run, the best of seven rounds each; they differ by some 10 % from run to run."
+
+WORST = """\
+Everything that a constant-time step must not notice: inputs and states of any bits, special numbers, all sizes; every
+end of a straight piece of the networks, its neighbours and every middle; staged sets of many sizes; sets whose memory
+was damaged into any bits, NaN, Inf, subnormals. "refused": a number was not finite and the step kept state and
+outputs. "adopting": the step took over another set. "commit" checks a staged set, and folds it, in the slow context;
+sets of more pieces than there is room for are among them. On the M3, whose soft float takes a time that depends on
+the numbers, a tenth of the calls."""
+
+CALLER = ("instance", "banks", "set", "commit stack bound")
+COSTS = ("instructions", "modelled kilocycles", "text", "constants", "RAM", "stack", "its bound")
+
+
+def summary(figures: Figures) -> str:
+    """The short table of README.md: our RK4 steps and the best of each other tool, on a Cortex-M4F."""
+    ours = _named(ours_at(figures, method="RK4", machine="m4f", real="float", level="-O2"))
+    tools: dict[str, Figures] = {}
+    for row in best_of_peers(figures):
+        tools.setdefault(row["name"].split()[0].rstrip(","), row)
+    rows = []
+    for row in sorted([*ours, *tools.values()], key=lambda row: row["cycles"]):
+        times = f"{row['cycles'][0] / ours[0]['cycles'][0]:.2f}"
+        counts = [number(row["instructions"][1]), kilo(row["cycles"]), times, number(row["text"])]
+        rows.append([row["name"], row["level"], *counts])
+    header = ["RK4 step on a Cortex-M4F", "flags", "instructions", "modelled kilocycles", "times ours", "code [B]"]
+    return rows_of(header, rows)
+
+
+def table(figures: Figures) -> str:
+    """table.md."""
+    ours = ours_at(figures, machine="m4f")
+    rivals = [*_named(r for r in ours if (r["method"], r["real"]) == ("RK4", "float")), *best_of_peers(figures)]
+    parts = [
+        HOW.format(**figures["made with"][0]),
+        "## Ours",
+        rows_of(["step, Cortex-M4F", "type", "flags", *COSTS], [[*_name(r), *_costs(r)] for r in ours]),
+        "### On other cores",
+        rows_of(["instructions", "type", "flags", *CORES.values()], [[*_name(r), *_by_core(figures, r)] for r in ours]),
+        SOFT,
+        "### Memory of the caller",
+        rows_of(
+            ["bytes that the caller gives", "type", "an instance", "buffers for staging", "a set", "stack of a commit"],
+            [[r["evaluator"], r["real"], *(number(r[k]) for k in CALLER)] for r in figures["memory"]],
+        ),
+        MEMORY,
+        "## Peers, each at its best flags",
+        rows_of(
+            ["RK4 step, Cortex-M4F", "flags", *COSTS],
+            [[r["name"], r["level"], *_costs(r)] for r in sorted(rivals, key=lambda r: r["cycles"])],
+        ),
+        PEERS,
+        "### At all flags",
+        rows_of(
+            ["RK4 step, Cortex-M4F", "flags", "-ffp-contract", *COSTS],
+            [[r["name"], r["level"], r["contract"].split("=")[1], *_costs(r)] for r in figures["peers"]],
+        ),
+        "### On the host",
+        rows_of(["time of a step, gcc -O2", "times ours"], [[r["name"], f"{r['ratio']:.2f}"] for r in figures["host"]]),
+        HOST,
+        "## Worst case",
+        WORST,
+        rows_of(["RK4, float, -O2", "calls", *CORES.values(), "M4F, modelled kilocycles"], _worst(figures)),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _named(rows: Iterable[Figures]) -> list[Figures]:
+    """Ours, with a name as peers have one."""
+    return [row | {"name": f"**penode, {row['evaluator']}**"} for row in rows]
+
+
+def _name(row: Figures) -> list[str]:
+    return [f"{row['method']}, {row['evaluator']}", row["real"], row["level"]]
+
+
+def _costs(row: Figures) -> list[str]:
+    """The columns of COSTS."""
+    found = [number(row[k]) if k in row else "" for k in ("text", "rodata", "ram", "stack", "stack bound")]
+    return [span(row["instructions"]), kilo(row["cycles"]), *found]
+
+
+def _by_core(figures: Figures, row: Figures) -> list[str]:
+    """Instructions of the same step on each core."""
+    same = ours_at(figures, **{k: row[k] for k in ("method", "evaluator", "real", "level")})
+    found = {r["machine"]: span(r["instructions"]) for r in same}
+    return [found[machine] for machine in CORES]
+
+
+def _worst(figures: Figures) -> list[list[str]]:
+    rows = []
+    for m4f in (r for r in figures["worst case"] if r["machine"] == "m4f"):
+        what = (m4f["evaluator"], m4f["kind"])
+        same = {r["machine"]: r for r in figures["worst case"] if (r["evaluator"], r["kind"]) == what}
+        cost = kilo(m4f["cycles"]) + (", constant" if m4f["constant cycles"] else ", the most")
+        counts = [span(same[machine]["instructions"]) for machine in CORES]
+        rows.append([", ".join(what), number(m4f["calls"]), *counts, cost])
+    return rows

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What `make bench` measures with: cycle model, counter, bound of the stack, check of peers; and a short worst case."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import penode_gen
+
+BENCH = Path(__file__).resolve().parents[1] / "bench"
+sys.path.insert(0, str(BENCH))
+
+import bench  # noqa: E402  (needs the path above)
+import cortex_m4  # noqa: E402
+import peers  # noqa: E402
+import programs  # noqa: E402
+import reference  # noqa: E402
+import report  # noqa: E402
+import worst_case  # noqa: E402
+
+
+def assembled(text: str, folder: Path, entry: str = "f") -> Path:
+    """A program of one or more functions, for a Cortex-M4F; C unless it has a directive of the assembler."""
+    source = folder / ("program.s" if ".thumb" in text else "program.c")
+    source.write_text(text)
+    elf = folder / "program.elf"
+    options = ["-O1", "-fno-inline", "-nostdlib", f"-Wl,-e,{entry}", "-o", str(elf), str(source)]
+    subprocess.run(["arm-none-eabi-gcc", *programs.core("m4f"), *options], check=True)
+    return elf
+
+
+# Low and high cycles by hand from DDI 0439, tables 3-1 and 7-1 and section 3.3.3.
+@pytest.mark.parametrize(
+    ("code", "low", "high"),
+    [
+        ("ldr r1, [r0]; ldr r2, [r0, #4]; str r2, [r0]", (2, 1, 1), (2, 1, 1)),  # loads follow each other
+        ("ldr r1, [r0]; ldr r2, [r1]", (2, 2), (2, 2)),  # but not where one has the address of the other
+        ("ldr r1, [r0]; str r2, [r0, r3]", (2, 1), (2, 1)),
+        ("str r2, [r0, r3]; ldr r1, [r0]", (2, 2), (2, 2)),  # nothing follows a store
+        ("vldr s0, [r0]; vldr s1, [r0, #4]; vstr s1, [r0]", (2, 1, 1), (2, 2, 2)),
+        ("vmul.f32 s0, s1, s2; vadd.f32 s3, s0, s4", (1, 2), (1, 2)),  # a result is waited for
+        ("vmul.f32 s0, s1, s2; vadd.f32 s3, s4, s5", (1, 1), (1, 1)),
+        ("vmul.f32 s0, s1, s2; vmla.f32 s0, s3, s4", (1, 3), (1, 3)),  # but not as an addend
+        ("vmul.f32 s3, s1, s2; vfma.f32 s0, s3, s4", (1, 4), (1, 4)),
+        ("vabs.f32 s0, s1; vadd.f32 s2, s0, s3", (1, 1), (1, 2)),
+        ("vdiv.f32 s0, s1, s2; vstr s0, [r0]", (14, 2), (14, 3)),
+        ("vcvt.f32.s32 s0, s0; vmov r0, s0; vmov s0, s1, r0, r1", (1, 2, 2), (1, 2, 2)),
+        ("push {r4-r7, lr}; vpush {d8-d9}; vldmia r0!, {s0-s2}", (6, 5, 4), (6, 5, 4)),
+        ("mla r0, r1, r2, r3; mul r0, r1, r2; udiv r0, r1, r2", (2, 1, 2), (2, 1, 12)),
+        (
+            "cmp r0, r1; it eq; moveq r0, r1; bls 1f; vmls.f32 s0, s1, s2; 1: bx lr",
+            (1, 0, 1, 1, 3, 1),
+            (1, 1, 1, 1, 3, 1),
+        ),
+    ],
+)
+def test_cycles(code: str, low: tuple[int, ...], high: tuple[int, ...], tmp_path: Path) -> None:
+    elf = assembled(f".syntax unified\n.thumb\n.fpu fpv4-sp-d16\n.global f\n.thumb_func\nf:\n{code}\n", tmp_path)
+    instructions = cortex_m4.disassemble(elf)
+    first = cortex_m4.base(instructions[0])
+    cost = [first, *(cortex_m4.after(*pair) for pair in zip(instructions, instructions[1:], strict=False))]
+    assert [c[0] for c in cost if c] == list(low)
+    assert [c[1] for c in cost if c] == list(high)
+
+
+def test_stack_bound_is_the_longest_chain(tmp_path: Path) -> None:
+    functions = {
+        "f": "push {r4, lr}; bl g; bl h; pop {r4, pc}",
+        "g": "push {r0-r3}; sub sp, #24; add sp, #40; bx lr",
+        "h": "vpush {s0}; b g",
+    }
+    text = "\n".join(f".global {name}\n.type {name}, %function\n{name}: {code}" for name, code in functions.items())
+    elf = assembled(f".syntax unified\n.thumb\n.fpu fpv4-sp-d16\n{text}\n", tmp_path)
+    assert programs.stack_bound(elf, "g") == 40
+    assert programs.stack_bound(elf, "f") == 8 + 4 + 40
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("int f(int n) { return n ? 3 * f(n - 1) + 1 : 2; }", "recursion"),
+        ("int f(int (*g)(void)) { return g() + 1; }", "pointer"),
+        ("__attribute__((noipa)) void g(char *b) { b[0] = 1; } void f(int n) { char b[n]; g(b); }", "variable size"),
+    ],
+)
+def test_stack_without_a_bound_is_refused(text: str, why: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=why):
+        programs.stack_bound(assembled(text, tmp_path), "f")
+
+
+def model(name: str = "nqvm") -> penode_gen.Model:
+    return penode_gen.load(programs.ROOT / "gen" / "nqvm" / f"{name}.toml")
+
+
+def test_plugin_and_timer_count_the_same() -> None:
+    """The plugin against SysTick, painted stack against its bound: measured() compares both pairs."""
+    found = bench.measured(programs.our_program(model()), bench.chirp(65))
+    assert found["instructions"][0] == found["instructions"][1] > 0
+
+
+@pytest.mark.parametrize("name", ["nqvm", "nqvm_folded"])
+@pytest.mark.parametrize("machine", worst_case.FPU)
+def test_every_step_costs_the_same(machine: str, name: str, show: Callable[[str], None]) -> None:
+    """Some hundred hostile steps here, ten thousand in `make bench`. Adoption adds a few stores and barriers."""
+    found = worst_case.measure(model(name), machine, 400)
+    count = {kind: calls["instructions"] for kind, calls in found.items() if kind != "commit"}
+    normal = count["normal"][0]
+    assert all(len(values) > 0 for values in count.values())
+    assert all((count[kind] == normal).all() for kind in ("normal", "refused", "holding"))
+    assert (count["adopting"] == count["adopting"][0]).all()
+    assert normal < count["adopting"][0] <= normal + 20
+    more, steps = count["adopting"][0] - normal, sum(map(len, count.values()))
+    show(f"{name} on {machine}: {normal} instructions, {more} more to adopt a set, {steps} steps")
+
+
+def test_a_peer_that_computes_something_else_is_found() -> None:
+    """A state that is off by no more than its rounding passes; one weight in 1186 that is 1 % off does not."""
+    case = peers.the_case()
+    weights, bias = case.networks["spring"][1]
+    wrong = weights.copy()
+    at = np.unravel_index(np.abs(wrong).argmax(), wrong.shape)
+    wrong[at] *= np.float32(1.01)
+    other = dataclasses.replace(
+        case,
+        networks=case.networks | {"spring": [case.networks["spring"][0], (wrong, bias), *case.networks["spring"][2:]]},
+    )
+    u = bench.chirp(300)
+
+    def run(of: peers.Case) -> np.ndarray:
+        x = [np.zeros((1, 4))]
+        for k in range(len(u) - 1):
+            x.append(reference.reference_step(of, x[-1], u[k : k + 1], u[k + 1 : k + 2])[0].astype(np.float32))
+        return np.concatenate(x[1:])
+
+    assert reference.same_step(case, run(case), u) <= 1
+    assert reference.same_step(case, run(other), u) > 1
+
+
+def test_table_and_readme_are_those_of_the_figures() -> None:
+    figures = json.loads(bench.KEPT.read_text())
+    assert bench.TABLE.read_text() == report.table(figures)
+    text = bench.README.read_text()
+    assert bench.with_block(text, "bench", report.summary(figures)) == text
