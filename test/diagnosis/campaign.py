@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Hides effects in recordings, lets a command diagnose them, scores the answers.
+
+    campaign.py --cases 300 --jobs 2 --out DIR           a fresh draw; its seed is printed
+    campaign.py --only 123456:17 --out DIR               one case again; leaves its files and truth
+    campaign.py --command "penode diagnose" --command "neural=python neural.py"     several on the same cases
+    campaign.py --cases 20 --generate --out DIR          only the files: DIR/cases/... and, apart from them, DIR/truth/...
+"""
+
+import argparse
+import json
+import os
+import secrets
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+import score  # noqa: E402
+from hidden import cases  # noqa: E402
+
+ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1")
+
+
+def diagnose(command: str, folder: Path, recordings: list[Path], timeout: float) -> tuple[dict | None, float, str]:
+    """Runs the command as a user would. Returns the diagnosis or None, seconds, and why there is none."""
+    answer = folder / "diagnosis"
+    call = [*shlex.split(command), folder / "model.toml", "--data", *recordings[:-1], "--holdout", recordings[-1], "-o", answer]
+    begin = time.monotonic()
+    try:
+        done = subprocess.run(list(map(str, call)), capture_output=True, text=True, timeout=timeout, env={**os.environ, **ONE_CORE})
+    except subprocess.TimeoutExpired:
+        return None, time.monotonic() - begin, "timeout"
+    seconds = time.monotonic() - begin
+    (folder / "stderr.txt").write_text(done.stderr)
+    if done.returncode:
+        return None, seconds, f"exit {done.returncode}: {(done.stderr.strip().splitlines() or [''])[-1][:160]}"
+    try:
+        return json.loads((answer / "diagnosis.json").read_text()), seconds, ""
+    except (OSError, ValueError) as problem:
+        return None, seconds, f"no diagnosis: {problem}"
+
+
+def simulated(command: str, model: Path, recording: Path) -> dict[str, float]:
+    """RMSE of a model file on a recording, by simulating it; nothing if it cannot be simulated."""
+    prediction = model.with_name("prediction.csv")
+    call = [*shlex.split(command), model, "--input", recording, "-o", prediction]
+    if not model.exists() or subprocess.run(list(map(str, call)), capture_output=True, timeout=120).returncode:
+        return {}
+    seen, said = (np.genfromtxt(f, delimiter=",", names=True, deletechars="") for f in (recording, prediction))
+    n = min(len(seen), len(said))
+    both = set(seen.dtype.names) & set(said.dtype.names)  # such as "a_body_[m/s^2]"
+    return {name.split("_[")[0]: float(np.sqrt(np.mean((seen[name][:n] - said[name][:n]) ** 2))) for name in both}
+
+
+def run(seed: int, index: int, commands: dict[str, str], simulate: str, timeout: float, out: Path, keep: bool) -> list[dict]:
+    """One case from draw to scores, one for each command. The truth is written only after the commands are through."""
+    case = cases.make(seed, index)
+    folder = out / "cases" / f"{seed}-{index}"
+    shutil.rmtree(folder, ignore_errors=True)
+    recordings, answers = case.write(folder), []
+    for name, command in commands.items():
+        found, seconds, why = diagnose(command, folder, recordings, timeout)
+        error: dict[str, float] = {}
+        if simulate and found and not case.bench.moving:  # else it needs a start state that only the diagnosis knows
+            error = simulated(simulate, folder / "diagnosis" / "model_extended.toml", recordings[-1])
+        answers.append((name, found, seconds, why, error))
+        if (folder / "diagnosis").exists() and len(commands) > 1:
+            (folder / "diagnosis").rename(folder / f"diagnosis of {name}")
+    truth = case.truth()
+    rows = [{"command": name, **score.score(truth, found, seconds, why, error)} for name, found, seconds, why, error in answers]
+    if keep or not rows[0]["right"]:
+        cases.write_truth(truth, out / "truth" / f"{seed}-{index}.json")
+    if not keep:
+        shutil.rmtree(folder)
+    return rows
+
+
+def generate(seed: int, index: int, out: Path) -> str:
+    """The files of one case, and its truth in a line."""
+    case = cases.make(seed, index)
+    truth = case.truth()
+    case.write(out / "cases" / f"{seed}-{index}")
+    cases.write_truth(truth, out / "truth" / f"{seed}-{index}.json")
+    hidden = [f"{e['kind']} at {e['where']} as {e['form']}, energy {e['energy']:.0f}" for e in truth["effects"]]
+    return f"{seed}:{index} {case.stratum}: {'; '.join(hidden) or 'nothing'}"
+
+
+def choose(seed: int, count: int, strata: set[str], kinds: set[str]) -> list[tuple[int, int]]:
+    """The first cases of the draw in these strata, and with one of these kinds if any are given."""
+    found: list[tuple[int, int]] = []
+    for index in range(200 * count + 1000):
+        hidden = {kind for kind, _ in cases.kinds_of(seed, index)}
+        if len(found) < count and cases.PATTERN[index % len(cases.PATTERN)] in strata and (not kinds or kinds & hidden):
+            found.append((seed, index))
+    return found
+
+
+def line(row: dict) -> str:
+    hidden = " + ".join(f"{k} ({f}, {e:.0f})" for k, f, e in zip(row["kinds"], row["forms"], row["energies"])) or "nothing"
+    answer = " + ".join(row["answer"]) or row["verdict"] or row["why"]
+    return f"{row['command']} {row['case']} {row['stratum']}: {row['outcome']}: {hidden} -> {answer}, {row['seconds']} s"
+
+
+def arguments() -> argparse.ArgumentParser:
+    parse = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add = parse.add_argument
+    add("--cases", type=int, default=48, help="how many cases (48)")
+    add("--seed", type=int, help="of the draw; default: a new one, which is printed")
+    add("--only", action="append", default=[], metavar="SEED:INDEX", help="just this case; may be given again")
+    add("--strata", default=",".join(cases.STRATA), help="take these only: " + ", ".join(cases.STRATA))
+    add("--kinds", default="", help="take only cases with one of these kinds")
+    add("--command", action="append", default=[], metavar="[NAME=]COMMAND",
+        help="called as COMMAND MODEL.toml --data REC... --holdout REC -o DIR (penode diagnose); may be given again")
+    add("--simulate", default="", metavar="COMMAND",
+        help="measure the gain by COMMAND model_extended.toml --input REC -o OUT.csv, not by what the diagnosis says")
+    add("--timeout", type=float, default=120, help="seconds for one case (120)")
+    add("--jobs", type=int, default=1, help="cases at the same time (1)")
+    add("--out", type=Path, default=Path("build/campaign"), help="folder (build/campaign)")
+    add("--keep", action="store_true", help="keep recordings, diagnoses and truths")
+    add("--generate", action="store_true", help="write the cases, diagnose nothing")
+    add("--gate", action="store_true", help="exit code 1 if the first command fails more often than chance allows (1 in 1000)")
+    return parse
+
+
+def main() -> int:
+    parse = arguments()
+    asked = parse.parse_args()
+    seed = secrets.randbelow(10**9) if asked.seed is None else asked.seed
+    strata, kinds = set(asked.strata.split(",")), set(filter(None, asked.kinds.split(",")))
+    if not strata <= set(cases.STRATA) or not kinds <= set(cases.KINDS):
+        parse.error(f"unknown: {', '.join((strata - set(cases.STRATA)) | (kinds - set(cases.KINDS)))}")
+    chosen = [tuple(map(int, one.split(":"))) for one in asked.only] or choose(seed, asked.cases, strata, kinds)
+    print(f"{len(chosen)} cases, seed {chosen[0][0] if chosen else seed}", flush=True)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    commands = dict(c.split("=", 1) if "=" in c.split()[0] else ("diagnose", c) for c in asked.command or ["penode diagnose"])
+    rows: dict[str, list[dict]] = {name: [] for name in commands}
+    with ProcessPoolExecutor(asked.jobs) as pool:
+        if asked.generate:
+            for job in [pool.submit(generate, *one, asked.out) for one in chosen]:
+                print(job.result(), flush=True)
+            return 0
+        more = (commands, asked.simulate, asked.timeout, asked.out, asked.keep or bool(asked.only))
+        for done, job in enumerate([pool.submit(run, *one, *more) for one in chosen], 1):
+            for row in job.result():
+                rows[row["command"]].append(row)
+                if not row["right"] or asked.only:
+                    print(line(row), flush=True)
+            if sys.stderr.isatty():
+                print(f"{done} of {len(chosen)}", end="\r", file=sys.stderr)
+    tables = {name: score.summary(own) for name, own in rows.items()}
+    for name, own in tables.items():
+        print(f"\n{name}: {commands[name]}\n{score.text(own)}")
+    result = {"seed": seed, "commands": commands, "tables": tables, "rows": rows}
+    (asked.out / "campaign.json").write_text(json.dumps(result, indent=1))
+    print(f"one case again: --only SEED:INDEX; all rows: {asked.out / 'campaign.json'}")
+    problems = score.gate(next(iter(rows.values()))) if asked.gate else []
+    print("".join(f"gate: {p}\n" for p in problems), end="")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Scores a diagnosis.json against the truth about its recordings, and adds many scores up to tables."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import permutations
+from math import ceil, comb, sqrt
+
+OUTSIDE = "outside_taxonomy"
+MOST_ALTERNATIVES = 4  # who lists more has not decided
+EXACT = 1.0  # chi-square that an exact equivalent may leave of an effect
+# stratum -> share of right answers that is asked for, and the least share of any kind in it
+DEMANDED = {"single_common": (0.97, 0.85), "single_foreign": (0.90, 0.70), "pair": (0.85, 0.0), "triple": (0.60, 0.0),
+            "hard": (0.90, 0.0), "null": (1.0, 0.0), "null_hard": (0.99, 0.0), "outside": (0.90, 0.0)}
+
+
+def _named(item: object) -> tuple[str, str]:
+    """Kind and place of a cause or an alternative, which may be a bare kind."""
+    return (str(item.get("kind")), str(item.get("where", ""))) if isinstance(item, Mapping) else (str(item), "")
+
+
+def matches(cause: Mapping, answer: Mapping) -> bool:
+    """Whether a cause is this answer: kind, place, and for a wrong parameter which one."""
+    kind, where = _named(cause)
+    if kind != answer["kind"] or (answer["where"] and where not in answer["where"]):
+        return False
+    return "parameter" not in answer or list(cause.get("parameters") or ()) == [answer["parameter"]]
+
+
+def explains(cause: Mapping, effect: Mapping, told: bool = True) -> bool:
+    """The cause is the effect or one of its rivals; with `told`, it lists the true kind and every exact equivalent."""
+    if not (matches(cause, effect) or any(matches(cause, rival) for rival in effect["rivals"])):
+        return False
+    others = cause.get("alternatives") or ()
+    named = {_named(cause)[0], *(_named(o)[0] for o in others if len(others) <= MOST_ALTERNATIVES)}
+    return not told or {effect["kind"], *(r["kind"] for r in effect["rivals"] if r["left"] < EXACT)} <= named
+
+
+def pairing(causes: Sequence[Mapping], effects: Sequence[Mapping], bound: float, told: bool = True) -> dict[int, int] | None:
+    """Cause -> effect if every cause explains another effect and only effects below the bound are left; else None."""
+    for order in permutations(range(len(effects)), len(causes)):
+        left = [e for i, e in enumerate(effects) if i not in order]
+        if all(explains(c, effects[i], told) for c, i in zip(causes, order)) and all(e["energy"] < bound for e in left):
+            return dict(enumerate(order))
+    return None
+
+
+def outcome(truth: Mapping, causes: Sequence[Mapping], verdict: str | None) -> str:
+    """What a diagnosis is worth, in a word or two; "right" if it is."""
+    effects, bound = truth["effects"], truth["bound"]
+    kinds, faint = [_named(c)[0] for c in causes], all(e["energy"] < bound for e in effects)
+    if not effects:
+        claims = causes or verdict in ("explained", "partly_explained", "unexplained")
+        return "false alarm" if claims else "right" if verdict == "no_discrepancy" else "open"
+    if not causes and faint and verdict in ("not_identifiable", "no_discrepancy"):
+        return "right"
+    if effects[0]["kind"] == OUTSIDE:
+        honest = kinds == [OUTSIDE] or (not causes and verdict == "unexplained")
+        return "right" if honest else "wrong name" if causes else "missed"
+    if not causes or kinds == [OUTSIDE]:
+        return "missed"
+    if pairing(causes, effects, bound) is not None:
+        return "right"
+    if pairing(causes, effects, bound, told=False) is not None:
+        return "equivalent not told"
+    if all(any(explains(c, e) for c in causes) for e in effects if e["energy"] >= bound):
+        return "extra name"
+    return "part missed" if all(any(explains(c, e) for e in effects) for c in causes) else "wrong name"
+
+
+def score(
+    truth: Mapping, diagnosis: Mapping | None, seconds: float, why: str = "", measured: Mapping[str, float] | None = None
+) -> dict:
+    """One row of the table. `diagnosis` None: the command gave none, `why` says so (crash, timeout).
+
+    `measured`: RMSE of the extended model on the hold-out, by who does not believe the diagnosis.
+    """
+    row = {
+        "case": f"{truth['seed']}:{truth['index']}",
+        "stratum": truth["stratum"],
+        "seconds": round(seconds, 2),
+        "kinds": [e["kind"] for e in truth["effects"]],
+        "forms": [e["form"] for e in truth["effects"]],
+        "energies": [e["energy"] for e in truth["effects"]],
+        "answer": [],
+        "verdict": None,
+        "right": False,
+        "why": why,
+        "outcome": why.split(":")[0] or "no answer",
+        "errors": [],
+        "covered": [],
+        "gain": {},
+    }
+    if diagnosis is None:
+        return row
+    causes = diagnosis.get("causes") or []
+    what = outcome(truth, causes, diagnosis.get("verdict"))
+    row |= {"answer": [" at ".join(_named(c)) for c in causes], "verdict": diagnosis.get("verdict"), "right": what == "right", "outcome": what}
+    pairs = pairing(causes, truth["effects"], truth["bound"]) if what == "right" else None
+    for i, k in (pairs or {}).items():
+        effect, said = truth["effects"][k], causes[i].get("parameters") or {}
+        if not effect["common"] or not matches(causes[i], effect):
+            continue
+        for name, value in effect["parameters"].items():
+            got = said.get(name)
+            if isinstance(got, Mapping) and got.get("value") is not None and value:
+                row["errors"].append([f"{effect['kind']}.{name}", abs(got["value"] - value) / abs(value)])
+                if got.get("ci95"):
+                    row["covered"].append([f"{effect['kind']}.{name}", bool(got["ci95"][0] <= value <= got["ci95"][1])])
+    for signal, gain in (diagnosis.get("gain") or {}).items():
+        if signal in truth["noise_floor"] and isinstance(gain, Mapping) and gain.get("after_rmse") is not None:
+            after = (measured or {}).get(signal, float(gain["after_rmse"]))
+            row["gain"][signal] = [x / truth["noise_floor"][signal] for x in (float(gain["before_rmse"]), after)]
+    row["inside"] = truth["holdout_inside"]
+    return row
+
+
+def wilson(right: int, n: int, z: float = 1.959964) -> tuple[float, float]:
+    """95 % interval of a share (Wilson 1927)."""
+    if n == 0:
+        return 0.0, 1.0
+    p, middle = right / n, 1 + z * z / n
+    half = z * sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return max(0.0, (p + z * z / (2 * n) - half) / middle), min(1.0, (p + z * z / (2 * n) + half) / middle)
+
+
+def allowed_failures(n: int, rate: float, risk: float) -> int:
+    """Least k such that a program which is right with probability `rate` has more than k of n cases wrong less often than `risk`.
+
+    Cases are independent, so failures are binomial: P(more than k) = 1 - sum over i <= k of C(n, i) (1 - rate)^i rate^(n - i).
+    """
+    below = 0.0
+    for k in range(n + 1):
+        below += comb(n, k) * (1 - rate) ** k * rate ** (n - k)
+        if 1 - below < risk:
+            return k
+    return n
+
+
+def quantile(values: Iterable[float], q: float) -> float | None:
+    """Smallest value with at least a share q at or below it; None of nothing."""
+    ordered = sorted(values)
+    return ordered[max(ceil(q * len(ordered) - 1e-9) - 1, 0)] if ordered else None
+
+
+def _share(rows: Sequence[Mapping]) -> dict:
+    right = sum(r["right"] for r in rows)
+    return {"n": len(rows), "right": right, "share": right / len(rows), "wilson95": wilson(right, len(rows))}
+
+
+def summary(rows: Sequence[Mapping]) -> dict:
+    """All tables of a campaign."""
+    strata = {s: [r for r in rows if r["stratum"] == s] for s in DEMANDED}
+    out: dict = {"strata": {}, "kinds": {}, "confusion": {}, "outcomes": {}}
+    for name, own in strata.items():
+        if own:
+            out["strata"][name] = {
+                **_share(own),
+                "demanded": DEMANDED[name][0],
+                "outcomes": dict(Counter(r["outcome"] for r in own)),
+            }
+    for name in ("single_common", "single_foreign", "hard"):
+        for kind in sorted({r["kinds"][0] for r in strata[name]}):
+            own = [r for r in strata[name] if r["kinds"][0] == kind]
+            instead = Counter(" + ".join(r["answer"]) or str(r["verdict"] or r["outcome"]) for r in own if not r["right"])
+            out["kinds"].setdefault(kind, {})[name] = {**_share(own), "instead": dict(instead)}
+            for r in own:
+                answer = (
+                    r["answer"][0].split(" at ")[0]
+                    if len(r["answer"]) == 1
+                    else "several" if r["answer"] else str(r["verdict"] or r["outcome"])
+                )
+                out["confusion"].setdefault(kind, Counter())[answer] += 1
+    errors = [e for r in rows for e in r["errors"]]
+    covered = [c for r in rows for c in r["covered"]]
+    inside = [max(g[1] for g in r["gain"].values()) for r in rows if r["right"] and r["kinds"] and r["gain"] and r.get("inside")]
+    worse = [
+        r["case"]
+        for r in rows
+        if r["stratum"] == "outside" and r["answer"] and any(g[1] > 1.05 * g[0] for g in r["gain"].values())
+    ]
+    seconds = [r["seconds"] for r in rows]
+    out["outcomes"] = dict(Counter(r["outcome"] for r in rows))
+    out["parameters"] = {
+        "n": len(errors),
+        "median_error": quantile((e for _, e in errors), 0.5),
+        "error_95": quantile((e for _, e in errors), 0.95),
+        "worst": sorted(errors, key=lambda e: -e[1])[:10],
+    }
+    out["coverage"] = {
+        "n": len(covered),
+        "share": sum(c for _, c in covered) / len(covered) if covered else None,
+        "wilson95": wilson(sum(c for _, c in covered), len(covered)),
+    }
+    out["gain"] = {
+        "n": len(inside),
+        "within_5_percent_of_floor": sum(g <= 1.05 for g in inside) / len(inside) if inside else None,
+        "ratio_95": quantile(inside, 0.95),
+        "outside_made_worse": worse,
+    }
+    out["time"] = {"median": quantile(seconds, 0.5), "q90": quantile(seconds, 0.9), "longest": max(seconds, default=None)}
+    return out
+
+
+def gate(rows: Sequence[Mapping], risk: float = 1e-3) -> list[str]:
+    """Strata with more failures than a program at the demanded rates has by chance, all strata together with at most `risk`.
+
+    The null strata ask for no false alarm in 100; a program with one in 500 is taken as right here.
+    """
+    strata = {s: [r for r in rows if r["stratum"] == s] for s in DEMANDED if any(r["stratum"] == s for r in rows)}
+    problems = []
+    for name, own in strata.items():
+        rate = 0.998 if name == "null" else DEMANDED[name][0]
+        wrong, most = sum(not r["right"] for r in own), allowed_failures(len(own), rate, risk / len(strata))
+        if wrong > most:
+            problems.append(f"{name}: {wrong} of {len(own)} wrong, at most {most} can be chance")
+    return problems
+
+
+def _percent(x: float | None, digits: int = 1) -> str:
+    return "-" if x is None else f"{100 * x:.{digits}f} %"
+
+
+def text(out: Mapping) -> str:
+    """The tables for a terminal."""
+    lines = [f"{'stratum':<16}{'right':>10}{'share':>9}  {'95 % interval':<18}{'asked':>7}  otherwise"]
+    for name, s in out["strata"].items():
+        low, high = s["wilson95"]
+        other = ", ".join(f"{n} {what}" for what, n in s["outcomes"].items() if what != "right")
+        lines.append(
+            f"{name:<16}{s['right']:>4} of {s['n']:<3}{_percent(s['share']):>8}  {_percent(low)} .. {_percent(high):<9}{_percent(s['demanded'], 0):>7}  {other}"
+        )
+    lines += ["", f"{'kind':<20}{'common':>9}{'foreign':>10}{'hard':>9}  answered instead"]
+    for kind, own in out["kinds"].items():
+        cell = lambda name: f"{own[name]['right']}/{own[name]['n']}" if name in own else "-"  # noqa: E731
+        instead = sum((Counter(s["instead"]) for s in own.values()), Counter())
+        lines.append(
+            f"{kind:<20}{cell('single_common'):>9}{cell('single_foreign'):>10}{cell('hard'):>9}  "
+            + ", ".join(f"{n}x {what}" for what, n in instead.items())
+        )
+    p, c, g, t = out["parameters"], out["coverage"], out["gain"], out["time"]
+    lines += [
+        "",
+        f"parameters ({p['n']}): median error {_percent(p['median_error'], 2)} (asked 1 %), 95 % within {_percent(p['error_95'], 2)} (asked 6 %)",
+        f"95 % intervals ({c['n']}): cover {_percent(c['share'])} of the truths (asked 90 .. 98 %), {_percent(c['wilson95'][0])} .. {_percent(c['wilson95'][1])}",
+        f"hold-out inside the trained range ({g['n']}): {_percent(g['within_5_percent_of_floor'])} within 5 % of the noise floor (asked 95 %)",
+        f"time a case: median {t['median']} s, 90 % within {t['q90']} s (asked 10 s), longest {t['longest']} s (asked 40 s)",
+    ]
+    return "\n".join(lines)

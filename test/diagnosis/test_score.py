@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The scorer, on diagnoses written by hand."""
+
+import json
+import sys
+
+import pytest
+from scipy import stats
+
+import campaign
+import score
+
+FRICTION = {
+    "kind": "coulomb_friction",
+    "where": ["spring", "damper"],
+    "form": "smooth_sign",
+    "common": True,
+    "energy": 900.0,
+    "parameters": {"force": 40.0},
+    "rivals": [],
+}
+LOAD = {
+    "kind": "constant_force",
+    "where": ["body"],
+    "form": "settled_load",
+    "common": True,
+    "energy": 800.0,
+    "parameters": {"force": 100.0},
+    "rivals": [{"kind": "sensor_bias", "where": ["deflection"], "left": 0.0}],
+}
+WRONG = {
+    "kind": "wrong_parameter",
+    "where": [],
+    "parameter": "c",
+    "form": "another_value",
+    "common": True,
+    "energy": 700.0,
+    "parameters": {"c": 2e4},
+    "rivals": [],
+}
+ALIEN = {
+    "kind": "outside_taxonomy",
+    "where": [],
+    "form": "engine",
+    "common": False,
+    "energy": 900.0,
+    "parameters": {"amplitude": 9.0},
+    "rivals": [],
+}
+
+
+def truth(*effects, stratum="single_common", **more):
+    return {
+        "seed": 1,
+        "index": 2,
+        "stratum": stratum,
+        "bound": 50.0,
+        "effects": list(effects),
+        "noise_floor": {"a_body": 0.02},
+        "holdout_inside": True,
+        **more,
+    }
+
+
+def cause(kind, where="", alternatives=(), **parameters):
+    return {"kind": kind, "where": where, "alternatives": list(alternatives), "parameters": parameters}
+
+
+def said(*causes, verdict="explained", **more):
+    return {"verdict": verdict, "causes": list(causes), **more}
+
+
+BIAS = ("sensor_bias", "deflection")
+NEAR = LOAD | {"rivals": [{"kind": "sensor_bias", "where": ["deflection"], "left": 12.0}]}
+
+
+@pytest.mark.parametrize("effects, diagnosis, outcome", [
+    ((FRICTION,), said(cause("coulomb_friction", "damper")), "right"),
+    ((FRICTION,), said(cause("coulomb_friction", "spring")), "right"),
+    ((FRICTION,), said(cause("coulomb_friction", "tyre")), "wrong name"),
+    ((FRICTION,), said(cause("stribeck_friction", "damper")), "wrong name"),
+    ((FRICTION,), said(cause("stribeck_friction", "damper", ["coulomb_friction"])), "wrong name"),
+    ((FRICTION,), said(cause("coulomb_friction", "damper"), cause("cubic_spring", "spring")), "extra name"),
+    ((FRICTION,), said(verdict="no_discrepancy"), "missed"),
+    ((FRICTION,), said(verdict="not_identifiable"), "missed"),
+    ((FRICTION,), said(cause("outside_taxonomy"), verdict="unexplained"), "missed"),
+    ((FRICTION | {"energy": 49.0},), said(verdict="not_identifiable"), "right"),
+    ((FRICTION | {"energy": 49.0},), said(verdict="unexplained"), "missed"),
+    ((FRICTION, LOAD), said(cause("coulomb_friction", "damper"), cause("constant_force", "body", ["sensor_bias"])), "right"),
+    ((FRICTION, LOAD), said(cause("constant_force", "body", ["sensor_bias"]), cause("coulomb_friction", "damper")), "right"),
+    ((FRICTION, LOAD), said(cause("coulomb_friction", "damper")), "part missed"),
+    ((FRICTION, LOAD | {"energy": 10.0}), said(cause("coulomb_friction", "damper")), "right"),
+    ((FRICTION, LOAD), said(cause("coulomb_friction", "damper"), cause("coulomb_friction", "spring")), "part missed"),
+    ((LOAD,), said(cause(*BIAS, ["constant_force"])), "right"),
+    ((LOAD,), said(cause(*BIAS, [{"kind": "constant_force", "where": "body"}])), "right"),
+    ((LOAD,), said(cause("constant_force", "body")), "equivalent not told"),
+    ((LOAD,), said(cause(*BIAS)), "equivalent not told"),
+    ((NEAR,), said(cause("constant_force", "body")), "right"),
+    ((NEAR,), said(cause(*BIAS)), "equivalent not told"),
+    ((NEAR,), said(cause(*BIAS, ["constant_force"])), "right"),
+    ((LOAD,), said(cause("sensor_bias", "a_body", ["constant_force"])), "wrong name"),
+    ((LOAD,), said(cause(*BIAS, ["constant_force", "bump_stop", "backlash", "cubic_spring", "bouc_wen"])), "equivalent not told"),
+    ((WRONG,), said(cause("wrong_parameter", "spring", c={"value": 2e4})), "right"),
+    ((WRONG,), said(cause("wrong_parameter", "spring", d={"value": 2e4})), "wrong name"),
+    ((WRONG,), said(cause("wrong_parameter", "spring", c={"value": 2e4}, d={"value": 1.0})), "wrong name"),
+    ((ALIEN,), said(cause("outside_taxonomy"), verdict="unexplained"), "right"),
+    ((ALIEN,), said(verdict="unexplained"), "right"),
+    ((ALIEN,), said(cause("outside_taxonomy"), cause("backlash", "spring")), "wrong name"),
+    ((ALIEN,), said(verdict="no_discrepancy"), "missed"),
+    ((), said(verdict="no_discrepancy"), "right"),
+    ((), said(cause("coulomb_friction", "damper")), "false alarm"),
+    ((), said(verdict="unexplained"), "false alarm"),
+    ((), said(verdict="not_identifiable"), "open"),
+])
+def test_outcome(effects, diagnosis, outcome):
+    row = score.score(truth(*effects), diagnosis, 1.0)
+    assert (row["outcome"], row["right"]) == (outcome, outcome == "right")
+
+
+def test_without_an_answer_every_case_is_wrong():
+    assert not score.score(truth(), None, 9.0, "timeout")["right"]
+
+
+def test_errors_and_intervals_count_for_common_forms_that_are_named_themselves():
+    force = {"value": 42.0, "unit": "N", "ci95": [39.0, 45.0]}
+    row = score.score(truth(FRICTION), said(cause("coulomb_friction", "damper", force=force)), 1.0)
+    assert row["errors"] == [["coulomb_friction.force", pytest.approx(0.05)]] and row["covered"] == [
+        ["coulomb_friction.force", True]
+    ]
+    narrow = score.score(truth(FRICTION), said(cause("coulomb_friction", "damper", force={**force, "ci95": [41.0, 43.0]})), 1.0)
+    assert narrow["covered"] == [["coulomb_friction.force", False]]
+    foreign = score.score(truth(FRICTION | {"common": False}), said(cause("coulomb_friction", "damper", force=force)), 1.0)
+    rival = score.score(truth(LOAD), said(cause(*BIAS, ["constant_force"], bias=force)), 1.0)
+    assert foreign["errors"] == foreign["covered"] == rival["errors"] == []
+
+
+def test_gain_is_measured_against_the_true_noise_floor():
+    """Not against the floor that the diagnosis claims."""
+    gain = {"a_body": {"before_rmse": 0.08, "after_rmse": 0.021, "noise_floor": 0.021, "share_of_achievable": 1.0}}
+    told = said(cause("coulomb_friction", "damper"), gain=gain)
+    assert score.score(truth(FRICTION), told, 1.0)["gain"] == {"a_body": pytest.approx([4.0, 1.05])}
+    assert score.score(truth(FRICTION), told, 1.0, measured={"a_body": 0.04})["gain"] == {"a_body": pytest.approx([4.0, 2.0])}
+
+
+@pytest.mark.parametrize("right, n", [(0, 7), (3, 7), (97, 100), (100, 100)])
+def test_wilson_interval_is_that_of_scipy(right, n):
+    expected = stats.binomtest(right, n).proportion_ci(method="wilson")
+    assert score.wilson(right, n) == pytest.approx((expected.low, expected.high), abs=1e-6)  # z has 7 digits
+
+
+@pytest.mark.parametrize("n, rate, risk", [(24, 0.9, 1e-3), (7, 0.6, 1e-4), (100, 0.998, 1e-3), (5, 0.97, 1.25e-4)])
+def test_gate_lets_a_right_program_fail_less_often_than_the_risk(n, rate, risk):
+    k = score.allowed_failures(n, rate, risk)
+    assert stats.binom.sf(k, n, 1 - rate) < risk
+    assert k == 0 or stats.binom.sf(k - 1, n, 1 - rate) >= risk, "and is as strict as that allows"
+
+
+def rows(stratum, right, n):
+    return [
+        score.score(
+            truth(*([] if "null" in stratum else [FRICTION]), stratum=stratum),
+            (
+                said(verdict="no_discrepancy")
+                if "null" in stratum
+                else said(cause("coulomb_friction" if i < right else "backlash", "damper"))
+            ),
+            float(i),
+        )
+        for i in range(n)
+    ]
+
+
+def test_gate_names_the_stratum_that_is_too_bad():
+    assert score.gate(rows("single_common", 19, 20) + rows("null", 20, 20)) == []
+    assert score.gate(rows("single_common", 10, 20) + rows("null", 20, 20)) == [
+        "single_common: 10 of 20 wrong, at most 4 can be chance"
+    ]
+
+
+def test_tables_add_up():
+    out = score.summary(rows("single_common", 18, 20) + rows("null", 10, 10))
+    assert out["strata"]["single_common"]["right"] == 18 and out["strata"]["null"]["share"] == 1.0
+    assert out["kinds"]["coulomb_friction"]["single_common"]["instead"] == {"backlash at damper": 2}
+    assert out["confusion"] == {"coulomb_friction": {"coulomb_friction": 18, "backlash": 2}}
+    assert (out["time"]["longest"], out["time"]["q90"]) == (19.0, 16.0)
+    assert "18 of 20" in score.text(out) and "2x backlash at damper" in score.text(out)
+
+
+ANSWERS = {"honest": 'json.dump({"verdict": "no_discrepancy", "causes": []}, open(out / "diagnosis.json", "w"))',
+           "crash": 'sys.exit("penode: train_1.csv: too short")', "silent": "pass", "slow": "time.sleep(60)"}
+
+
+@pytest.mark.parametrize(
+    "answer, outcome",
+    [("honest", "right"), ("crash", "exit 1: penode: train_1.csv: too short"), ("silent", "no diagnosis"), ("slow", "timeout")],
+)
+def test_campaign_runs_a_command_and_survives_it(tmp_path, answer, outcome):
+    script = tmp_path / "explain.py"
+    script.write_text(
+        "import json, pathlib, sys, time\nout = pathlib.Path(sys.argv[sys.argv.index('-o') + 1])\n"
+        "assert pathlib.Path(sys.argv[1]).name == 'model.toml' and not list(pathlib.Path(sys.argv[1]).parent.glob('*truth*'))\n"
+        f"out.mkdir()\n{ANSWERS[answer]}\n"
+    )
+    (row,) = campaign.run(
+        1, 1, {"mine": f"{sys.executable} {script}"}, "", 5.0 if answer != "slow" else 0.5, tmp_path / "out", keep=True
+    )
+    assert row["stratum"] == "null" and (row["why"] or row["outcome"]).startswith(outcome)
+    assert json.loads((tmp_path / "out" / "truth" / "1-1.json").read_text())["effects"] == []
+
+
+def test_extended_model_is_simulated_again(tmp_path):
+    """The simulation here answers with the recording and an error of 0.5 in one signal."""
+    recording = tmp_path / "holdout_1.csv"
+    recording.write_text("time [s],z_road [m],a_body [m/s^2],deflection [m]\n0,0,1,2\n0.001,0,1,2\n")
+    (tmp_path / "model_extended.toml").touch()
+    script = tmp_path / "simulate.py"
+    script.write_text(
+        "import sys\nopen(sys.argv[5], 'w').write('time [s],deflection [m],a_body [m/s^2],z_b [m]\\n0,2,1.5,0\\n0.001,2,0.5,0\\n')\n"
+    )
+    found = campaign.simulated(f"{sys.executable} {script}", tmp_path / "model_extended.toml", recording)
+    assert found["a_body"] == pytest.approx(0.5) and found["deflection"] == 0.0 and "z_b" not in found
+    assert campaign.simulated(f"{sys.executable} -c 1/0", tmp_path / "model_extended.toml", recording) == {}
+    assert campaign.simulated("true", tmp_path / "no_model.toml", recording) == {}
