@@ -25,10 +25,10 @@ run: setup ## The main job: recalibration while it runs, on the host and on an e
 test: setup ## All checks; the last line adds them up
 	$(Q)$(PYTHON) test/tally.py $(SUITES)
 
-figures: setup ## Measure what a step costs; rewrite the table of README.md
-	$(Q)$(PYTHON) test/bench/figures.py
+figures: setup ## Measure what our steps cost; rewrite the tables of README.md and test/bench/
+	$(Q)$(PYTHON) test/bench/bench.py --ours
 
-bench: setup ## Measure steps of other tools beside ours (ten minutes); rewrite test/bench/table.md
+bench: setup ## The same with the steps of other tools (ten minutes, downloads them)
 	$(Q)$(PYTHON) test/bench/bench.py
 
 clean: ## Remove all that was built (the set-up too)

@@ -2,8 +2,11 @@
 # Copyright (c) 2026 the penode authors
 """`make bench`: what a step costs, ours and that of other tools, measured anew; writes bench.json and table.md.
 
-bench.py            measures everything (some minutes), writes both, and the block "bench" of README.md
-bench.py --table    writes table and block from bench.json
+bench.py            measures everything (some minutes), writes both, and the blocks of README.md
+bench.py --ours     the same, but keeps what was measured of others
+bench.py --table    writes tables and blocks from bench.json
+bench.py --check    measures the steps in float on the Cortex-M4F, and RK4 on all cores; fails where a figure is more than
+                    2 % worse than the kept one or above what is promised, or where README.md shows something else
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,13 +26,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import batch
 import cycles
 import peers
 import penode_gen
 import programs
 import report
 import worst_case
-from figures import CORES, README, hostile_inputs, with_block
+from figures import CORES, README, ROOT, accuracy, hostile_inputs, run_text, with_block
 from programs import Program
 from reference import same_step
 
@@ -78,12 +83,14 @@ def measured(program: Program, u: NDArray, n_x: int = 4, weights_inside: int = 0
     if ticks != [count.min(), count.max()]:
         raise AssertionError(f"{program.elf}: plugin {count.min()} .. {count.max()}, SysTick {ticks}")
     bound = programs.stack_bound(program.elf, program.step)
-    if seen["stack"] > bound:
+    marks = max(programs.stack_bound(program.elf, f"board_count_{mark}") for mark in ("start", "stop"))
+    if seen["stack"] > max(bound, marks):
         raise AssertionError(f"{program.elf}: {seen['stack']} B of stack used, bound {bound}")
+    stack = min(seen["stack"], bound)  # where starting and stopping the count took more than the step
     found: Figures = {"instructions": [int(count.min()), int(count.max())]}
     if program.machine == "m4f":
         found["cycles"] = [int(calls["low"].max()), int(calls["high"].max())]
-    return found | programs.sizes(program, weights_inside) | {"stack": seen["stack"], "stack bound": bound}
+    return found | programs.sizes(program, weights_inside) | {"stack": stack, "stack bound": bound}
 
 
 # -- ours -------------------------------------------------------------------------------------------------------------
@@ -101,20 +108,22 @@ def our_models() -> dict[tuple[str, str], penode_gen.Model]:
     }
 
 
-def our_figures(say: Callable[[str], None]) -> list[Figures]:
-    """One row for each method, evaluator, type, core and level."""
+def our_figures(say: Callable[[str], None], wanted: Callable[[Figures], bool] = lambda row: True) -> list[Figures]:
+    """One row for each method, evaluator, type, core and level that is wanted."""
     rows = []
     for (method, evaluator), model in our_models().items():
         for real, defines in REALS.items():
             dtype = np.float64 if real == "double" else np.float32
             u = np.repeat(hostile_inputs()[::12].astype(dtype), len(model.inputs), axis=1)
             for machine in CORES:
-                say(f"{method}, {evaluator}, {real}, {machine}")
+                keys = {"method": method, "evaluator": evaluator, "real": real, "machine": machine}
+                if not wanted(keys):
+                    continue
+                say(", ".join(keys.values()))
                 unit = DOUBLE_UNIT.get(machine, ()) if real == "double" else ()
                 for level in LEVELS:
                     program = programs.our_program(model, machine, (level, *defines, *unit))
-                    row = {"method": method, "evaluator": evaluator, "real": real, "machine": machine, "level": level}
-                    rows.append(row | measured(program, u, len(model.states)))
+                    rows.append(keys | {"level": level} | measured(program, u, len(model.states)))
     return rows
 
 
@@ -215,11 +224,17 @@ def worst_figures(say: Callable[[str], None], steps: int = 10_000) -> list[Figur
 # -- command ----------------------------------------------------------------------------------------------------------
 
 
+def say(text: str) -> None:
+    print(f"bench: {text}", file=sys.stderr, flush=True)
+
+
+def measure_ours() -> Figures:
+    """What changes with our code."""
+    return {"ours": our_figures(say), "memory": memory_figures(), "accuracy": accuracy(), "worst case": worst_figures(say)}
+
+
 def measure() -> Figures:
     """Everything."""
-
-    def say(text: str) -> None:
-        print(f"bench: {text}", file=sys.stderr, flush=True)
 
     def first_line(*command: str) -> str:
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[0]
@@ -232,12 +247,60 @@ def measure() -> Figures:
                 "emulator": first_line("qemu-system-arm", "--version"),
             }
         ],
-        "ours": our_figures(say),
-        "memory": memory_figures(),
         "peers": peer_figures(case, say),
         "host": host_ratios(case, say),
-        "worst case": worst_figures(say),
-    }
+        "batch": batch.measure(),
+    } | measure_ours()
+
+
+# What is promised of the whole step on the Cortex-M4F in float, whatever was kept.
+PROMISED = {
+    ("RK4", "layered", "-O2"): {"instructions": 16_600, "cycles": 18_900, "stack bound": 300, "ram": 0},
+    ("RK4", "layered", "-Os"): {"instructions": 13_700, "text": 1_340, "stack bound": 300, "ram": 0},
+    ("RK4", "folded", "-O2"): {"instructions": 1_100, "cycles": 1_300, "stack bound": 300, "ram": 0},
+    ("Rosenbrock 1", "layered", "-O2"): {"instructions": 7_700},
+    ("Rosenbrock 1", "folded", "-O2"): {"instructions": 550},
+}
+
+
+def worse(new: list[Figures], kept: list[Figures]) -> list[str]:
+    """What is worse than it was, or than it may be."""
+
+    def name(row: Figures) -> str:
+        return ", ".join(row[key] for key in ("method", "evaluator", "real", "machine", "level"))
+
+    before, found = {name(row): row for row in kept}, []
+    for row in new:
+        limits = PROMISED.get((row["method"], row["evaluator"], row["level"]), {}) if row["machine"] == "m4f" else {}
+        values = {"instructions": row["instructions"][1], **{key: row[key] for key in ("text", "rodata", "ram", "stack bound")}}
+        for key, value in values.items():
+            was = before[name(row)][key][1] if key == "instructions" else before[name(row)][key]
+            if value > 1.02 * was:
+                found.append(f"{name(row)}: {value} {key} instead of {was}, more than 2 % worse")
+            if value > limits.get(key, value):
+                found.append(f"{name(row)}: {value} {key} is above the promised {limits[key]}")
+        if "cycles" in row and row["cycles"][row["evaluator"] == "folded"] > limits.get("cycles", np.inf):
+            found.append(f"{name(row)}: {row['cycles']} cycles are above the promised {limits['cycles']}")
+        if row["machine"] != "m3" and row["instructions"][0] != row["instructions"][1]:
+            found.append(f"{name(row)}: {report.span(row['instructions'])} instructions: the step's cost depends on its input")
+    return found
+
+
+def check(figures: Figures) -> list[str]:
+    """What is wrong with the code, or with what README.md says of it."""
+    wanted = lambda row: row["real"] == "float" and (row["machine"] == "m4f" or row["method"] == "RK4")  # noqa: E731
+    found = worse(our_figures(lambda text: None, wanted), figures["ours"]) + batch.too_slow(figures["batch"])
+    if figures["accuracy"] != accuracy():
+        found.append(f"accuracy: {accuracy()} instead of {figures['accuracy']}; run make figures")
+    if shown(figures) != README.read_text():
+        found.append("README.md: what it shows is not what make run and the figures give; run make figures")
+    return found
+
+
+def shown(figures: Figures) -> str:
+    """README.md with its blocks as they should be."""
+    text = with_block(README.read_text(), "figures", report.prices(figures))
+    return with_block(with_block(text, "bench", report.summary(figures)), "run", run_text())
 
 
 def written(figures: Figures) -> str:
@@ -251,13 +314,24 @@ def written(figures: Figures) -> str:
 
 def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--table", action="store_true", help="only write what is made from bench.json")
-    if not arguments.parse_args().table:
-        KEPT.write_text(written(measure()))
+    what = arguments.add_mutually_exclusive_group()
+    what.add_argument("--ours", action="store_true", help="measure only what changes with our code")
+    what.add_argument("--table", action="store_true", help="measure nothing, write what is made from bench.json")
+    what.add_argument("--check", action="store_true", help="write nothing, compare")
+    given = arguments.parse_args()
     figures = json.loads(KEPT.read_text())
+    if given.check:
+        found = check(figures)
+        for line in found:
+            print(line, file=sys.stderr)
+        return 1 if found else 0
+    if not given.table:
+        figures |= measure_ours() if given.ours else measure()
+        KEPT.write_text(written(figures))
     TABLE.write_text(report.table(figures))
-    README.write_text(with_block(README.read_text(), "bench", report.summary(figures)))
-    print(report.summary(figures))
+    README.write_text(shown(figures))
+    shutil.copy(ROOT / "build" / "run" / "recalibration.png", ROOT / "sil" / "recalibration.png")
+    print(report.prices(figures), report.summary(figures), sep="\n\n")
     return 0
 
 

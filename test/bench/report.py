@@ -105,6 +105,11 @@ weights.
 
 HOST = "Ratios of one run, the best of seven rounds each; they differ by some 10 % from run to run."
 
+MANY = """\
+`penode_sil.batch` steps many runs of a model in the lanes of vector registers, each to the bit as alone; below is how
+many steps it takes in the time of one step of the same C in a loop (the faster of gcc -O2 and -O3 -march=native), and of
+one step of the same loop in NumPy and in SciPy's solve_ivp. One thread, one run, vectors of the machine at hand."""
+
 WORST = """\
 Everything that a constant-time step must not notice: inputs and states of any bits, special numbers, all sizes; every
 end of a straight piece of the networks, its neighbours and every middle; staged sets of many sizes; sets whose memory
@@ -130,6 +135,40 @@ def summary(figures: Figures) -> str:
         rows.append([row["name"], row["level"], *counts])
     header = ["RK4 step on a Cortex-M4F", "flags", "instructions", "modelled kilocycles", "times ours", "code [B]"]
     return rows_of(header, rows)
+
+
+PRICES = {"RK4": ("RK4", "layered"), "RK4, folded": ("RK4", "folded"), "explicit Euler": ("explicit Euler", "layered")}
+
+
+def prices(figures: Figures) -> str:
+    """The price table of README.md."""
+    at = {
+        (title, machine, level): ours_at(figures, method=method, evaluator=evaluator, real="float", machine=machine, level=level)[0]
+        for title, (method, evaluator) in PRICES.items()
+        for machine in CORES
+        for level in ("-O2", "-Os")
+    }
+    columns = [(title, level) for title in PRICES for level in ("-O2", "-Os")]
+    header = [f"{title} {level}" for title, level in columns]
+    counts = [[name, *(span(at[title, machine, level]["instructions"]) for title, level in columns)] for machine, name in CORES.items()]
+    names = {"text": "code of the whole step", "rodata": "its constants, without weights", "stack": "its stack", "ram": "other RAM"}
+    sizes = [[name, *(number(at[title, "m4f", level][key]) for title, level in columns)] for key, name in names.items()]
+    memory = {row["evaluator"]: row for row in figures["memory"] if row["real"] == "float"}
+    caller = {"instance": "an instance", "set": "a parameter set, in flash or in RAM of the caller"}
+    sizes += [[name, *(number(memory[PRICES[title][1]][key]) for title, _ in columns)] for key, name in caller.items()]
+    errors = {row["model"]: row for row in figures["accuracy"]}
+    exact = [[name, *(_micrometres(errors[title][key]) for title in PRICES)] for key, name in (("largest", "largest error of z_b, z_w"), ("RMS", "RMS error"))]
+    return "\n\n".join(
+        (
+            rows_of(["instructions a step", *header], counts),
+            rows_of(["bytes on a Cortex-M4F", *header], sizes),
+            rows_of(["float C at 1 ms against the exact solution, 10 s of a chirp", *PRICES], exact),
+        )
+    )
+
+
+def _micrometres(nanometres: int) -> str:
+    return f"{nanometres / 1000:.3g} µm" if nanometres < 1e6 else f"{nanometres / 1e6:.3g} mm"
 
 
 def table(figures: Figures) -> str:
@@ -163,6 +202,10 @@ def table(figures: Figures) -> str:
         "### On the host",
         rows_of(["time of a step, gcc -O2", "times ours"], [[r["name"], f"{r['ratio']:.2f}"] for r in figures["host"]]),
         HOST,
+        "### Many runs at once on the host",
+        MANY,
+        rows_of(["model", "real", "times the C loop"], [[r["model"], r["real"], f"{r['ratio']:.1f}"] for r in figures["batch"] if "real" in r]),
+        "\n".join(f"* {r['model']}: {number(r['ratio'])} times" for r in figures["batch"] if "real" not in r),
         "## Worst case",
         WORST,
         rows_of(["RK4, float, -O2", "calls", *CORES.values(), "M4F, modelled kilocycles"], _worst(figures)),
