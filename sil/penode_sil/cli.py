@@ -84,7 +84,7 @@ def generate(model: Path, output: Path) -> None:
 @cli.command()
 @click.argument("model", type=FILE)
 @click.option("--scenario", type=FILE, help="Scenario file (TOML) to run.")
-@click.option("--input", "record", type=FILE, help="Recording (CSV with units) whose inputs drive the model.")
+@click.option("--input", "record", type=FILE, help="Recording (CSV with units, or MDF) whose inputs drive the model.")
 @click.option(
     "--on",
     "target",
@@ -154,29 +154,64 @@ def simulate(
     click.echo(json.dumps(summary, indent=2) if as_json else _sentences(summary))
 
 
+class _Several(click.Command):
+    """A command whose options of several values take all words up to the next option: --data a.csv b.csv."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        several = {name for p in self.params if isinstance(p, click.Option) and p.multiple for name in p.opts}
+        spread: list[str] = []
+        current = ""
+        for word in args:
+            if word.startswith("-"):
+                current = word if word in several else ""
+                spread.append(word)
+            elif current and spread[-1] != current:
+                spread += [current, word]
+            else:
+                spread.append(word)
+        return super().parse_args(ctx, spread)
+
+
+@cli.command(cls=_Several)
+@click.argument("model", type=FILE)
+@click.option("--data", type=FILE, multiple=True, required=True, help="Recordings (CSV with units, or MDF4) to learn from.")
+@click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on.")
+@click.option("-o", "--output", type=FILE, required=True, help="Directory for diagnosis.json and model_extended.toml.")
+@click.option("--set", "set_name", default="default", show_default=True, help="Parameter set to start from.")
+@click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
+@click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json.")
+def diagnose(
+    model: Path, data: tuple[Path, ...], holdout: tuple[Path, ...], output: Path, set_name: str, channel: tuple[str, ...], as_json: bool
+) -> None:
+    """Show what the model file MODEL gets wrong, name the cause, extend the model, measure the gain."""
+    from . import diagnosis  # SciPy's parts are slow to load
+    from .measured import load
+
+    loaded = penode_gen.load(model)
+    if set_name not in loaded.sets and loaded.networks:
+        raise UserError(f'--set: the model has no set "{set_name}"; {hint(set_name, loaded.sets)}')
+    if output.exists() and not output.is_dir():
+        raise UserError(f"{output}: this is a file; name a directory")
+    if not output.exists() and not output.absolute().parent.is_dir():
+        raise UserError(f"{output}: there is no directory {output.parent}; create it")
+    train, held = load(data, loaded, channel), load(holdout, loaded, channel)
+    found = diagnosis.diagnose(loaded, train, held, output, set_name)
+    text = json.dumps(found.as_json(), indent=2)
+    (output / "diagnosis.json").write_text(text + "\n")
+    click.echo(text if as_json else diagnosis.sentences(loaded, found, output))
+
+
 def _replay(record: Path, model: Any, set_name: str | None) -> tuple[scenarios.Scenario, Any, float, Any]:
     """A recording as a scenario; its sample times from 0, its first time [s], and its inputs on the model's raster."""
-    data = recording.read_csv(record)
-    problems: list[str] = []
-    columns = []
-    try:
-        time = data.time()
-    except UserError as exc:
-        problems += exc.problems
-    for signal in model.inputs:
-        try:
-            columns.append(data.channel(signal.name, signal.unit))
-        except UserError as exc:
-            problems += exc.problems
-    if problems:
-        raise UserError(*problems)
-    raster, u, remark = recording.resample(time, np.column_stack(columns), model.sample_time)
-    if remark:
+    wanted = {signal.name: signal.unit for signal in model.inputs}
+    raster, u, remarks = recording.on_raster(recording.read(record, [*wanted, "time"]), wanted, model.sample_time)
+    for remark in remarks:
         note(f"{record}: {remark}")
     times = np.arange(raster.size) * model.sample_time
     inputs = {s.name: Samples(times, column) for s, column in zip(model.inputs, u.T)}
     instance = scenarios.Instance(model.name, set_name or next(iter(model.sets)))
-    return scenarios.Scenario(record.stem, float(times[-1]), inputs, {}, (instance,), record), times, float(time[0]), u
+    plan = scenarios.Scenario(record.stem, float(times[-1]), inputs, {}, (instance,), record)
+    return plan, times, float(raster[0]), u
 
 
 def _warn_range(model: Any, u: NDArray[np.float64]) -> None:

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""From hypotheses to a model that can be simulated and fitted: each elementary law becomes an element of the model."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from penode_gen.laws import LAWS
+from penode_gen.model import GROUND, Element, Model
+
+from .fit import Free
+from .hypotheses import Basis, Fault
+from .plant import Place, extend
+from .score import Candidate
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """A candidate with the gain that the regression gave it."""
+
+    candidate: Candidate
+    gain: float
+
+    @property
+    def group(self) -> tuple[str, str]:
+        return self.candidate.kind, self.candidate.where
+
+
+@dataclass(frozen=True, eq=False)
+class Extended:
+    """A model with terms in it: what is free in it beyond the nuisances, the faults of its sensors as series, and per term
+    the names of its element and parameters."""
+
+    model: Model
+    free: tuple[Free, ...]
+    faults: tuple[Fault, ...]
+    loosened: frozenset[str]
+    names: tuple[str, ...]
+
+
+def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tuple[float, str]], list[Free]]:
+    """The element of a force law, its parameters, and what is free in it."""
+    what = term.candidate.what
+    if not isinstance(what, Basis):  # an absorber
+        _, _, f0, zeta = what
+        w, m = 2.0 * np.pi * f0, max(term.gain, 1e-9)
+        values = {"mass": (m, "kg"), "stiffness": (m * w * w, "N/m"), "damping": (2.0 * zeta * w * m, "N*s/m")}
+        arguments = {key: f"{name}_{key}" for key in values}
+        body = next(b for b in place.ends if b != GROUND)
+        free = [Free(arguments[key], v, 1.0, log=True, low=1e-9) for key, (v, _) in values.items()]
+        return Element(name, (body, GROUND), "absorber", arguments), {arguments[k]: v for k, v in values.items()}, free
+    gain, unit = what.gain
+    shapes = {f"{name}_{key}": value for key, value in what.shapes.items()}
+    known = {f"{name}_{key}": value for key, value in what.fixed.items()}
+    parameters = {f"{name}_{gain}": (term.gain, unit)} | shapes | known
+    size = max(abs(term.gain), 1e-12)
+    low, high = (0.0, np.inf) if what.sign > 0 else (-np.inf, 0.0) if what.sign < 0 else (-np.inf, np.inf)
+    free = [Free(f"{name}_{gain}", term.gain, size, low=low, high=high)]
+    free += [Free(key, value, 1.0, log=True, low=value / (3.0 if key.endswith("presliding") else 30.0), high=value * 30.0) for key, (value, _) in shapes.items()]
+    if what.law in LAWS:
+        return Element(name, place.ends, what.law, {key: f"{name}_{key}" for key in LAWS[what.law].arguments}), parameters, free
+    text = re.sub(r"\b(k|knee|gap|width)\b", lambda m: f"{name}_{m[1]}", what.law)
+    return Element(name, place.ends, "expression", expression=text), parameters, free
+
+
+def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recordings: int, settled: int) -> Extended:
+    """The model with all terms. States of laws start free in `recordings`, a body under a settled load in `settled`."""
+    elements, parameters, where, names = [], {}, [], []
+    free: list[Free] = []
+    faults: list[Fault] = []
+    loosened = set()
+    for i, term in enumerate(terms):
+        what = term.candidate.what
+        names.append(f"x{i}")
+        if isinstance(what, str):
+            loosened.add(what)
+        elif isinstance(what, Fault):
+            size = max(abs(term.gain), 1e-12)
+            if what.what in ("bias", "scale", "delay"):
+                free.append(Free((what.what, what.sensor), term.gain, size, low=0.0 if what.what == "delay" else -np.inf))
+            else:
+                free.append(Free(("fault", len(faults)), term.gain, size))
+                faults.append(what)
+        else:
+            place = places[what.place if isinstance(what, Basis) else what[1]]
+            one, values, own = element(term, place, names[-1])
+            elements.append(one)
+            where.append(place)
+            parameters |= values
+            free += own
+    whole = extend(model, elements, parameters, where)
+    if not recordings and any(isinstance(t.candidate.what, Basis) and t.candidate.what.settled for t in terms):
+        free += [Free(("start", e, i), x, 1e-3) for e in range(settled) for i, x in enumerate(model.start[: len(model.bodies)])]
+    for i, state in enumerate(whole.extra_states[len(model.extra_states) :], len(model.states)):
+        sigma = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3}[state.unit]
+        if not state.name.endswith(("_faded", "_warm")):
+            free += [Free(("start", e, i), 0.0, 0.1 * sigma, sigma=sigma) for e in range(recordings)]
+    return Extended(whole, tuple(free), tuple(faults), frozenset(loosened), tuple(names))
+
+
+def all_free(nuisances: Sequence[Free], found: Extended) -> tuple[Free, ...]:
+    """Nuisances, those that a hypothesis set free without their priors, and what the terms add."""
+    loose = tuple(replace(f, sigma=np.inf, low=min(0.0, 10.0 * f.origin), high=max(0.0, 10.0 * f.origin)) if f.target in found.loosened else f for f in nuisances)
+    return loose + found.free

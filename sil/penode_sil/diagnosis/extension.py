@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The model file with the causes in it, and what they gain on other data with the generated C."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import penode_gen
+from penode_gen import units
+from penode_gen.laws import LAWS
+from penode_gen.model import Model, Signal
+
+from ..batch import Batch
+from ..targets import Sil
+from .build import Term
+from .fit import Free, Problem
+from .hypotheses import Basis, Fault, size
+from .noise import Experiment, metric
+from .plant import anonymous
+from .result import Cause, Gain, Value
+from .search import Explanation
+from .study import Study, watched, widened
+
+Array = NDArray[np.float64]
+
+
+def _table(values: dict[str, object]) -> str:
+    return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in values.items()) + " }"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return repr(float(f"{value:.7g}"))
+
+
+def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> tuple[str, Model]:
+    """Text of model_extended.toml, and the model that it describes."""
+    model = study.model
+    lines = [
+        f"# What the recordings taught about {model.path.name}: " + (", ".join(f"{c.kind} at {c.where or '?'}" for c in causes) or "nothing") + ".",
+        "", "[model]", f"extends = {_toml(str(model.path.resolve()))}", f"name = {_toml(model.name + '_extended')}",
+        f"sample_time = {_toml(f'{model.sample_time:.12g} s')}", "",
+    ]  # fmt: skip
+    if any(c.kind == "integration_error" for c in causes):
+        lines[-1:] = ['method = "rk4"', 'input = "linear"', ""]
+    if e is not None:
+        substeps = max([1, *(_fine(study, t, n, e) for t, n in zip(e.terms, e.built.names))])
+        delays = [f.value for f in e.fit.free if f.target[0] == "delay" and f.value > 0.02 * model.sample_time]
+        substeps = max([substeps, *(int(np.ceil(2.0 * model.sample_time / d)) for d in delays)])
+        if substeps > model.substeps:
+            lines.insert(-1, f"substeps = {substeps}")
+    if e is None:
+        text = "\n".join(lines)
+        return text, _load(text)
+    values = {f.target: f.value for f in e.fit.free}
+    taken = {*model.parameters, *model.states, *(x.name for x in model.elements), *(s.name for s in model.sensors)}
+    rename = {}
+    for term, name in zip(e.terms, e.built.names):
+        stem = term.candidate.kind.replace("network_extrapolation", "beyond_range")  # network_ is the generator's own
+        new, number = stem, 1
+        while new in taken or new in rename.values():
+            number += 1
+            new = f"{stem}_{number}"
+        rename[name] = new
+
+    def named(text: str) -> str:
+        return re.sub(r"\b((?:F_)?)(x\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
+
+    parameters = []
+    for p in e.built.model.parameters.values():
+        known = model.parameters.get(p.name)
+        value = values.get(p.name, p.value)
+        if known is None:
+            parameters.append(f"{named(p.name)} = {_table({'value': value, 'unit': p.unit})}")
+        elif p.name in values and value != known.value:
+            more = {"tolerance": known.tolerance} if known.tolerance else {}
+            more |= {"tunable": True} if known.tunable else {}
+            more |= {"description": known.description} if known.description else {}
+            parameters.append(f"{p.name} = {_table({'value': value / units.factor(p.unit), 'unit': p.unit, **more})}")
+    elements = []
+    for x in e.built.model.elements[len(model.elements) :]:
+        entry: dict[str, object] = {"between": x.ends, "law": x.law}
+        entry |= {"force": named(x.expression)} if x.law == "expression" else {k: named(x.arguments[k]) for k in LAWS[x.law].arguments}
+        elements.append(f"{named(x.name)} = {_table(entry)}")
+    sensors, states, equations = [], [], []
+    changed: dict[Signal, str] = {}
+    for j, (s, old) in enumerate(zip(e.built.model.sensors, model.sensors)):
+        expression = named(s.expression)
+        unit = units.si(s.unit)
+        bent = _bent(e, values, j, f"({expression})", s.name, unit, parameters)
+        if bent:
+            expression = f"{expression} + {bent}"
+        if values.get(("delay", j), 0.0) > 0.02 * model.sample_time:
+            parameters.append(f"delay_{s.name} = {_table({'value': max(values[('delay', j)], 1e-9), 'unit': 's'})}")
+            states.append(f"late_{s.name} = {_table({'unit': unit})}")
+            equations.append(f"late_{s.name} = {_toml(f'der(late_{s.name})*delay_{s.name} = 2*({expression} - late_{s.name})')}")
+            expression = f"2*late_{s.name} - ({expression})"
+        if ("scale", j) in values:
+            parameters.append(f"gain_{s.name} = {_table({'value': 1.0 + values[('scale', j)], 'unit': '1'})}")
+            expression = f"gain_{s.name}*({expression})"
+        if ("bias", j) in values:
+            parameters.append(f"bias_{s.name} = {_table({'value': values[('bias', j)], 'unit': unit})}")
+            expression = f"{expression} + bias_{s.name}"
+        if expression != old.expression and s.name in model.states:
+            lines[0] += f" The sensor {s.name} has the name of a state, so its fault cannot be written here: rename it."
+        elif expression != old.expression:
+            changed[s] = expression
+            sensors.append(f"{s.name} = {_table({'value': expression, 'unit': s.unit, 'noise': s.noise / units.factor(s.unit)})}")
+    measured = {s.name: entry for s, entry in changed.items()}  # one name means one quantity
+    outputs = [
+        f"{s.name} = {_table({'value': measured.get(s.name, named(s.expression)), 'unit': s.unit})}"
+        for s, old in zip(e.built.model.outputs, model.outputs) if s.expression != old.expression or s.name in measured
+    ]  # fmt: skip
+    for title, entries in (
+        ("parameters", parameters), ("elements", elements), ("states", states), ("equations", equations), ("outputs", outputs),
+        ("sensors", sensors),
+    ):  # fmt: skip
+        if entries:
+            lines += [f"[{title}]", *entries, ""]
+    text = "\n".join(lines)
+    return text, _load(text)
+
+
+def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
+    """Steps a sample, so that none jumps over the presliding of a friction."""
+    what = term.candidate.what
+    if not isinstance(what, Basis) or "presliding" not in what.shapes:
+        return 1
+    speed = size([s.motions[what.place] for s in study.seen])[1]
+    return min(int(np.ceil(1.5 * speed * study.model.sample_time / e.fit.value(f"{name}_presliding"))), 100)
+
+
+def _bent(
+    e: Explanation, values: dict[object, float], sensor: int, signal: str, name: str, unit: str, parameters: list[str]
+) -> str:
+    """What a scale of two sides or a bent one adds to a signal; drifts belong to their recording, not to the model."""
+    faults = [t.candidate.what for t in e.terms if isinstance(t.candidate.what, Fault)]
+    series = [f for f in faults if f.what not in ("bias", "scale", "delay")]
+    parts = []
+    for i, f in enumerate(series):
+        k = values[("fault", i)]
+        if f.sensor == sensor and f.what == "scale_side":
+            parts.append(f"{k:.7g}*abs{signal}")
+        if f.sensor == sensor and f.what == "scale_bend":
+            parts.append(f"{k:.7g}*{signal}^3/curve_{name}^2")
+            parameters.append(f"curve_{name} = {_table({'value': f.shape, 'unit': unit})}")
+    return " + ".join(parts)
+
+
+def _load(text: str) -> Model:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model_extended.toml"
+        path.write_text(text)
+        return penode_gen.load(path)
+
+
+def started(model: Model, e: Experiment, study: Study) -> Array:
+    """The start state with which a model fits a recording best, all else given."""
+    metrics = [metric(e, study.levels[0][:1].repeat(e.band, 0), np.zeros((e.band, len(model.sensors), len(model.inputs))))]
+    problem = Problem(model, [e], metrics, study.set_name, study.linear.fastest)
+    free = tuple(Free(("start", 0, i), x, 1e-3, sigma=1.0) for i, x in enumerate(model.start))
+    fit = problem.solve(free, 3)
+    return np.array([f.value for f in fit.free])
+
+
+def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
+    """Sensors [n, n_z] of the generated C (float) driven by the recorded inputs from a start state."""
+    instance = Sil(model).instance(set_name)
+    if len(start):
+        instance.set_state(start)
+    run = instance.run(e.u[1:])
+    return np.concatenate([run.z[:1], run.z]).astype(float)
+
+
+def measure(study: Study, extended: Model, holdout: Sequence[Experiment]) -> tuple[dict[str, Gain], list[str]]:
+    """Errors before and after on held-out recordings, with the generated C; how much of them lies outside of what was
+    seen in training, where a right name says nothing about size."""
+    model = study.model
+    sums = {s.name: np.zeros(3) for s in model.sensors}
+    limits = [1.02 * x for k in range(len(study.places)) for x in size([m.motions[k] for m in study.seen])]
+    outside, notes = [], []
+    for e in holdout:
+        starts = [started(m, e, study) for m in (model, extended)]
+        before, after = (deployed(m, e, x, study.set_name) for m, x in zip((model, extended), starts))
+        paths = followed(extended, e, starts[1], study)
+        beyond = np.any(np.abs(paths) > np.array(limits), axis=1)
+        outside.append(beyond)
+        if beyond.any():
+            notes.append(f"{e.name}: {np.mean(beyond):.1%} of the samples move farther or faster than in training; there the gain is extrapolated")
+        for j, s in enumerate(model.sensors):
+            good = e.good[:, j]
+            sums[s.name] += good.sum(), *(float(np.sum((e.y[good, j] - z[good, j]) ** 2)) for z in (before, after))
+    e = study.experiments[0]
+    through = study.linear.transfer(e.frequencies[: e.band])[:, :, : len(model.inputs)] * np.array([i.noise for i in model.inputs])
+    gains = {}
+    for j, s in enumerate(model.sensors):
+        n, b, a = sums[s.name]
+        if n == 0:
+            continue
+        floor = float(np.sqrt(np.mean(study.levels[0][:, j]) + np.mean(np.sum(np.abs(through[:, j]) ** 2, axis=1))))
+        before_rmse, after_rmse = float(np.sqrt(b / n)), float(np.sqrt(a / n))
+        room = before_rmse - floor
+        share = (before_rmse - after_rmse) / room if room > 0.05 * floor else None
+        gains[s.name] = Gain(before_rmse, after_rmse, floor, share, units.si(s.unit), float(np.mean(np.concatenate(outside))))
+    return gains, notes
+
+
+def followed(model: Model, e: Experiment, start: Array, study: Study) -> Array:
+    """Deflection and rate [n, 2 places] of all places in a simulation."""
+    problem = Problem(watched(model, study.places), [widened(e, 2 * len(study.places))], study.metrics[:1], study.set_name, study.linear.fastest)
+    free = tuple(Free(("start", 0, i), x, 1.0) for i, x in enumerate(start))
+    return np.array(problem.simulate(0, free, np.zeros((1, len(free))))[0][0][:, -2 * len(study.places) :])
+
+
+COARSE = 0.02  # of a signal: what the deployed step may err by
+
+
+def numerics(study: Study) -> tuple[dict[str, object], Cause | None]:
+    """Error of the deployed step on the first training recording, against the exact solution of the same model with the same
+    start and input; and the cause `integration_error` if that is more than COARSE of a signal and more than its noise."""
+    model, e = study.model, study.experiments[0]
+    fixed = tuple(f for f in study.null.free if f.target[0] == "start")
+    start = np.array([next((f.value for f in fixed if f.target == ("start", 0, i)), x) for i, x in enumerate(model.start)])
+    problem = Problem(model, study.experiments[:1], study.metrics[:1], study.set_name, study.linear.fastest)
+    exact = problem.simulate(0, fixed, np.zeros((1, len(fixed))))[0][0]
+    stepped = Batch(anonymous(model)).run(e.drive, x0=start, set_name=study.set_name).z[0]
+    found: dict[str, object] = {}
+    parameters: dict[str, Value] = {}
+    for j, s in enumerate(model.sensors):
+        error, signal = float(np.sqrt(np.mean((stepped[:, j] - exact[:, j]) ** 2))), float(np.std(exact[:, j]))
+        found[s.name] = {"rms_error": error, "unit": units.si(s.unit), "share_of_signal": error / signal if signal else 0.0}
+        if error > COARSE * signal and error**2 > float(np.mean(study.levels[0][:, j])):
+            parameters[f"rms_error_{s.name}"] = Value(error, units.si(s.unit), (error, error))
+    return found, Cause("integration_error", model.name, parameters, 0.99) if parameters else None

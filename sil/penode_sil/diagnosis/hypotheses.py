@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What may be wrong: every kind of cause as a family of elementary laws, none of which is a formula of its own.
+
+A kind is known by its features (odd or even, growing faster or slower than linear, one side, threshold, memory of amplitude
+or of rate, slow in time), and its family is a set of basis functions with exactly those features, on a grid of shapes. A sum
+of a few of them with the signs of the kind comes close to any curve of that kind; the textbook law is a sum of one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+import penode_gen
+from penode_gen.model import GROUND
+
+from ..batch import Batch
+from .plant import Place
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Basis:
+    """One elementary law at a place: `law` is a named one, or an expression; `gain` names the argument that multiplies it,
+    `shapes` are the others; `sign` is that of the gain (0: either). `series` is its force for gain 1, per recording."""
+
+    kind: str
+    place: int
+    law: str
+    gain: tuple[str, str]
+    shapes: dict[str, tuple[float, str]]
+    sign: int
+    series: tuple[Array, ...] = field(repr=False)
+    companion: bool = False  # may help another of its kind, but is no cause alone
+    settled: bool = False  # acted already long before the start
+    fixed: dict[str, tuple[float, str]] = field(default_factory=dict)  # shapes that are known
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One elementary fault of a sensor: `series` is what it adds to that sensor for gain 1, per recording."""
+
+    kind: str
+    sensor: int
+    what: str
+    sign: int
+    series: tuple[Array, ...] = field(repr=False)
+    shape: float = 0.0
+    companion: bool = False
+
+    def of(self, y: Array, recording: int) -> Array:
+        """What it adds for gain 1 to a simulated signal [..., n]; a fault of scale must not be told by what was measured."""
+        match self.what:
+            case "scale_side":
+                return np.abs(y)
+            case "scale_bend":
+                return y**3 / max(self.shape, 1e-300) ** 2
+            case "scale_drift":
+                return y * (np.arange(y.shape[-1]) / y.shape[-1] - 0.5)
+            case "clip":
+                return -np.sign(self.shape) * np.maximum(np.sign(self.shape) * y - abs(self.shape), 0.0)
+        return self.series[recording]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Deflection, rate [n] of a place in one recording, and the time [s] since its start."""
+
+    s: Array
+    v: Array
+    t: Array
+
+
+def size(motions: Sequence[Motion]) -> tuple[float, float]:
+    """What deflection and rate reach, but for a thousandth of the time."""
+    pairs = [(np.quantile(np.abs(m.s), 0.999), np.quantile(np.abs(m.v), 0.999)) for m in motions]
+    return tuple(float(max(p[k] for p in pairs)) for k in (0, 1))
+
+
+HYSTERESIS = """
+[model]
+name = "hysteresis"
+sample_time = "1 s"
+substeps = 4
+[parameters]
+one = { value = 1, unit = "N" }
+width = { value = 1, unit = "m" }
+[inputs]
+x = { unit = "m" }
+[elements]
+wen = { between = ["x", "ground"], law = "bouc_wen", force = "one", presliding = "width" }
+dahl = { between = ["x", "ground"], law = "dahl_friction", force = "one", presliding = "width" }
+[outputs]
+wen = { value = "wen_slip", unit = "1" }
+dahl = { value = "dahl_slip", unit = "1" }
+"""
+
+
+@cache
+def _hysteresis() -> Batch:
+    """Both laws with memory of the way, under prescribed motion."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "hysteresis.toml"
+        path.write_text(HYSTERESIS)
+        return Batch(penode_gen.load(path))
+
+
+def slips(s: Array, widths: Sequence[float]) -> Array:
+    """Slip [2 widths, n] of the laws bouc_wen, then dahl_friction, starting without force."""
+    z = _hysteresis().run((s - s[0])[:, None], parameters={"width": np.asarray(widths)}, outputs=("wen", "dahl")).y
+    return np.clip(np.concatenate([z[:, :, 0], z[:, :, 1]]), -1.0, 1.0)
+
+
+def lag(x: Array, tau: float, step: float) -> Array:
+    """First-order lag of x."""
+    a = np.exp(-step / tau)
+    return lfilter([1.0 - a], [1.0, -a], x)
+
+
+GRID = (0.03, 0.06, 0.12, 0.25, 0.5)
+
+
+def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, prescribed: bool) -> Iterator[Basis]:
+    """All elementary laws that may act at a place."""
+    reach, speed = size(motions)
+    if p.role == "body" or GROUND in p.ends:
+        yield from _constant(place, motions)
+    if p.role == "body":
+        return
+    if reach <= 0.0 or speed <= 0.0:
+        return
+
+    def each(function) -> tuple[Array, ...]:
+        return tuple(function(m.s, m.v, m.t) for m in motions)
+
+    def law(kind, name, gain, shapes, sign, function, companion=False, fixed={}) -> Basis:
+        return Basis(kind, place, name, gain, shapes, sign, each(function), companion, False, fixed)
+
+    k, d, n = ("stiffness", "N/m"), ("damping", "N*s/m"), ("force", "N")
+    if p.role == "tyre":
+        yield law("tyre_damping", "linear_damper", d, {}, 1, lambda s, v, t: v)
+        for tau in (0.002, 0.006, 0.02, 0.06):
+            yield law("tyre_damping", "maxwell_bushing", k, {"relaxation": (tau, "s")}, 1, lambda s, v, t: s - lag(s, tau, step))
+        top = max(float(np.quantile(m.s, 0.9995)) for m in motions)
+        for share in (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9):
+            g = share * top
+            yield law("tyre_liftoff", "liftoff", k, {"static": (g, "m")}, 1, lambda s, v, t: -np.maximum(s - g, 0.0))
+        for sign in (1, -1):
+            yield law("tyre_nonlinear", "quadratic_spring", ("quadratic", "N/m^2"), {}, sign, lambda s, v, t: s * s)
+            yield law("tyre_nonlinear", "cubic_spring", ("cubic", "N/m^3"), {}, sign, lambda s, v, t: s**3, True)
+            yield law("tyre_nonlinear", "k*s*abs(s)", ("k", "N/m^2"), {}, sign, lambda s, v, t: s * np.abs(s), True)
+            yield law("tyre_nonlinear", "linear_spring", k, {}, sign, lambda s, v, t: s, True)
+        return
+
+    # a network beyond the range that it was trained on
+    for _, what, low, high in p.trained:
+        for edge, side in ((high, 1), (low, -1)):
+            far = max(float(np.quantile(side * (m.s if what == "s" else m.v), 0.995)) for m in motions)
+            if far <= side * edge:
+                continue
+            gap = side * edge
+            unit = "N/m" if what == "s" else "N*s/m"
+            over = f"max({what} - gap, 0)" if side > 0 else f"min({what} + gap, 0)"
+            for sign in (1, -1):
+                yield law(
+                    "network_extrapolation", f"k*{over}", ("k", unit), {}, sign,
+                    lambda s, v, t: side * np.maximum(side * (s if what == "s" else v) - gap, 0.0), fixed={"gap": (gap, "m" if what == "s" else "m/s")},
+                )  # fmt: skip
+                yield law(
+                    "network_extrapolation", f"k*{over}^2", ("k", f"{unit.replace('/m', '/m^2')}"), {}, sign,
+                    lambda s, v, t: np.maximum(side * (s if what == "s" else v) - gap, 0.0) ** 2, fixed={"gap": (gap, "m" if what == "s" else "m/s")},
+                )  # fmt: skip
+    # friction: odd, constant in rate, little or no deflection before it slides
+    slide = [0.003, 0.01, 0.03, 0.06]
+    for w in slide:
+        a = w * speed
+        yield law("coulomb_friction", "coulomb_friction", n, {"transition": (a, "m/s")}, 1, lambda s, v, t: np.tanh(v / a))
+        yield law("stribeck_friction", "coulomb_friction", n, {"transition": (a, "m/s")}, 1, lambda s, v, t: np.tanh(v / a), True)
+    # hysteresis: odd, memory of the way since the last reversal; with little of it, friction
+    widths = [w * reach for w in (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)]
+    widths = [w for w in widths if w > 0.3 * speed * step]  # a sample must not jump over it
+    slipped = [slips(m.s, widths) if widths else np.empty((0, len(m.s))) for m in motions]
+    for row, (name, a) in enumerate([(name, a) for name in ("bouc_wen", "dahl_friction") for a in widths]):
+        kind = "coulomb_friction" if a < 0.05 * reach else "bouc_wen"
+        yield Basis(kind, place, name, n, {"presliding": (a, "m")}, 1, tuple(each_slip[row] for each_slip in slipped))
+        if name == "bouc_wen" and kind == name and prescribed:  # a play shows in series with friction where no mass is in between
+            flat = tuple(each_slip[row] ** 5 for each_slip in slipped)
+            yield Basis("backlash", place, "slack_friction", n, {"presliding": (a, "m")}, 1, flat)
+    for w in (0.01, 0.02, 0.04, 0.08, 0.16, 0.3):
+        a = w * speed
+        yield law(
+            "stribeck_friction", "2.3316439815971242*k*exp(-(v/width)^2)*v/width", ("k", "N"), {"width": (a, "m/s")}, 1,
+            lambda s, v, t: 2.3316439815971242 * np.exp(-((v / a) ** 2)) * v / a,
+        )  # fmt: skip
+    # relaxation: linear, memory in time
+    for tau in (0.004, 0.01, 0.025, 0.06, 0.15, 0.4, 1.0):
+        yield law("maxwell_bushing", "maxwell_bushing", k, {"relaxation": (tau, "s")}, 1, lambda s, v, t: s - lag(s, tau, step))
+    # dampers: odd and slower than linear, odd and faster, even, fading
+    for w in (0.06, 0.15, 0.4, 1.0, 2.5):
+        a = w * speed
+        yield law(
+            "degressive_damper", "degressive_damper", d, {"knee": (a, "m/s")}, 1, lambda s, v, t: -v * np.abs(v) / (a + np.abs(v))
+        )
+    for w in GRID:
+        a = w * speed
+        yield law(
+            "degressive_damper", "-k*(max(v - knee, 0) + min(v + knee, 0))", ("k", "N*s/m"), {"knee": (a, "m/s")}, 1,
+            lambda s, v, t: np.clip(v, -a, a) - v,
+        )  # fmt: skip
+        if w > 0.1:
+            yield law(
+                "quadratic_damper", "k*(max(v - knee, 0) + min(v + knee, 0))", ("k", "N*s/m"), {"knee": (a, "m/s")}, 1,
+                lambda s, v, t: v - np.clip(v, -a, a),
+            )  # fmt: skip
+    yield law("degressive_damper", "linear_damper", d, {}, 0, lambda s, v, t: v, True)
+    yield law("quadratic_damper", "quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, 1, lambda s, v, t: v * np.abs(v))
+    yield law("quadratic_damper", "k*v^3", ("k", "N*s^3/m^3"), {}, 1, lambda s, v, t: v**3)
+    yield law("quadratic_damper", "linear_damper", d, {}, 0, lambda s, v, t: v, True)
+    for sign in (1, -1):
+        yield law("asymmetric_damper", "k*abs(v)", ("k", "N*s/m"), {}, sign, lambda s, v, t: np.abs(v))
+        yield law("asymmetric_damper", "k*v^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: v * v)
+        for w in (0.1, 0.3):
+            a = w * speed
+            yield law(
+                "asymmetric_damper", "k*(max(v - knee, 0) - min(v + knee, 0))", ("k", "N*s/m"), {"knee": (a, "m/s")}, sign,
+                lambda s, v, t: np.maximum(np.abs(v) - a, 0.0),
+            )  # fmt: skip
+    yield law("asymmetric_damper", "linear_damper", d, {}, 0, lambda s, v, t: v, True)
+    last = max(float(m.t[-1]) for m in motions)
+    for sign in (1, -1):
+        for w in (0.1, 0.3, 1.0, 10.0):
+            a = w * last
+            yield law(
+                "damper_fading", "fading_damper", d, {"time": (a, "s")}, sign, lambda s, v, t: v * (1.0 - np.exp(-t / a))
+            )
+        work = max(float(np.trapezoid(m.v**2, m.t)) for m in motions)
+        for w in (0.3, 1.0, 10.0):
+            a = w * work
+            yield law(
+                "damper_fading", "heating_damper", d, {"work": (a, "m^2/s")}, sign,
+                lambda s, v, t: v * (1.0 - np.exp(-np.cumsum(v * v) * (t[1] - t[0]) / a)),
+            )  # fmt: skip
+    # springs: odd and faster or slower than linear, even, beyond a gap, missing within a gap
+    for sign in (1, -1):
+        yield law("cubic_spring", "cubic_spring", ("cubic", "N/m^3"), {}, sign, lambda s, v, t: s**3)
+        yield law("cubic_spring", "k*s*abs(s)", ("k", "N/m^2"), {}, sign, lambda s, v, t: s * np.abs(s))
+        yield law("cubic_spring", "k*s^5", ("k", "N/m^5"), {}, sign, lambda s, v, t: s**5)
+        yield law("asymmetric_spring", "k*abs(s)", ("k", "N/m"), {}, sign, lambda s, v, t: np.abs(s))
+        yield law("asymmetric_spring", "quadratic_spring", ("quadratic", "N/m^2"), {}, sign, lambda s, v, t: s * s)
+    yield law("cubic_spring", "linear_spring", k, {}, 0, lambda s, v, t: s, True)
+    yield law("asymmetric_spring", "linear_spring", k, {}, 0, lambda s, v, t: s, True)
+    for side, name in ((1, "bump_stop"), (-1, "rebound_stop")):
+        far = max(float(np.quantile(side * m.s, 0.9995)) for m in motions)
+        for w in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9):
+            g = w * far
+            if g <= 0.0:
+                continue
+            yield law("bump_stop", name, k, {"gap": (g, "m")}, 1, lambda s, v, t: side * np.maximum(side * s - g, 0.0))
+            text = "k*max(s - gap, 0)^2" if side > 0 else "-k*min(s + gap, 0)^2"
+            yield law("bump_stop", text, ("k", "N/m^2"), {"gap": (g, "m")}, 1, lambda s, v, t: side * np.maximum(side * s - g, 0.0) ** 2)
+    for w in (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5):
+        g = w * reach
+        yield law("backlash", "backlash", k, {"gap": (g, "m")}, 1, lambda s, v, t: -np.clip(s, -g, g))
+
+
+def _constant(place: int, motions: Sequence[Motion]) -> Iterator[Basis]:
+    ones = tuple(np.ones_like(m.t) for m in motions)
+    for settled in (False, True):
+        yield Basis("constant_force", place, "constant_force", ("force", "N"), {}, 0, ones, False, settled)
+
+
+def sensor_faults(sensor: int, signals: Sequence[Array], times: Sequence[Array], step: float) -> Iterator[Fault]:
+    """All elementary faults of a sensor that should measure `signals`."""
+
+    def fault(kind, what, sign, function, shape=0.0, companion=False) -> Fault:
+        return Fault(kind, sensor, what, sign, tuple(function(y, t) for y, t in zip(signals, times)), shape, companion)
+
+    yield fault("sensor_bias", "bias", 0, lambda y, t: np.ones_like(y))
+    yield fault("sensor_scale", "scale", 0, lambda y, t: y)
+    yield fault("sensor_delay", "delay", 1, lambda y, t: -np.gradient(y, step))
+    top = max(float(np.max(np.abs(y))) for y in signals)
+    for side in (1, -1):
+        for w in (0.3, 0.5, 0.7, 0.85):
+            edge = w * top
+            yield fault("sensor_clipping", "clip", 1, lambda y, t: -side * np.maximum(side * y - edge, 0.0), side * edge)
+    # slow or bent forms of the same
+    last = max(float(t[-1]) for t in times)
+    for w in (0.1, 0.3):
+        yield fault("sensor_bias", "warming", 0, lambda y, t: 1.0 - np.exp(-t / (w * last)), w * last, True)
+    yield fault("sensor_bias", "drift", 0, lambda y, t: t / last - 0.5, 0.0, True)
+    for m in (1, 2, 3):
+        yield fault("sensor_bias", "drift", 0, lambda y, t: np.cos(m * np.pi * t / last), float(m), True)
+    yield fault("sensor_scale", "scale_drift", 0, lambda y, t: y * (t / last - 0.5), 0.0, True)
+    yield fault("sensor_scale", "scale_side", 0, lambda y, t: np.abs(y), 0.0, True)
+    yield fault("sensor_scale", "scale_bend", 0, lambda y, t: y**3 / max(top, 1e-300) ** 2, top, True)

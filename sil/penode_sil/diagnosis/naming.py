@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""From fitted elementary laws to the parameters that a vehicle engineer asks for, with intervals.
+
+Each parameter is a function of the whole curve of its kind, not of a formula: the friction force is where the curve ends,
+a gap where it begins. Its interval follows from the covariance of all that was fitted (delta method).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from penode_gen import units
+from penode_gen.model import Model
+
+from .build import Term
+from .hypotheses import Basis, Fault, size
+from .plant import Place
+from .result import Value
+from .search import Explanation, Group
+from .study import Study
+
+Array = NDArray[np.float64]
+Values = Mapping[object, float]
+
+
+def nominal(model: Model, place: Place, law: str, argument: str, values: Values) -> float:
+    """Sum of what the linear elements of a place have already, with what was fitted."""
+    total = 0.0
+    for e in model.elements:
+        if e.law == law and any(name == e.name for name, _ in place.elements):
+            name = e.arguments[argument]
+            total += values.get(name, model.parameters[name].value)
+    return total
+
+
+class Curve:
+    """The force of a group of terms over deflection or rate, for any values of what is free."""
+
+    def __init__(self, terms: Sequence[Term], names: Sequence[str]):
+        self.parts = [(t, n) for t, n in zip(terms, names) if isinstance(t.candidate.what, Basis)]
+
+    def __call__(self, s: Array, v: Array, values: Values) -> Array:
+        total = np.zeros_like(s)
+        for term, name in self.parts:
+            what = term.candidate.what
+            gain = values.get(f"{name}_{what.gain[0]}", term.gain)
+            a = {k: values.get(f"{name}_{k}", x) for k, (x, _) in (what.shapes | what.fixed).items()}
+            total = total + gain * shape(what.law, s, v, a)
+        return total
+
+
+def shape(law: str, s: Array, v: Array, a: Mapping[str, float]) -> Array:
+    """A memoryless elementary law for gain 1; hysteresis as it is long after a reversal, relaxation as it is at first."""
+    match law:
+        case "linear_spring" | "maxwell_bushing":
+            return s
+        case "linear_damper":
+            return v
+        case "coulomb_friction":
+            return np.tanh(v / a["transition"])
+        case "bouc_wen" | "dahl_friction" | "slack_friction":
+            return np.sign(v)
+        case "degressive_damper":
+            return -v * np.abs(v) / (a["knee"] + np.abs(v))
+        case "quadratic_damper":
+            return v * np.abs(v)
+        case "cubic_spring":
+            return s**3
+        case "quadratic_spring":
+            return s * s
+        case "bump_stop":
+            return np.maximum(s - a["gap"], 0.0)
+        case "rebound_stop":
+            return np.minimum(s + a["gap"], 0.0)
+        case "backlash":
+            return -np.clip(s, -a["gap"], a["gap"])
+        case "liftoff":
+            return -np.maximum(s - a["static"], 0.0)
+        case "constant_force":
+            return np.ones_like(s)
+        case "fading_damper" | "heating_damper":
+            return v
+    words = {"s": s, "v": v, "k": 1.0, "abs": np.abs, "exp": np.exp, "max": np.maximum, "min": np.minimum} | dict(a)
+    return eval(law.replace("^", "**"), {"__builtins__": {}}, words)  # one of our own texts
+
+
+def line(x: Array, y: Array, *others: Array) -> float:
+    """Least-squares factor of x in y, beside others."""
+    return float(np.linalg.lstsq(np.stack([x, *others], axis=1), y, rcond=None)[0][0])
+
+
+def functions(
+    study: Study, e: Explanation, group: Group, reach: float, speed: float
+) -> dict[str, tuple[str, Callable[[Values], float]]]:
+    """Name, unit and value as a function of all that is free, for the parameters of one cause."""
+    kind, where = group
+    terms, names = zip(*[(t, n) for t, n in zip(e.terms, e.built.names) if t.group == group])
+    what = terms[0].candidate.what
+    model = study.model
+    curve = Curve(terms, names)
+    if isinstance(what, str):
+        unit = model.parameters[what].unit
+        return {what: (unit, lambda p: p[what])}
+    if isinstance(what, Fault):
+        return _fault(model, kind, what)
+    if isinstance(what, tuple):
+        best = max(range(len(terms)), key=lambda i: terms[i].gain)
+        n = names[best]
+        m, k, d = (f"{n}_{key}" for key in ("mass", "stiffness", "damping"))
+        return {
+            "frequency": ("Hz", lambda p: np.sqrt(p[k] / p[m]) / (2 * np.pi)),
+            "mass": ("kg", lambda p: p[m]),
+            "damping_ratio": ("1", lambda p: p[d] / (2 * np.sqrt(p[k] * p[m]))),
+        }
+    place = study.places[what.place]
+    v = np.linspace(-speed, speed, 401)
+    s = np.linspace(-reach, reach, 401)
+    zero = np.zeros_like(v)
+    d0 = lambda p: nominal(model, place, "linear_damper", "damping", p)  # noqa: E731
+    c0 = lambda p: nominal(model, place, "linear_spring", "stiffness", p)  # noqa: E731
+    up = v[v > 0.0]
+    flat = np.zeros_like(up)
+    match kind:
+        case "coulomb_friction":
+            return {"force": ("N", lambda p: float(curve(zero[:1], np.array([speed]), p)[0]))}
+        case "stribeck_friction":
+            fine = np.geomspace(1e-4 * speed, speed, 600)
+            fz = np.zeros_like(fine)
+
+            def rate(p: Values) -> float:
+                f = curve(fz, fine, p)
+                top = int(np.argmax(f))
+                below = np.flatnonzero(f[top:] - f[-1] < (f[top] - f[-1]) / np.e)
+                if not below.size or not below[0]:
+                    return float(fine[-1])
+                k = top + below[0]
+                level = f[-1] + (f[top] - f[-1]) / np.e
+                return float(np.interp(level, f[k - 1 : k + 1][::-1], fine[k - 1 : k + 1][::-1]))
+
+            return {
+                "breakaway": ("N", lambda p: float(np.max(curve(fz, fine, p)))),
+                "coulomb": ("N", lambda p: float(curve(fz[-1:], fine[-1:], p)[0])),
+                "stribeck_rate": ("m/s", rate),
+            }
+        case "cubic_spring":
+            return {"cubic": ("N/m^3", lambda p: line(s**3, curve(s, zero, p), s))}
+        case "asymmetric_spring":
+            return {"difference": ("N/m", lambda p: -2.0 * line(np.abs(s), curve(s, zero, p), s))}
+        case "bump_stop":
+            ends = np.array([-reach, reach])
+            main = max(range(len(terms)), key=lambda i: np.max(np.abs(Curve(terms[i : i + 1], names[i : i + 1])(ends, 0.0 * ends, {}))))
+            n, law = names[main], terms[main].candidate.what.law
+            side = -1.0 if law == "rebound_stop" or "min" in law else 1.0
+
+            def stiffness(p: Values) -> float:
+                gap = p[f"{n}_gap"]
+                x = side * np.linspace(gap, max(reach, 1.05 * gap), 50)
+                return line(x - side * gap, curve(x, np.zeros_like(x), p))
+
+            return {"gap": ("m", lambda p: p[f"{n}_gap"]), "stiffness": ("N/m", stiffness)}
+        case "backlash":
+            main = max(range(len(terms)), key=lambda i: terms[i].gain)
+            n, slack = names[main], terms[main].candidate.what.law == "slack_friction"
+            return {"gap": ("m", lambda p: 1.4 * p[f"{n}_presliding"] if slack else 2.0 * p[f"{n}_gap"])}
+        case "asymmetric_damper":
+            return {
+                "rebound": ("N*s/m", lambda p: d0(p) + line(up, curve(flat, up, p))),
+                "compression": ("N*s/m", lambda p: d0(p) + line(-up, curve(flat, -up, p))),
+            }
+        case "degressive_damper":
+            low = np.linspace(0.0, 0.05 * speed, 20)[1:]
+            high = np.linspace(0.9 * speed, speed, 20)
+            z = np.zeros(19)
+
+            def knee(p: Values) -> float:
+                a, b = d0(p) + line(low, curve(z, low, p)), d0(p) + line(high - high[0], curve(np.zeros(20), high, p), np.ones(20))
+                top = d0(p) * speed + float(curve(zero[:1], np.array([speed]), p)[0])
+                return float(np.clip((top - b * speed) / (a - b), 0.0, speed)) if a != b else speed
+
+            return {
+                "knee": ("m/s", knee),
+                "low_rate_damping": ("N*s/m", lambda p: d0(p) + line(low, curve(z, low, p))),
+                "high_rate_damping": ("N*s/m", lambda p: d0(p) + line(high, curve(np.zeros(20), high, p), np.ones(20))),
+            }
+        case "quadratic_damper":
+            return {"coefficient": ("N*s^2/m^2", lambda p: line(v * np.abs(v), curve(zero, v, p), v))}
+        case "damper_fading":
+
+            def loss(p: Values) -> float:
+                m = study.seen[0].motions[what.place]
+                work = float(np.trapezoid(m.v**2, m.t))
+                total = 0.0
+                for t, n in zip(terms, names):
+                    basis = t.candidate.what
+                    done = m.t[-1] / p[f"{n}_time"] if basis.law == "fading_damper" else work / p[f"{n}_work"]
+                    total += p[f"{n}_damping"] * (1.0 - np.exp(-done))
+                return -total / d0(p)
+
+            return {"loss": ("1", loss)}
+        case "bouc_wen":
+            pairs = [(f"{n}_force", f"{n}_presliding") for n in names]
+            force = lambda p: sum(p[f] for f, _ in pairs)  # noqa: E731
+            return {
+                "force": ("N", force),
+                "yield_deflection": ("m", lambda p: force(p) / max(sum(p[f] / p[w] for f, w in pairs), 1e-300)),
+            }
+        case "maxwell_bushing":
+            pairs = [(f"{n}_stiffness", f"{n}_relaxation") for n in names]
+            total = lambda p: sum(p[k] for k, _ in pairs)  # noqa: E731
+            return {
+                "stiffness": ("N/m", total),
+                "relaxation_time": ("s", lambda p: sum(p[k] * p[t] for k, t in pairs) / max(total(p), 1e-300)),
+            }
+        case "tyre_liftoff":
+            main = max(range(len(terms)), key=lambda i: terms[i].gain)
+            return {"preload": ("N", lambda p: c0(p) * p[f"{names[main]}_static"])}
+        case "tyre_damping":
+
+            def damping(p: Values) -> float:
+                total = 0.0
+                for t, n in zip(terms, names):
+                    b = t.candidate.what
+                    total += p[f"{n}_damping"] if b.law == "linear_damper" else p[f"{n}_stiffness"] * p[f"{n}_relaxation"]
+                return total
+
+            return {"damping": ("N*s/m", damping)}
+        case "tyre_nonlinear":
+            return {"quadratic": ("N/m^2", lambda p: -line(s * s, curve(s, zero, p), s, s**3))}
+        case "network_extrapolation":
+            edge = max(abs(x) for _, quantity, low, high in place.trained if quantity == "s" for x in (low, high))
+            return {"force_at_peak": ("N", lambda p: float(np.max(np.abs(curve(s, zero, p))))), "edge": ("m", lambda p: edge)}
+        case "constant_force":
+            sense = 1.0 if any(end in {i.name for i in model.inputs} for end in place.ends) else -1.0
+            return {"force": ("N", lambda p: sense * p[f"{names[0]}_force"])}
+    raise AssertionError(f"no parameters are known for {kind}")
+
+
+def _fault(model: Model, kind: str, what: Fault) -> dict[str, tuple[str, Callable[[Values], float]]]:
+    unit, j = model.sensors[what.sensor].unit, what.sensor
+    si = units.si(unit)
+    match kind:
+        case "sensor_bias":
+            return {"bias": (si, lambda p: p.get(("bias", j), 0.0))}
+        case "sensor_scale":
+            return {"scale": ("1", lambda p: 1.0 + p.get(("scale", j), 0.0))}
+        case "sensor_delay":
+            return {"delay": ("s", lambda p: p[("delay", j)])}
+    return {}
+
+
+def values(study: Study, e: Explanation, group: Group) -> dict[str, Value]:
+    """All parameters of a cause with their intervals."""
+    free = e.fit.free
+    centre = {f.target: f.value for f in free}
+    terms = [t for t in e.terms if t.group == group]
+    what = terms[0].candidate.what
+    reach, speed = size([s.motions[what.place] for s in study.seen]) if isinstance(what, Basis) else (1.0, 1.0)
+    found = functions(study, e, group, reach, speed)
+    priors = np.array([(f.unit / f.sigma) ** 2 for f in free])
+    curvature = e.fit.jacobian.T @ e.fit.jacobian + np.diag(priors)
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
+    covariance = np.linalg.pinv(curvature * np.outer(scale, scale), rcond=1e-10) * np.outer(scale, scale)
+    covariance *= max(1.0, e.fit.chi2 / len(e.fit.residual))
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    result = {}
+    for name, (unit, function) in found.items():
+        middle = float(function(centre))
+        slope = np.zeros(len(free))
+        for i, f in enumerate(free):
+            if isinstance(f.target, tuple) and f.target[0] in ("start", "skew"):
+                continue
+            step = min(0.1 * deviation[i], 0.01) if f.log else 0.1 * deviation[i]
+            if step > 0.0:
+                moved = float(function(centre | {f.target: float(f.at(step))}))
+                slope[i] = (moved - middle) / step
+        sigma = float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+        result[name] = Value(middle, unit, (middle - 1.96 * sigma, middle + 1.96 * sigma))
+    return result

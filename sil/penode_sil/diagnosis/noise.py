@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What measurement alone does to a residual, and the metric that follows from it.
+
+At each frequency the residuals of all sensors have the covariance S = S_sensor + |G|^2 S_input: noise of the sensors, and
+noise of the measured inputs that went through the linearised plant. The latter is common to all sensors. A residual times
+the inverse root of S is white with variance 1, so that its sum of squares is the log likelihood (Whittle), and noise of the
+road cannot be mistaken for a delay or a scale of a sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.interpolate import CubicSpline
+
+from ..noise import Noise
+
+Array = NDArray[np.float64]
+TOP = 100.0  # [Hz] what vehicles do above it is not looked at, but for the noise
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """One recording on the model's raster: inputs u [n, n_u], sensors y [n, n_z] (NaN nowhere), and which samples are good.
+
+    `drive`, `rate` [n, n_u] are the inputs as they most likely were and their rates, `unsure` [f, n_u] the standard
+    deviation of what is left of their noise (see prepare).
+    """
+
+    name: str
+    time: Array
+    u: Array
+    y: Array
+    good: NDArray[np.bool_]
+    drive: Array
+    rate: Array
+    unsure: Array
+    quiet: Array  # variance per sample that a sensor's own record shows, [f, n_z]; NaN where it shows none
+
+    @property
+    def step(self) -> float:
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def frequencies(self) -> Array:
+        """All frequencies of its spectra [Hz]."""
+        return fft.rfftfreq(len(self.time), self.step)
+
+    @property
+    def band(self) -> int:
+        """How many of them are looked at."""
+        return max(int(np.searchsorted(self.frequencies, min(TOP, 0.4 / self.step))), 2)
+
+
+def prepare(name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_], noise: Array, laws: Sequence[Noise | None]) -> Experiment:
+    """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors.
+
+    Where the noise exceeds the input's own spectrum, the measured input is damped to what is likely (Wiener), and the rest
+    is unsure. The number of samples becomes one that Fourier transforms like.
+    """
+    n = fft.prev_fast_len(len(time), real=True)
+    time, u, y, good = time[:n], u[:n], y[:n], good[:n]
+    step = float(time[1] - time[0])
+    f = fft.rfftfreq(2 * n, step)
+    line = np.linspace(0.0, 1.0, n)[:, None]
+    trend = u[:1] + line * (u[-1:] - u[:1])
+    rest = u - trend
+    spectra = fft.rfft(np.concatenate([rest, -rest[::-1]]), axis=0)  # turned round: no jump at the ends
+    unsure = np.zeros((n // 2 + 1, u.shape[1]))
+    for k, sigma in enumerate(noise):
+        if sigma > 0.0:
+            power = np.abs(spectra[:, k]) ** 2 / (2 * n)
+            kernel = np.hanning(2 * max(int(0.5 / f[1]), 2) + 1)
+            power = np.convolve(power, kernel, "same") / np.convolve(np.ones(len(f)), kernel, "same")
+            floor = float(np.median(power[int(0.6 * len(f)) : int(0.95 * len(f))]))  # there is no road left
+            sigma = min(sigma, np.sqrt(floor))
+            share = np.maximum(1.0 - 1.05 * sigma**2 / np.maximum(power, 1e-300), 0.0)
+            spectra[:, k] *= share
+            unsure[:, k] = sigma * np.sqrt(share)[: 2 * len(unsure) : 2][: len(unsure)]
+    whole = fft.irfft(spectra, 2 * n, axis=0)[:n] + trend
+    rate = CubicSpline(time, whole)(time, 1)
+    f = fft.rfftfreq(n, step)
+    quiet = np.stack([np.full(len(f), np.nan) if law is None else law.density(f, step) / (2.0 * step) for law in laws], axis=1)
+    return Experiment(name, time, u, y, good, whole, rate, unsure, quiet)
+
+
+@dataclass(frozen=True, eq=False)
+class Metric:
+    """`root` [f, sensors, sensors] turns spectra of residuals white."""
+
+    n: int
+    root: NDArray[np.complex128]
+
+    def spectrum(self, r: Array) -> NDArray[np.complex128]:
+        """Spectra [..., f, sensors] of signals [..., n, sensors] in the band."""
+        rows = np.ascontiguousarray(np.moveaxis(r, -1, -2))
+        return np.moveaxis(fft.rfft(rows, axis=-1)[..., : len(self.root)], -1, -2)
+
+    def white(self, spectra: NDArray[np.complex128]) -> Array:
+        """Real numbers [..., rows] of unit variance if spectra [..., f, sensors] are those of noise."""
+        w = np.einsum("fij,...fj->...fi", self.root, spectra)
+        w[..., 0, :] /= np.sqrt(2.0)  # the mean has one real part only
+        flat = w.reshape(*w.shape[:-2], -1)
+        return np.concatenate([flat.real, flat.imag], axis=-1)
+
+    def __call__(self, r: Array) -> Array:
+        return self.white(self.spectrum(r))
+
+
+def sensor_levels(e: Experiment, residual: Array, declared: Array, through: NDArray[np.complex128]) -> Array:
+    """Noise variance per sample of each sensor over all frequencies of the band [f, sensors].
+
+    What a sensor's record shows by itself, above the band of the signals, is continued below; a slow part is added as the
+    residual shows it, up to what the sensor's declared noise leaves room for. Bands with much more than that do not count:
+    there something is wrong, which is not noise.
+    """
+    n, band, f = len(e.time), e.band, e.frequencies
+    size = n // 5  # nine stretches, each half over the next: what is there in less than half of the time is no noise
+    window = np.hanning(size)[:, None]
+    stretches = [fft.rfft(residual[k * size // 2 : k * size // 2 + size] * window, axis=0) for k in range(9)]
+    middle = np.median(np.abs(stretches) ** 2, axis=0) / (size * 0.375 * 0.7456)  # the median of nine exponentials
+    power = np.stack([np.interp(f, fft.rfftfreq(size, e.step), column) for column in middle.T], axis=1)
+    high = slice(band, max(int(0.9 * len(f)), band + 1))
+    omega = 2.0 * np.pi * f * e.step
+    wide = max(int(1.0 / f[1]), 2)  # bins of a band of 1 Hz
+    edges = np.arange(1, band, wide)
+    found = np.empty((band, residual.shape[1]))
+    for j, sigma in enumerate(declared):
+        road = np.sum(np.abs(through[:, j, :] * e.unsure) ** 2, axis=1)
+        base = e.quiet[:, j]
+        if not np.all(np.isfinite(base)):
+            raw = float(np.mean(power[high, j]))
+            base = np.full(len(f), max(raw - float(np.median(road[high])), 0.05 * raw, 1e-300))
+        base = base * max(1.0, (0.75 * sigma) ** 2 / float(np.mean(base)))  # a sensor is hardly better than its data sheet
+        bins = np.diff(np.append(edges, band))
+        p, b, r = (np.add.reduceat(x[:band], edges) / bins for x in (power[:, j], base, road))
+        room = max((1.25 * sigma) ** 2 if sigma > 0.0 else 4.0 * float(np.mean(base)), 1.1 * float(np.mean(base))) - float(np.mean(base))
+        best = np.inf, base
+        for pole in (0.0, 0.3, 0.5, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985):
+            shape = (1.0 - pole**2) / np.abs(1.0 - pole * np.exp(-1j * omega)) ** 2
+            c = np.add.reduceat(shape[:band], edges) / bins
+            for share in (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 0.75, 1.0):
+                s = b + r + share * room * c
+                loss = float(np.sum(bins * (np.log(s) + np.minimum(p / s, 12.0))))
+                if loss < best[0] - 2.0:
+                    best = loss, base + share * room * shape
+        found[:, j] = best[1][:band]
+    return found
+
+
+def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Metric:
+    """The metric of a recording: levels [f, sensors] and the transfer [f, sensors, inputs] of the inputs' noise."""
+    g = through[: e.band] * e.unsure[: e.band, None, :]
+    s = g @ np.conj(np.swapaxes(g, 1, 2)) + levels[:, :, None] * np.eye(levels.shape[1])
+    root = np.linalg.inv(np.linalg.cholesky(s)) * np.sqrt(2.0 / len(e.time))
+    return Metric(len(e.time), root)
+
+
+def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> list[NDArray[np.bool_]]:
+    """Samples [n, n_z] of short bursts that one sensor alone shows: against neighbours far beyond its usual roughness."""
+    found = []
+    for e, z in zip(experiments, simulated):
+        r = np.where(e.good, e.y - z, 0.0)
+        rough = np.abs(np.diff(r, 2, axis=0, prepend=r[:1], append=r[-1:]))
+        usual = 1.4826 * np.median(rough, axis=0) + 1e-300
+        wild = rough > 14.0 * usual
+        wild[:20] = wild[-20:] = False  # where rates of inputs are not well known
+        wide = np.stack([np.convolve(w, np.ones(9), "same") > 0 for w in wild.T], axis=1)
+        alone = wide & (np.sum(wide, axis=1, keepdims=True) == 1) if wide.shape[1] > 1 else wide
+        few = np.mean(wild & alone, axis=0) < 0.01
+        found.append((alone & few & (np.sum(wild & alone, axis=0) >= 5)) | _sunken(e, z, r))
+    return found
+
+
+def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
+    """Samples of short stretches in which a sensor sinks towards zero while the model goes on."""
+    usual = 1.4826 * np.median(np.abs(r), axis=0) + 1e-300
+    longest = int(0.5 / e.step)
+    found = np.zeros(r.shape, dtype=bool)
+    for j in range(r.shape[1]):
+        far = np.abs(r[:, j]) > 6.0 * usual[j]
+        wide = np.convolve(far, np.ones(9), "same") > 0
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], wide.astype(np.int8), [0]])))
+        for a, b in zip(edges[::2], edges[1::2]):
+            inside = far[a:b]
+            y, model = e.y[a:b, j][inside], z[a:b, j][inside]
+            sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2)
+            if b - a < longest and np.mean(sinks) > 0.95 and np.min(np.abs(y)) < 0.25 * np.max(np.abs(model)) and np.count_nonzero(inside) > 4:
+                found[a:b, j] = True
+        if np.mean(found[:, j]) > 0.02:
+            found[:, j] = False
+    return found

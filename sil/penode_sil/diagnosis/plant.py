@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The model as seen by a diagnosis: places where a force may be missing, and the linearised way from there to the sensors.
+
+A place is a pair of ends between which at least one element acts, or a body and ground. A force that is missing at a place
+is seen by every sensor through a transfer function, whatever its law; so hypotheses about laws need no simulation each.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import penode_gen
+from penode_gen import laws
+from penode_gen.model import GROUND, Element, Input, Model, Parameter, Signal, State
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Ends between which a force may act. `elements` act there already, each with its sense; `role` says what may be
+    found there: "force" (any element), "tyre" (a wheel on a measured road), or "body" (nothing acts there yet)."""
+
+    ends: tuple[str, str]
+    elements: tuple[tuple[str, int], ...]
+    role: str
+    trained: tuple[tuple[str, str, float, float], ...] = ()  # element, "s" or "v", and the range its network was trained on
+
+    @property
+    def name(self) -> str:
+        """What a report calls it: its first element, or the body."""
+        return self.elements[0][0] if self.elements else self.ends[0]
+
+
+def places(model: Model, set_name: str = "default") -> tuple[Place, ...]:
+    """All places of a model, those with elements first; ranges of networks are those of a set."""
+    found: dict[tuple[str, str], list[tuple[str, int]]] = {}
+    for e in model.elements:
+        if not _external(model, e):
+            back = e.ends[::-1]
+            key, sense = (back, -1) if back in found else (e.ends, 1)
+            found.setdefault(key, []).append((e.name, sense))
+    bodies, inputs = {b.name for b in model.bodies}, {i.name for i in model.inputs}
+    carried = {end for ends in found if set(ends) <= bodies for end in ends}
+    result = []
+    for ends, elements in found.items():
+        tyre = bool(set(ends) & inputs) and bool(set(ends) & carried)
+        own = [e for e in model.elements if e.network and any(e.name == name for name, _ in elements)]
+        trained = tuple(entry for e in own for entry in _trained(model, e, set_name))
+        result.append(Place(ends, tuple(elements), "tyre" if tyre else "force", trained))
+    known = {frozenset(p.ends) for p in result}
+    result += [Place((b.name, GROUND), (), "body") for b in model.bodies if frozenset((b.name, GROUND)) not in known]
+    return tuple(result)
+
+
+def _trained(model: Model, e: Element, set_name: str) -> list[tuple[str, str, float, float]]:
+    network = model.sets[set_name].networks[e.network]
+    if network.input_min is None or network.input_max is None:
+        return []
+    ranges = zip(e.network_inputs, network.input_min, network.input_max)
+    return [(e.name, "s" if what == "deflection" else "v", float(low), float(high)) for what, low, high in ranges]
+
+
+def _external(model: Model, e: Element) -> bool:
+    """A measured force that is put on a body: an expression without deflection or rate."""
+    return e.law == "expression" and not re.search(r"\b[sv]\b|\b[sv]_", e.expression)
+
+
+def extend(
+    model: Model, elements: Sequence[Element], parameters: Mapping[str, tuple[float, str]], where: Sequence[Place] = ()
+) -> Model:
+    """The model with more elements. What measures the force at a place then measures theirs as well."""
+    sensors, outputs = model.sensors, model.outputs
+    for e, place in zip(elements, where):
+        sensors, outputs = (tuple(_share(s, e.name, place) for s in signals) for signals in (sensors, outputs))
+    states = tuple(
+        State(e.state(name), state.unit)
+        for e in elements
+        for name, state in (laws.LAWS[e.law].states.items() if e.law in laws.LAWS else ())
+    )
+    values = {name: Parameter(name, value, unit) for name, (value, unit) in parameters.items()}
+    return replace(
+        model, elements=(*model.elements, *elements), parameters={**model.parameters, **values}, sensors=sensors,
+        outputs=outputs, extra_states=(*model.extra_states, *states),
+    )  # fmt: skip
+
+
+def _share(signal: Signal, new: str, place: Place) -> Signal:
+    """A signal that mentions the force of an element of the place gets that of the new element beside it."""
+    for name, sense in place.elements:
+        pattern = rf"\bF_{name}\b"
+        if re.search(pattern, signal.expression):
+            both = f"(F_{name} {'+' if sense > 0 else '-'} F_{new})"
+            return replace(signal, expression=re.sub(pattern, both, signal.expression, count=1))
+    return signal
+
+
+def anonymous(model: Model) -> Model:
+    """The same equations under a common name: models of one structure then share one compiled library."""
+    return replace(model, name="plant", description="", path=Path("plant.toml"), digest="0" * 16)
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The model linearised: dx = a x + b w + b1 dw, y = c x + d w + d1 dw; w holds the inputs, then a force for each
+    place; y holds the sensors, then deflection and rate of each place."""
+
+    a: Array
+    b: Array
+    b1: Array
+    c: Array
+    d: Array
+    d1: Array
+    n_inputs: int
+    n_sensors: int
+
+    def transfer(self, f: Array) -> NDArray[np.complex128]:
+        """Responses [f, y, w] at frequencies [Hz]."""
+        jw = 2j * np.pi * f[:, None, None]
+        inner = np.linalg.solve(self._pencil(f), self.b + jw * self.b1) if len(self.a) else 0.0
+        return (self.c @ inner if len(self.a) else 0.0) + self.d + jw * self.d1
+
+    def states(self, f: Array) -> NDArray[np.complex128]:
+        """Responses [f, x, places] of the states to forces at the places."""
+        jw = 2j * np.pi * f[:, None, None]
+        return np.linalg.solve(self._pencil(f), self.b + jw * self.b1)[:, :, self.n_inputs :]
+
+    def free(self, f: Array, rate: float) -> NDArray[np.complex128]:
+        """Spectra [f, y, x] of the responses to start states, sampled with `rate` [Hz]."""
+        if not len(self.a):
+            return np.zeros((len(f), len(self.c), 0), dtype=complex)
+        return rate * (self.c @ np.linalg.inv(self._pencil(f)))
+
+    def _pencil(self, f: Array) -> NDArray[np.complex128]:
+        n = len(self.a)
+        jw = 2j * np.pi * np.maximum(f, 1e-4)[:, None, None]  # a plant without a spring to ground drifts at 0 Hz
+        return jw * np.eye(n) - self.a
+
+    @cached_property
+    def fastest(self) -> float:
+        """The highest natural frequency [Hz], 0 without states."""
+        return float(np.max(np.abs(np.linalg.eigvals(self.a)), initial=0.0) / (2.0 * np.pi))
+
+
+def linearise(model: Model, found: Sequence[Place], x: Array, u: Array) -> Linear:
+    """Mean slopes of the model along states x [n, n_x] and inputs u [n, n_u]."""
+    forces = [Element(f"probe{k}", p.ends, "expression", expression=f"at{k}") for k, p in enumerate(found)]
+    probed = extend(model, forces, {}, found)
+    seen = [Signal(f"{q}_probe{k}", f"{q}_probe{k}", unit) for k in range(len(found)) for q, unit in (("s", "m"), ("v", "m/s"))]
+    probed = replace(
+        probed, interpolation="linear", inputs=(*model.inputs, *(Input(f"at{k}", "N") for k in range(len(found)))), sensors=(*probed.sensors, *seen)
+    )
+    system = penode_gen.numeric(probed)
+    n_x, n_w = len(probed.states), len(probed.inputs)
+    step = np.concatenate(
+        [1e-4 * np.maximum(np.ptp(x, axis=0), 1e-3), 1e-4 * np.maximum(np.ptp(u, axis=0), 1e-3), np.ones(len(found)), np.ones(n_w)]
+    )
+
+    def value(point: Array) -> Array:
+        parts = point[:n_x], point[n_x : n_x + n_w], point[n_x + n_w :]
+        return np.concatenate([system.rates(*parts), system.sensors(*parts)])
+
+    slopes = []
+    for state, drive in zip(x, u):
+        centre = np.concatenate([state, drive, np.zeros(len(found) + n_w)])
+        moves = np.diag(step)
+        slopes.append(np.stack([(value(centre + m) - value(centre - m)) / (2.0 * h) for m, h in zip(moves, step)], axis=1))
+    mean = np.mean(slopes, axis=0)
+    top, low = mean[:n_x], mean[n_x:]
+    return Linear(
+        top[:, :n_x], top[:, n_x : n_x + n_w], top[:, n_x + n_w :], low[:, :n_x], low[:, n_x : n_x + n_w], low[:, n_x + n_w :],
+        len(model.inputs), len(model.sensors),
+    )  # fmt: skip

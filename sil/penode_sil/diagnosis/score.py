@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""All hypotheses at once, without a simulation each.
+
+First the motion is estimated as it was, whatever the cause: unknown forces at all places with elements, with spectra that
+the data choose (expectation and maximisation), explain the residual; what they do to deflections and rates is known from the
+linearised plant. Along that motion each elementary law is a known force, and its effect on the sensors one multiplication per
+frequency. So all of them are columns of one linear regression, in the metric of the noise, nuisances projected out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, optimize
+
+from . import hypotheses as hy
+from .fit import Fit
+from .hypotheses import Basis, Fault, Motion
+from .noise import Experiment, Metric
+from penode_gen.model import GROUND, Model
+
+from .plant import Linear, Place
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """One recording after the smoother: motion of every place, sensors without noise, and the response of the sensors to a
+    force at each place [f, sensors, places]."""
+
+    motions: tuple[Motion, ...]
+    sensors: Array
+    response: Complex
+    states: Complex | None  # of the states [f, x, places], and of the sensors to a start state [f, sensors, x]:
+    free: Complex | None  # None if start states are free anyway
+
+    def answer(self, force: Complex, place: int, settled: Sequence[bool] = ()) -> Complex:
+        """Spectra [k, f, sensors] of what forces [k, f] at a place do to the sensors, from rest unless settled."""
+        spectra = force[:, :, None] * self.response[None, :, :, place]
+        if self.states is not None and self.free is not None:
+            # what is periodic is not at rest at the start: take that start away
+            start = np.einsum("kf,fx->kx", force, self.states[:, :, place]) * 2.0 - force[:, :1] * self.states[0, :, place]
+            if settled:
+                start[np.array(settled)] = 0.0
+            spectra = spectra - np.einsum("kx,fsx->kfs", start.real / self.n, self.free)
+        return spectra
+
+    @property
+    def n(self) -> int:
+        return len(self.sensors)
+
+
+def smooth(
+    e: Experiment, m: Metric, levels: Array, linear: Linear, found: Sequence[Place], simulated: Array, paths: Array, moving: bool
+) -> Seen:
+    """Motion and sensors as they most likely were, from a simulation: its sensors [n, n_z] and paths [n, 2 places]."""
+    n, band = len(e.time), e.band
+    h = linear.transfer(e.frequencies[:band])
+    n_z, n_u = linear.n_sensors, linear.n_inputs
+    acting = [k for k, p in enumerate(found) if p.role != "body"]
+    columns = [n_u + k for k in acting] + list(range(n_u))
+    g = h[:, :n_z, columns]
+    r = m.spectrum(np.where(e.good, e.y - simulated, 0.0)) / np.sqrt(n)
+    sensor = levels[:, :, None] * np.eye(n_z)
+    prior = np.empty((band, len(columns)))
+    strength = np.sum(np.abs(g) ** 2 / levels[:, :, None], axis=1)
+    prior[:, : len(acting)] = 1.0 / np.median(strength[:, : len(acting)], axis=0)
+    prior[:, len(acting) :] = np.maximum(e.unsure[:band], 1e-15) ** 2
+    width = max(int(0.5 / (e.frequencies[1])), 3)  # spectra of causes are smooth over half a hertz
+    kernel = np.hanning(2 * width + 1)
+    weight = np.convolve(np.ones(band), kernel, "same")
+    for _ in range(8):
+        gp = g * prior[:, None, :]
+        gain = np.conj(np.swapaxes(gp, 1, 2)) @ np.linalg.inv(gp @ np.conj(np.swapaxes(g, 1, 2)) + sensor)
+        w = (gain @ r[:, :, None])[:, :, 0]
+        left = prior - np.real(np.einsum("fqi,fiq->fq", gain, gp))
+        power = np.abs(w) ** 2 + np.maximum(left, 0.0)
+        for q in range(len(acting)):
+            prior[:, q] = np.maximum(np.convolve(power[:, q], kernel, "same") / weight, 1e-30)
+    moved = np.einsum("fyq,fq->fy", h[:, :, columns], w) * np.sqrt(n)
+    whole = np.zeros((len(e.frequencies), moved.shape[1]), dtype=complex)
+    whole[:band] = moved
+    change = fft.irfft(whole, n, axis=0)
+    paths = paths + change[:, n_z:]
+    t = e.time - e.time[0]
+    motions = tuple(Motion(paths[:, 2 * k], paths[:, 2 * k + 1], t) for k in range(len(found)))
+    f = e.frequencies[:band]
+    states, free = (None, None) if moving or not len(linear.a) else (linear.states(f), linear.free(f, 1.0 / e.step)[:, :n_z])
+    return Seen(motions, simulated + change[:, :n_z], h[:, :n_z, n_u:], states, free)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One column of the regression and what it stands for."""
+
+    kind: str
+    where: str
+    sign: int
+    companion: bool
+    what: Basis | Fault | str | tuple[str, int, float, float]
+
+
+class Regression:
+    """Whitened columns of all candidates against the whitened residual of a fit, its free values projected out."""
+
+    def __init__(self, fit: Fit, candidates: Sequence[Candidate], columns: Array):
+        self.candidates = tuple(candidates)
+        movable = [i for i, f in enumerate(fit.free) if f.low < f.value < f.high]  # the others stand at their bounds
+        free = [fit.free[i] for i in movable]
+        priors = np.array([f.unit / f.sigma for f in free])
+        q = np.linalg.qr(np.concatenate([fit.jacobian[:, movable], np.diag(priors)]))[0] if free else np.zeros((len(fit.residual), 0))
+        r, offsets = fit.residual, np.array([f.offset for f in free])
+        top, low = q[: len(r)], q[len(r) :]
+        tx, tr = top.T @ columns, top.T @ r - low.T @ offsets  # columns have no part in the rows of the priors
+        self.gram = columns.T @ columns - tx.T @ tx
+        self.slope = columns.T @ r - tx.T @ tr
+        self.scale = np.sqrt(np.maximum(np.diag(self.gram), 1e-300))
+        self.raw = np.einsum("ij,ij->j", columns, columns)
+        self.alive = np.diag(self.gram) > 1e-9 * self.raw  # what nuisances do not imitate altogether
+        self.gram /= np.outer(self.scale, self.scale)
+        self.slope /= self.scale
+        self.chi2 = float(r @ r + offsets @ offsets - tr @ tr)
+
+    def gain(self, chosen: Sequence[int]) -> tuple[float, Array]:
+        """How much chi2 falls with these columns, signs as their kinds demand, and their gains in SI."""
+        index, flip = [], []
+        for c in chosen:
+            sign = self.candidates[c].sign
+            for s in (1, -1) if sign == 0 else (sign,):
+                index.append(c)
+                flip.append(float(s))
+        flips = np.array(flip)
+        gram = self.gram[np.ix_(index, index)] * np.outer(flips, flips)
+        slope = self.slope[index] * flips
+        lower = np.linalg.cholesky(gram + 1e-9 * np.eye(len(index)))
+        x, _ = optimize.nnls(lower.T, np.linalg.solve(lower, slope))
+        found = np.zeros(len(chosen))
+        order = {c: k for k, c in enumerate(chosen)}
+        for c, f, value in zip(index, flips, x):
+            found[order[c]] += f * value / self.scale[c]
+        return float(2.0 * x @ slope - x @ gram @ x), found
+
+    def best_single(self, chosen: Sequence[int], pool: Sequence[int], costs: Mapping[int, float]) -> tuple[float, int]:
+        """The column of `pool` that, beside `chosen`, takes most from chi2 beyond its cost (signs of `chosen` free); -1 if none."""
+        if not pool:
+            return 0.0, -1
+        c, p = list(chosen), np.array(pool)
+        slope, curve = self.slope[p].copy(), np.ones(len(p))
+        if c:
+            inverse = np.linalg.pinv(self.gram[np.ix_(c, c)], rcond=1e-9)
+            cross = self.gram[np.ix_(c, p)]
+            slope -= cross.T @ (inverse @ self.slope[c])
+            curve -= np.einsum("ij,ij->j", cross, inverse @ cross)
+        signs = np.array([self.candidates[i].sign for i in pool])
+        usable = (curve > 1e-4) & ((signs == 0) | (slope * signs > 0.0)) & self.alive[p]
+        gains = np.where(usable, slope**2 / np.maximum(curve, 1e-12), 0.0)
+        left = gains - np.array([costs[i] for i in pool])
+        best = int(np.argmax(left))
+        return float(gains[best]), int(p[best]) if left[best] > 0.0 else -1
+
+
+def _where(kind: str, place: Place, model: Model) -> str:
+    """What a report says of the place: a spring or damper by its law, a load by its body."""
+    if kind in ("constant_force", "hidden_resonance"):
+        return next((end for end in place.ends if end in {b.name for b in model.bodies}), place.name)
+    if kind == "network_extrapolation":
+        return place.trained[0][0]
+    damper = any(word in kind for word in ("friction", "damper"))
+    laws = {e.name: e.law for e in model.elements}
+    fitting = [name for name, _ in place.elements if ("damper" in laws[name] or "friction" in laws[name]) == damper]
+    return fitting[0] if fitting else place.name
+
+
+def collect(
+    model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], seen: Sequence[Seen], found: Sequence[Place],
+    sensor_names: Sequence[str], fit: Fit, parameters: Sequence[str],
+) -> tuple[list[Candidate], Array]:  # fmt: skip
+    """All candidates and their whitened columns [rows, candidates]."""
+    candidates: list[Candidate] = []
+    parts: list[list[Array]] = [[] for _ in experiments]
+    step = experiments[0].step
+
+    def masked(e: int, spectra: Complex) -> Array:
+        """Whitened columns of effects given as spectra [k, f, sensors]; samples that do not count are taken out."""
+        good = experiments[e].good
+        if not good.all():
+            n, band = len(good), experiments[e].band
+            whole = np.zeros((len(spectra), n // 2 + 1, good.shape[1]), dtype=complex)
+            whole[:, :band] = spectra
+            return metrics[e](fft.irfft(whole, n, axis=1) * good)
+        return metrics[e].white(spectra)
+
+    for k, place in enumerate(found):
+        motions = [s.motions[k] for s in seen]
+        laws = list(hy.force_laws(k, place, motions, step, not {b.name for b in model.bodies} & set(place.ends)))
+        body = next((b.name for b in model.bodies if set(place.ends) == {b.name, GROUND}), None)
+        if laws:
+            candidates += [Candidate(b.kind, _where(b.kind, place, model), b.sign, b.companion, b) for b in laws]
+            for e, s in enumerate(seen):
+                rows = np.stack([b.series[e] for b in laws])
+                phi = fft.rfft(rows, axis=1)[:, : experiments[e].band]
+                parts[e].append(masked(e, s.answer(phi, k, [b.settled for b in laws])))
+        if body is not None:
+            bands = [experiments[e].frequencies[: experiments[e].band] for e in range(len(seen))]
+            accelerations = [fft.rfft(np.gradient(m.v, step))[: len(f)] for m, f in zip(motions, bands)]
+            for f0 in np.geomspace(0.5, 40.0, 45):
+                for zeta in (0.02, 0.06, 0.15, 0.35):
+                    candidates.append(Candidate("hidden_resonance", body, 1, False, ("absorber", k, float(f0), zeta)))
+            for e, s in enumerate(seen):
+                f = bands[e]
+                spectra = []
+                for f0 in np.geomspace(0.5, 40.0, 45):
+                    for zeta in (0.02, 0.06, 0.15, 0.35):
+                        x = f / f0
+                        t = (1.0 + 2j * zeta * x) / (1.0 - x**2 + 2j * zeta * x)
+                        spectra.append(t * accelerations[e])
+                parts[e].append(masked(e, s.answer(np.stack(spectra), k)))
+    for j, name in enumerate(sensor_names):
+        faults = list(hy.sensor_faults(j, [s.sensors[:, j] for s in seen], [s.motions[0].t if s.motions else experiments[e].time for e, s in enumerate(seen)], step))
+        candidates += [Candidate(f.kind, name, f.sign, f.companion, f) for f in faults]
+        for e in range(len(seen)):
+            rows = np.stack([f.series[e] for f in faults])
+            columns = np.zeros((len(faults), rows.shape[1], len(sensor_names)))
+            columns[:, :, j] = rows * experiments[e].good[:, j]
+            parts[e].append(metrics[e](columns))
+    stacked = np.concatenate([np.concatenate(p, axis=0) for p in parts], axis=1).T
+    index = {f.target: i for i, f in enumerate(fit.free)}
+    chosen = [p for p in parameters if p in index]
+    candidates += [Candidate("wrong_parameter", p, 0, False, p) for p in chosen]
+    stacked = np.concatenate([stacked, fit.jacobian[:, [index[p] for p in chosen]]], axis=1)
+    return candidates, stacked

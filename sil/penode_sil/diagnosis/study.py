@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The state of a diagnosis: a model against its recordings, with noise, places, and what is free within tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from penode_gen.model import Model, Signal
+
+from . import plant
+from .fit import Fit, Free, Problem
+from .noise import Experiment, Metric, metric, sensor_levels
+from .plant import Linear, Place
+from .score import Regression, Seen, collect, smooth
+
+Array = NDArray[np.float64]
+SKEW = 0.004  # of a sample: channels are never sampled at quite the same time
+LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
+SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Everything that does not depend on a hypothesis."""
+
+    model: Model
+    set_name: str
+    experiments: tuple[Experiment, ...]
+    places: tuple[Place, ...]
+    linear: Linear
+    levels: tuple[Array, ...]
+    metrics: tuple[Metric, ...]
+    nuisances: tuple[Free, ...]
+    null: Fit
+    seen: tuple[Seen, ...] = ()
+    moving: bool = True  # start states are free
+
+
+def nuisances(model: Model, experiments: Sequence[Experiment]) -> tuple[Free, ...]:
+    """Parameters within tolerance and all start states."""
+    free = [
+        Free(
+            p.name, p.value, abs(p.value) * p.tolerance * SHARE, sigma=abs(p.value) * p.tolerance * SHARE, origin=p.value,
+            low=p.value - LIMIT * abs(p.value) * p.tolerance, high=p.value + LIMIT * abs(p.value) * p.tolerance,
+        )  # fmt: skip
+        for p in model.parameters.values()
+        if p.tolerance > 0.0 and p.value != 0.0
+    ]
+    skew = SKEW * model.sample_time
+    free += [Free(("skew", j), 0.0, skew, sigma=skew, low=-3.0 * skew, high=3.0 * skew) for j in range(len(model.sensors))]
+    for e, experiment in enumerate(experiments):
+        for i, start in enumerate(model.start):
+            unit = 1e-3 if i < len(model.bodies) else 1e-2 if i < 2 * len(model.bodies) else 1.0
+            free.append(Free(("start", e, i), start, unit))
+    return tuple(free)
+
+
+def watched(model: Model, found: Sequence[Place]) -> Model:
+    """The model with deflection and rate of every place as further sensors."""
+    ends = {b.name: (b.position, b.velocity) for b in model.bodies}
+    signals = []
+    for k, p in enumerate(found):
+        if p.elements:
+            texts = (f"s_{p.elements[0][0]}", f"v_{p.elements[0][0]}")
+        else:
+            texts = ends[p.ends[0]]
+        signals += [Signal(f"{q}_place{k}", text, unit) for q, text, unit in zip("sv", texts, ("m", "m/s"))]
+    return replace(model, sensors=(*model.sensors, *signals))
+
+
+MOVING = 10.0  # chi2 that a free start state must gain: recordings start at rest unless they show the contrary
+
+
+def begin(model: Model, experiments: Sequence[Experiment], set_name: str = "default") -> tuple[Study, Study]:
+    """The study with start states as they are likely (at rest, or free), and the other one."""
+    free = null_study(model, experiments, set_name)
+    kept = tuple(f for f in free.nuisances if f.target[0] != "start")
+    rest = replace(free, nuisances=kept, null=refit(free, kept), moving=False)
+    freedom = MOVING * len(model.states) * len(experiments)
+    rest = replace(rest, nuisances=kept)
+    return (rest, free) if rest.null.cost < free.null.cost + freedom else (free, rest)
+
+
+def refit(study: Study, free: Sequence[Free]) -> Fit:
+    """The null fit with other nuisances."""
+    return Problem(study.model, study.experiments, study.metrics, study.set_name, study.linear.fastest).solve(free, 8)
+
+
+def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = "default") -> Study:
+    """Null fit: nothing but tolerances, start states and noise."""
+    experiments = tuple(experiments)
+    found = plant.places(model, set_name)
+    declared = np.array([s.noise for s in model.sensors])
+    free = nuisances(model, experiments)
+    levels = [np.tile(np.where(declared > 0.0, declared, 1e-2 * np.std(e.y, axis=0) + 1e-12) ** 2, (e.band, 1)) for e in experiments]
+    metrics = [metric(e, l, np.zeros((e.band, len(declared), len(model.inputs)))) for e, l in zip(experiments, levels)]
+    problem = Problem(model, experiments, metrics, set_name, 0.0)
+    z, x = problem.simulate(0, (), np.zeros((1, 0)), model.states)
+    pick = np.linspace(0, len(x[0]) - 1, 12).astype(int) if model.networks else [0]
+    linear = plant.linearise(model, found, np.array(x[0][pick]), experiments[0].u[pick])
+    for _ in range(2):
+        fit = problem.solve(free, 6)
+        for e, experiment in enumerate(experiments):
+            h = linear.transfer(experiment.frequencies)[:, : len(declared), : len(model.inputs)]
+            residual = np.where(experiment.good, experiment.y - fit.simulated[e], 0.0)
+            levels[e] = sensor_levels(experiment, residual, declared, h)
+            metrics[e] = metric(experiment, levels[e], h)
+        problem = Problem(model, experiments, metrics, set_name)
+        free = fit.free
+    fit = problem.solve(free, 8)
+    return Study(model, set_name, experiments, found, linear, tuple(levels), tuple(metrics), fit.free, fit)
+
+
+def requieted(study: Study, fit: Fit) -> Study | None:
+    """The study with noise as an explanation's residual shows it; None if that is no other noise."""
+    declared = np.array([s.noise for s in study.model.sensors])
+    levels, metrics, change = [], [], 0.0
+    for e, old, z in zip(study.experiments, study.levels, fit.simulated):
+        h = study.linear.transfer(e.frequencies)[:, : len(declared), : len(study.model.inputs)]
+        levels.append(sensor_levels(e, np.where(e.good, e.y - z, 0.0), declared, h))
+        metrics.append(metric(e, levels[-1], h))
+        change = max(change, float(np.max(np.mean(np.abs(np.log(levels[-1] / old)), axis=0))))
+    if change < 0.1:
+        return None
+    quiet = replace(study, levels=tuple(levels), metrics=tuple(metrics))
+    return replace(quiet, null=refit(quiet, study.nuisances))
+
+
+def regression(study: Study, fit: Fit, parameters: Sequence[str]) -> Regression:
+    """All hypotheses beside a fit."""
+    seen = look(study, fit)
+    names = [s.name for s in study.model.sensors]
+    candidates, columns = collect(study.model, study.experiments, study.metrics, seen, study.places, names, fit, parameters)
+    return Regression(fit, candidates, columns)
+
+
+def look(study: Study, fit: Fit) -> tuple[Seen, ...]:
+    """The smoothed motion around a fit."""
+    problem = Problem(watched(fit.model, study.places), [widened(e, 2 * len(study.places)) for e in study.experiments], study.metrics, study.set_name, faults=fit.faults)
+    seen = []
+    n_z = len(study.model.sensors)
+    for e, experiment in enumerate(study.experiments):
+        z, _ = problem.simulate(e, fit.free, np.zeros((1, len(fit.free))))
+        z = np.array(z[0])
+        seen.append(smooth(experiment, study.metrics[e], study.levels[e], study.linear, study.places, z[:, :n_z], z[:, n_z:], study.moving))
+    return tuple(seen)
+
+
+def widened(e: Experiment, more: int) -> Experiment:
+    """The experiment for a model with more sensors than were measured."""
+    n = len(e.time)
+    return replace(e, y=np.hstack([e.y, np.zeros((n, more))]), good=np.hstack([e.good, np.zeros((n, more), bool)]))
