@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -76,7 +77,9 @@ def diagnose(
     text, extended = extension.extend_file(study, named, causes)
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
-        (output / "model_extended.toml").write_text(text)
+        nominal = model.path.resolve()
+        beside = Path(os.path.relpath(nominal, output.resolve()))  # so that both can be moved together
+        (output / "model_extended.toml").write_text(text.replace(extension.extends(nominal), extension.extends(beside), 1))
         extended = penode_gen.load(output / "model_extended.toml")
     if holdout:
         gain, notes = extension.measure(study, extended, [experiment(m, model) for m in holdout])

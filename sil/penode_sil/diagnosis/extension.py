@@ -46,12 +46,17 @@ def _toml(value: object) -> str:
     return repr(float(f"{value:.7g}"))
 
 
+def extends(path: Path) -> str:
+    """The line that names the nominal model file."""
+    return f"extends = {_toml(path.as_posix())}"
+
+
 def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> tuple[str, Model]:
     """Text of model_extended.toml, and the model that it describes."""
     model = study.model
     lines = [
         f"# What the recordings taught about {model.path.name}: " + (", ".join(f"{c.kind} at {c.where or '?'}" for c in causes) or "nothing") + ".",
-        "", "[model]", f"extends = {_toml(str(model.path.resolve()))}", f"name = {_toml(model.name + '_extended')}",
+        "", "[model]", extends(model.path.resolve()), f"name = {_toml(model.name + '_extended')}",
         f"sample_time = {_toml(f'{model.sample_time:.12g} s')}", "",
     ]  # fmt: skip
     if any(c.kind == "integration_error" for c in causes):
