@@ -141,6 +141,7 @@ static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size
         const bool beyond = kink && ((side->way * (side->edge - next)) > ZERO); /* is the edge */
         const bool leaving = (status == PEN_OK) && !beyond && (pen_port_abs(side->edge) < PEN_REAL_MAX);
         const bool flat = side->clamp && (status != PEN_OK);
+        bool moved = false; /* else a piece without length, or the last one */
 
         here->start = start;
         here->slope = flat ? ZERO : view.slope;
@@ -148,20 +149,21 @@ static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size
         here->status = status;
         begin = false;
         (*looks)--;
-        more = (kink || leaving) && !flat;
-        if (more) {
-            const pen_real_t to = leaving ? side->edge : next;
-            const bool moved = leaving || ((side->way * (to - x)) > ZERO); /* else a piece without length */
-            if (leaving) {
-                status = PEN_OUTSIDE;
-            } else {
-                walk->active[view.neuron] = !walk->active[view.neuron];
-            }
-            start = leaving ? side->start : to;
-            here->start = (moved && down) ? start : here->start;
-            count += moved ? 1U : 0U;
-            x = to;
+        if (leaving) {
+            moved = true;
+            status = PEN_OUTSIDE;
+            start = side->start;
+            x = side->edge;
+        } else if (kink && !flat) {
+            moved = ((side->way * (next - x)) > ZERO);
+            walk->active[view.neuron] = !walk->active[view.neuron];
+            start = moved ? next : start; /* a kink on the edge of the envelope leaves its start beyond the edge */
+            x = next;
+        } else {
+            more = false;
         }
+        here->start = (moved && down) ? start : here->start;
+        count += moved ? 1U : 0U;
     }
     return more ? (room + 1U) : (count + 1U);
 }

@@ -205,14 +205,6 @@ pen_real_t pen_sigmoid(pen_real_t x)
     return SIGMOID_SCALE / (sum + ((scale * e.p) + lost));
 }
 
-/* `inner` if |x| < limit, else `outer`; through memory, so that no compiler skips the one it does not need. */
-static pen_real_t pick(pen_real_t size, pen_real_t limit, pen_real_t inner, pen_real_t outer)
-{
-    const pen_real_t both[2] = {outer, inner};
-
-    return both[(size < limit) ? 1U : 0U];
-}
-
 /* Near 0 a polynomial; else 1 - 2 / (1 + e^2|x|), which is monotone because each of its operations is. */
 pen_real_t pen_tanh(pen_real_t x)
 {
@@ -226,7 +218,7 @@ pen_real_t pen_tanh(pen_real_t x)
     const pen_real_t outer = ONE - (TWO / ((ONE + scale) + (scale * e.p)));
     const pen_real_t outer_signed = (x > ZERO) ? outer : -outer;
 
-    return pick(size, TANH_NEAR, inner, outer_signed);
+    return pen_where(size < TANH_NEAR, inner, outer_signed);
 }
 
 /* Near 0 a polynomial; else max(x, 0) + log(1 + e^-|x|). */
@@ -242,5 +234,5 @@ pen_real_t pen_softplus(pen_real_t x)
     const pen_real_t ramp = (x > zero) ? x : zero;
     const pen_real_t outer = ramp + (e + ((e * e) * log1p_tail(e)));
 
-    return pick(size, ONE, inner, outer);
+    return pen_where(size < ONE, inner, outer);
 }

@@ -14,18 +14,6 @@
 #define ONE  ((pen_real_t)1)
 #define TWO  ((pen_real_t)2)
 
-/* A block of 16 rows. y may be x: nothing is written before all is read. */
-static void dense16_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[])
-{
-    pen_rows_t a;
-
-    pen_rows_begin(&a, w);
-    for (size_t i = 0U; i < n_in; i++) {
-        pen_rows_add(&a, &w[(16U * i) + 16U], pen_rectified(x[i]));
-    }
-    pen_rows_end(&a, y);
-}
-
 /* Rows r .. r + 3 of a block that has `rows` of them; without its bias, the tangent. */
 static void four_rows(size_t rows, size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[], bool bias, bool relu)
 {
@@ -74,7 +62,7 @@ void pen_dense_relu(size_t n_out, size_t n_in, const pen_real_t w[], const pen_r
     const size_t wide = n_out - (n_out % 16U);
 
     for (size_t row = 0U; row < wide; row += 16U) {
-        dense16_relu(n_in, &w[row * (n_in + 1U)], x, &y[row]);
+        pen_rows_relu(n_in, &w[row * (n_in + 1U)], x, &y[row]);
     }
     fours(n_out - wide, n_in, &w[wide * (n_in + 1U)], x, &y[wide], true, true);
     for (size_t row = n_out - (n_out % 4U); row < n_out; row++) {
@@ -282,7 +270,7 @@ static pen_real_t margin(size_t n, const pen_real_t range[], pen_real_t width, c
     const pen_real_t below = x[i] - range[i];
     const pen_real_t above = range[n + i] - x[i];
 
-    return ONE + (((below < above) ? below : above) / span);
+    return ONE + (pen_where(below < above, below, above) / span);
 }
 
 pen_real_t pen_fade(size_t n, const pen_real_t range[], pen_real_t width, const pen_real_t x[])
@@ -291,24 +279,25 @@ pen_real_t pen_fade(size_t n, const pen_real_t range[], pen_real_t width, const 
 
     for (size_t i = 0U; i < n; i++) {
         const pen_real_t here = margin(n, range, width, x, i);
-        trust = ((here < trust) ? here : trust) + (ZERO * here);
+        trust = pen_where(here < trust, here, trust) + (ZERO * here);
     }
-    return (trust < ZERO) ? ZERO : trust;
+    return pen_where(trust < ZERO, ZERO, trust);
 }
 
 pen_real_t pen_clamp_slope(size_t n, const pen_real_t range[], const pen_real_t x[], size_t i)
 {
-    const bool inside = (x[i] >= range[i]) && (x[i] <= range[n + i]);
+    const pen_real_t inside_low = pen_where(x[i] >= range[i], ONE, ZERO);
 
-    return inside ? ONE : ZERO;
+    return pen_where(x[i] <= range[n + i], inside_low, ZERO);
 }
 
 pen_real_t pen_fade_slope(size_t n, const pen_real_t range[], pen_real_t width, const pen_real_t x[], size_t i)
 {
     const pen_real_t trust = pen_fade(n, range, width, x);
-    const bool fading = (trust > ZERO) && (trust < ONE) && !(margin(n, range, width, x, i) > trust);
     const pen_real_t steepness = ONE / (width * (range[n + i] - range[i]));
-    const pen_real_t slope = (x[i] < range[i]) ? steepness : -steepness;
+    const pen_real_t slope = pen_where(x[i] < range[i], steepness, -steepness);
+    const pen_real_t above_none = pen_where(trust > ZERO, slope, ZERO);
+    const pen_real_t fading = pen_where(trust < ONE, above_none, ZERO);
 
-    return fading ? slope : ZERO;
+    return pen_where(margin(n, range, width, x, i) > trust, ZERO, fading); /* another input counts */
 }

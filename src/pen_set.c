@@ -56,13 +56,21 @@ void pen_tuning_announce(pen_tuning_t *tuning, const pen_set_t *ready)
     pen_port_store(&tuning->pending, YES);
 }
 
-static pen_status_t check_values(const pen_set_t *set)
+/* Layout and length come from the code: what lies in RAM may have lost a bit. */
+static bool fits(const pen_set_head_t *head, uint32_t layout, uint32_t length)
+{
+    return (head->layout == layout) && (head->length == length);
+}
+
+static pen_status_t check_set(const pen_set_t *set, uint32_t layout, uint32_t length)
 {
     pen_status_t status;
 
-    if (pen_set_checksum(set->value, set->head.length) != set->head.checksum) {
+    if (!fits(&set->head, layout, length)) {
+        status = PEN_SET_LAYOUT;
+    } else if (pen_set_checksum(set->value, length) != set->head.checksum) {
         status = PEN_SET_CHECKSUM;
-    } else if (!pen_finite(set->head.length, set->value)) {
+    } else if (!pen_finite(length, set->value)) {
         status = PEN_SET_NONFINITE;
     } else {
         status = PEN_OK;
@@ -70,12 +78,13 @@ static pen_status_t check_values(const pen_set_t *set)
     return status;
 }
 
-static pen_status_t check_head(const pen_tuning_t *tuning, const pen_set_head_t *head)
+/* The bank of the open set; NULL if none is open, or if the pointers to it have come apart: nothing is written there. */
+static pen_real_t *open_bank(const pen_tuning_t *tuning)
 {
-    const pen_set_head_t *const running = &tuning->slot[pen_tuning_spare(tuning) ^ 1U].head;
-    const bool fits = (head->layout == running->layout) && (head->length == running->length);
+    const pen_real_t *const value = tuning->slot[pen_tuning_spare(tuning)].value;
+    pen_real_t *const bank = (tuning->bank[0] == value) ? tuning->bank[0] : tuning->bank[1];
 
-    return fits ? PEN_OK : PEN_SET_LAYOUT;
+    return ((tuning->open == YES) && (bank == value)) ? bank : NULL;
 }
 
 pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set,
@@ -85,10 +94,8 @@ pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t len
 
     if ((tuning == NULL) || (set == NULL) || (set->value == NULL) || ((bank0 == NULL) != (bank1 == NULL))) {
         status = PEN_BADARG;
-    } else if ((set->head.layout != layout) || (set->head.length != length)) {
-        status = PEN_SET_LAYOUT;
     } else {
-        status = check_values(set);
+        status = check_set(set, layout, length);
     }
     if (status == PEN_OK) {
         tuning->slot[0] = *set;
@@ -97,6 +104,8 @@ pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t len
         tuning->previous.value = NULL;
         tuning->bank[0] = bank0;
         tuning->bank[1] = bank1;
+        tuning->bank_again[0] = bank0;
+        tuning->bank_again[1] = bank1;
         tuning->open = NO;
         tuning->fill = 0U;
         tuning->active = 0U;
@@ -106,16 +115,22 @@ pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t len
     return status;
 }
 
-pen_status_t pen_tuning_begin(pen_tuning_t *tuning, const pen_set_head_t *head)
+static bool has_banks(const pen_tuning_t *tuning)
+{
+    return (tuning->bank[0] != NULL) && (tuning->bank[0] == tuning->bank_again[0]) &&
+           (tuning->bank[1] == tuning->bank_again[1]);
+}
+
+pen_status_t pen_tuning_begin(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_head_t *head)
 {
     pen_status_t status;
 
-    if ((head == NULL) || (tuning->bank[0] == NULL)) {
+    if ((head == NULL) || !has_banks(tuning)) {
         status = PEN_BADARG;
     } else if (!settled(tuning)) {
         status = PEN_SET_BUSY;
     } else {
-        status = check_head(tuning, head);
+        status = fits(head, layout, length) ? PEN_OK : PEN_SET_LAYOUT;
     }
     if (status == PEN_OK) {
         const uint32_t free_slot = pen_tuning_spare(tuning);
@@ -129,19 +144,18 @@ pen_status_t pen_tuning_begin(pen_tuning_t *tuning, const pen_set_head_t *head)
         }
         tuning->slot[free_slot].head = *head;
         tuning->slot[free_slot].value = tuning->bank[bank];
-        tuning->staging = tuning->bank[bank];
         tuning->fill = 0U;
         tuning->open = YES;
     }
     return status;
 }
 
-pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t offset, const pen_real_t value[], uint32_t n)
+pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t length, uint32_t offset, const pen_real_t value[], uint32_t n)
 {
-    const uint32_t length = tuning->slot[pen_tuning_spare(tuning)].head.length;
+    pen_real_t *const bank = open_bank(tuning);
     pen_status_t status;
 
-    if (tuning->open != YES) {
+    if (bank == NULL) {
         status = PEN_SET_CLOSED;
     } else if (value == NULL) {
         status = PEN_BADARG;
@@ -149,7 +163,7 @@ pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t offset, const pen_r
         status = PEN_SET_RANGE;
     } else {
         for (uint32_t i = 0U; i < n; i++) {
-            tuning->staging[offset + i] = value[i];
+            bank[offset + i] = value[i];
         }
         tuning->fill = ((offset + n) > tuning->fill) ? (offset + n) : tuning->fill;
         status = PEN_OK;
@@ -157,17 +171,17 @@ pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t offset, const pen_r
     return status;
 }
 
-pen_status_t pen_tuning_commit(const pen_tuning_t *tuning, pen_set_t *ready)
+pen_status_t pen_tuning_commit(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, pen_set_t *ready)
 {
     const pen_set_t *const set = &tuning->slot[pen_tuning_spare(tuning)];
     pen_status_t status;
 
-    if (tuning->open != YES) {
+    if (open_bank(tuning) == NULL) {
         status = PEN_SET_CLOSED;
-    } else if (tuning->fill != set->head.length) {
+    } else if (tuning->fill != length) {
         status = PEN_SET_SHORT;
     } else {
-        status = check_values(set);
+        status = check_set(set, layout, length);
     }
     if (status == PEN_OK) {
         *ready = *set;
@@ -183,7 +197,8 @@ pen_status_t pen_tuning_abort(pen_tuning_t *tuning)
     return status;
 }
 
-pen_status_t pen_tuning_select(const pen_tuning_t *tuning, const pen_set_t *set, pen_set_t *ready)
+pen_status_t pen_tuning_select(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set,
+                               pen_set_t *ready)
 {
     pen_status_t status;
 
@@ -192,8 +207,7 @@ pen_status_t pen_tuning_select(const pen_tuning_t *tuning, const pen_set_t *set,
     } else if (!settled(tuning)) {
         status = PEN_SET_BUSY;
     } else {
-        status = check_head(tuning, &set->head);
-        status = (status == PEN_OK) ? check_values(set) : status;
+        status = check_set(set, layout, length);
     }
     if (status == PEN_OK) {
         *ready = *set;
@@ -201,7 +215,7 @@ pen_status_t pen_tuning_select(const pen_tuning_t *tuning, const pen_set_t *set,
     return status;
 }
 
-pen_status_t pen_tuning_rollback(const pen_tuning_t *tuning, pen_set_t *ready)
+pen_status_t pen_tuning_rollback(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, pen_set_t *ready)
 {
     pen_status_t status;
 
@@ -210,8 +224,10 @@ pen_status_t pen_tuning_rollback(const pen_tuning_t *tuning, pen_set_t *ready)
     } else if (tuning->previous.value == NULL) {
         status = PEN_SET_NO_PREVIOUS;
     } else {
+        status = check_set(&tuning->previous, layout, length);
+    }
+    if (status == PEN_OK) {
         *ready = tuning->previous;
-        status = PEN_OK;
     }
     return status;
 }

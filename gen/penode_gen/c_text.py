@@ -102,6 +102,7 @@ class Printer:
     _calls = {
         sp.exp: "pen_exp", sp.tanh: "pen_tanh", ex.Sigmoid: "pen_sigmoid", ex.Softplus: "pen_softplus", ex.Absolute: "pen_port_abs",
         ex.Sign: "pen_sign", sp.Heaviside: "pen_heaviside", sp.Max: "pen_max", sp.Min: "pen_min",
+        sp.Piecewise: "pen_where",
     }  # fmt: skip
 
     def __init__(self, name: Callable[[sp.Symbol], str]):
@@ -126,15 +127,13 @@ class Printer:
             for argument in rest:
                 text = f"{function}({text}, {self(argument)})"
             return text
+        if isinstance(expr, sp.Piecewise):
+            (yes, condition), *rest = expr.args
+            return f"{self._calls[expr.func]}({self(condition)}, {self(yes)}, {self(sp.Piecewise(*rest))})"
         if expr.func in self._calls:
             return f"{self._calls[expr.func]}({self(expr.args[0])})"
         if expr.is_Relational:
             return f"{self.inner(expr.args[0])} {expr.rel_op} {self.inner(expr.args[1])}"
-        if isinstance(expr, sp.Piecewise):
-            (yes, condition), *rest = expr.args
-            if condition == sp.true:
-                return self(yes)
-            return f"{self.inner(condition)} ? {self.inner(yes)} : {self.inner(sp.Piecewise(*rest))}"
         raise ValueError(f"no C for {expr.func.__name__} in {expr}")
 
     def inner(self, expr: sp.Expr) -> str:

@@ -40,21 +40,17 @@ class _LanePrinter(Printer):
     """Prints expressions over lanes: selections are masks, and numbers on their own are widened."""
 
     _calls = {function: name.replace("pen_port_", "lanes_").replace("pen_", "lanes_") for function, name in Printer._calls.items()}
+    _calls[sp.Piecewise] = "lanes_pick"
 
     def __call__(self, expr: sp.Expr) -> str:
         if expr.is_Rational or expr.is_Float:
             return f"lanes_wide({super().__call__(expr)})"
-        if isinstance(expr, sp.Piecewise):
-            (yes, condition), *rest = expr.args
-            if condition == sp.true:
-                return self(yes)
-            return f"lanes_pick({self(condition)}, {self(yes)}, {self(sp.Piecewise(*rest))})"
         return super().__call__(expr)
 
     def inner(self, expr: sp.Expr) -> str:
         if expr.is_Rational or expr.is_Float:  # beside an operator a number may stay one
             return real(float(expr)) if expr >= 0 else f"({real(float(expr))})"
-        return self(expr) if isinstance(expr, sp.Piecewise) else super().inner(expr)
+        return super().inner(expr)
 
 
 class _LaneEmitter(_Emitter):

@@ -38,7 +38,6 @@ _TAKEN = frozenset(
     "p x u y z dx fx fu yx yu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
     "inner along drive before advance fold f x0 copy begin finish usable unit solve integrate node".split()
 )
-_MATH = ("pen_exp", "pen_tanh", "pen_sigmoid", "pen_softplus", "pen_sign", "pen_heaviside", "pen_max", "pen_min")
 _AFFINE = {"centre": "pen_centre", "rescale": "pen_rescale"}
 _METHOD_NAMES = {
     "euler": "explicit Euler", "heun": "Heun (order 2)", "rk4": "Runge-Kutta of order 4",

@@ -49,23 +49,31 @@ static inline bool pen_finite(size_t n, const pen_real_t value[])
     return sum >= (pen_real_t)0; /* false for NaN; -0 >= 0 is true */
 }
 
+/** `yes` or `no`, both made beforehand: through memory, so that no compiler branches around the one it does not need. */
+static inline pen_real_t pen_where(bool condition, pen_real_t yes, pen_real_t no)
+{
+    const pen_real_t both[2] = { no, yes };
+
+    return both[condition ? 1U : 0U];
+}
+
 /* Kinks. NaN, and an Inf that the result would hide, come out as NaN. */
 
 static inline pen_real_t pen_max(pen_real_t a, pen_real_t b)
 {
-    return ((a > b) ? a : b) + ((pen_real_t)0 * (a + b));
+    return pen_where(a > b, a, b) + ((pen_real_t)0 * (a + b));
 }
 
 static inline pen_real_t pen_min(pen_real_t a, pen_real_t b)
 {
-    return ((a < b) ? a : b) + ((pen_real_t)0 * (a + b));
+    return pen_where(a < b, a, b) + ((pen_real_t)0 * (a + b));
 }
 
 /** -1, 0 or 1 */
 static inline pen_real_t pen_sign(pen_real_t x)
 {
-    const pen_real_t above = (x > (pen_real_t)0) ? (pen_real_t)1 : (pen_real_t)0;
-    const pen_real_t below = (x < (pen_real_t)0) ? (pen_real_t)1 : (pen_real_t)0;
+    const pen_real_t above = pen_where(x > (pen_real_t)0, (pen_real_t)1, (pen_real_t)0);
+    const pen_real_t below = pen_where(x < (pen_real_t)0, (pen_real_t)1, (pen_real_t)0);
 
     return (above - below) + ((pen_real_t)0 * x);
 }
@@ -73,7 +81,7 @@ static inline pen_real_t pen_sign(pen_real_t x)
 /** 0 below and at zero, 1 above: the slope of pen_max(x, 0) */
 static inline pen_real_t pen_heaviside(pen_real_t x)
 {
-    return ((x > (pen_real_t)0) ? (pen_real_t)1 : (pen_real_t)0) + ((pen_real_t)0 * x);
+    return pen_where(x > (pen_real_t)0, (pen_real_t)1, (pen_real_t)0) + ((pen_real_t)0 * x);
 }
 
 #endif

@@ -15,6 +15,13 @@
  * PEN_PORT_UNROLL, which stands before a loop whose length is a small constant and may ask the compiler to
  * write it out where speed counts more than size.
  *
+ * A port may define PEN_PORT_ROWS too, and with it what takes the place of the C in pen_rows_relu (penode/pen_net16.h):
+ *
+ *   void pen_port_rows(size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[])
+ *
+ * Sixteen rows of a layer, n_in >= 1; y may be x. It must give the bits of the C (for NaN any NaN), and its time may
+ * depend on n_in alone; test/unit/test_pen_net.c compares the bits. port/gnu has one for size builds on a Cortex-M with FPU.
+ *
  * Cost on a Cortex-M with FPU: load, store, abs one instruction each, barrier one (DMB).
  */
 #ifndef PEN_PORT_H

@@ -16,6 +16,9 @@
  * pending. So the step never sees a half-written set, whichever of the two pre-empts the other, also on two cores.
  * One tuning context at a time. A refused call changes nothing that the step reads.
  *
+ * `layout` and `length` are those of the model, constants of the code: no bit that flips in RAM can move a write out of a
+ * bank, or let a set of another shape pass.
+ *
  * The values lie in the order in which the kernels stream them (see the generated header of the model for the map).
  */
 #ifndef PEN_SET_H
@@ -50,15 +53,14 @@ typedef struct {
     volatile uint32_t hold;     /* PEN_HELD: the step keeps the state                                        */
     pen_set_t         previous; /* what rollback returns to; value is NULL if it is gone                     */
     pen_real_t       *bank[2];  /* [length] each; NULL if the model runs from selected sets only             */
-    pen_real_t       *staging;  /* the bank being filled                                                     */
+    pen_real_t       *bank_again[2]; /* the same: an address that has lost a bit is not written to            */
     uint32_t          open;     /* 1: between begin and commit                                               */
     uint32_t          fill;     /* values written so far                                                     */
 } pen_tuning_t;
 
 /**
  * Start with a whole set active.
- * @param layout  what every set of this model must name
- * @param length  number of values of every set of this model
+ * @param layout, length  what every set of this model must name, here and in every call below
  * @param set     borrowed for as long as it may be active or previous; checked as commit does
  * @param bank0, bank1  [length] each, for staging; or both NULL: then only select works
  * @return PEN_OK; PEN_BADARG; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE
@@ -68,33 +70,38 @@ pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t len
 
 /**
  * Open the inactive buffer for a new set. The set before the running one is kept for rollback if a bank is free.
- * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT if layout or length differ; PEN_BADARG if head is NULL or there is no bank
+ * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT if layout or length differ; PEN_BADARG if head is NULL, or there is no bank,
+ *         or its address is damaged
  */
-pen_status_t pen_tuning_begin(pen_tuning_t *tuning, const pen_set_head_t *head);
+pen_status_t pen_tuning_begin(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_head_t *head);
 
 /**
  * Write values [offset, offset + n). In order; a chunk may be sent again, a gap is refused.
- * @return PEN_OK; PEN_SET_CLOSED; PEN_SET_RANGE; PEN_BADARG
+ * @return PEN_OK; PEN_SET_CLOSED, also if the pointers to the bank do not agree any more; PEN_SET_RANGE; PEN_BADARG
  */
-pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t offset, const pen_real_t value[], uint32_t n);
+pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t length, uint32_t offset, const pen_real_t value[], uint32_t n);
 
 /* Three ways to a new set. Each checks one and gives it out as `ready`; nothing changes until it is announced. In between,
  * what is derived from the set is made for the slot that it will take. Cost: about 10 operations per byte of the set. */
 
 /**
  * The open set. A refused one stays open: send the wrong part again, or abort.
- * @return PEN_OK; PEN_SET_CLOSED; PEN_SET_SHORT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE
+ * @return PEN_OK; PEN_SET_CLOSED; PEN_SET_SHORT; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE
  */
-pen_status_t pen_tuning_commit(const pen_tuning_t *tuning, pen_set_t *ready);
+pen_status_t pen_tuning_commit(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, pen_set_t *ready);
 
 /**
  * A whole set (in flash, say), without copying it; an open set is dropped.
  * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE; PEN_BADARG
  */
-pen_status_t pen_tuning_select(const pen_tuning_t *tuning, const pen_set_t *set, pen_set_t *ready);
+pen_status_t pen_tuning_select(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set,
+                               pen_set_t *ready);
 
-/** The set that ran before; an open set is dropped. @return PEN_OK; PEN_SET_BUSY; PEN_SET_NO_PREVIOUS */
-pen_status_t pen_tuning_rollback(const pen_tuning_t *tuning, pen_set_t *ready);
+/**
+ * The set that ran before; an open set is dropped.
+ * @return PEN_OK; PEN_SET_BUSY; PEN_SET_NO_PREVIOUS; if it is no longer what it was PEN_SET_LAYOUT, PEN_SET_CHECKSUM
+ */
+pen_status_t pen_tuning_rollback(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, pen_set_t *ready);
 
 /** The slot that the next set will take: what belongs to it may be written. Stable while nothing is pending. */
 uint32_t pen_tuning_spare(const pen_tuning_t *tuning);

@@ -53,6 +53,12 @@ PEN_PORT_INLINE pen_real_t pen_port_abs(pen_real_t x)
 #endif
 }
 
+#if defined(__OPTIMIZE_SIZE__) && !defined(PEN_REAL_DOUBLE) && defined(__ARM_FP) && defined(__ARM_ARCH_PROFILE)
+#if (__ARM_ARCH_PROFILE == 'M') && ((__ARM_FP & 4) != 0)
+#include "pen_port_rows.h"
+#endif
+#endif
+
 /** x86: time stamp counter. Cortex-M3 and up: DWT_CYCCNT, which the application must have started. Others: 0. */
 PEN_PORT_INLINE uint32_t pen_port_cycles(void)
 {

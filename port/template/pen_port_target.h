@@ -4,7 +4,8 @@
 /**
  * A port in plain C99, to copy for a compiler that is not GCC or clang. Right as it stands on a single core whose
  * aligned 32-bit accesses are atomic and whose compiler keeps ordinary accesses in order around volatile ones;
- * anything else puts its barrier instruction (DMB on Cortex-M) where the comment says.
+ * anything else puts its barrier instruction (DMB on Cortex-M) where the comment says. penode/pen_port.h is the contract;
+ * it also names what a port may add for speed, and need not.
  */
 #ifndef PEN_PORT_TARGET_H
 #define PEN_PORT_TARGET_H

@@ -23,6 +23,7 @@ import penode_gen
 from penode_gen.emit_batch import BatchCode, render_batch
 
 from .errors import UserError
+from .output import whole
 from .targets import FLAGS, ROOT, _digest, _files, build_directory, compile_program
 
 Array = NDArray[Any]
@@ -214,6 +215,7 @@ def _build(name: str, code: BatchCode, dtype: type, per_run: bool) -> Path:
     if not library.exists():
         stem.parent.mkdir(parents=True, exist_ok=True)
         source = stem.with_suffix(".c")
-        source.write_text(code.text)
+        with whole(source) as part:  # other processes may be about to compile the same
+            part.write_text(code.text)
         compile_program([*command, str(source), *map(str, folding)], library)
     return library

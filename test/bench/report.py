@@ -112,11 +112,12 @@ one step of the same loop in NumPy and in SciPy's solve_ivp. One thread, one run
 
 WORST = """\
 Everything that a constant-time step must not notice: inputs and states of any bits, special numbers, all sizes; every
-end of a straight piece of the networks, its neighbours and every middle; staged sets of many sizes; sets whose memory
-was damaged into any bits, NaN, Inf, subnormals. "refused": a number was not finite and the step kept state and
-outputs. "adopting": the step took over another set. "commit" checks a staged set, and folds it, in the slow context;
-sets of more pieces than there is room for are among them. On the M3, whose soft float takes a time that depends on
-the numbers, a tenth of the calls."""
+end of a straight piece of the networks, every edge of their envelopes, every parameter of a law, and their neighbours;
+staged sets of many sizes; sets whose memory was damaged into any bits, NaN, Inf, subnormals. "refused": a number was
+not finite and the step kept state and outputs. "adopting": the step took over another set. "commit" checks a staged
+set, and folds it, in the slow context; sets of more pieces than there is room for are among them. On the M3, whose
+soft float takes a time that depends on the numbers, a tenth of the calls. "every law": a model with every law,
+function and kind of layer that there is (`all_laws.py`); ros1 runs through all their slopes, too."""
 
 CALLER = ("instance", "banks", "set", "commit stack bound")
 COSTS = ("instructions", "modelled kilocycles", "text", "constants", "RAM", "stack", "its bound")
@@ -208,7 +209,7 @@ def table(figures: Figures) -> str:
         "\n".join(f"* {r['model']}: {number(r['ratio'])} times" for r in figures["batch"] if "real" not in r),
         "## Worst case",
         WORST,
-        rows_of(["RK4, float, -O2", "calls", *CORES.values(), "M4F, modelled kilocycles"], _worst(figures)),
+        rows_of(["float, -O2", "calls", *CORES.values(), "M4F, modelled kilocycles"], _worst(figures)),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -241,6 +242,6 @@ def _worst(figures: Figures) -> list[list[str]]:
         what = (m4f["evaluator"], m4f["kind"])
         same = {r["machine"]: r for r in figures["worst case"] if (r["evaluator"], r["kind"]) == what}
         cost = kilo(m4f["cycles"]) + (", constant" if m4f["constant cycles"] else ", the most")
-        counts = [span(same[machine]["instructions"]) for machine in CORES]
+        counts = [span(same[machine]["instructions"]) if machine in same else "" for machine in CORES]
         rows.append([", ".join(what), number(m4f["calls"]), *counts, cost])
     return rows

@@ -8,6 +8,7 @@ worst_case.py [MODEL.toml] [--steps 10000] [--machine m4f ...]
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -19,22 +20,41 @@ from numpy.typing import NDArray
 import cycles
 import penode_gen
 import programs
+from all_laws import all_laws
 from penode_gen import fold
 from penode_sil.status import BIT
 from penode_sil.targets import MACHINES, ROOT
 
 ROUND = 100  # steps, see worst_case.c
+METHODS, POLICIES = ("rk4", "ros1"), ("clamp", "fade")  # of a model of everything: values, and slopes, of all there is
 FPU = ("m4f", "m7", "m33", "m55")
 
 
 def points(model: penode_gen.Model) -> NDArray[np.float32]:
-    """Ends of the straight pieces of the default set's networks, their neighbours in float, and the middles."""
-    places = [np.zeros(1, dtype=np.float32)]
-    for network in filter(fold.foldable, model.sets["default"].networks.values()):
-        kinks = fold.kinks(network).astype(np.float32)
-        below, above = (np.nextafter(kinks, np.float32(end)) for end in (-np.inf, np.inf))
-        places += [kinks, below, above, (kinks[1:] + kinks[:-1]) / 2]
-    return np.concatenate(places)
+    """
+    Where something changes along a state, and its neighbours in float: ends of the straight pieces of the default set's
+    networks, edges of their envelopes, ends of the fading, values of parameters (gaps, knees); 0, and the pieces' middles.
+    """
+    places, middles = [np.zeros(1), np.array([p.value for p in model.parameters.values()])], []
+    for network in model.sets["default"].networks.values():
+        edges = np.array([network.input_min, network.input_max])
+        fading = model.fade_width * np.diff(edges, axis=0) * [[-1], [1]]
+        places += [edges.ravel(), (edges + fading).ravel()]
+        if fold.foldable(network):
+            kinks = fold.kinks(network)
+            places.append(kinks)
+            middles.append((kinks[1:] + kinks[:-1]) / 2)
+    at = np.concatenate(places).astype(np.float32)
+    below, above = (np.nextafter(at, np.float32(end)) for end in (-np.inf, np.inf))
+    return np.concatenate([at, below, above, *(m.astype(np.float32) for m in middles)])
+
+
+def everything() -> list[penode_gen.Model]:
+    """Models of every law (all_laws.py), by method and policy outside of the trust envelope."""
+    with tempfile.TemporaryDirectory() as folder:
+        model = all_laws(Path(folder))
+    names = {(method, outside): f"{model.name}_{method}_{outside}" for method in METHODS for outside in POLICIES}
+    return [dataclasses.replace(model, name=name, method=m, outside=o) for (m, o), name in names.items()]
 
 
 def measure(model: penode_gen.Model, machine: str, steps: int, flags: Sequence[str] = ("-O2",)) -> dict[str, NDArray]:

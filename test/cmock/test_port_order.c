@@ -98,26 +98,26 @@ static pen_status_t commit(void)
 {
     pen_set_t ready;
 
-    return announced(pen_tuning_commit(&tuning, &ready), &ready);
+    return announced(pen_tuning_commit(&tuning, LAYOUT, LENGTH, &ready), &ready);
 }
 
 static pen_status_t choose(const pen_set_t *set)
 {
     pen_set_t ready;
 
-    return announced(pen_tuning_select(&tuning, set, &ready), &ready);
+    return announced(pen_tuning_select(&tuning, LAYOUT, LENGTH, set, &ready), &ready);
 }
 
 void test_begin_looks_at_pending_and_then_waits_for_its_view_of_active(void)
 {
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &other.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, LENGTH, &other.head));
     TEST_ASSERT_EQUAL_STRING("p|", trace);
 }
 
 void test_commit_announces_a_set_that_is_whole_before_the_barrier(void)
 {
-    (void)pen_tuning_begin(&tuning, &other.head);
-    (void)pen_tuning_write(&tuning, 0U, other_value, LENGTH);
+    (void)pen_tuning_begin(&tuning, LAYOUT, LENGTH, &other.head);
+    (void)pen_tuning_write(&tuning, LENGTH, 0U, other_value, LENGTH);
     forget();
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, commit());
     TEST_ASSERT_EQUAL_STRING("|P", trace);

@@ -107,19 +107,23 @@ def test_plugin_and_timer_count_the_same() -> None:
     assert found["instructions"][0] == found["instructions"][1] > 0
 
 
-@pytest.mark.parametrize("name", ["nqvm", "nqvm_folded"])
+CASES = [model("nqvm"), model("nqvm_folded"), *worst_case.everything()]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 @pytest.mark.parametrize("machine", worst_case.FPU)
-def test_every_step_costs_the_same(machine: str, name: str, show: Callable[[str], None]) -> None:
-    """Some hundred hostile steps here, ten thousand in `make bench`. Adoption adds a few stores and barriers."""
-    found = worst_case.measure(model(name), machine, 400)
-    count = {kind: calls["instructions"] for kind, calls in found.items() if kind != "commit"}
-    normal = count["normal"][0]
-    assert all(len(values) > 0 for values in count.values())
-    assert all((count[kind] == normal).all() for kind in ("normal", "refused", "holding"))
-    assert (count["adopting"] == count["adopting"][0]).all()
-    assert normal < count["adopting"][0] <= normal + 20
-    more, steps = count["adopting"][0] - normal, sum(map(len, count.values()))
-    show(f"{name} on {machine}: {normal} instructions, {more} more to adopt a set, {steps} steps")
+def test_every_step_costs_the_same(machine: str, case: penode_gen.Model, show: Callable[[str], None]) -> None:
+    """Some hundred hostile steps here, ten thousand in `make figures`. Adoption adds a few stores and barriers."""
+    for level in bench.LEVELS:
+        found = worst_case.measure(case, machine, 400, (level,))
+        count = {kind: calls["instructions"] for kind, calls in found.items() if kind != "commit"}
+        normal = count["normal"][0]
+        assert all(len(values) > 0 for values in count.values())
+        assert all((count[kind] == normal).all() for kind in ("normal", "refused", "holding"))
+        assert (count["adopting"] == count["adopting"][0]).all()
+        assert normal < count["adopting"][0] <= normal + 20
+        more, steps = count["adopting"][0] - normal, sum(map(len, count.values()))
+        show(f"{case.name} {level} on {machine}: {normal} instructions, {more} more to adopt a set, {steps} steps")
 
 
 def test_a_peer_that_computes_something_else_is_found() -> None:
@@ -150,3 +154,12 @@ def test_table_and_readme_are_those_of_the_figures() -> None:
     assert bench.TABLE.read_text() == report.table(figures)
     text = bench.README.read_text()
     assert bench.with_block(text, "bench", report.summary(figures)) == text
+
+
+def test_ten_thousand_steps_cost_the_same_in_the_figures() -> None:
+    rows = [row for row in json.loads(bench.KEPT.read_text())["worst case"] if row["machine"] in worst_case.FPU and row["kind"] != "commit"]
+    assert all(row["instructions"][0] == row["instructions"][1] for row in rows)
+    calls: dict[tuple[str, str], int] = {}
+    for row in rows:
+        calls[row["evaluator"], row["machine"]] = calls.get((row["evaluator"], row["machine"]), 0) + row["calls"]
+    assert len(calls) == len(CASES) * len(worst_case.FPU) and min(calls.values()) >= 10_000

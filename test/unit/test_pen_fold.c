@@ -190,3 +190,118 @@ void test_random_networks_against_their_layers(void)
     }
     TEST_ASSERT_GREATER_THAN_UINT32(30U, folded);
 }
+
+/* The tent between a scaling of the input and one of the output: 4 tent((x - 2) / 2) + 1, a tent from 0 to 4. */
+void test_scaled_input_and_output(void)
+{
+    static const pen_layer_t layer[4] = {
+        { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_DENSE, 3U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U }
+    };
+    static const pen_chain_t chain = { layer, 4U, 3U, 3U };
+    static const pen_real_t x[5] = { (pen_real_t)-1, (pen_real_t)1, (pen_real_t)2, (pen_real_t)3.5F, (pen_real_t)5 };
+    static const pen_real_t expected[5] = { (pen_real_t)1, (pen_real_t)3, (pen_real_t)5, (pen_real_t)2, (pen_real_t)1 };
+    pen_real_t p[16] = { (pen_real_t)-4, (pen_real_t)8, (pen_real_t)2, (pen_real_t)0.5F };
+
+    for (size_t i = 0U; i < 10U; i++) {
+        p[4U + i] = tent_value[2U + i];
+    }
+    p[14] = (pen_real_t)4;
+    p[15] = (pen_real_t)1;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&chain, p, false, line, active, 12U, piece));
+    for (size_t i = 0U; i < 5U; i++) {
+        pen_status_t status;
+        const pen_real_t y = value(12U, x[i], &status);
+        TEST_ASSERT_TRUE(!(y > expected[i]) && !(y < expected[i]));
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, status);
+    }
+}
+
+/* Nothing is lost at 0, where the numbers are closest together. */
+void test_an_envelope_that_ends_at_zero(void)
+{
+    pen_real_t p[12];
+    pen_status_t status;
+
+    for (size_t i = 0U; i < 12U; i++) {
+        p[i] = tent_value[i];
+    }
+    p[1] = (pen_real_t)0;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, false, line, active, 12U, piece));
+    (void)value(12U, (pen_real_t)0, &status);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, status);
+    (void)value(12U, PEN_REAL_MIN * PEN_REAL_EPSILON, &status); /* the smallest number */
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, status);
+}
+
+/* An envelope of all numbers has no edges; a kink beyond all numbers is none. */
+void test_without_edges_and_without_an_end(void)
+{
+    static const pen_layer_t one_layer[2] = { { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_DENSE, 1U, 1U } };
+    static const pen_chain_t one = { one_layer, 2U, 1U, 1U };
+    const pen_real_t far[6] = {
+        (pen_real_t)-1, (pen_real_t)1, PEN_REAL_MAX * (pen_real_t)0.5F, -PEN_REAL_MIN, (pen_real_t)0, (pen_real_t)1
+    };
+    pen_real_t p[12];
+    pen_status_t status;
+    pen_real_t y;
+
+    for (size_t i = 0U; i < 12U; i++) {
+        p[i] = tent_value[i];
+    }
+    p[0] = -PEN_REAL_MAX;
+    p[1] = PEN_REAL_MAX;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, false, line, active, 6U, piece)); /* 3 kinks, the centre */
+    y = value(6U, (pen_real_t)-1e30F, &status);
+    TEST_ASSERT_TRUE(!(y > (pen_real_t)0) && !(y < (pen_real_t)0));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, status);
+    y = value(6U, (pen_real_t)0.25F, &status);
+    TEST_ASSERT_TRUE(!(y > (pen_real_t)0.75F) && !(y < (pen_real_t)0.75F));
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&one, far, false, line, active, 4U, piece));
+    y = value(4U, (pen_real_t)9, &status);
+    TEST_ASSERT_TRUE(!(y > far[2]) && !(y < far[2]));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, status);
+}
+
+/* All kinks on one side of the centre: the room is used up on the way down, or on the way up. */
+void test_too_many_pieces_on_one_side(void)
+{
+    pen_real_t p[12];
+
+    for (size_t i = 0U; i < 12U; i++) {
+        p[i] = tent_value[i];
+    }
+    p[1] = (pen_real_t)9; /* the centre is 3: 3 kinks and an edge below */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_PIECES, pen_fold(&tent, p, false, line, active, 4U, piece));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, false, line, active, 8U, piece));
+    p[0] = (pen_real_t)-9;
+    p[1] = (pen_real_t)3;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_PIECES, pen_fold(&tent, p, false, line, active, 4U, piece));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, false, line, active, 8U, piece));
+}
+
+/*
+ * A saw of 16 teeth between 1 and the next number, which 16 neurons cut: 256 kinks without any number between them. The walk
+ * gives up in time, after as many looks as there is room and neurons.
+ */
+void test_kinks_closer_than_numbers(void)
+{
+    static const pen_layer_t layer[4] = {
+        { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 16U }, { PEN_LAYER_RELU, 16U, 16U }, { PEN_LAYER_DENSE, 16U, 1U }
+    };
+    static const pen_chain_t chain = { layer, 4U, 16U, 32U };
+    const pen_real_t tooth = PEN_REAL_EPSILON / (pen_real_t)64;
+    pen_real_t p[2U + 2U + 32U + 272U + 17U] = { (pen_real_t)0, (pen_real_t)2, (pen_real_t)1, (pen_real_t)1 };
+
+    for (size_t i = 0U; i < 16U; i++) {
+        p[4U + i] = -tooth * (pen_real_t)i; /* kinks at 1, 1 + tooth, ... */
+        p[20U + i] = (pen_real_t)1;
+        p[36U + i] = -tooth * (((pen_real_t)i + (pen_real_t)0.5F) / (pen_real_t)17); /* where the saw is cut */
+        for (size_t k = 0U; k < 16U; k++) {
+            const pen_real_t turn = ((i % 2U) == 0U) ? (pen_real_t)2 : (pen_real_t)-2;
+            p[52U + (16U * i) + k] = (i == 0U) ? (pen_real_t)1 : turn;
+        }
+        p[309U + i] = (pen_real_t)1;
+    }
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_PIECES, pen_fold(&chain, p, false, line, active, 12U, piece));
+}

@@ -247,6 +247,33 @@ void test_zero_and_subnormal_numbers_are_exact(void)
     }
 }
 
+void test_kinks_choose_and_hide_nothing(void)
+{
+    const pen_real_t two = (pen_real_t)2;
+    const pen_real_t three = (pen_real_t)3;
+    const pen_real_t one = (pen_real_t)1;
+    const pen_real_t zero = real_of(0U);
+    const pen_real_t bad[3] = {real_of(INFINITE), -real_of(INFINITE), real_of(INFINITE | 1U)};
+
+    expect_bits(three, pen_max(two, three));
+    expect_bits(three, pen_max(three, two));
+    expect_bits(-three, pen_min(-three, two));
+    expect_bits(-three, pen_min(two, -three));
+    expect_bits(one, pen_sign(two));
+    expect_bits(-one, pen_sign(-real_of(1U)));
+    expect_bits(zero, pen_sign(zero));
+    expect_bits(one, pen_heaviside(real_of(1U)));
+    expect_bits(zero, pen_heaviside(zero));
+    expect_bits(two, pen_where(true, two, bad[2])); /* what is not chosen does not matter */
+    expect_bits(two, pen_where(false, bad[0], two));
+    for (size_t i = 0U; i < 3U; i++) {
+        TEST_ASSERT_TRUE(is_nan(pen_max(bad[i], two)));
+        TEST_ASSERT_TRUE(is_nan(pen_min(two, bad[i])));
+        TEST_ASSERT_TRUE(is_nan(pen_sign(bad[i])));
+        TEST_ASSERT_TRUE(is_nan(pen_heaviside(bad[i])));
+    }
+}
+
 void test_exp_overflows_and_underflows_where_e_to_the_x_does(void)
 {
     TEST_ASSERT_TRUE(pen_exp(EXP_LAST) <= PEN_REAL_MAX);

@@ -3,6 +3,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "penode/pen_math.h"
 #include "penode/pen_net.h"
@@ -140,6 +141,84 @@ void test_dense_dual(void)
             }
         }
     }
+}
+
+static uint32_t word(void)
+{
+    seed ^= seed << 13U;
+    seed ^= seed >> 17U;
+    seed ^= seed << 5U;
+    return seed;
+}
+
+/* Any bits; what is special; all sizes; -1 to 1. */
+static pen_real_t hostile(uint32_t kind)
+{
+    const pen_real_t special[] = { (pen_real_t)0, nan_value, inf_value, PEN_REAL_MAX, PEN_REAL_MIN, PEN_REAL_MIN * PEN_REAL_EPSILON };
+    const uint32_t bits[2] = { word(), word() };
+    const pen_real_t sign = ((bits[1] & 1U) != 0U) ? (pen_real_t)-1 : (pen_real_t)1;
+    pen_real_t value = (pen_real_t)(int32_t)bits[0] / (pen_real_t)2147483648.0;
+
+    if (kind == 0U) {
+        memcpy(&value, bits, sizeof(value));
+    } else if (kind == 1U) {
+        value = sign * special[bits[0] % (sizeof(special) / sizeof(special[0]))];
+    } else if (kind == 2U) {
+        for (uint32_t k = bits[1] % 150U; k > 0U; k--) {
+            value *= ((bits[1] & 256U) != 0U) ? (pen_real_t)0.5 : (pen_real_t)1.75;
+        }
+    } else {
+        /* as it is */
+    }
+    return value;
+}
+
+#ifdef PEN_PORT_ROWS
+#define ROUNDS 100000U
+#else
+#define ROUNDS 2000U
+#endif
+
+/* Sixteen rows side by side, by the port if it has a way of its own, and one after the other: the same bits. In each
+ * round sixteen weights change, to -1 .. 1 or to all sizes; one may become anything, and so may every fourth row of
+ * inputs. A NaN may be any NaN. */
+void test_rows_side_by_side_or_one_by_one(void)
+{
+    static pen_real_t w[16U + (16U * MAX_IN)];
+    const size_t length = sizeof(w) / sizeof(w[0]);
+    size_t numbers = 0U;
+
+    for (size_t round = 0U; round < ROUNDS; round++) {
+        const uint32_t kind = (round / 4U) % 4U;
+        const size_t n_in = 1U + (word() % MAX_IN);
+        pen_real_t in[MAX_IN];
+        pen_real_t expected[16];
+        pen_real_t *const found = ((round % 2U) == 0U) ? in : y;
+        for (size_t i = 0U; i < 16U; i++) {
+            w[word() % length] = hostile(2U + ((round / 16U) % 2U));
+        }
+        w[word() % length] = hostile(kind);
+        for (size_t i = 0U; i < MAX_IN; i++) {
+            in[i] = hostile(((round % 4U) == 0U) ? kind : 3U);
+        }
+        for (size_t r = 0U; r < 16U; r++) {
+            expected[r] = w[r];
+            for (size_t i = 0U; i < n_in; i++) {
+                expected[r] += w[(16U * i) + 16U + r] * ((pen_real_t)0.5 * (in[i] + pen_port_abs(in[i])));
+            }
+        }
+        pen_rows_relu(n_in, w, in, found);
+        for (size_t r = 0U; r < 16U; r++) {
+            if (expected[r] == expected[r]) {
+                TEST_ASSERT_EQUAL_MEMORY(&expected[r], &found[r], sizeof(pen_real_t));
+                numbers++;
+            } else {
+                TEST_ASSERT_FALSE(found[r] == found[r]);
+            }
+        }
+    }
+    TEST_ASSERT_TRUE(numbers > (8U * ROUNDS));
+    TEST_ASSERT_TRUE(numbers < (15U * ROUNDS));
 }
 
 /* 1-16-...-16-1 in one piece gives the bits of layer by layer, also where sums are not exact; so does its slope's value.

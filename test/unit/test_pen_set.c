@@ -56,21 +56,21 @@ static pen_status_t commit(void)
 {
     pen_set_t ready;
 
-    return announced(pen_tuning_commit(&tuning, &ready), &ready);
+    return announced(pen_tuning_commit(&tuning, LAYOUT, N, &ready), &ready);
 }
 
 static pen_status_t choose(const pen_set_t *set)
 {
     pen_set_t ready;
 
-    return announced(pen_tuning_select(&tuning, set, &ready), &ready);
+    return announced(pen_tuning_select(&tuning, LAYOUT, N, set, &ready), &ready);
 }
 
 static pen_status_t roll_back(void)
 {
     pen_set_t ready;
 
-    return announced(pen_tuning_rollback(&tuning, &ready), &ready);
+    return announced(pen_tuning_rollback(&tuning, LAYOUT, N, &ready), &ready);
 }
 
 /* What a step would run with now. */
@@ -110,9 +110,9 @@ static void stage(uint32_t id)
     pen_real_t value[N];
 
     fill(&set, value, id);
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, 2U));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 2U, &value[2], N - 2U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, 2U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 2U, &value[2], N - 2U));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, commit());
 }
 
@@ -164,10 +164,10 @@ void test_nothing_can_be_staged_while_a_set_waits(void)
 
     fill(&set, value, 9U);
     stage(3U);
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BUSY, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BUSY, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_BUSY, choose(&other));
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_BUSY, roll_back());
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, 0U, value, 1U)); /* write after commit */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, value, 1U)); /* write after commit */
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, commit());
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_abort(&tuning));
     expect_adoption(3U);
@@ -179,12 +179,12 @@ void test_short_set_is_refused_and_can_be_completed(void)
     pen_real_t value[N];
 
     fill(&set, value, 6U);
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_SHORT, commit());
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N - 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, N - 1U));
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_SHORT, commit());
     expect_running(1U);
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N - 1U, &value[N - 1U], 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, N - 1U, &value[N - 1U], 1U));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, commit());
     expect_adoption(6U);
 }
@@ -195,13 +195,13 @@ void test_wrong_checksum_is_refused_and_the_chunk_can_be_sent_again(void)
     pen_real_t value[N];
 
     fill(&set, value, 6U);
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
     value[2] += (pen_real_t)1;
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, N));
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_CHECKSUM, commit());
     expect_running(1U);
     value[2] -= (pen_real_t)1;
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 2U, &value[2], 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 2U, &value[2], 1U));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, commit());
     expect_adoption(6U);
 }
@@ -221,8 +221,8 @@ void test_nan_and_inf_are_refused_even_with_the_right_checksum(void)
             fill(&set, value, 6U);
             value[i] = bad[b];
             set.head.checksum = pen_set_checksum(value, N);
-            TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
-            TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N));
+            TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
+            TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, N));
             TEST_ASSERT_EQUAL_HEX32(PEN_SET_NONFINITE, commit());
             TEST_ASSERT_EQUAL_HEX32(PEN_SET_NONFINITE, choose(&set));
             expect_running(1U);
@@ -235,13 +235,13 @@ void test_other_layout_or_length_is_refused(void)
     pen_set_head_t head = first.head;
 
     head.layout ^= 1U;
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, pen_tuning_begin(&tuning, &head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, pen_tuning_begin(&tuning, LAYOUT, N, &head));
     head = first.head;
     head.length--;
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, pen_tuning_begin(&tuning, &head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, pen_tuning_begin(&tuning, LAYOUT, N, &head));
     other.head.layout ^= 1U;
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, choose(&other));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_begin(&tuning, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_begin(&tuning, LAYOUT, N, NULL));
     expect_running(1U);
 }
 
@@ -251,16 +251,16 @@ void test_chunks_may_not_leave_the_set(void)
     pen_real_t value[N];
 
     fill(&set, value, 6U);
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, 0U, value, 1U));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, 1U, value, 1U)); /* a gap */
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, 0U, value, N + 1U));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N));
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, value, 1U));
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, 1U, value, UINT32_MAX)); /* offset + n wraps */
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, UINT32_MAX, value, 2U));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_write(&tuning, 0U, NULL, 1U));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, value, 0U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, 1U, value, 1U)); /* a gap */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, 0U, value, N + 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, N, value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, 1U, value, UINT32_MAX)); /* offset + n wraps */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, UINT32_MAX, value, 2U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_write(&tuning, N, 0U, NULL, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, N, value, 0U));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, commit());
 }
 
@@ -271,9 +271,9 @@ void test_damaged_fill_does_not_open_the_bank(void)
     pen_real_t value[N];
 
     fill(&set, value, 6U);
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
     tuning.fill = 0x80000000U;
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, 0x7fffffffU, value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, 0x7fffffffU, value, 1U));
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_SHORT, commit());
 }
 
@@ -284,8 +284,8 @@ void test_abort_drops_the_open_set(void)
 
     fill(&set, value, 6U);
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_abort(&tuning));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, 0U, value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, N));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_abort(&tuning));
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, commit());
     expect_running(1U);
@@ -314,7 +314,7 @@ void test_rollback_is_kept_while_a_bank_is_free_and_given_up_when_not(void)
     fill(&set, value, 6U);
     stage(3U);
     expect_adoption(3U); /* 3 runs in a bank, 1 lies in flash: begin takes the free bank */
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_abort(&tuning));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, roll_back());
     expect_adoption(1U);
@@ -322,7 +322,7 @@ void test_rollback_is_kept_while_a_bank_is_free_and_given_up_when_not(void)
     expect_adoption(4U);
     stage(5U);
     expect_adoption(5U); /* both banks hold 4 and 5: begin must take that of 4 */
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_NO_PREVIOUS, roll_back());
     expect_running(5U);
 }
@@ -333,9 +333,9 @@ void test_select_borrows_a_set_and_drops_an_open_one(void)
     pen_real_t value[N];
 
     fill(&set, value, 6U);
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, choose(&other));
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, 0U, value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, value, 1U));
     expect_adoption(2U);
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, choose(&first));
     expect_adoption(1U);
@@ -350,7 +350,7 @@ void test_select_borrows_a_set_and_drops_an_open_one(void)
 void test_without_banks_only_select_works(void)
 {
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_init(&tuning, LAYOUT, N, &first, NULL, NULL));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_begin(&tuning, &other.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_begin(&tuning, LAYOUT, N, &other.head));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, choose(&other));
     expect_adoption(2U);
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, roll_back());
@@ -368,4 +368,68 @@ void test_hold_does_not_keep_a_set_from_being_adopted(void)
     TEST_ASSERT_EQUAL_UINT32(3U, id);
     pen_tuning_hold(&tuning, false);
     expect_running(3U);
+}
+
+/* What a bit that flips in the instance can do to its addresses: nothing is written, nothing is committed. */
+void test_damaged_addresses_of_the_banks(void)
+{
+    static pen_real_t elsewhere[N];
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 6U);
+    for (size_t i = 0U; i < 2U; i++) {
+        pen_real_t *const kept = tuning.bank[i];
+        tuning.bank[i] = elsewhere;
+        TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
+        tuning.bank[i] = kept;
+    }
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, N));
+    tuning.bank[0] = elsewhere; /* the open one */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, commit());
+    tuning.bank[0] = bank0;
+    tuning.slot[1].value = elsewhere;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, commit());
+    for (size_t i = 0U; i < N; i++) {
+        TEST_ASSERT_TRUE(!(elsewhere[i] < (pen_real_t)0) && !(elsewhere[i] > (pen_real_t)0));
+    }
+    tuning.slot[1].value = bank0;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, commit());
+    expect_adoption(6U);
+}
+
+/* Layout and length count as the code names them, whatever lies in the instance. */
+void test_damaged_heads_do_not_let_another_shape_pass(void)
+{
+    pen_set_t set;
+    pen_real_t value[N];
+
+    fill(&set, value, 6U);
+    tuning.slot[0].head.length = N + 1U;
+    tuning.slot[0].head.layout = 0U;
+    other.head.length = N + 1U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, choose(&other));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
+    tuning.slot[1].head.length = N + 1U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, 0U, value, N + 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, commit());
+}
+
+void test_rollback_refuses_a_set_that_is_no_longer_what_it_was(void)
+{
+    stage(3U);
+    expect_adoption(3U);
+    first_value[1] += (pen_real_t)1;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CHECKSUM, roll_back());
+    first_value[1] -= (pen_real_t)1;
+    tuning.previous.head.length--;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_LAYOUT, roll_back());
+    tuning.previous.head.length++;
+    expect_running(3U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, roll_back());
+    expect_adoption(1U);
 }

@@ -285,3 +285,34 @@ void test_order_out_of_range_or_null_is_refused_and_nothing_written(void)
     TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_solve(2U, a, NULL));
     TEST_ASSERT_TRUE((a[0] < -98) && (b[0] < -98));
 }
+
+/* The same as pen_solve, to the bit, whichever row comes first, and the same verdict on what has no solution. */
+void test_order_two_in_place(void)
+{
+    volatile pen_real_t zero = (pen_real_t)0;
+    const pen_real_t odd[6] = { zero, zero / zero, (pen_real_t)1 / zero, (pen_real_t)-1 / zero, PEN_REAL_MAX, SMALLEST };
+
+    for (uint32_t round = 0U; round < 3000U; round++) {
+        pen_real_t matrix[4];
+        pen_real_t right[2];
+        pen_status_t expected;
+        for (size_t i = 0U; i < 4U; i++) {
+            matrix[i] = next_noise();
+        }
+        right[0] = next_noise();
+        right[1] = next_noise();
+        if (round >= 1000U) { /* one or two of them out of the ordinary */
+            matrix[round % 4U] = odd[(round / 4U) % 6U];
+            matrix[(round / 24U) % 4U] = odd[(round / 96U) % 6U];
+        }
+        if ((round % 7U) == 6U) {
+            right[round % 2U] = odd[(round / 7U) % 6U];
+        }
+        load(2U, matrix, right);
+        expected = pen_solve(2U, a, b);
+        TEST_ASSERT_EQUAL_HEX32(expected, pen_solve2(matrix, right));
+        if (expected == PEN_OK) {
+            expect_solution(2U, right);
+        }
+    }
+}

@@ -543,7 +543,7 @@ pen_status_t nqvm_tune_begin(nqvm_t *self, const pen_set_head_t *head)
     pen_status_t status = PEN_BADARG;
 
     if (usable(self)) {
-        status = pen_tuning_begin(&self->tuning, head);
+        status = pen_tuning_begin(&self->tuning, NQVM_LAYOUT, NQVM_SET_LENGTH, head);
         pen_status_note_tune(&self->log, status);
     }
     return status;
@@ -554,7 +554,7 @@ pen_status_t nqvm_tune_write(nqvm_t *self, uint32_t offset, const pen_real_t val
     pen_status_t status = PEN_BADARG;
 
     if (usable(self)) {
-        status = pen_tuning_write(&self->tuning, offset, value, n);
+        status = pen_tuning_write(&self->tuning, NQVM_SET_LENGTH, offset, value, n);
         pen_status_note_tune(&self->log, status);
     }
     return status;
@@ -589,7 +589,7 @@ pen_status_t nqvm_tune_commit(nqvm_t *self)
 
     if (usable(self)) {
         pen_set_t ready;
-        status = pen_tuning_commit(&self->tuning, &ready);
+        status = pen_tuning_commit(&self->tuning, NQVM_LAYOUT, NQVM_SET_LENGTH, &ready);
         status = announce(self, &ready, status);
     }
     return status;
@@ -601,7 +601,7 @@ pen_status_t nqvm_tune_select(nqvm_t *self, const pen_set_t *set)
 
     if (usable(self)) {
         pen_set_t ready;
-        status = pen_tuning_select(&self->tuning, set, &ready);
+        status = pen_tuning_select(&self->tuning, NQVM_LAYOUT, NQVM_SET_LENGTH, set, &ready);
         status = announce(self, &ready, status);
     }
     return status;
@@ -613,7 +613,7 @@ pen_status_t nqvm_tune_rollback(nqvm_t *self)
 
     if (usable(self)) {
         pen_set_t ready;
-        status = pen_tuning_rollback(&self->tuning, &ready);
+        status = pen_tuning_rollback(&self->tuning, NQVM_LAYOUT, NQVM_SET_LENGTH, &ready);
         status = announce(self, &ready, status);
     }
     return status;

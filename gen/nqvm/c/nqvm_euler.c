@@ -499,7 +499,7 @@ pen_status_t nqvm_euler_tune_begin(nqvm_euler_t *self, const pen_set_head_t *hea
     pen_status_t status = PEN_BADARG;
 
     if (usable(self)) {
-        status = pen_tuning_begin(&self->tuning, head);
+        status = pen_tuning_begin(&self->tuning, NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, head);
         pen_status_note_tune(&self->log, status);
     }
     return status;
@@ -510,7 +510,7 @@ pen_status_t nqvm_euler_tune_write(nqvm_euler_t *self, uint32_t offset, const pe
     pen_status_t status = PEN_BADARG;
 
     if (usable(self)) {
-        status = pen_tuning_write(&self->tuning, offset, value, n);
+        status = pen_tuning_write(&self->tuning, NQVM_EULER_SET_LENGTH, offset, value, n);
         pen_status_note_tune(&self->log, status);
     }
     return status;
@@ -545,7 +545,7 @@ pen_status_t nqvm_euler_tune_commit(nqvm_euler_t *self)
 
     if (usable(self)) {
         pen_set_t ready;
-        status = pen_tuning_commit(&self->tuning, &ready);
+        status = pen_tuning_commit(&self->tuning, NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, &ready);
         status = announce(self, &ready, status);
     }
     return status;
@@ -557,7 +557,7 @@ pen_status_t nqvm_euler_tune_select(nqvm_euler_t *self, const pen_set_t *set)
 
     if (usable(self)) {
         pen_set_t ready;
-        status = pen_tuning_select(&self->tuning, set, &ready);
+        status = pen_tuning_select(&self->tuning, NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, set, &ready);
         status = announce(self, &ready, status);
     }
     return status;
@@ -569,7 +569,7 @@ pen_status_t nqvm_euler_tune_rollback(nqvm_euler_t *self)
 
     if (usable(self)) {
         pen_set_t ready;
-        status = pen_tuning_rollback(&self->tuning, &ready);
+        status = pen_tuning_rollback(&self->tuning, NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, &ready);
         status = announce(self, &ready, status);
     }
     return status;

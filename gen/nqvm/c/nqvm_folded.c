@@ -539,7 +539,7 @@ pen_status_t nqvm_folded_tune_begin(nqvm_folded_t *self, const pen_set_head_t *h
     pen_status_t status = PEN_BADARG;
 
     if (usable(self)) {
-        status = pen_tuning_begin(&self->tuning, head);
+        status = pen_tuning_begin(&self->tuning, NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, head);
         pen_status_note_tune(&self->log, status);
     }
     return status;
@@ -550,7 +550,7 @@ pen_status_t nqvm_folded_tune_write(nqvm_folded_t *self, uint32_t offset, const 
     pen_status_t status = PEN_BADARG;
 
     if (usable(self)) {
-        status = pen_tuning_write(&self->tuning, offset, value, n);
+        status = pen_tuning_write(&self->tuning, NQVM_FOLDED_SET_LENGTH, offset, value, n);
         pen_status_note_tune(&self->log, status);
     }
     return status;
@@ -588,7 +588,7 @@ pen_status_t nqvm_folded_tune_commit(nqvm_folded_t *self)
 
     if (usable(self)) {
         pen_set_t ready;
-        status = pen_tuning_commit(&self->tuning, &ready);
+        status = pen_tuning_commit(&self->tuning, NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, &ready);
         status = announce(self, &ready, status);
     }
     return status;
@@ -600,7 +600,7 @@ pen_status_t nqvm_folded_tune_select(nqvm_folded_t *self, const pen_set_t *set)
 
     if (usable(self)) {
         pen_set_t ready;
-        status = pen_tuning_select(&self->tuning, set, &ready);
+        status = pen_tuning_select(&self->tuning, NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, set, &ready);
         status = announce(self, &ready, status);
     }
     return status;
@@ -612,7 +612,7 @@ pen_status_t nqvm_folded_tune_rollback(nqvm_folded_t *self)
 
     if (usable(self)) {
         pen_set_t ready;
-        status = pen_tuning_rollback(&self->tuning, &ready);
+        status = pen_tuning_rollback(&self->tuning, NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, &ready);
         status = announce(self, &ready, status);
     }
     return status;
