@@ -29,6 +29,8 @@ LAWS: dict[str, Law] = {
     "linear_spring": Law("stiffness*s", {"stiffness": "N/m"}),
     "linear_damper": Law("damping*v", {"damping": "N*s/m"}),
     "constant_force": Law("force", {"force": "N"}),
+    # a load that is put on within some time, from none
+    "growing_force": Law("force*grown", {"force": "N", "time": "s"}, {"grown": LawState("1", "(1 - grown)/time")}),
     "cubic_spring": Law("cubic*s^3", {"cubic": "N/m^3"}),
     # quadratic in the distance to the point of zero stiffness, as in the published case study
     "progressive_spring": Law("(root*(s + lead))^2 - (root*lead)^2", {"root": "N^0.5/m", "lead": "m"}),
@@ -62,6 +64,11 @@ LAWS: dict[str, Law] = {
     ),
     # hysteresis of Dahl: ever softer after a reversal
     "dahl_friction": Law("force*slip", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - abs(v)*slip)/presliding")}),
+    # the part of a dry friction that is there at low rates only, with the memory of Dahl's
+    "falling_friction": Law(
+        "force*slip/(1 + (v/stribeck)^2)", {"force": "N", "presliding": "m", "stribeck": "m/s"},
+        {"slip": LawState("1", "(v - abs(v)*slip)/presliding")},
+    ),  # fmt: skip
     # hysteresis behind a play: without force for about 1.4 times the presliding after a reversal
     "slack_friction": Law(
         "force*slip^5", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - (v*slip^2 + abs(v)*slip*abs(slip))/2)/presliding")}
@@ -70,13 +77,17 @@ LAWS: dict[str, Law] = {
     "maxwell_bushing": Law(
         "pull", {"stiffness": "N/m", "relaxation": "s"}, {"pull": LawState("N", "stiffness*v - pull/relaxation")}
     ),
+    # what a bushing of rubber pulls more than its linear one when it is stretched far
+    "hardening_bushing": Law(
+        "cubic*stretch^3", {"cubic": "N/m^3", "relaxation": "s"}, {"stretch": LawState("m", "v - stretch/relaxation")}
+    ),
     # a mass that hangs on the first end by spring and damper; the second end is ground
     "absorber": Law(
-        "stiffness*(s - position) + damping*(v - rate)",
-        {"mass": "kg", "stiffness": "N/m", "damping": "N*s/m"},
+        "stiffness*(s - position) + cubic*(s - position)^3 + damping*(v - rate)",
+        {"mass": "kg", "stiffness": "N/m", "cubic": "N/m^3", "damping": "N*s/m"},
         {
             "position": LawState("m", "rate"),
-            "rate": LawState("m/s", "(stiffness*(s - position) + damping*(v - rate))/mass"),
+            "rate": LawState("m/s", "(stiffness*(s - position) + cubic*(s - position)^3 + damping*(v - rate))/mass"),
         },
     ),
 }

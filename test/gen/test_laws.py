@@ -46,7 +46,7 @@ def bouc_wen(s: float, v: float, own: np.ndarray) -> tuple[float, list[float]]:
 
 
 def absorber(s: float, v: float, own: np.ndarray) -> tuple[float, list[float]]:
-    force = 90.0 * (s - own[0]) + 0.8 * (v - own[1])
+    force = 90.0 * (s - own[0]) + 2e4 * (s - own[0]) ** 3 + 0.8 * (v - own[1])
     return force, [own[1], force / 0.4]
 
 
@@ -75,9 +75,17 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
     ),
     "bouc_wen": ({"force": "9 N", "presliding": "10 mm"}, bouc_wen),
     "dahl_friction": ({"force": "9 N", "presliding": "10 mm"}, lambda s, v, own: (9.0 * own[0], [(v - abs(v) * own[0]) / 0.01])),
+    "falling_friction": (
+        {"force": "9 N", "presliding": "10 mm", "stribeck": "100 mm/s"},
+        lambda s, v, own: (9.0 * own[0] / (1.0 + (v / 0.1) ** 2), [(v - abs(v) * own[0]) / 0.01]),
+    ),
+    "growing_force": ({"force": "4 N", "time": "300 ms"}, lambda s, v, own: (4.0 * own[0], [(1.0 - own[0]) / 0.3])),
+    "hardening_bushing": (
+        {"cubic": "2e4 N/m^3", "relaxation": "60 ms"}, lambda s, v, own: (2e4 * own[0] ** 3, [v - own[0] / 0.06])
+    ),
     "slack_friction": ({"force": "9 N", "presliding": "10 mm"}, lambda s, v, own: (9.0 * own[0] ** 5, bouc_wen(s, v, own)[1])),
     "maxwell_bushing": ({"stiffness": "300 N/m", "relaxation": "60 ms"}, lambda s, v, own: (own[0], [300.0 * v - own[0] / 0.06])),
-    "absorber": ({"mass": "0.4 kg", "stiffness": "90 N/m", "damping": "0.8 N*s/m"}, absorber),
+    "absorber": ({"mass": "0.4 kg", "stiffness": "90 N/m", "cubic": "2e4 N/m^3", "damping": "0.8 N*s/m"}, absorber),
 }  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from .plant import Place, extend
 from .score import Candidate
 
 Array = NDArray[np.float64]
+BENT = 0.01  # [m] deflection of a hidden mass's spring where its bend would show
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,7 @@ class Term:
 
     candidate: Candidate
     gain: float
+    bend: float = 0.0  # N/m^3, of a hidden mass's spring
 
     @property
     def group(self) -> tuple[str, str]:
@@ -56,6 +58,9 @@ def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tup
         arguments = {key: f"{name}_{key}" for key in values}
         body = next(b for b in place.ends if b != GROUND)
         free = [Free(arguments[key], v, 1.0, log=True, low=1e-9) for key, (v, _) in values.items()]
+        values["cubic"] = (term.bend, "N/m^3")
+        free.append(Free(f"{name}_cubic", term.bend, 0.03 * m * w * w / BENT**2))
+        arguments = {key: f"{name}_{key}" for key in values}
         return Element(name, (body, GROUND), "absorber", arguments), {arguments[k]: v for k, v in values.items()}, free
     gain, unit = what.gain
     shapes = {f"{name}_{key}": value for key, value in what.shapes.items()}
@@ -64,7 +69,9 @@ def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tup
     size = max(abs(term.gain), 1e-12)
     low, high = (0.0, np.inf) if what.sign > 0 else (-np.inf, 0.0) if what.sign < 0 else (-np.inf, np.inf)
     free = [Free(f"{name}_{gain}", term.gain, size, low=low, high=high)]
-    free += [Free(key, value, 1.0, log=True, low=value / (3.0 if key.endswith("presliding") else 30.0), high=value * 30.0) for key, (value, _) in shapes.items()]
+    for key, (value, _) in shapes.items():
+        below, above = (3.0, 10.0) if key.endswith("presliding") else (30.0, 3.0) if key.endswith("transition") else (30.0, 30.0)
+        free.append(Free(key, value, 1.0, log=True, low=value / below, high=value * above))
     if what.law in LAWS:
         return Element(name, place.ends, what.law, {key: f"{name}_{key}" for key in LAWS[what.law].arguments}), parameters, free
     text = re.sub(r"\b(k|knee|gap|width)\b", lambda m: f"{name}_{m[1]}", what.law)
@@ -101,7 +108,9 @@ def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recor
         free += [Free(("start", e, i), x, 1e-3) for e in range(settled) for i, x in enumerate(model.start[: len(model.bodies)])]
     for i, state in enumerate(whole.extra_states[len(model.extra_states) :], len(model.states)):
         sigma = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3}[state.unit]
-        if not state.name.endswith(("_faded", "_warm")):
+        if state.name.endswith(("_faded", "_warm")):  # a damper may be warm already
+            free += [Free(("start", e, i), 0.0, 0.1, sigma=0.3, low=0.0, high=1.0) for e in range(recordings)]
+        elif not state.name.endswith("_grown"):
             free += [Free(("start", e, i), 0.0, 0.1 * sigma, sigma=sigma) for e in range(recordings)]
     return Extended(whole, tuple(free), tuple(faults), frozenset(loosened), tuple(names))
 

@@ -17,19 +17,24 @@ import penode_gen
 from penode_gen import units
 from penode_gen.model import Model
 
+from ..errors import UserError
 from ..measured import Measured
-from . import extension, naming, noise, search
+from . import extension, naming, noise, plausible, residual, search
 from .noise import Experiment
-from .result import Cause, Diagnosis, Gain, Named, Value
+from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
 from .search import Explanation
 from .study import MOVING, SKEW, Study, begin, look
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it
-ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be a whole explanation
+ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
+PATCHED = 0.985  # share that several causes must take away if sensors still share a residual
+WHOLE = 0.97  # share that is a whole explanation
+ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
 OUTSIDE = "outside_taxonomy"
+SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 
 
 def experiment(m: Measured, model: Model) -> Experiment:
@@ -45,20 +50,26 @@ def experiment(m: Measured, model: Model) -> Experiment:
 def diagnose(
     model: Model, train: Sequence[Measured], holdout: Sequence[Measured] = (), output: Path | None = None,
     set_name: str = "default", log: Callable[[str], None] = lambda text: None,
+    tell: Callable[[float, str], None] = lambda share, doing: None,
 ) -> Diagnosis:  # fmt: skip
     """Name what the model gets wrong in `train`, and measure on `holdout` what knowing it gains; with `output`, write
-    model_extended.toml there."""
+    model_extended.toml there. `log` hears what is tried, `tell` which share of the work is done and what comes next."""
     started = time.perf_counter()
-    experiments = [experiment(m, model) for m in train]
+    log = advancing(log, tell)
+    tell(0.0, "fitting the model as it is")
+    experiments, unused = ([experiment(m, model) for m in ms] for ms in (train, holdout))
+    if problems := plausible.misfits(model, [*experiments, *unused], set_name):
+        raise UserError(*problems)
     study, other = begin(model, experiments, set_name)
     bursts = noise.bursts(study.experiments, study.null.simulated)
     if any(b.any() for b in bursts):
         study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, bursts)], set_name)
     faults = broken_sensors(model, train, study, bursts)
+    tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
     if study.moving and search.at_rest(other, study):
         other, found = search.search(other, log)
-        costs = [e[0].fit.cost - e[0].score + e[0].gain if e else s.null.cost for s, e in ((study, explanations), (other, found))]
+        costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
         if costs[1] < costs[0] + MOVING * len(model.states) * len(experiments):
             study, explanations = other, found
@@ -66,14 +77,21 @@ def diagnose(
     if best is not None:  # bursts that a cause explains were none
         kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
         faults = broken_sensors(model, train, study, kept)
+    tell(SEARCH[1], "weighing them against numerics")
     study = replace(study, seen=look(study, best.fit if best else study.null))
     numbers, step = extension.numerics(study)
-    causes, verdict, explained, evidence = judge(study, explanations, faults)
+    alike = noise.kinship(study.experiments, study.metrics, best.fit.simulated if best else study.null.simulated)
+    log(f"kinship {alike:.1f}")
+    causes, verdict, explained, evidence = judge(study, explanations, faults, alike)
+    if doubt := plausible.doubt(study, best, verdict):
+        causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
     notes: list[str] = []
     gain: dict[str, Gain] = {}
-    named = best if best is not None and any(c.kind not in (OUTSIDE, "sensor_clipping", "sensor_dropout") for c in causes) else None
+    named = None  # what has no name does not go into a model
+    if not any(c.kind == OUTSIDE for c in causes):
+        named = best if best is not None and causes else search.explain(study, [])
     text, extended = extension.extend_file(study, named, causes)
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
@@ -81,11 +99,31 @@ def diagnose(
         beside = Path(os.path.relpath(nominal, output.resolve()))  # so that both can be moved together
         (output / "model_extended.toml").write_text(text.replace(extension.extends(nominal), extension.extends(beside), 1))
         extended = penode_gen.load(output / "model_extended.toml")
+    held: list[residual.Channel] = []
     if holdout:
-        gain, notes = extension.measure(study, extended, [experiment(m, model) for m in holdout])
+        tell(0.85, "measuring the gain")
+        gain, notes, held = extension.measure(study, extended, unused)
+    tell(0.9, "showing what is wrong")
+    whole = best is not None and named is best
+    shown = residual.show(study, best.fit if whole else None, extended if whole else None, held)
+    data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
+    causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(
-        verdict, causes, gain, numbers, explained, evidence, tuple(notes), time.perf_counter() - started
+        verdict, causes, gain, numbers, explained, evidence, alike, tuple([doubt] * bool(doubt) + notes), data, shown.numbers(), time.perf_counter() - started, shown
     )
+
+
+def advancing(log: Callable[[str], None], tell: Callable[[float, str], None]) -> Callable[[str], None]:
+    """A log of the search that tells progress too. How many fits are to come is not known: each takes a share of the rest."""
+    done = SEARCH[0]
+
+    def both(text: str) -> None:
+        nonlocal done
+        done += 0.12 * (SEARCH[1] - done)
+        tell(done, "looking for causes")
+        log(text)
+
+    return both
 
 
 def still_wild(study: Study, e: Explanation, bursts: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
@@ -103,7 +141,8 @@ def broken_sensors(model: Model, train: Sequence[Measured], study: Study, bursts
     found = []
     for j, sensor in enumerate(model.sensors):
         unit = units.si(sensor.unit)
-        clipped, dropped, total, limit = 0, 0, 0, 0.0
+        clipped, dropped, railed, total = 0, 0, 0, 0
+        rails: dict[str, float] = {}
         for k, m in enumerate(train):
             channel = m.quality.channels.get(sensor.name)
             if channel is None:
@@ -113,42 +152,60 @@ def broken_sensors(model: Model, train: Sequence[Measured], study: Study, bursts
             sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
             flagged = ~m.mask[sensor.name][:n]
             off = np.abs(m.z[sensor.name][:n] - study.null.simulated[k][:, j]) > 4.0 * sigma
-            if channel.saturated:
-                clipped += channel.saturated
-                limit = max(limit, *(abs(x) for x in (channel.low, channel.high) if x is not None))
+            for side, name, rail in ((-1.0, "low", channel.low), (1.0, "high", channel.high)):
+                if rail is None:
+                    continue
+                at = flagged & (np.abs(m.z[sensor.name][:n] - rail) < 1e-6 * abs(rail))
+                beyond = side * (study.null.simulated[k][at, j] - rail) > -4.0 * sigma
+                if np.mean(beyond) > 0.5:
+                    clipped += np.count_nonzero(at)
+                    rails[name] = rail
+                else:  # a rail that the signal was not near
+                    railed += np.count_nonzero(at)
             lost = channel.held + channel.missing + channel.spikes
             if lost and (channel.missing or np.count_nonzero(flagged & off) > 0.2 * lost):
                 dropped += lost
             dropped += int(np.count_nonzero(bursts[k][:n, j])) if len(bursts) > k else 0
+        dropped += 0 if clipped >= FEW else railed
         if clipped >= FEW:
-            found.append(Cause("sensor_clipping", sensor.name, {"limit": Value(limit, unit, (0.998 * limit, 1.002 * limit))}, 0.99))
+            sizes = {"limit": max(map(abs, rails.values())), **rails}
+            exact = {k: Value(x, unit, (x - 0.002 * abs(x), x + 0.002 * abs(x))) for k, x in sizes.items()}
+            found.append(Cause("sensor_clipping", sensor.name, exact, 0.99))
         if dropped >= FEW:
             share = dropped / total
             found.append(Cause("sensor_dropout", sensor.name, {"share": Value(share, "1", (0.9 * share, 1.1 * share))}, 0.99))
     return found
 
 
-def judge(study: Study, explanations: Sequence[Explanation], faults: list[Cause]) -> tuple[tuple[Cause, ...], str, float, float]:
-    """Causes, verdict, share explained, and the evidence that there is anything at all."""
+def judge(
+    study: Study, explanations: Sequence[Explanation], faults: list[Cause], alike: float
+) -> tuple[tuple[Cause, ...], str, float, float]:
+    """Causes, verdict, share explained, and the evidence that there is anything at all; `alike`: see noise.kinship."""
     rows = len(study.null.residual) * float(np.mean([np.mean(e.good) for e in study.experiments]))
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)
     if not explanations:
-        if evidence > DOUBT and excess > 0.15 * rows:
+        if evidence > DOUBT and excess > 0.15 * rows or alike > ALIKE:
             return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0, evidence
-        return tuple(faults), "explained" if faults else "no_discrepancy", 1.0, evidence
+        verdict = "explained" if faults else "not_identifiable" if evidence > DOUBT else "no_discrepancy"
+        return tuple(faults), verdict, 1.0, evidence
     best = explanations[0]
-    left = max(best.fit.chi2 - rows, 0.0)
-    share = best.gain / (best.gain + left) if best.gain + left > 0.0 else 1.0
-    if share < ENOUGH and left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows):
+    left = max(best.fit.chi2 - rows, 0.0)  # in the noise that the best explanation leaves
+    gained = study.null.cost - best.fit.cost
+    share = gained / (gained + left) if gained + left > 0.0 else 1.0
+    if share < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > ALIKE):
+        return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
+    if len(best.groups) > 1 and share < PATCHED and alike > ALIKE:  # several causes, and still no whole: a patchwork
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     causes = [cause(study, explanations, group) for group in best.groups]
     causes = [c for c in causes if worth(study, c)]
-    if any(c.kind == "hidden_resonance" and c.parameters["damping_ratio"].value > DAMPED for c in causes):
+    several = sum(c.kind == "wrong_parameter" for c in causes) > 1  # then it is another vehicle, or another effect
+    if several or any(c.kind == "hidden_resonance" and c.parameters["damping_ratio"].value > DAMPED for c in causes):
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     faulty = {(c.kind, c.where) for c in causes}
     causes += [f for f in faults if (f.kind, f.where) not in faulty]
-    return tuple(causes), "explained" if causes else "no_discrepancy", share, evidence
+    whole = share > WHOLE or left < 0.15 * rows
+    return tuple(causes), ("explained" if whole else "partly_explained") if causes else "no_discrepancy", share, evidence
 
 
 def worth(study: Study, c: Cause) -> bool:
@@ -163,7 +220,7 @@ def worth(study: Study, c: Cause) -> bool:
             return all(abs(v / study.model.parameters[k].value - 1.0) > study.model.parameters[k].tolerance for k, v in p.items())
         case "hidden_resonance":
             mass = next(study.model.parameters[b.mass].value for b in study.model.bodies if b.name == c.where)
-            return p["mass"] > 0.005 * mass
+            return p["mass"] > 0.002 * mass
     return True
 
 

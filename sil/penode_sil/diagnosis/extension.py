@@ -25,6 +25,7 @@ from .fit import Free, Problem
 from .hypotheses import Basis, Fault, size
 from .noise import Experiment, metric
 from .plant import anonymous
+from .residual import Channel, channels, noise_floor, rms
 from .result import Cause, Gain, Value
 from .search import Explanation
 from .study import Study, watched, widened
@@ -119,6 +120,11 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         if ("bias", j) in values:
             parameters.append(f"bias_{s.name} = {_table({'value': values[('bias', j)], 'unit': unit})}")
             expression = f"{expression} + bias_{s.name}"
+        rails = next((c.parameters for c in causes if (c.kind, c.where) == ("sensor_clipping", s.name)), {})
+        for side, cut in (("high", "min"), ("low", "max")):
+            if side in rails:
+                parameters.append(f"{side}_{s.name} = {_table({'value': rails[side].value, 'unit': unit})}")
+                expression = f"{cut}({expression}, {side}_{s.name})"
         if expression != old.expression and s.name in model.states:
             lines[0] += f" The sensor {s.name} has the name of a state, so its fault cannot be written here: rename it."
         elif expression != old.expression:
@@ -190,11 +196,12 @@ def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
     return np.concatenate([run.z[:1], run.z]).astype(float)
 
 
-def measure(study: Study, extended: Model, holdout: Sequence[Experiment]) -> tuple[dict[str, Gain], list[str]]:
+def measure(study: Study, extended: Model, holdout: Sequence[Experiment]) -> tuple[dict[str, Gain], list[str], list[Channel]]:
     """Errors before and after on held-out recordings, with the generated C; how much of them lies outside of what was
-    seen in training, where a right name says nothing about size."""
+    seen in training, where a right name says nothing about size; and all of it sample by sample."""
     model = study.model
-    sums = {s.name: np.zeros(3) for s in model.sensors}
+    shown: list[Channel] = []
+    floors = noise_floor(study, 0)
     limits = [1.02 * x for k in range(len(study.places)) for x in size([m.motions[k] for m in study.seen])]
     outside, notes = [], []
     for e in holdout:
@@ -205,22 +212,37 @@ def measure(study: Study, extended: Model, holdout: Sequence[Experiment]) -> tup
         outside.append(beyond)
         if beyond.any():
             notes.append(f"{e.name}: {np.mean(beyond):.1%} of the samples move farther or faster than in training; there the gain is extrapolated")
-        for j, s in enumerate(model.sensors):
-            good = e.good[:, j]
-            sums[s.name] += good.sum(), *(float(np.sum((e.y[good, j] - z[good, j]) ** 2)) for z in (before, after))
+        shown += channels(e, model, before, after, floors, beyond)
     e = study.experiments[0]
     through = study.linear.transfer(e.frequencies[: e.band])[:, :, : len(model.inputs)] * np.array([i.noise for i in model.inputs])
     gains = {}
     for j, s in enumerate(model.sensors):
-        n, b, a = sums[s.name]
-        if n == 0:
+        own = [c for c in shown if c.sensor == s.name]
+        if not own:
             continue
         floor = float(np.sqrt(np.mean(study.levels[0][:, j]) + np.mean(np.sum(np.abs(through[:, j]) ** 2, axis=1))))
-        before_rmse, after_rmse = float(np.sqrt(b / n)), float(np.sqrt(a / n))
-        room = before_rmse - floor
-        share = (before_rmse - after_rmse) / room if room > 0.05 * floor else None
-        gains[s.name] = Gain(before_rmse, after_rmse, floor, share, units.si(s.unit), float(np.mean(np.concatenate(outside))))
-    return gains, notes
+        errors = [np.concatenate([r.values[c.good] for c, r in zip(own, each)]) for each in ([c.before for c in own], [c.after for c in own])]
+        share, ci95 = achieved(*errors, floor)
+        gains[s.name] = Gain(rms(errors[0]), rms(errors[1]), floor, share, units.si(s.unit), float(np.mean(np.concatenate(outside))), ci95)
+    return gains, notes, shown
+
+
+BLOCKS = 40  # of the held-out samples, drawn anew together: errors near in time are alike
+DRAWS = 2000
+
+
+def achieved(before: Array, after: Array, floor: float) -> tuple[float | None, tuple[float, float] | None]:
+    """Share of the achievable gain in RMS [errors before and after, n each], and its 95 % interval by a block bootstrap; None
+    where there is next to nothing to gain."""
+    power = np.array([[np.mean(b**2) for b in np.array_split(x, min(BLOCKS, len(x)))] for x in (before, after)])
+    draws = np.random.default_rng(0).integers(power.shape[1], size=(DRAWS, power.shape[1]))
+    b, a = np.sqrt(power[:, draws].mean(axis=2))
+    room = rms(before) - floor
+    if not room > 0.05 * floor:
+        return None, None
+    shares = (b - a) / np.maximum(b - floor, 0.01 * floor)
+    low, high = np.quantile(shares, (0.025, 0.975))
+    return (rms(before) - rms(after)) / room, (float(low), float(high))
 
 
 def followed(model: Model, e: Experiment, start: Array, study: Study) -> Array:

@@ -28,7 +28,7 @@ from .plant import Place
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Basis:
     """One elementary law at a place: `law` is a named one, or an expression; `gain` names the argument that multiplies it,
     `shapes` are the others; `sign` is that of the gain (0: either). `series` is its force for gain 1, per recording."""
@@ -45,7 +45,7 @@ class Basis:
     fixed: dict[str, tuple[float, str]] = field(default_factory=dict)  # shapes that are known
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fault:
     """One elementary fault of a sensor: `series` is what it adds to that sensor for gain 1, per recording."""
 
@@ -156,28 +156,29 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
             yield law("tyre_liftoff", "liftoff", k, {"static": (g, "m")}, 1, lambda s, v, t: -np.maximum(s - g, 0.0))
         for sign in (1, -1):
             yield law("tyre_nonlinear", "quadratic_spring", ("quadratic", "N/m^2"), {}, sign, lambda s, v, t: s * s)
-            yield law("tyre_nonlinear", "cubic_spring", ("cubic", "N/m^3"), {}, sign, lambda s, v, t: s**3, True)
-            yield law("tyre_nonlinear", "k*s*abs(s)", ("k", "N/m^2"), {}, sign, lambda s, v, t: s * np.abs(s), True)
+            yield law("tyre_nonlinear", "cubic_spring", ("cubic", "N/m^3"), {}, sign, lambda s, v, t: s**3)
+            yield law("tyre_nonlinear", "k*s*abs(s)", ("k", "N/m^2"), {}, sign, lambda s, v, t: s * np.abs(s))
             yield law("tyre_nonlinear", "linear_spring", k, {}, sign, lambda s, v, t: s, True)
         return
 
     # a network beyond the range that it was trained on
-    for _, what, low, high in p.trained:
+    for _, what, low, high, stated in p.trained:
         for edge, side in ((high, 1), (low, -1)):
             far = max(float(np.quantile(side * (m.s if what == "s" else m.v), 0.995)) for m in motions)
             if far <= side * edge:
                 continue
             gap = side * edge
             unit = "N/m" if what == "s" else "N*s/m"
+            known = {"gap": (gap, "m" if what == "s" else "m/s")}
             over = f"max({what} - gap, 0)" if side > 0 else f"min({what} + gap, 0)"
             for sign in (1, -1):
                 yield law(
-                    "network_extrapolation", f"k*{over}", ("k", unit), {}, sign,
-                    lambda s, v, t: side * np.maximum(side * (s if what == "s" else v) - gap, 0.0), fixed={"gap": (gap, "m" if what == "s" else "m/s")},
+                    "network_extrapolation", f"k*{over}", ("k", unit), {} if stated else known, sign,
+                    lambda s, v, t: side * np.maximum(side * (s if what == "s" else v) - gap, 0.0), fixed=known if stated else {},
                 )  # fmt: skip
                 yield law(
-                    "network_extrapolation", f"k*{over}^2", ("k", f"{unit.replace('/m', '/m^2')}"), {}, sign,
-                    lambda s, v, t: np.maximum(side * (s if what == "s" else v) - gap, 0.0) ** 2, fixed={"gap": (gap, "m" if what == "s" else "m/s")},
+                    "network_extrapolation", f"k*{over}^2", ("k", f"{unit.replace('/m', '/m^2')}"), {} if stated else known, sign,
+                    lambda s, v, t: np.maximum(side * (s if what == "s" else v) - gap, 0.0) ** 2, fixed=known if stated else {},
                 )  # fmt: skip
     # friction: odd, constant in rate, little or no deflection before it slides
     slide = [0.003, 0.01, 0.03, 0.06]
@@ -201,9 +202,23 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
             "stribeck_friction", "2.3316439815971242*k*exp(-(v/width)^2)*v/width", ("k", "N"), {"width": (a, "m/s")}, 1,
             lambda s, v, t: 2.3316439815971242 * np.exp(-((v / a) ** 2)) * v / a,
         )  # fmt: skip
-    # relaxation: linear, memory in time
-    for tau in (0.004, 0.01, 0.025, 0.06, 0.15, 0.4, 1.0):
+    for w in (0.003, 0.01, 0.03):
+        for fall in (0.02, 0.06, 0.2):
+            a, b = w * reach, fall * speed
+            if a > 0.3 * speed * step:
+                slipped = [slips(m.s, [a])[1] for m in motions]
+                rows = tuple(z / (1.0 + (m.v / b) ** 2) for z, m in zip(slipped, motions))
+                shapes = {"presliding": (a, "m"), "stribeck": (b, "m/s")}
+                yield Basis("stribeck_friction", place, "falling_friction", n, shapes, 1, rows)
+    # relaxation: linear, memory in time; in series with a spring or damper it takes some of that away
+    yield law("maxwell_bushing", "linear_damper", d, {}, -1, lambda s, v, t: v, True)
+    yield law("maxwell_bushing", "linear_spring", k, {}, -1, lambda s, v, t: s, True)
+    for tau in (0.0006, 0.0015, 0.004, 0.01, 0.025, 0.06, 0.15, 0.4, 1.0):
         yield law("maxwell_bushing", "maxwell_bushing", k, {"relaxation": (tau, "s")}, 1, lambda s, v, t: s - lag(s, tau, step))
+    for tau in (0.01, 0.06, 0.4):
+        yield law(
+            "maxwell_bushing", "hardening_bushing", ("cubic", "N/m^3"), {"relaxation": (tau, "s")}, 0, lambda s, v, t: (s - lag(s, tau, step)) ** 3, True
+        )
     # dampers: odd and slower than linear, odd and faster, even, fading
     for w in (0.06, 0.15, 0.4, 1.0, 2.5):
         a = w * speed
@@ -228,6 +243,8 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
     for sign in (1, -1):
         yield law("asymmetric_damper", "k*abs(v)", ("k", "N*s/m"), {}, sign, lambda s, v, t: np.abs(v))
         yield law("asymmetric_damper", "k*v^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: v * v)
+        yield law("asymmetric_damper", "k*max(v, 0)^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: np.maximum(v, 0.0) ** 2)
+        yield law("asymmetric_damper", "k*min(v, 0)^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: np.minimum(v, 0.0) ** 2)
         for w in (0.1, 0.3):
             a = w * speed
             yield law(
@@ -255,6 +272,10 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
         yield law("cubic_spring", "k*s*abs(s)", ("k", "N/m^2"), {}, sign, lambda s, v, t: s * np.abs(s))
         yield law("cubic_spring", "k*s^5", ("k", "N/m^5"), {}, sign, lambda s, v, t: s**5)
         yield law("asymmetric_spring", "k*abs(s)", ("k", "N/m"), {}, sign, lambda s, v, t: np.abs(s))
+        yield law("asymmetric_spring", "k*max(s, 0)^2", ("k", "N/m^2"), {}, sign, lambda s, v, t: np.maximum(s, 0.0) ** 2)
+        yield law("asymmetric_spring", "k*min(s, 0)^2", ("k", "N/m^2"), {}, sign, lambda s, v, t: np.minimum(s, 0.0) ** 2)
+        yield law("asymmetric_spring", "k*max(s, 0)^3", ("k", "N/m^3"), {}, sign, lambda s, v, t: np.maximum(s, 0.0) ** 3)
+        yield law("asymmetric_spring", "k*min(s, 0)^3", ("k", "N/m^3"), {}, sign, lambda s, v, t: np.minimum(s, 0.0) ** 3)
         yield law("asymmetric_spring", "quadratic_spring", ("quadratic", "N/m^2"), {}, sign, lambda s, v, t: s * s)
     yield law("cubic_spring", "linear_spring", k, {}, 0, lambda s, v, t: s, True)
     yield law("asymmetric_spring", "linear_spring", k, {}, 0, lambda s, v, t: s, True)
@@ -270,12 +291,17 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
     for w in (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5):
         g = w * reach
         yield law("backlash", "backlash", k, {"gap": (g, "m")}, 1, lambda s, v, t: -np.clip(s, -g, g))
+        for side, text in ((1, "k*(max(s - gap, 0) - max(s, 0))"), (-1, "k*(min(s + gap, 0) - min(s, 0))")):
+            yield law("backlash", text, ("k", "N/m"), {"gap": (g, "m")}, 1, lambda s, v, t: -side * np.clip(side * s, 0.0, g), True)
 
 
 def _constant(place: int, motions: Sequence[Motion]) -> Iterator[Basis]:
     ones = tuple(np.ones_like(m.t) for m in motions)
     for settled in (False, True):
         yield Basis("constant_force", place, "constant_force", ("force", "N"), {}, 0, ones, False, settled)
+    for tau in (0.1, 0.3, 1.0):
+        grown = tuple(1.0 - np.exp(-m.t / tau) for m in motions)
+        yield Basis("constant_force", place, "growing_force", ("force", "N"), {"time": (tau, "s")}, 0, grown)
 
 
 def sensor_faults(sensor: int, signals: Sequence[Array], times: Sequence[Array], step: float) -> Iterator[Fault]:
@@ -292,6 +318,7 @@ def sensor_faults(sensor: int, signals: Sequence[Array], times: Sequence[Array],
         for w in (0.3, 0.5, 0.7, 0.85):
             edge = w * top
             yield fault("sensor_clipping", "clip", 1, lambda y, t: -side * np.maximum(side * y - edge, 0.0), side * edge)
+    yield fault("sensor_clipping", "scale_bend", -1, lambda y, t: y**3 / max(top, 1e-300) ** 2, top, True)
     # slow or bent forms of the same
     last = max(float(t[-1]) for t in times)
     for w in (0.1, 0.3):

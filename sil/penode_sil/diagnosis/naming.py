@@ -9,6 +9,8 @@ a gap where it begins. Its interval follows from the covariance of all that was 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +21,93 @@ from penode_gen.model import Model
 from .build import Term
 from .hypotheses import Basis, Fault, size
 from .plant import Place
+from .fit import Fit
 from .result import Value
-from .search import Explanation, Group
+from .score import where
 from .study import Study
 
+if TYPE_CHECKING:
+    from .search import Explanation, Group
+
+ELASTIC = 0.04  # of the reach: friction that yields farther before it slides is hysteresis of the element
+FRICTION = ("coulomb_friction", "stribeck_friction", "bouc_wen")
+DAMPERS = ("asymmetric_damper", "degressive_damper", "quadratic_damper")
+SPRINGS = ("asymmetric_spring", "cubic_spring", "bump_stop", "network_extrapolation")
+QUIET = 0.25  # of the largest force that an element is wrong by: less where its network was trained, and it is not the element
+UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that makes it asymmetric
+PEAK = 1.08  # friction at low rates over that at high ones that makes it Stribeck's
 Array = NDArray[np.float64]
 Values = Mapping[object, float]
+
+
+def christened(terms: Sequence[Term], names: Sequence[str], fit: Fit, study: Study) -> tuple[Term, ...]:
+    """The terms of friction, dampers and springs named by what their fitted curve does, not by the laws that it was put
+    together from."""
+    values = {f.target: f.value for f in fit.free}
+    named = list(terms)
+    for kinds, name in ((FRICTION, _friction), (DAMPERS, _damper), (SPRINGS, _spring)):
+        for place in {t.candidate.what.place for t in terms if t.candidate.kind in kinds}:
+            own = [i for i, t in enumerate(terms) if t.candidate.kind in kinds and t.candidate.what.place == place]
+            curve = Curve([terms[i] for i in own], [names[i] for i in own])
+            kind = name([terms[i] for i in own], [names[i] for i in own], values, *study.sizes[place])
+            if kinds is SPRINGS and _beyond(curve, values, study.places[place], study.sizes[place][0]):
+                kind = "network_extrapolation"
+            for i in own:
+                candidate = replace(terms[i].candidate, kind=kind, where=where(kind, study.places[place], study.model))
+                named[i] = replace(terms[i], candidate=candidate)
+    return tuple(named)
+
+
+def _friction(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
+    force = travel = 0.0
+    for term, name in zip(terms, names):
+        if term.candidate.what.gain[0] == "force":
+            gain = values[f"{name}_force"]
+            force += gain
+            travel += gain * values.get(f"{name}_presliding", 0.0)
+    v = np.geomspace(0.004 * speed, speed, 200)
+    f = Curve(terms, names)(np.zeros_like(v), v, values)
+    if travel > ELASTIC * reach * force:
+        return "bouc_wen"
+    return "stribeck_friction" if np.max(f) > PEAK * f[-1] else "coulomb_friction"
+
+
+def _damper(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
+    v = np.linspace(-speed, speed, 401)
+    f = Curve(terms, names)(np.zeros_like(v), v, values)
+    odd, even = _parts(v, f)
+    if _size(even) > UNEVEN * _size(odd):
+        return "asymmetric_damper"
+    return "quadratic_damper" if odd @ v**3 > line(v, v**3) * (odd @ v) else "degressive_damper"
+
+
+def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
+    s = np.linspace(-reach, reach, 401)
+    odd, even = _parts(s, Curve(terms, names)(s, np.zeros_like(s), values))
+    found = {t.candidate.kind for t in terms}
+    if found & {"bump_stop", "network_extrapolation"}:
+        return terms[0].candidate.kind
+    if found == {"asymmetric_spring"} and _size(even) < UNEVEN * _size(odd):
+        return "cubic_spring"
+    return "asymmetric_spring" if found == {"cubic_spring"} and _size(even) > UNEVEN * _size(odd) else terms[0].candidate.kind
+
+
+def _beyond(curve: Curve, values: Values, place: Place, reach: float) -> bool:
+    """Is a curve one of where a network was not trained, and next to nothing where it was?"""
+    inside = [(low, high) for _, what, low, high, _ in place.trained if what == "s"]
+    s = np.linspace(-reach, reach, 401)
+    f = np.abs(curve(s, np.zeros_like(s), values))
+    return any(np.max(f[(s >= low) & (s <= high)], initial=0.0) < QUIET * np.max(f) for low, high in inside)
+
+
+def _parts(x: Array, f: Array) -> tuple[Array, Array]:
+    """Odd part less its line, and even part, of a curve over a symmetric range."""
+    odd, even = (f - f[::-1]) / 2.0, (f + f[::-1]) / 2.0
+    return odd - line(x, odd) * x, even - even[len(x) // 2]
+
+
+def _size(f: Array) -> float:
+    return float(np.sqrt(np.mean(f * f)))
 
 
 def nominal(model: Model, place: Place, law: str, argument: str, values: Values) -> float:
@@ -58,6 +141,8 @@ def shape(law: str, s: Array, v: Array, a: Mapping[str, float]) -> Array:
     match law:
         case "linear_spring" | "maxwell_bushing":
             return s
+        case "hardening_bushing":
+            return s**3
         case "linear_damper":
             return v
         case "coulomb_friction":
@@ -80,8 +165,10 @@ def shape(law: str, s: Array, v: Array, a: Mapping[str, float]) -> Array:
             return -np.clip(s, -a["gap"], a["gap"])
         case "liftoff":
             return -np.maximum(s - a["static"], 0.0)
-        case "constant_force":
+        case "constant_force" | "growing_force":
             return np.ones_like(s)
+        case "falling_friction":
+            return np.sign(v) / (1.0 + (v / a["stribeck"]) ** 2)
         case "fading_damper" | "heating_damper":
             return v
     words = {"s": s, "v": v, "k": 1.0, "abs": np.abs, "exp": np.exp, "max": np.maximum, "min": np.minimum} | dict(a)
@@ -97,7 +184,7 @@ def functions(
     study: Study, e: Explanation, group: Group, reach: float, speed: float
 ) -> dict[str, tuple[str, Callable[[Values], float]]]:
     """Name, unit and value as a function of all that is free, for the parameters of one cause."""
-    kind, where = group
+    kind = group[0]
     terms, names = zip(*[(t, n) for t, n in zip(e.terms, e.built.names) if t.group == group])
     what = terms[0].candidate.what
     model = study.model
@@ -108,8 +195,7 @@ def functions(
     if isinstance(what, Fault):
         return _fault(model, kind, what)
     if isinstance(what, tuple):
-        best = max(range(len(terms)), key=lambda i: terms[i].gain)
-        n = names[best]
+        n = names[0]  # others only help it
         m, k, d = (f"{n}_{key}" for key in ("mass", "stiffness", "damping"))
         return {
             "frequency": ("Hz", lambda p: np.sqrt(p[k] / p[m]) / (2 * np.pi)),
@@ -195,21 +281,20 @@ def functions(
                 work = float(np.trapezoid(m.v**2, m.t))
                 total = 0.0
                 for t, n in zip(terms, names):
-                    basis = t.candidate.what
-                    done = m.t[-1] / p[f"{n}_time"] if basis.law == "fading_damper" else work / p[f"{n}_work"]
-                    total += p[f"{n}_damping"] * (1.0 - np.exp(-done))
+                    slow, scale = ("faded", f"{n}_time") if t.candidate.what.law == "fading_damper" else ("warm", f"{n}_work")
+                    done = (m.t[-1] if slow == "faded" else work) / p[scale]
+                    before = p.get(("start", 0, e.built.model.states.index(f"{n}_{slow}")), 0.0)
+                    total += p[f"{n}_damping"] * (1.0 - (1.0 - before) * np.exp(-done))
                 return -total / d0(p)
 
             return {"loss": ("1", loss)}
         case "bouc_wen":
-            pairs = [(f"{n}_force", f"{n}_presliding") for n in names]
-            force = lambda p: sum(p[f] for f, _ in pairs)  # noqa: E731
-            return {
-                "force": ("N", force),
-                "yield_deflection": ("m", lambda p: force(p) / max(sum(p[f] / p[w] for f, w in pairs), 1e-300)),
-            }
+            pairs = [(f"{n}_force", f"{n}_presliding") for n, t in zip(names, terms) if "presliding" in t.candidate.what.shapes]
+            stiff = lambda p: sum(p[f] / p[w] for f, w in pairs)  # noqa: E731
+            force = lambda p: float(curve(zero[:1], np.array([speed]), p)[0])  # noqa: E731
+            return {"force": ("N", force), "yield_deflection": ("m", lambda p: force(p) / max(stiff(p), 1e-300))}
         case "maxwell_bushing":
-            pairs = [(f"{n}_stiffness", f"{n}_relaxation") for n in names]
+            pairs = [(f"{n}_stiffness", f"{n}_relaxation") for n, t in zip(names, terms) if t.candidate.what.law == "maxwell_bushing"]
             total = lambda p: sum(p[k] for k, _ in pairs)  # noqa: E731
             return {
                 "stiffness": ("N/m", total),
@@ -231,7 +316,7 @@ def functions(
         case "tyre_nonlinear":
             return {"quadratic": ("N/m^2", lambda p: -line(s * s, curve(s, zero, p), s, s**3))}
         case "network_extrapolation":
-            edge = max(abs(x) for _, quantity, low, high in place.trained if quantity == "s" for x in (low, high))
+            edge = max(abs(x) for _, quantity, low, high, _ in place.trained if quantity == "s" for x in (low, high))
             return {"force_at_peak": ("N", lambda p: float(np.max(np.abs(curve(s, zero, p))))), "edge": ("m", lambda p: edge)}
         case "constant_force":
             sense = 1.0 if any(end in {i.name for i in model.inputs} for end in place.ends) else -1.0
@@ -271,7 +356,7 @@ def values(study: Study, e: Explanation, group: Group) -> dict[str, Value]:
         middle = float(function(centre))
         slope = np.zeros(len(free))
         for i, f in enumerate(free):
-            if isinstance(f.target, tuple) and f.target[0] in ("start", "skew"):
+            if f.target[0] == "skew" or f.target[0] == "start" and group[0] != "damper_fading":
                 continue
             step = min(0.1 * deviation[i], 0.01) if f.log else 0.1 * deviation[i]
             if step > 0.0:

@@ -21,6 +21,9 @@ from scipy.interpolate import CubicSpline
 from ..noise import Noise
 
 Array = NDArray[np.float64]
+POLES = (0.0, 0.3, 0.5, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985)  # of slow noise, per sample
+BINS = 16  # of a spectrum in which coherence is estimated
+PARTS = (0.1, 2.0, 6.0, 20.0)  # [Hz] from which to which coherence is added up
 TOP = 100.0  # [Hz] what vehicles do above it is not looked at, but for the noise
 
 
@@ -74,12 +77,10 @@ def prepare(name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_],
     unsure = np.zeros((n // 2 + 1, u.shape[1]))
     for k, sigma in enumerate(noise):
         if sigma > 0.0:
-            power = np.abs(spectra[:, k]) ** 2 / (2 * n)
-            kernel = np.hanning(2 * max(int(0.5 / f[1]), 2) + 1)
-            power = np.convolve(power, kernel, "same") / np.convolve(np.ones(len(f)), kernel, "same")
+            power = _smoothed(np.abs(spectra[:, k]) ** 2 / (2 * n), f[1])
             floor = float(np.median(power[int(0.6 * len(f)) : int(0.95 * len(f))]))  # there is no road left
-            sigma = min(sigma, np.sqrt(floor))
-            share = np.maximum(1.0 - 1.05 * sigma**2 / np.maximum(power, 1e-300), 0.0)
+            sigma = min(1.25 * sigma, np.sqrt(floor))
+            share = np.maximum(1.0 - sigma**2 / np.maximum(power, 1e-300), 0.02)
             spectra[:, k] *= share
             unsure[:, k] = sigma * np.sqrt(share)[: 2 * len(unsure) : 2][: len(unsure)]
     whole = fft.irfft(spectra, 2 * n, axis=0)[:n] + trend
@@ -87,6 +88,15 @@ def prepare(name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_],
     f = fft.rfftfreq(n, step)
     quiet = np.stack([np.full(len(f), np.nan) if law is None else law.density(f, step) / (2.0 * step) for law in laws], axis=1)
     return Experiment(name, time, u, y, good, whole, rate, unsure, quiet)
+
+
+def _smoothed(power: Array, bin: float) -> Array:
+    """A spectrum over bands of 1 Hz, at high frequencies over a sixth of the frequency to either side."""
+    n = len(power)
+    half = np.maximum(int(0.5 / bin), np.arange(n) // 6) + 1
+    low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
+    total = np.concatenate([[0.0], np.cumsum(power)])
+    return (total[high] - total[low]) / (high - low)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,20 +121,28 @@ class Metric:
     def __call__(self, r: Array) -> Array:
         return self.white(self.spectrum(r))
 
+    @property
+    def volume(self) -> float:
+        """What belongs to chi2 for a log likelihood where metrics differ: 2 log det S summed over the band."""
+        return -4.0 * float(np.sum(np.log(np.abs(np.diagonal(self.root, axis1=1, axis2=2)))))
 
-def sensor_levels(e: Experiment, residual: Array, declared: Array, through: NDArray[np.complex128]) -> Array:
+
+def sensor_levels(e: Experiment, residual: Array, declared: Array, through: NDArray[np.complex128], coloured: bool = True, robust: bool = True) -> Array:
     """Noise variance per sample of each sensor over all frequencies of the band [f, sensors].
 
     What a sensor's record shows by itself, above the band of the signals, is continued below; a slow part is added as the
     residual shows it, up to what the sensor's declared noise leaves room for. Bands with much more than that do not count:
-    there something is wrong, which is not noise.
+    there something is wrong, which is not noise; nor, if `robust`, does what is there in less than half of the time.
     """
     n, band, f = len(e.time), e.band, e.frequencies
-    size = n // 5  # nine stretches, each half over the next: what is there in less than half of the time is no noise
-    window = np.hanning(size)[:, None]
-    stretches = [fft.rfft(residual[k * size // 2 : k * size // 2 + size] * window, axis=0) for k in range(9)]
-    middle = np.median(np.abs(stretches) ** 2, axis=0) / (size * 0.375 * 0.7456)  # the median of nine exponentials
-    power = np.stack([np.interp(f, fft.rfftfreq(size, e.step), column) for column in middle.T], axis=1)
+    if robust:
+        size = n // 5  # nine stretches, each half over the next
+        window = np.hanning(size)[:, None]
+        stretches = [fft.rfft(residual[k * size // 2 : k * size // 2 + size] * window, axis=0) for k in range(9)]
+        middle = np.median(np.abs(stretches) ** 2, axis=0) / (size * 0.375 * 0.7456)  # the median of nine exponentials
+        power = np.stack([np.interp(f, fft.rfftfreq(size, e.step), column) for column in middle.T], axis=1)
+    else:
+        power = np.abs(fft.rfft(residual, axis=0)) ** 2 / n
     high = slice(band, max(int(0.9 * len(f)), band + 1))
     omega = 2.0 * np.pi * f * e.step
     wide = max(int(1.0 / f[1]), 2)  # bins of a band of 1 Hz
@@ -141,12 +159,12 @@ def sensor_levels(e: Experiment, residual: Array, declared: Array, through: NDAr
         p, b, r = (np.add.reduceat(x[:band], edges) / bins for x in (power[:, j], base, road))
         room = max((1.25 * sigma) ** 2 if sigma > 0.0 else 4.0 * float(np.mean(base)), 1.1 * float(np.mean(base))) - float(np.mean(base))
         best = np.inf, base
-        for pole in (0.0, 0.3, 0.5, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985):
+        for pole in POLES if coloured else ():
             shape = (1.0 - pole**2) / np.abs(1.0 - pole * np.exp(-1j * omega)) ** 2
             c = np.add.reduceat(shape[:band], edges) / bins
             for share in (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 0.75, 1.0):
                 s = b + r + share * room * c
-                loss = float(np.sum(bins * (np.log(s) + np.minimum(p / s, 12.0))))
+                loss = float(np.sum(bins * (np.log(s) + (np.minimum(p / s, 12.0) if robust else p / s))))
                 if loss < best[0] - 2.0:
                     best = loss, base + share * room * shape
         found[:, j] = best[1][:band]
@@ -173,7 +191,9 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
         wide = np.stack([np.convolve(w, np.ones(9), "same") > 0 for w in wild.T], axis=1)
         alone = wide & (np.sum(wide, axis=1, keepdims=True) == 1) if wide.shape[1] > 1 else wide
         few = np.mean(wild & alone, axis=0) < 0.01
-        found.append((alone & few & (np.sum(wild & alone, axis=0) >= 5)) | _sunken(e, z, r))
+        many = np.sum(wild & alone, axis=0) >= np.where(np.max(rough, axis=0) > 30.0 * usual, 2, 5)
+        often = np.mean(e.good, axis=0) > 0.5  # a sensor slower than the raster has no neighbours to be far beyond
+        found.append(((alone & few & many) | _sunken(e, z, r)) & often)
     return found
 
 
@@ -195,3 +215,29 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
         if np.mean(found[:, j]) > 0.02:
             found[:, j] = False
     return found
+
+
+def kinship(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> float:
+    """How much the residuals of different sensors are alike, in standard deviations of what independent noise makes, in that
+    part of the spectrum where they are most alike.
+
+    Noise of sensors has nothing in common (what the inputs' noise has, the metrics take out), so coherence between two of
+    them is the mark of something that moves the plant. Over B bins, -2 (B - 1) log(1 - coherence) is chi-square of 2.
+    """
+    found, freedom = np.zeros(len(PARTS)), np.zeros(len(PARTS))
+    for e, m, z in zip(experiments, metrics, simulated):
+        r = m.spectrum(np.where(e.good, e.y - z, 0.0))
+        w = np.einsum("fij,fj->fi", m.root, r)
+        edges = [max(int(f / e.frequencies[1]), 1) for f in (*PARTS, TOP)]
+        for part, (low, high) in enumerate(zip(edges, edges[1:])):
+            for band in np.array_split(w[low:high], max((high - low) // BINS, 1)):
+                if len(band) < 4:
+                    continue
+                s = band.T @ band.conj()
+                power = np.real(np.diag(s))
+                for i in range(len(s)):
+                    for j in range(i):
+                        coherence = float(np.abs(s[i, j]) ** 2 / max(power[i] * power[j], 1e-300))
+                        found[part] -= 2.0 * (len(band) - 1) * np.log1p(-min(coherence, 1.0 - 1e-12))
+                        freedom[part] += 2.0
+    return float(np.max((found - freedom) / np.sqrt(2.0 * np.maximum(freedom, 1.0))))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
-from penode_gen import laws
+from penode_gen import fold, laws
 from penode_gen.model import GROUND, Element, Input, Model, Parameter, Signal, State
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Place:
     ends: tuple[str, str]
     elements: tuple[tuple[str, int], ...]
     role: str
-    trained: tuple[tuple[str, str, float, float], ...] = ()  # element, "s" or "v", and the range its network was trained on
+    trained: tuple[tuple[str, str, float, float, bool], ...] = ()  # element, "s" or "v", range of its network, and whether it is stated
 
     @property
     def name(self) -> str:
@@ -61,12 +61,17 @@ def places(model: Model, set_name: str = "default") -> tuple[Place, ...]:
     return tuple(result)
 
 
-def _trained(model: Model, e: Element, set_name: str) -> list[tuple[str, str, float, float]]:
+def _trained(model: Model, e: Element, set_name: str) -> list[tuple[str, str, float, float, bool]]:
+    """Where its network was trained; if it does not say, where eight tenths of its kinks are: it is straight beyond them."""
     network = model.sets[set_name].networks[e.network]
-    if network.input_min is None or network.input_max is None:
-        return []
-    ranges = zip(e.network_inputs, network.input_min, network.input_max)
-    return [(e.name, "s" if what == "deflection" else "v", float(low), float(high)) for what, low, high in ranges]
+    low, high = network.input_min, network.input_max
+    stated = low is not None and high is not None
+    if not stated:
+        if not fold.foldable(network) or len(kinks := fold.kinks(network)) < 3:
+            return []
+        low, high = ([x] for x in np.quantile(kinks, (0.1, 0.9)))
+    ranges = zip(e.network_inputs, low, high)
+    return [(e.name, "s" if what == "deflection" else "v", float(low), float(high), stated) for what, low, high in ranges]
 
 
 def _external(model: Model, e: Element) -> bool:

@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
+
+from ..measured import Measured
 
 
 @dataclass(frozen=True)
@@ -28,8 +30,8 @@ class Named:
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause. `confidence` 0..1 against the next best explanation; `alternatives` explain the data about as well,
-    and `separate` says what excitation would tell them apart."""
+    """A named cause. `confidence` 0..1 against the next best explanation; `alternatives` explain the data about as
+    well, and `separate` says what excitation would tell them apart."""
 
     kind: str
     where: str
@@ -50,11 +52,28 @@ class Gain:
     share_of_achievable: float | None
     unit: str
     outside: float
+    share_ci95: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A recording that was used, and what is not as it should be in it. `role`: training or hold-out."""
+
+    name: str
+    role: str
+    samples: int
+    seconds: float
+    problems: tuple[str, ...]
+
+    @staticmethod
+    def of(m: Measured, role: str) -> Recorded:
+        return Recorded(m.title, role, len(m.time), float(m.time[-1] - m.time[0]), tuple(m.quality.problems))
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """See `penode diagnose`. `explained`: share of the avoidable residual that the causes take away in training."""
+    """See `penode diagnose`. `explained`: share of the avoidable residual that the causes take away in training;
+    `residual`: where it is in time, frequency and state space (see residual.py); `shown`: the same sample by sample."""
 
     verdict: str
     causes: tuple[Cause, ...]
@@ -62,25 +81,101 @@ class Diagnosis:
     numerics: dict[str, Any]
     explained: float
     evidence: float  # chi2 that the null fit leaves beyond the noise, in its standard deviations
+    alike: float  # what sensors share of the residual that is left, in standard deviations of independent noise
     notes: tuple[str, ...] = ()
+    data: tuple[Recorded, ...] = ()
+    residual: dict[str, Any] = field(default_factory=dict)
     seconds: float = field(default=0.0, compare=False)
+    shown: Any = field(default=None, compare=False, repr=False)
 
     def as_json(self) -> dict[str, Any]:
-        return asdict(self)
+        """All but `shown`, as plain data."""
+        shallow = type(self)(**{f.name: getattr(self, f.name) for f in fields(self) if f.name != "shown"})
+        return {k: v for k, v in asdict(shallow).items() if k != "shown"}
+
+
+_RIVALS = """
+constant_force, sensor_bias: put the load on or take it off during the recording: only that transient tells them apart
+coulomb_friction, stribeck_friction: slow motion with many reversals, and fast motion too: the lowest rates tell
+coulomb_friction, bouc_wen: small strokes besides large ones: before it slides, one is a spring, the other is not
+degressive_damper, quadratic_damper: rates over more than a decade
+degressive_damper, wrong_parameter: two amplitudes of one road: lower damping scales, a bend does not
+quadratic_damper, wrong_parameter: two amplitudes of one road: other damping scales, a bend does not
+damper_fading, wrong_parameter: the same excitation at the start and at the end of one long recording
+damper_fading, degressive_damper: the same excitation at the start and at the end of one recording, at two amplitudes
+cubic_spring, bump_stop: a rough road, which has small and large amplitudes, instead of a chirp of constant amplitude
+bouc_wen, maxwell_bushing: several amplitudes at one frequency: memory of the way depends on them, that in time not
+tyre_nonlinear, wrong_parameter: two amplitudes of a rough road, up to large tyre loads; no chirp
+tyre_nonlinear, tyre_liftoff: a rough road that unloads the tyre for moments, and a smooth one that does not
+sensor_scale, wrong_parameter: record wheel acceleration and deflection too, or weigh the body
+sensor_delay, sensor_scale: excitation up to higher frequencies: a delay turns the phase, a scale does not
+"""
+_PAIRS = (line.split(": ", 1) for line in _RIVALS.strip().split("\n"))
+RIVALS = {frozenset(pair.split(", ")): how for pair, how in _PAIRS}
+OTHERWISE = "a rough road at two amplitudes, with all sensors of the model file; chirps of constant amplitude tell least"
+
+
+def separating(c: Cause) -> str:
+    """The excitation that would tell a cause from its alternatives; empty if it has none."""
+    found = dict.fromkeys(RIVALS.get(frozenset((c.kind, a.kind)), OTHERWISE) for a in c.alternatives)
+    return "; ".join(found)
+
+
+# -- for the terminal -------------------------------------------------------------------------------------------------
+
+WIDTH, HEIGHT = 80, 24
+VERDICTS = {
+    "no_discrepancy": "the model agrees with the recordings within noise and tolerances",
+    "explained": "the model is wrong, and the causes named explain it",
+    "partly_explained": "the model is wrong, and the causes named explain a part of it",
+    "unexplained": "the model is wrong, and nothing on the list of causes explains it",
+    "not_identifiable": "something may be wrong, but these recordings cannot tell what",
+}
+
+
+PEOPLE = {"coulomb": "Coulomb", "stribeck": "Stribeck", "bouc wen": "Bouc-Wen", "maxwell": "Maxwell"}
+PEOPLE |= {"outside taxonomy": "outside of the list"}
+
+
+def plain(name: str) -> str:
+    """coulomb_friction as people write it."""
+    text = name.replace("_", " ")
+    for low, proper in PEOPLE.items():
+        text = text.replace(low, proper)
+    return text
+
+
+def place(kind: str, where: str) -> str:
+    return f"{plain(kind)} at {where}" if where else plain(kind)
 
 
 def sentences(model: Any, d: Diagnosis, output: Path) -> str:
-    """One screen for people."""
-    lines = [f"{model.name}: {d.verdict.replace('_', ' ')}, {d.explained:.1%} of the avoidable residual explained ({d.seconds:.1f} s)"]
+    """One screen: at most HEIGHT lines of WIDTH columns; files that are named may stand out."""
+    head = [f"{model.name}: {plain(d.verdict)}", f"  {VERDICTS[d.verdict]}"]
+    body: list[str] = []
     for c in d.causes:
-        lines.append(f"  {c.kind}{f' at {c.where}' if c.where else ''}, confidence {c.confidence:.2f}")
-        for name, v in c.parameters.items():
-            lines.append(f"    {name} = {v.value:.5g} {v.unit}  [{v.ci95[0]:.5g}, {v.ci95[1]:.5g}]")
-        if c.alternatives:
-            lines.append("    or " + ", ".join(f"{a.kind} at {a.where}" for a in c.alternatives))
+        body.append(f"  {place(c.kind, c.where)}, confidence {min(c.confidence, 0.99):.0%}")
+        body += [
+            f"    {k:<18} {v.value:>11.5g} {v.unit:<10} [{v.ci95[0]:.5g}, {v.ci95[1]:.5g}]"
+            for k, v in c.parameters.items()
+        ]
+        body += [f"    or {', '.join(place(a.kind, a.where) for a in c.alternatives)}"] if c.alternatives else []
     if d.gain:
-        lines.append("  on held-out data, RMSE before -> after (noise floor):")
-        lines += [f"    {k}: {g.before_rmse:.4g} -> {g.after_rmse:.4g} ({g.noise_floor:.4g}) {g.unit}" for k, g in d.gain.items()]
-    lines += [f"  note: {n}" for n in d.notes]
-    lines.append(f"  -> {output / 'diagnosis.json'}, {output / 'model_extended.toml'}")
-    return "\n".join(lines)
+        body.append(f"  {'RMS error on held-out data':<28}{'before':>10}{'after':>11}{'noise':>11}  gained")
+        for name, g in d.gain.items():
+            gained = "" if g.share_of_achievable is None else f"{g.share_of_achievable:.0%}"
+            body.append(
+                f"    {name:<26}{g.before_rmse:>10.4g}{g.after_rmse:>11.4g}{g.noise_floor:>11.4g}  {gained:<6} {g.unit}"
+            )
+    body += [f"  note: {n}" for n in d.notes]
+    body += [f"  {r.name}: {p}" for r in d.data for p in r.problems]
+    room = HEIGHT - len(head) - 2
+    if len(body) > room:
+        body = [*body[: room - 1], f"  ... {len(body) - room + 1} more lines in the report"]
+    tail = (
+        [f"  {d.explained:.1%} of the avoidable residual explained, {d.seconds:.1f} s"]
+        if d.verdict != "no_discrepancy"
+        else [f"  {d.seconds:.1f} s"]
+    )
+    lines = [line if len(line) <= WIDTH else line[: WIDTH - 3] + "..." for line in [*head, *body, *tail]]
+    return "\n".join([*lines, f"  -> {output / 'report.html'}"])

@@ -11,6 +11,7 @@ frequency. So all of them are columns of one linear regression, in the metric of
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,8 @@ from .plant import Linear, Place
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+RESONANCES = np.geomspace(0.5, 40.0, 36)  # [Hz] of hidden masses that are tried
+DAMPINGS = (0.03, 0.1, 0.3)  # and their damping ratios
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +113,7 @@ class Regression:
     """Whitened columns of all candidates against the whitened residual of a fit, its free values projected out."""
 
     def __init__(self, fit: Fit, candidates: Sequence[Candidate], columns: Array):
-        self.candidates = tuple(candidates)
+        self.candidates, self.columns = tuple(candidates), columns
         movable = [i for i, f in enumerate(fit.free) if f.low < f.value < f.high]  # the others stand at their bounds
         free = [fit.free[i] for i in movable]
         priors = np.array([f.unit / f.sigma for f in free])
@@ -129,6 +132,8 @@ class Regression:
 
     def gain(self, chosen: Sequence[int]) -> tuple[float, Array]:
         """How much chi2 falls with these columns, signs as their kinds demand, and their gains in SI."""
+        if not len(chosen):
+            return 0.0, np.zeros(0)
         index, flip = [], []
         for c in chosen:
             sign = self.candidates[c].sign
@@ -145,6 +150,31 @@ class Regression:
         for c, f, value in zip(index, flips, x):
             found[order[c]] += f * value / self.scale[c]
         return float(2.0 * x @ slope - x @ gram @ x), found
+
+    def without(self, fit: Fit) -> Regression:
+        """The same columns against another residual and other free values."""
+        return Regression(fit, self.candidates, self.columns)
+
+    def beside(self, taken: Sequence[int]) -> Regression:
+        """The regression with these columns free in size and sign, so that only what none of them can do is left."""
+        c = [k for k in taken if self.alive[k]]
+        values, vectors = np.linalg.eigh(self.gram[np.ix_(c, c)])
+        kept = values > 1e-6 * np.max(values, initial=0.0)
+        span = vectors[:, kept] / np.sqrt(values[kept])
+        cross = span.T @ self.gram[c]
+        along = span.T @ self.slope[c]
+        rest = copy(self)
+        rest.gram = self.gram - cross.T @ cross
+        rest.slope = self.slope - cross.T @ along
+        rest.chi2 = self.chi2 - float(along @ along)
+        left = np.diag(rest.gram)
+        rest.alive = self.alive & (left > 1e-4)
+        left = np.where(rest.alive, left, 1.0)
+        rest.alive[list(taken)] = False
+        rest.gram = rest.gram / np.sqrt(np.outer(left, left))
+        rest.slope = rest.slope / np.sqrt(left)
+        rest.scale = self.scale * np.sqrt(left)
+        return rest
 
     def best_single(self, chosen: Sequence[int], pool: Sequence[int], costs: Mapping[int, float]) -> tuple[float, int]:
         """The column of `pool` that, beside `chosen`, takes most from chi2 beyond its cost (signs of `chosen` free); -1 if none."""
@@ -165,7 +195,7 @@ class Regression:
         return float(gains[best]), int(p[best]) if left[best] > 0.0 else -1
 
 
-def _where(kind: str, place: Place, model: Model) -> str:
+def where(kind: str, place: Place, model: Model) -> str:
     """What a report says of the place: a spring or damper by its law, a load by its body."""
     if kind in ("constant_force", "hidden_resonance"):
         return next((end for end in place.ends if end in {b.name for b in model.bodies}), place.name)
@@ -201,7 +231,7 @@ def collect(
         laws = list(hy.force_laws(k, place, motions, step, not {b.name for b in model.bodies} & set(place.ends)))
         body = next((b.name for b in model.bodies if set(place.ends) == {b.name, GROUND}), None)
         if laws:
-            candidates += [Candidate(b.kind, _where(b.kind, place, model), b.sign, b.companion, b) for b in laws]
+            candidates += [Candidate(b.kind, where(b.kind, place, model), b.sign, b.companion, b) for b in laws]
             for e, s in enumerate(seen):
                 rows = np.stack([b.series[e] for b in laws])
                 phi = fft.rfft(rows, axis=1)[:, : experiments[e].band]
@@ -209,14 +239,14 @@ def collect(
         if body is not None:
             bands = [experiments[e].frequencies[: experiments[e].band] for e in range(len(seen))]
             accelerations = [fft.rfft(np.gradient(m.v, step))[: len(f)] for m, f in zip(motions, bands)]
-            for f0 in np.geomspace(0.5, 40.0, 45):
-                for zeta in (0.02, 0.06, 0.15, 0.35):
+            for f0 in RESONANCES:
+                for zeta in DAMPINGS:
                     candidates.append(Candidate("hidden_resonance", body, 1, False, ("absorber", k, float(f0), zeta)))
             for e, s in enumerate(seen):
                 f = bands[e]
                 spectra = []
-                for f0 in np.geomspace(0.5, 40.0, 45):
-                    for zeta in (0.02, 0.06, 0.15, 0.35):
+                for f0 in RESONANCES:
+                    for zeta in DAMPINGS:
                         x = f / f0
                         t = (1.0 + 2j * zeta * x) / (1.0 - x**2 + 2j * zeta * x)
                         spectra.append(t * accelerations[e])

@@ -2,8 +2,9 @@
 # Copyright (c) 2026 the penode authors
 """Which causes: a search that scores all hypotheses at once (score), fits the best few by simulation, and looks again.
 
-A kind takes up to TERMS elementary laws before another kind may come in; what a further kind adds must be worth more than
-chance (COST) and more than the first kind's form may be wrong by (SHARE).
+A cause is a curve, not a formula: a kind takes up to TERMS elementary laws, and another kind comes in only by what no curve
+of the first one's family at the same place could do. Explanations are compared by their likelihood, each with the noise that
+suits it, so that slow noise and a cause compete like any two causes.
 """
 
 from __future__ import annotations
@@ -16,36 +17,50 @@ import numpy as np
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
 from .hypotheses import Basis, Fault
+from .naming import christened
 from .score import Candidate, Regression
-from .study import Study, regression, requieted
+from .study import Study, loss, regression, requieted
 
 TERMS = 3  # elementary laws of one kind
 COST = 10.0  # chi2 that an elementary law must gain for each of its numbers, and the choice among many
 NEW = 50.0  # chi2 that a further kind must gain beyond that
-SHARE = 0.02  # of what has been gained: forms are wrong by about as much
-LEAST = 0.004  # of what has been gained: less is a matter of form in any case
-MOST = 0.6  # of what was left: what a further kind may also take to be believed
 FORM = 7e-4  # of what has been gained: a number more must gain that, or it only mends the form
+LEAST = 1e-3  # of what has been gained: less, beside a curve, is a matter of its memory that no family has
+CURVES = {  # kinds of one family at one place are one curve with one name
+    "coulomb_friction": "friction", "stribeck_friction": "friction", "bouc_wen": "friction",
+    "degressive_damper": "damper", "quadratic_damper": "damper", "asymmetric_damper": "damper", "damper_fading": "damper",
+    "cubic_spring": "spring", "asymmetric_spring": "spring", "bump_stop": "spring", "backlash": "spring", "network_extrapolation": "spring",
+    "tyre_nonlinear": "tyre", "tyre_liftoff": "tyre",
+}  # fmt: skip
+RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
+SLACK = 10.0  # of score, that a textbook law may be worse by
+TEXTBOOK = {
+    "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "asymmetric_spring": ("k*abs(s)", "linear_spring"),
+    "backlash": ("backlash",), "coulomb_friction": ("coulomb_friction",), "bouc_wen": ("bouc_wen",), "maxwell_bushing": ("maxwell_bushing",),
+    "asymmetric_damper": ("k*abs(v)", "linear_damper"), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
+    "degressive_damper": ("-k*(max(v - knee, 0) + min(v + knee, 0))",),
+}  # fmt: skip
+EXACT = ("wrong_parameter", "constant_force", "hidden_resonance")  # a formula after all
 Group = tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """Some causes, fitted. `gain`: fall of the cost against the null fit; `score`: less what its freedom is worth."""
+    """Some causes, fitted. `gain`: fall of the loss against the null fit; `score`: less what its freedom is worth."""
 
     terms: tuple[Term, ...]
     built: Extended
+    problem: Problem
     fit: Fit
     gain: float
+
+    def whole(self) -> Explanation:
+        """With all derivatives."""
+        return replace(self, fit=self.problem.complete(self.fit))
 
     @property
     def groups(self) -> tuple[Group, ...]:
         return tuple(dict.fromkeys(t.group for t in self.terms))
-
-    @property
-    def left(self) -> float:
-        """Cost beyond what noise makes."""
-        return self.fit.cost - len(self.fit.residual)
 
     @property
     def score(self) -> float:
@@ -57,6 +72,8 @@ def cost(c: Candidate) -> float:
     """What the freedom of an elementary law is worth in chi2."""
     if isinstance(c.what, tuple):
         return 4.0 * COST  # three numbers, found among hundreds of places in the spectrum
+    if c.kind == "constant_force":
+        return 1.5 * COST  # where a bias explains as much, it is the bias
     return COST * (1 + len(c.what.shapes) if isinstance(c.what, Basis) else 1)
 
 
@@ -87,13 +104,17 @@ def pursue(r: Regression, pool: Sequence[int], base: Sequence[int] = (), terms: 
     return gain - start, chosen
 
 
-def explain(study: Study, terms: Sequence[Term], iterations: int = 10) -> Explanation:
-    """Fit some terms by simulation."""
+def explain(study: Study, terms: Sequence[Term], iterations: int = 10, start: Fit | None = None) -> Explanation:
+    """Fit some terms by simulation, with everything else from where a fit has left it."""
     recordings = len(study.experiments)
     built = extended(study.model, study.places, terms, recordings if study.moving else 0, recordings)
     problem = Problem(built.model, study.experiments, study.metrics, study.set_name, study.linear.fastest, built.faults)
-    fit = problem.solve(problem.eased(all_free(study.null.free, built)), iterations)
-    return Explanation(tuple(terms), built, fit, study.null.cost - fit.cost if np.isfinite(fit.cost) else -np.inf)
+    values = {f.target: f.value for f in (start or study.null).free}
+    free = tuple(replace(f, value=values.get(f.target, f.value)) if i < len(study.null.free) else f for i, f in enumerate(all_free(study.null.free, built)))
+    near = {i: study.null.jacobian[:, i] for i, f in enumerate(study.null.free) if f.target not in built.loosened}
+    fit = problem.solve(problem.eased(free), iterations, 0.5, near)
+    gain = study.nothing - loss(study, fit) if np.isfinite(fit.cost) else -np.inf
+    return Explanation(christened(fitted(terms, built, fit), built.names, fit, study), built, problem, fit, gain)
 
 
 def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
@@ -108,11 +129,8 @@ def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
         return []
     best = ranked[0][0]
     taken = [x for x in ranked if x[0] > 0.5 * best - NEW][:few]
-    found = []
-    for _, group, chosen in taken:
-        _, gains = r.gain(chosen)
-        terms = [Term(r.candidates[c], float(g)) for c, g in zip(chosen, gains) if g != 0.0]
-        found.append(explain(study, terms))
+    taken += [x for x in ranked if x[1][0] == "network_extrapolation" and x[0] > 0.2 * best and x not in taken]  # known to happen
+    found = [explain(study, terms) for terms in (terms_of(r, chosen) for _, _, chosen in taken) if terms]
     return sorted(found, key=lambda e: -e.score)
 
 
@@ -127,18 +145,19 @@ def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str
                     best = gain, chosen[0], r.gain(chosen)[1][0]
         if best is None:
             break
-        wider = explain(study, [*_updated(e), Term(r.candidates[best[1]], float(best[2]))])
+        wider = explain(study, [*e.terms, Term(r.candidates[best[1]], float(best[2]))], start=e.fit)
         if wider.score < e.score + 2e-3 * e.gain:
             break
-        e, r = wider, regression(study, wider.fit, parameters)
+        e = wider.whole()
+        r = regression(study, e.fit, parameters)
     return e, r
 
 
-def _updated(e: Explanation) -> list[Term]:
+def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
     """The terms with gains and shapes where the fit left them."""
-    values = {f.target: f.value for f in e.fit.free}
+    values = {f.target: f.value for f in fit.free}
     found, fault = [], 0
-    for term, name in zip(e.terms, e.built.names):
+    for term, name in zip(terms, built.names):
         what = term.candidate.what
         if isinstance(what, Basis):
             shapes = {k: (values[f"{name}_{k}"], u) for k, (_, u) in what.shapes.items()}
@@ -152,7 +171,7 @@ def _updated(e: Explanation) -> list[Term]:
         elif isinstance(what, tuple):
             m, k, d = (values[f"{name}_{key}"] for key in ("mass", "stiffness", "damping"))
             w = np.sqrt(k / m)
-            found.append(Term(replace(term.candidate, what=(what[0], what[1], w / (2 * np.pi), d / (2 * w * m))), m))
+            found.append(Term(replace(term.candidate, what=(what[0], what[1], w / (2 * np.pi), d / (2 * w * m))), m, values[f"{name}_cubic"]))
         else:
             found.append(term)
     return found
@@ -163,84 +182,176 @@ def at_rest(rest: Study, free: Study) -> bool:
     r = regression(rest, rest.null, [])
     loads = [k for k, c in enumerate(r.candidates) if c.kind == "constant_force"]
     gains = [r.gain([k])[0] for k in loads]
-    return bool(gains) and max(gains) > 0.3 * (rest.null.cost - free.null.cost)
+    return bool(gains) and max(gains) > 0.8 * (rest.null.cost - free.null.cost)
+
+
+def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:
+    """All candidates that are of one curve, or one fault of a sensor, with some groups."""
+    places = {(c.kind, c.where): c.what.place for c in r.candidates if isinstance(c.what, Basis)}
+    curves = {(CURVES.get(g[0], g[0]), places.get(g, g[1])) for g in groups}
+    return [
+        k for k, c in enumerate(r.candidates)
+        if (CURVES.get(c.kind, c.kind), c.what.place if isinstance(c.what, Basis) else c.where) in curves
+    ]  # fmt: skip
+
+
+def further(study: Study, e: Explanation, r: Regression) -> list[list[int]]:
+    """Choices of one more kind by what no curve of the causes so far can do, from best to worst."""
+    taken = family(study, r, e.groups)
+    rest, kin = r.beside(taken), set(taken)
+    least = 0.0 if all(kind in EXACT for kind, _ in e.groups) else LEAST * e.gain
+    found = []
+    for pool in pools(r).values():
+        if kin.isdisjoint(pool):
+            gain, chosen = pursue(rest, pool, terms=2)
+            price = sum(cost(r.candidates[c]) for c in chosen)
+            if chosen and gain > max(NEW + price, least):
+                found.append((gain - price, chosen))
+    return [chosen for _, chosen in sorted(found, key=lambda x: -x[0])]
+
+
+def terms_of(r: Regression, chosen: Sequence[int]) -> list[Term]:
+    """The chosen candidates with the sizes that the regression gives them; none if only companions are left."""
+    _, gains = r.gain(chosen)
+    found = [Term(r.candidates[c], float(g)) for c, g in zip(chosen, gains) if g != 0.0]
+    return found if any(not t.candidate.companion for t in found) else []
 
 
 def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation]]:
-    """Explanations from best to worst; empty if there is nothing to explain. What the first and best of them takes for
-    noise may be less than what the null fit did: then all is weighed anew, in the study returned."""
+    """Explanations from best to worst, empty if there is nothing to explain; and the study with the noise that the best of
+    them leaves. The first look is taken twice: the null fit may take a cause for slow noise."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
-    first = singles(study, regression(study, study.null, parameters), 2)
+    study = replace(study, nothing=loss(study, study.null))
+    bare = requieted(study, study.null, coloured=False)
+    bare = replace(bare, nothing=min(study.nothing, loss(bare, bare.null)))
+    first = singles(bare, regression(bare, bare.null, parameters), 3)
+    if bare.metrics is not study.metrics:
+        slow = replace(study, nothing=bare.nothing)
+        first = sorted([*first, *singles(slow, regression(slow, slow.null, parameters), 2)], key=lambda e: -e.score)
+    for e in first:
+        log(f"first {e.groups} {e.gain:.0f}")
     if not first or first[0].score <= 0.0:
         return study, []
-    quiet = requieted(study, first[0].fit)
-    return quiet or study, grow(quiet or study, log)
+    quiet = requieted(bare, first[0].fit)
+    beam = first if quiet is bare else singles(quiet, regression(quiet, quiet.null, parameters)) or first
+    return grow(quiet, beam, log)
 
 
-def grow(study: Study, log) -> list[Explanation]:
+def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Explanation]]:
     """Explanations by one kind, by two and by three, from best to worst."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
-    r = regression(study, study.null, parameters)
-    beam = singles(study, r)
     for e in beam:
         log(f"{e.groups} {e.gain:.0f}")
-    if not beam:
-        return []
     done = list(beam)
-    if beam[0].left < max(60.0, 0.01 * beam[0].gain):
-        return [e for e in done if e.score > 0.0]
-    for depth in (2, 3):
+    for _ in (2, 3):
         grown: list[Explanation] = []
         for e in [b for b in beam[:2] if b.gain > 0.7 * beam[0].gain]:
-            e, r = refine(study, e, regression(study, e.fit, parameters), parameters)
+            here = requieted(study, e.fit)
+            if here is not study:
+                e = explain(here, e.terms, 4, e.fit)
+            e = e.whole()
+            e, r = refine(here, e, regression(here, e.fit, parameters), parameters)
             done.append(e)
-            log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f} of {study.null.chi2 - len(e.fit.residual):.0f}")
-            found = []
-            for group, pool in pools(r).items():
-                if group in e.groups:
+            log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f}")
+            for new in [terms_of(r, chosen) for chosen in further(here, e, r)[:2]]:
+                if not new:
                     continue
-                gain, chosen = pursue(r, pool, terms=2)
-                if chosen and gain > max(NEW + sum(cost(r.candidates[c]) for c in chosen), LEAST * e.gain, min(0.5 * SHARE * e.gain, 0.3 * e.left)):
-                    found.append((gain - sum(cost(r.candidates[c]) for c in chosen), chosen))
-            found.sort(key=lambda x: -x[0])
-            for gain, chosen in found[:2]:
-                _, gains = r.gain(chosen)
-                terms = [Term(r.candidates[c], float(g)) for c, g in zip(chosen, gains) if g != 0.0]
-                pair = explain(study, [*_updated(e), *terms])
-                log(f"  + {pair.groups[-1]} {gain:.0f} -> {pair.gain:.0f}")
-                more = pair.gain - e.gain
-                if more > max(NEW, LEAST * e.gain) and (more > SHARE * e.gain or more > MOST * e.left > 30.0):
-                    grown.append(pair)
-        if not grown or done and max(done, key=lambda e: e.score).left < 60.0:
-            done += grown
+                more = explain(here, [*e.terms, *new], start=e.fit)
+                log(f"  + {more.groups[-1]} -> {more.gain:.0f}")
+                if more.score > e.score:
+                    grown.append(more)
+        done += grown
+        if not grown:
             break
         beam = sorted(grown, key=lambda e: -e.score)
-        done += beam
-        if beam[0].left < 0.01 * beam[0].gain:
-            break
     done = sorted((e for e in done if e.score > 0.0), key=lambda e: -e.score)
+    if done:
+        study = requieted(study, done[0].fit)
     if done and len(done[0].groups) > 1:
         done = sorted(done + exchanged(study, done[0], parameters, log), key=lambda e: -e.score)
-    return done
+    return study, [settled(study, plain(study, done[0], parameters, log)), *done[1:]] if done else []
+
+
+def settled(study: Study, e: Explanation) -> Explanation:
+    """The explanation fitted to the end in the noise of the study."""
+    free = [replace(f, value=v.value) for f, v in zip(all_free(study.null.free, e.built), e.fit.free)]
+    problem = Problem(e.built.model, study.experiments, study.metrics, study.set_name, study.linear.fastest, e.built.faults)
+    return replace(e, problem=problem, fit=problem.solve(free, 4))
+
+
+def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Explanation:
+    """The explanation with the textbook law of a kind in place of several laws, where it does about as well: its parameters
+    are known better."""
+    laws = {g: [_law(t) for t in e.terms if t.group == g] for g in e.groups if g[0] in TEXTBOOK}
+    bent = [g for g, own in laws.items() if len(own) > len(TEXTBOOK[g[0]]) or not set(own) <= set(TEXTBOOK[g[0]])]
+    if not bent:
+        return e
+    whole = e.whole()
+    r = regression(study, whole.fit, parameters)
+    for group in bent:
+        pool = [k for k in pools(r).get(group, []) if _law(Term(r.candidates[k], 0.0)) in TEXTBOOK[group[0]]]
+        without = r.without(missing(whole, group))
+        new = terms_of(without, pursue(without, pool, terms=len(TEXTBOOK[group[0]]))[1])
+        if new:
+            simple = explain(study, [*(t for t in e.terms if t.group != group), *new], start=e.fit)
+            log(f"  plain {group}: {simple.gain:.0f} for {e.gain:.0f}")
+            if set(simple.groups) == set(e.groups) and simple.score > e.score - SLACK:
+                e = simple
+    return e
+
+
+def _law(t: Term) -> str:
+    return getattr(t.candidate.what, "law", "")
 
 
 def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> list[Explanation]:
-    """Explanations with one cause of `e` exchanged for another: the first one found may have stood in for two."""
+    """Explanations with one cause of `e` exchanged for another: the first one found may have stood in for it."""
+    e = e.whole()
+    r = regression(study, e.fit, parameters)
     found: list[Explanation] = []
-    terms = _updated(e)
     for group in e.groups:
-        rest = explain(study, [t for t in terms if t.group != group], 4)
-        r = regression(study, rest.fit, parameters)
-        worth = e.gain - rest.gain
+        without = r.without(missing(e, group))
+        worth = without.chi2 - r.chi2
         ranked = []
         for other, pool in pools(r).items():
             if other not in e.groups:
-                gain, chosen = pursue(r, pool)
-                if chosen and gain > 0.7 * worth:
+                gain, chosen = pursue(without, pool)
+                if chosen and gain > RIVAL * worth:
                     ranked.append((gain, chosen))
-        for gain, chosen in sorted(ranked, key=lambda x: -x[0])[:3]:
-            _, gains = r.gain(chosen)
-            new = [Term(r.candidates[c], float(g)) for c, g in zip(chosen, gains) if g != 0.0]
-            found.append(explain(study, [*_updated(rest), *new]))
+        for new in [terms_of(without, chosen) for _, chosen in sorted(ranked, key=lambda x: -x[0])[:2]]:
+            if not new:
+                continue
+            kept = [t for t in e.terms if t.group != group]
+            found.append(explain(study, [*kept, *new], start=e.fit))
             log(f"  {group} for {found[-1].groups[-1]}: {found[-1].gain:.0f}")
     return found
+
+
+def missing(e: Explanation, group: Group) -> Fit:
+    """The fit as it would be without a cause, to first order."""
+    names = {f"{n}_" for t, n in zip(e.terms, e.built.names) if t.group == group}
+    faults = [t.candidate.what for t in e.terms if t.group == group and isinstance(t.candidate.what, Fault)]
+    own = []
+    for i, f in enumerate(e.fit.free):
+        if isinstance(f.target, str):
+            own += [i] if f.target == group_parameter(e, group) or any(f.target.startswith(n) for n in names) else []
+        elif f.target[0] in ("bias", "scale", "delay"):
+            own += [i] if any(f.target == (x.what, x.sensor) for x in faults) else []
+        elif f.target[0] == "fault":
+            own += [i] if e.built.faults[f.target[1]] in faults else []
+    effect = np.zeros(len(e.fit.residual))
+    for i in own:
+        f = e.fit.free[i]
+        if f.log:
+            effect += e.fit.jacobian[:, i] if str(f.target).endswith("_mass") else 0.0
+        else:
+            effect += e.fit.jacobian[:, i] * (f.value - f.origin) / f.unit
+    rest = [i for i in range(len(e.fit.free)) if i not in own]
+    return replace(
+        e.fit, free=tuple(e.fit.free[i] for i in rest), residual=e.fit.residual + effect, jacobian=e.fit.jacobian[:, rest]
+    )
+
+
+def group_parameter(e: Explanation, group: Group) -> str:
+    """The parameter of the model that a cause is about, if it is about one."""
+    return group[1] if group[0] == "wrong_parameter" else ""

@@ -13,6 +13,7 @@ from penode_gen.model import Model, Signal
 
 from . import plant
 from .fit import Fit, Free, Problem
+from .hypotheses import size
 from .noise import Experiment, Metric, metric, sensor_levels
 from .plant import Linear, Place
 from .score import Regression, Seen, collect, smooth
@@ -38,6 +39,8 @@ class Study:
     null: Fit
     seen: tuple[Seen, ...] = ()
     moving: bool = True  # start states are free
+    sizes: tuple[tuple[float, float], ...] = ()  # what deflection and rate reach, per place
+    nothing: float = 0.0  # loss of the null fit, see `loss`
 
 
 def nuisances(model: Model, experiments: Sequence[Experiment]) -> tuple[Free, ...]:
@@ -82,7 +85,7 @@ def begin(model: Model, experiments: Sequence[Experiment], set_name: str = "defa
     rest = replace(free, nuisances=kept, null=refit(free, kept), moving=False)
     freedom = MOVING * len(model.states) * len(experiments)
     rest = replace(rest, nuisances=kept)
-    return (rest, free) if rest.null.cost < free.null.cost + freedom else (free, rest)
+    return (rest, free) if rest.null.cost <= free.null.cost + freedom else (free, rest)
 
 
 def refit(study: Study, free: Sequence[Free]) -> Fit:
@@ -103,7 +106,7 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
     pick = np.linspace(0, len(x[0]) - 1, 12).astype(int) if model.networks else [0]
     linear = plant.linearise(model, found, np.array(x[0][pick]), experiments[0].u[pick])
     for _ in range(2):
-        fit = problem.solve(free, 6)
+        fit = problem.solve(free, 6, 0.5)
         for e, experiment in enumerate(experiments):
             h = linear.transfer(experiment.frequencies)[:, : len(declared), : len(model.inputs)]
             residual = np.where(experiment.good, experiment.y - fit.simulated[e], 0.0)
@@ -112,21 +115,39 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
         problem = Problem(model, experiments, metrics, set_name)
         free = fit.free
     fit = problem.solve(free, 8)
-    return Study(model, set_name, experiments, found, linear, tuple(levels), tuple(metrics), fit.free, fit)
+    study = Study(model, set_name, experiments, found, linear, tuple(levels), tuple(metrics), fit.free, fit)
+    seen = look(study, fit)
+    return replace(study, sizes=tuple(size([s.motions[k] for s in seen]) for k in range(len(found))))
 
 
-def requieted(study: Study, fit: Fit) -> Study | None:
-    """The study with noise as an explanation's residual shows it; None if that is no other noise."""
+def heard(study: Study, fit: Fit, coloured: bool = True, robust: bool = True) -> tuple[tuple[Array, ...], tuple[Metric, ...]]:
+    """Noise levels and metrics as the residual of a fit shows them, see sensor_levels."""
     declared = np.array([s.noise for s in study.model.sensors])
-    levels, metrics, change = [], [], 0.0
-    for e, old, z in zip(study.experiments, study.levels, fit.simulated):
+    levels, metrics = [], []
+    for e, z in zip(study.experiments, fit.simulated):
         h = study.linear.transfer(e.frequencies)[:, : len(declared), : len(study.model.inputs)]
-        levels.append(sensor_levels(e, np.where(e.good, e.y - z, 0.0), declared, h))
+        levels.append(sensor_levels(e, np.where(e.good, e.y - z, 0.0), declared, h, coloured, robust))
         metrics.append(metric(e, levels[-1], h))
-        change = max(change, float(np.max(np.mean(np.abs(np.log(levels[-1] / old)), axis=0))))
-    if change < 0.1:
-        return None
-    quiet = replace(study, levels=tuple(levels), metrics=tuple(metrics))
+    return tuple(levels), tuple(metrics)
+
+
+def loss(study: Study, fit: Fit) -> float:
+    """-2 log likelihood of a fit with the noise that suits it best: what absorbs less into noise is worth more."""
+    _, metrics = heard(study, fit, robust=False)
+    total = sum(f.offset**2 for f in fit.free)
+    for e, m, z in zip(study.experiments, metrics, fit.simulated):
+        r = m(np.where(e.good, e.y - z, 0.0))
+        total += float(r @ r) + m.volume
+    return total
+
+
+def requieted(study: Study, fit: Fit, coloured: bool = True) -> Study:
+    """The study with noise as a fit's residual shows it; itself if that is no other noise."""
+    levels, metrics = heard(study, fit, coloured)
+    change = max(float(np.max(np.mean(np.abs(np.log(new / old)), axis=0))) for new, old in zip(levels, study.levels))
+    if change < 0.05:
+        return study
+    quiet = replace(study, levels=levels, metrics=metrics)
     return replace(quiet, null=refit(quiet, study.nuisances))
 
 
@@ -138,16 +159,19 @@ def regression(study: Study, fit: Fit, parameters: Sequence[str]) -> Regression:
     return Regression(fit, candidates, columns)
 
 
+def watch(study: Study, fit: Fit) -> list[Array]:
+    """Sensors, then deflection and rate of every place, as a fit simulates them: [n, n_z + 2 places] per recording."""
+    more = 2 * len(study.places)
+    problem = Problem(watched(fit.model, study.places), [widened(e, more) for e in study.experiments], study.metrics, study.set_name, faults=fit.faults)
+    start = np.zeros((1, len(fit.free)))
+    return [np.array(problem.simulate(e, fit.free, start)[0][0]) for e in range(len(study.experiments))]
+
+
 def look(study: Study, fit: Fit) -> tuple[Seen, ...]:
     """The smoothed motion around a fit."""
-    problem = Problem(watched(fit.model, study.places), [widened(e, 2 * len(study.places)) for e in study.experiments], study.metrics, study.set_name, faults=fit.faults)
-    seen = []
     n_z = len(study.model.sensors)
-    for e, experiment in enumerate(study.experiments):
-        z, _ = problem.simulate(e, fit.free, np.zeros((1, len(fit.free))))
-        z = np.array(z[0])
-        seen.append(smooth(experiment, study.metrics[e], study.levels[e], study.linear, study.places, z[:, :n_z], z[:, n_z:], study.moving))
-    return tuple(seen)
+    parts = zip(study.experiments, study.metrics, study.levels, watch(study, fit))
+    return tuple(smooth(e, m, l, study.linear, study.places, z[:, :n_z], z[:, n_z:], study.moving) for e, m, l, z in parts)
 
 
 def widened(e: Experiment, more: int) -> Experiment:

@@ -85,7 +85,12 @@ class Case:
     @cached_property
     def energies(self) -> list[float]:
         """Chi-square of each effect after the nominal model and the sizes of the other effects are re-fitted."""
-        return [self.bench.left(x, self.others(i)) for i, x in enumerate(self.differences)]
+        found = [self.bench.left(x, self.others(i)) for i, x in enumerate(self.differences)]
+        for i, e in enumerate(self.effects):
+            for name, factor in e.change.factor.items():  # what is not linear in a large step is no evidence: a re-fit takes it
+                step = self.bench.of_parameters[name] * (factor - 1.0)
+                found[i] = min(found[i], self.bench.left(step, self.others(i)))
+        return found
 
     def rivals(self, i: int) -> list[dict]:
         """Answers that leave less than APART of effect i unexplained: exact or near equivalents."""

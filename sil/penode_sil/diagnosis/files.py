@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""One diagnosis from files to files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import penode_gen
+
+from ..errors import UserError, hint
+from ..measured import load
+from . import report
+from .engine import diagnose
+from .result import Diagnosis
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is diagnosed, and the folder where the answer goes. `channels` are texts like `x=pos_mm`."""
+
+    model: Path
+    data: tuple[Path, ...]
+    holdout: tuple[Path, ...]
+    output: Path
+    set_name: str = "default"
+    channels: tuple[str, ...] = ()
+
+
+def load_model(job: Job) -> penode_gen.Model:
+    """The model of a job, which has the set that is asked for; UserError or ModelError if not."""
+    model = penode_gen.load(job.model)
+    if job.set_name not in model.sets and model.networks:
+        raise UserError(f'--set: the model has no set "{job.set_name}"; {hint(job.set_name, model.sets)}')
+    return model
+
+
+def run(
+    job: Job,
+    log: Callable[[str], None] = lambda text: None,
+    tell: Callable[[float, str], None] = lambda share, doing: None,
+) -> tuple[penode_gen.Model, Diagnosis]:
+    """Diagnose and write diagnosis.json, model_extended.toml and report.html; all or none. UserError for bad input."""
+    model = load_model(job)
+    train, held = load(job.data, model, job.channels), load(job.holdout, model, job.channels)
+    with all_or_none(job.output):
+        found = diagnose(model, train, held, job.output, job.set_name, log, tell)
+        (job.output / "diagnosis.json").write_text(json.dumps(found.as_json(), indent=2) + "\n", encoding="utf-8")
+        report.write(job.output / "report.html", model, found, job.output / "model_extended.toml")
+    return model, found
+
+
+def check_folder(folder: Path) -> None:
+    """UserError now rather than after long work, if results cannot go into `folder`."""
+    if folder.exists() and not folder.is_dir():
+        raise UserError(f"{folder}: this is a file; name a directory")
+    if not folder.exists() and not folder.absolute().parent.is_dir():
+        raise UserError(f"{folder}: there is no directory {folder.parent}; create it")
+
+
+@contextmanager
+def all_or_none(folder: Path) -> Iterator[None]:
+    """What is written into `folder` meanwhile goes away again on an error, the folder too if it is new."""
+    old = set(folder.iterdir()) if folder.exists() else None
+    try:
+        yield
+    except BaseException:
+        for path in set(folder.iterdir()) - (old or set()) if folder.exists() else ():
+            path.unlink()
+        if old is None and folder.exists():
+            folder.rmdir()
+        raise

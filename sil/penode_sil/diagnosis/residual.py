@@ -1,0 +1,455 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Where a simulation is wrong: in time, in frequency and in the state space, and by how much of the signal.
+
+All is SI. `before` is the model as its file says, parameters within their tolerance and start state as they fit best;
+`after` is the same with the named causes, None if there are none. Spectra are one-sided densities [unit^2/Hz].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal, stats
+from scipy.fft import irfft, rfft, rfftfreq
+
+from penode_gen import units
+from penode_gen.model import GROUND, Input, Model, ModelError, Signal
+
+from ..errors import UserError
+from .fit import Fit, Problem
+from .noise import Experiment
+from .plant import Place
+from .study import Study, watch
+
+Array = NDArray[np.float64]
+STRETCHES = 40  # of time, at most
+BINS = 15  # of deflection and of rate
+LEAST = 5  # samples of a bin that counts
+OVERLAP = 1.0 + 2.0 / 36.0  # variance of a mean over Hann segments that overlap by half, over that of separate ones
+CHANCE = 0.05  # of what a limit calls significant
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Bartlett's test on the periodogram over the noise spectrum. `distance`: the largest of its normalised running sum
+    from a straight line; noise exceeds `limit` in 5 % of all cases. `level`: mean ratio, 1 for noise."""
+
+    distance: float
+    limit: float
+    p_value: float
+    level: float
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """Of one sensor in one recording: samples [n]; densities [unit^2/Hz], coherence with the inputs [f], test for
+    whiteness."""
+
+    values: Array
+    density: Array
+    coherence: Array
+    white: Whiteness
+    running: Array  # the running sum of the test, over the frequencies `Channel.bins`
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One sensor in one recording. `good`: samples that count; `noise`: RMS of what measurement alone leaves, `floor`
+    its density; `limit`: coherence that chance exceeds at 5 % of all frequencies, `chance`: its mean; `beyond`: samples
+    farther or faster than trained."""
+
+    recording: str
+    sensor: str
+    unit: str
+    time: Array
+    measured: Array
+    good: NDArray[np.bool_]
+    noise: float
+    f: Array
+    signal: Array
+    floor: Array
+    limit: float
+    chance: float
+    bins: Array
+    before: Residual
+    after: Residual | None
+    beyond: NDArray[np.bool_] | None = None
+
+    @property
+    def strength(self) -> float:
+        """RMS of the measured signal about its mean."""
+        return rms(self.measured[self.good] - np.mean(self.measured[self.good]))
+
+    def level(self, r: Residual) -> float:
+        """RMS of a residual over the samples that count."""
+        return rms(r.values[self.good])
+
+    @property
+    def share(self) -> float:
+        """Residual before as a share of the signal; 0 of a signal that stands still."""
+        return self.level(self.before) / self.strength if self.strength > 0.0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Restoring force of a place along the smoothed motion: s, v, and forces [n] as measured and as the elements give
+    them there; means on a grid of BINS deflections by BINS rates (NaN where fewer than LEAST samples are)."""
+
+    place: str
+    elements: tuple[str, ...]
+    s: Array
+    v: Array
+    measured: Array
+    nominal: Array
+    extended: Array | None
+    edges: tuple[Array, Array]
+
+    def grid(self, values: Array) -> Array:
+        """Mean of values [n] on the grid [deflections, rates]."""
+        return averages(values, *self._cells(), (BINS, BINS))
+
+    def count(self) -> NDArray[np.int64]:
+        return np.bincount(np.ravel_multi_index(self._cells(), (BINS, BINS)), minlength=BINS * BINS).reshape(BINS, BINS)
+
+    def _cells(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return cells(self.s, self.edges[0]), cells(self.v, self.edges[1])
+
+
+def segment(n: int, step: float, few: int) -> int:
+    """Samples of the segments of a spectrum: for a resolution of 0.5 Hz if that leaves `few` of them, at least; at most
+    1/16 of the recording if that is longer."""
+    return max(n // 16, min(n // few, int(2.0 / step)), 8)
+
+
+def density(r: Array, step: float, length: int, good: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
+    """Frequencies [Hz] and one-sided power density of r [n] (Welch, Hann, overlap by half); r is 0 where it is not
+    good."""
+    f, power = signal.welch(r, 1.0 / step, "hann", length, detrend=False)
+    if good is None or good.all():
+        return f, power
+    window = signal.get_window("hann", length) ** 2
+    counted = [window @ good[k : k + length] for k in range(0, len(r) - length + 1, max(length - length // 2, 1))]
+    return f, power * (window.sum() / max(float(np.mean(counted)), 1e-300))
+
+
+def coherence(r: Array, u: Array, step: float, length: int) -> tuple[Array, float, float]:
+    """Multiple coherence [f] of r [n] with inputs u [n, n_u]: share of its power that is linear in them; of independent
+    signals, what it exceeds with CHANCE, and its mean."""
+    window = np.hanning(length + 1)[:length, None]
+    starts = range(0, len(r) - length + 1, max(length // 2, 1))
+    r, u = r - np.mean(r), u - np.mean(u, axis=0)
+    x = np.stack([rfft(window * u[k : k + length], axis=0) for k in starts])
+    y = np.stack([rfft(window[:, 0] * r[k : k + length]) for k in starts])
+    power = np.einsum("kfi,kfj->fij", x, np.conj(x))
+    power += 1e-12 * np.trace(power, axis1=1, axis2=2)[:, None, None] * np.eye(u.shape[1]) + 1e-300 * np.eye(u.shape[1])
+    cross = np.einsum("kfi,kf->fi", x, np.conj(y))
+    linear = np.real(np.einsum("fi,fi->f", np.conj(cross), np.linalg.solve(power, cross[:, :, None])[:, :, 0]))
+    number = len(starts) / OVERLAP
+    limit = float(stats.beta.ppf(1.0 - CHANCE, u.shape[1], max(number - u.shape[1], 0.5)))
+    found = np.clip(linear / np.maximum(np.sum(np.abs(y) ** 2, axis=0), 1e-300), 0.0, 1.0)
+    return found, limit, min(u.shape[1] / number, 1.0)
+
+
+def whiteness(ratio: Array) -> tuple[Whiteness, Array]:
+    """The test on periodogram ordinates over the noise spectrum [m], and their running sum [m], which ends at 1."""
+    m = len(ratio)
+    running = np.cumsum(ratio) / max(float(np.sum(ratio)), 1e-300)
+    inner = np.sort(running[:-1])
+    line = np.arange(m) / max(m - 1, 1)
+    distance = float(max(np.max(line[1:] - inner), np.max(inner - line[:-1]))) if m > 1 else 0.0
+    limit = float(stats.kstwobign.ppf(1.0 - CHANCE)) / np.sqrt(max(m - 1, 1))
+    return Whiteness(
+        distance, limit, float(stats.kstwobign.sf(distance * np.sqrt(max(m - 1, 1)))), float(np.mean(ratio))
+    ), running
+
+
+def rms(values: Array) -> float:
+    """Root mean square; 0 of nothing."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
+def stretches(time: Array, good: NDArray[np.bool_], *signals: Array) -> list[tuple[float, float, list[float]]]:
+    """From, to [s] and the RMS of each signal in equal stretches of time; those without a good sample are left out."""
+    edges = np.linspace(0, len(time), min(STRETCHES, max(len(time) // 20, 1)) + 1).astype(int)
+    step = time[1] - time[0]
+    return [
+        (float(time[a]), float(time[b - 1] + step), [rms(x[a:b][good[a:b]]) for x in signals])
+        for a, b in zip(edges, edges[1:]) if good[a:b].any()
+    ]  # fmt: skip
+
+
+def third_octaves(low: float, high: float) -> Array:
+    """Edges [Hz] of third-octave bands (base ten) that lie between two frequencies."""
+    k = np.arange(np.ceil(10.0 * np.log10(low) - 0.5), np.floor(10.0 * np.log10(high) + 0.5) + 1)
+    return 10.0 ** ((k - 0.5) / 10.0)
+
+
+def band_rms(f: Array, power: Array, edges: Array) -> Array:
+    """RMS [bands] of a density between edges: the integral of its straight lines."""
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(f))])
+    inner = np.interp(edges, f, power)
+    at = np.clip(np.searchsorted(f, edges, "right") - 1, 0, len(f) - 1)
+    whole = total[at] + 0.5 * (power[at] + inner) * (np.clip(edges, f[0], f[-1]) - f[at])
+    return np.sqrt(np.maximum(np.diff(whole), 0.0))
+
+
+def cells(x: Array, edges: Array) -> NDArray[np.int64]:
+    """Number of the bin of each value; those outside count to the last one."""
+    return np.clip(np.searchsorted(edges, x, "right") - 1, 0, len(edges) - 2)
+
+
+def averages(values: Array, rows: NDArray[np.int64], columns: NDArray[np.int64], shape: tuple[int, int]) -> Array:
+    """Means of values [n] by row and column; NaN where fewer than LEAST are."""
+    flat, n = np.ravel_multi_index((rows, columns), shape), shape[0] * shape[1]
+    count = np.bincount(flat, minlength=n)
+    total = np.bincount(flat, values, minlength=n)
+    return np.where(count >= LEAST, total / np.maximum(count, 1), np.nan).reshape(shape)
+
+
+def channels(
+    e: Experiment, model: Model, before: Array, after: Array | None, floor: tuple[Array, Array],
+    beyond: NDArray[np.bool_] | None = None,
+) -> list[Channel]:  # fmt: skip
+    """All sensors of a recording that were measured, from what was simulated [n, n_z]; `floor`: frequencies and noise
+    variance per sample [f, n_z]."""
+    n, step, found = len(e.time), e.step, []
+    length, short_length = segment(n, step, 6), max(segment(n, step, 12) // 2, 8)
+    top = e.frequencies[e.band - 1]
+    for j, sensor in enumerate(model.sensors):
+        good = e.good[:, j]
+        if not good.any():
+            continue
+        share = float(np.mean(good))
+        variance = np.interp(e.frequencies[1 : e.band], floor[0], floor[1][:, j])
+        f, power = density(np.where(good, e.y[:, j] - np.mean(e.y[good, j]), 0.0), step, length, good)
+        kept = (f > 0.0) & (f <= top)
+
+        def residual(simulated: Array) -> Residual:
+            r = np.where(good, e.y[:, j] - simulated[:, j], 0.0)
+            linear = np.interp(f[kept], rfftfreq(short_length, step), coherence(r, e.u, step, short_length)[0])
+            ratio = np.abs(rfft(r)[1 : e.band]) ** 2 / (n * share * variance)
+            white, running = whiteness(ratio)
+            return Residual(r, density(r, step, length, good)[1][kept], linear, white, running)
+
+        _, limit, chance = coherence(e.y[:, j], e.u, step, short_length)
+        found.append(Channel(
+            e.name, sensor.name, units.si(sensor.unit), e.time - e.time[0], e.y[:, j], good,
+            float(np.sqrt(np.mean(floor[1][:, j]))), f[kept], power[kept],
+            2.0 * step * np.interp(f[kept], floor[0], floor[1][:, j]), limit, chance, e.frequencies[1 : e.band],
+            residual(before), None if after is None else residual(after), beyond,
+        ))  # fmt: skip
+    return found
+
+
+def noise_floor(study: Study, k: int) -> tuple[Array, Array]:
+    """Frequencies and noise variance per sample [f, n_z] of recording k: sensors, and inputs through the plant."""
+    e = study.experiments[k]
+    f = e.frequencies[: e.band]
+    through = study.linear.transfer(f)[:, : len(study.model.sensors), : len(study.model.inputs)]
+    return f, study.levels[k] + np.sum(np.abs(through * e.unsure[: e.band, None, :]) ** 2, axis=2)
+
+
+def rig(model: Model, places: Sequence[Place]) -> Model:
+    """The elements of places alone, each place under prescribed deflection `s_place0`...; sensors are their forces
+    [N]."""
+    elements, signals = [], []
+    for k, place in enumerate(places):
+        names = []
+        for x in model.elements:
+            if x.ends in (place.ends, place.ends[::-1]):
+                ahead = x.ends == place.ends
+                elements.append(replace(x, ends=(f"s_place{k}", GROUND) if ahead else (GROUND, f"s_place{k}")))
+                names.append(f"{'+' if ahead else '-'} F_{x.name}")
+        signals.append(Signal(f"force_place{k}", " ".join(names).removeprefix("+ "), "N"))
+    memory = tuple(s for s in model.extra_states if any(s.name.startswith(f"{x.name}_") for x in elements))
+    inputs = (*(Input(f"s_place{k}", "m") for k in range(len(places))), *model.inputs)
+    return replace(
+        model, bodies=(), inputs=inputs, elements=tuple(elements), extra_states=memory, variables=(), equations=(),
+        outputs=(signals[0],), sensors=tuple(signals),
+    )  # fmt: skip
+
+
+def smoother(study: Study, k: int, residual: Array) -> NDArray[np.complex128]:
+    """Gain [f, forces, n_z] from spectra of a residual to those of forces at the places with elements, then of errors
+    of the inputs: their most likely values, with spectra that a residual [n, n_z] itself suggests, smooth over half a
+    hertz."""
+    e, model = study.experiments[k], study.model
+    n_z, n_u = len(model.sensors), len(model.inputs)
+    columns = [n_u + p for p, place in enumerate(study.places) if place.elements] + list(range(n_u))
+    f = e.frequencies[: e.band]
+    g = study.linear.transfer(f)[:, :n_z, columns]
+    r = rfft(np.where(e.good, residual, 0.0), axis=0)[: e.band] / np.sqrt(len(e.time))
+    levels = study.levels[k]
+    prior = np.tile(1.0 / np.median(np.sum(np.abs(g) ** 2 / levels[:, :, None], axis=1), axis=0), (e.band, 1))
+    prior[:, -n_u:] = np.maximum(e.unsure[: e.band], 1e-15) ** 2
+    kernel = np.hanning(2 * max(int(0.5 / f[1]), 3) + 1)
+    weight = np.convolve(np.ones(e.band), kernel, "same")
+    for again in range(9):
+        spread = g * prior[:, None, :]
+        gain = np.conj(np.swapaxes(spread, 1, 2)) @ np.linalg.inv(
+            spread @ np.conj(np.swapaxes(g, 1, 2)) + levels[:, :, None] * np.eye(n_z)
+        )
+        if again < 8:
+            left = prior - np.real(np.einsum("fqi,fiq->fq", gain, spread))
+            power = np.abs((gain @ r[:, :, None])[:, :, 0]) ** 2 + np.maximum(left, 0.0)
+            for q in range(len(columns) - n_u):
+                prior[:, q] = np.maximum(np.convolve(power[:, q], kernel, "same") / weight, 1e-30)
+    return gain
+
+
+def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surface]:
+    """Restoring forces of all places with elements, over all recordings; none if their laws need more than motion.
+
+    The motion and the measured force are those of the best model there is (`fit`, or the null fit), and what the
+    smoother makes of its residual; its gain is that for the residual of the null fit.
+    """
+    acting = [p for p, place in enumerate(study.places) if place.elements]
+    places = [study.places[p] for p in acting]
+    n_z, n_u = len(study.model.sensors), len(study.model.inputs)
+    motions, beside, rigs = [], [], []
+    for k, (e, simulated) in enumerate(zip(study.experiments, watch(study, fit or study.null))):
+        gain = smoother(study, k, e.y - study.null.simulated[k])
+        w = np.einsum("fqz,fz->fq", gain, rfft(np.where(e.good, e.y - simulated[:, :n_z], 0.0), axis=0)[: e.band])
+        h = study.linear.transfer(e.frequencies[: e.band])[:, n_z:, [n_u + p for p in acting] + list(range(n_u))]
+        whole = np.zeros((len(e.frequencies), h.shape[1] + len(acting)), dtype=complex)
+        whole[: e.band] = np.concatenate([np.einsum("fyq,fq->fy", h, w), w[:, : len(acting)]], axis=1)
+        change = irfft(whole, len(e.time), axis=0)
+        paths = simulated[:, n_z:] + change[:, : h.shape[1]]
+        s, v = (paths[:, [2 * p + q for p in acting]] for q in (0, 1))
+        motions.append((s, v))
+        beside.append(change[:, h.shape[1] :])
+        none = np.zeros((len(s), len(acting)))
+        rigs.append(replace(e, drive=np.hstack([s, e.drive]), rate=np.hstack([v, e.rate]), y=none, good=none > 0.0))
+    known = tuple(f for f in study.null.free if isinstance(f.target, str))  # nominal is what the tolerance allows
+    try:
+        laws = [
+            (Problem(rig(m, places), rigs, (), study.set_name), free)
+            for m, free in ((study.model, known), (extended, ()))
+            if m
+        ]
+    except (ModelError, UserError):
+        return []
+    both = [
+        [np.array(p.simulate(k, free, np.zeros((1, len(free))))[0][0]) for k in range(len(rigs))] for p, free in laws
+    ]
+    found = []
+    for i, place in enumerate(places):
+        s, v = (np.concatenate([m[q][:, i] for m in motions]) for q in (0, 1))
+        forces = [np.concatenate([z[:, i] for z in each]) for each in both]
+        edges = tuple(
+            np.linspace(-x, x, BINS + 1) for x in (max(float(np.quantile(np.abs(q), 0.999)), 1e-12) for q in (s, v))
+        )
+        measured = forces[-1] + np.concatenate([w[:, i] for w in beside])
+        names = tuple(name for name, _ in place.elements)
+        found.append(Surface(place.name, names, s, v, measured, forces[0], forces[1] if extended else None, edges))
+    return found
+
+
+# -- numbers ----------------------------------------------------------------------------------------------------------
+
+
+def short(value: Any) -> Any:
+    """Numbers of five digits, for a file; None for NaN."""
+    if isinstance(value, np.ndarray):
+        return [short(x) for x in value]
+    return float(f"{value:.5g}") if np.isfinite(value) else None
+
+
+def channel_numbers(c: Channel) -> dict[str, Any]:
+    """Where in time and frequency a sensor's residual is, and by how much of the signal."""
+    both = [c.before, *([c.after] if c.after else [])]
+    names = ["before", "after"][: len(both)]
+    values = {name: c.level(r) for name, r in zip(names, both)}
+    edges = third_octaves(c.f[0], c.f[-1])
+    in_bands = {name: band_rms(c.f, r.density, edges) for name, r in zip(names, both)}
+    noise, whole = band_rms(c.f, c.floor, edges), band_rms(c.f, c.signal, edges)
+    found_in = {name: map(short, values) for name, values in (*in_bands.items(), ("noise", noise), ("signal", whole))}
+    frequency = [
+        {"from": short(a), "to": short(b), **dict(zip(found_in, levels)), "coherence": short(_mean(c, a, b))}
+        for a, b, *levels in zip(edges, edges[1:], *found_in.values())
+    ]
+    time = [
+        {"from": short(a), "to": short(b), **dict(zip(names, map(short, found)))}
+        for a, b, found in stretches(c.time, c.good, *(r.values for r in both))
+    ]
+    return {
+        "recording": c.recording,
+        "signal": c.sensor,
+        "unit": c.unit,
+        "signal_rms": short(c.strength),
+        "noise_rms": short(c.noise),
+        **{f"{name}_rms": short(x) for name, x in values.items()},
+        "share_of_signal": short(c.share),
+        "linear_in_input": short(linear_share(c, c.before)),
+        "coherence_limit": short(c.limit),
+        "whiteness": {name: {k: short(x) for k, x in vars(r.white).items()} for name, r in zip(names, both)},
+        "time": time,
+        "frequency": frequency,
+    }
+
+
+def _mean(c: Channel, low: float, high: float) -> float:
+    """Mean coherence before in a band; NaN if no frequency lies in it."""
+    inside = (c.f >= low) & (c.f < high)
+    return float(np.mean(c.before.coherence[inside])) if inside.any() else np.nan
+
+
+def linear_share(c: Channel, r: Residual) -> float:
+    """Share of a residual's power that is a linear function of the inputs; what chance gives is taken off."""
+    corrected = np.maximum(r.coherence - c.chance, 0.0) / max(1.0 - c.chance, 1e-12)
+    return float(np.sum(corrected * r.density) / max(float(np.sum(r.density)), 1e-300))
+
+
+def surface_numbers(s: Surface) -> dict[str, Any]:
+    """Forces over deflection and rate, where they are most wrong, and by how much."""
+    gap = s.grid(s.measured - s.nominal)
+    found: dict[str, Any] = {
+        "place": s.place,
+        "elements": list(s.elements),
+        "unit": "N",
+        "force_rms": short(rms(s.nominal - np.mean(s.nominal))),
+        "before_rms": short(rms(s.measured - s.nominal)),
+    }
+    if s.extended is not None:
+        found["after_rms"] = short(rms(s.measured - s.extended))
+    if np.isfinite(gap).any():
+        i, j = np.unravel_index(np.nanargmax(s.count() * gap**2), gap.shape)
+        middle = [0.5 * (e[k] + e[k + 1]) for e, k in zip(s.edges, (i, j))]
+        found["worst"] = {"deflection": short(middle[0]), "rate": short(middle[1]), "missing": short(gap[i, j])}
+    forces = {"measured": s.measured, "nominal": s.nominal} | ({} if s.extended is None else {"extended": s.extended})
+    grids = {name: short(s.grid(values)) for name, values in forces.items()}
+    found["grid"] = {"deflection": short(s.edges[0]), "rate": short(s.edges[1]), "samples": s.count().tolist(), **grids}
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """All that a report draws."""
+
+    train: tuple[Channel, ...]
+    holdout: tuple[Channel, ...]
+    surfaces: tuple[Surface, ...]
+
+    def numbers(self) -> dict[str, Any]:
+        """As in diagnosis.json."""
+        return {
+            "signals": [channel_numbers(c) for c in self.train],
+            "holdout": [channel_numbers(c) for c in self.holdout],
+            "state_space": [surface_numbers(s) for s in self.surfaces],
+        }
+
+
+def show(study: Study, fit: Fit | None, extended: Model | None, holdout: Sequence[Channel]) -> Shown:
+    """What the model gets wrong in training; `fit` and `extended`: the model with the named causes, if there are
+    any."""
+    train: list[Channel] = []
+    for k, e in enumerate(study.experiments):
+        train += channels(
+            e, study.model, study.null.simulated[k], fit.simulated[k] if fit else None, noise_floor(study, k)
+        )
+    return Shown(tuple(train), tuple(holdout), tuple(surfaces(study, extended, fit)))
