@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,6 +56,28 @@ def progress(title: str, total: float) -> Iterator[Callable[[float], None]]:
         yield lambda done: bars.update(task, completed=done)
 
 
+@contextmanager
+def counted(title: str) -> Iterator[Callable[[int, int], None]]:
+    """The same for things that are done one by one, whose number shows later."""
+    with progress(title, 1.0) as tell:
+        yield lambda done, total: tell(done / max(total, 1))
+
+
+@contextmanager
+def staged() -> Iterator[Callable[[float, str], None]]:
+    """The same for work of several stages, that says which one is next."""
+    if not sys.stderr.isatty():
+        yield lambda done, doing: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description:<32}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        task = bars.add_task("reading", total=1.0)
+        yield lambda done, doing: bars.update(task, completed=done, description=doing)
+
+
 def note(text: str) -> None:
     """A line for people; stdout stays for results."""
     click.echo(f"note: {text}", err=True)
@@ -64,94 +87,6 @@ def note(text: str) -> None:
 @click.version_option(penode_gen.VERSION, prog_name="penode")
 def cli() -> None:
     """Physics-enhanced neural ODEs: from a model file to checked C, in the loop on host and Cortex-M."""
-
-
-@cli.command()
-@click.argument("model", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help="Directory for the C files; created if need be.")
-def generate(model: Path, output: Path) -> None:
-    """Check the model file MODEL and write its C."""
-    loaded = penode_gen.load(model)
-    if output.exists() and not output.is_dir():
-        raise UserError(f"{output}: this is a file; name a directory")
-    if not output.exists() and not output.absolute().parent.is_dir():
-        raise UserError(f"{output}: there is no directory {output.parent}; create it")
-    penode_gen.generate(loaded, output)
-    for suffix in (".h", ".c", "_params.c"):
-        click.echo(str(output / f"{loaded.name}{suffix}"))
-
-
-@cli.command()
-@click.argument("model", type=FILE)
-@click.option("--scenario", type=FILE, help="Scenario file (TOML) to run.")
-@click.option("--input", "record", type=FILE, help="Recording (CSV with units, or MDF) whose inputs drive the model.")
-@click.option(
-    "--on",
-    "target",
-    default="sil",
-    show_default=True,
-    metavar="mil|sil|pil[:machine]",
-    help=f"Exact reference, C on this machine, or C on an emulated one of {', '.join(MACHINES)}.",
-)
-@click.option("-o", "--output", type=FILE, required=True, help="CSV file to write.")
-@click.option("--plot", type=FILE, help="Picture to write as well (.png, .svg, .pdf).")
-@click.option("--signal", help="Signal to plot; the first output if not given.")
-@click.option("--set", "set_name", help="Parameter set for --input.")
-@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
-def simulate(
-    model: Path,
-    scenario: Path | None,
-    record: Path | None,
-    target: str,
-    output: Path,
-    plot: Path | None,
-    signal: str | None,
-    set_name: str | None,
-    as_json: bool,
-) -> None:
-    """Run the model file MODEL on a scenario or on recorded inputs."""
-    if (scenario is None) == (record is None):
-        raise UserError("simulate needs exactly one of --scenario and --input; name a scenario file or a recording")
-    place, _, machine = target.partition(":")
-    if place not in ("mil", "sil", "pil") or (machine and place != "pil"):
-        raise UserError(f'--on: "{target}" is not known; use mil, sil, pil or pil:MACHINE')
-    if machine and machine not in MACHINES:
-        raise UserError(f'--on: there is no machine "{machine}"; {hint(machine, MACHINES)}')
-    for path in filter(None, (output, plot)):
-        check_writable(path)
-    if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
-        raise UserError(f'{plot}: a picture cannot be written as "{plot.suffix}"; end its name in .png, .svg or .pdf')
-    loaded = penode_gen.load(model)
-    names = list(dict.fromkeys([*(s.name for s in (*loaded.outputs, *loaded.sensors)), *loaded.states]))
-    if signal is not None and signal not in names:
-        raise UserError(f'--signal: the model has no signal "{signal}"; {hint(signal, names)}')
-    if set_name is not None and (scenario is not None or set_name not in loaded.sets):
-        raise UserError(
-            "--set: scenarios name their sets themselves; remove it"
-            if scenario is not None
-            else f'--set: the model has no set "{set_name}"; {hint(set_name, loaded.sets)}'
-        )
-    length = int(np.asarray(penode_gen.set_values(loaded, next(iter(loaded.sets)))).size)
-    if scenario is not None:
-        plan = scenarios.load(scenario, loaded, length)
-        times = scenarios.sample_times(plan, loaded.sample_time)
-        offset, u = 0.0, scenarios.sampled(plan, loaded, times)
-    else:
-        plan, times, offset, u = _replay(record, loaded, set_name)
-    _warn_range(loaded, u)
-    results = _run(loaded, plan, times, u, place, machine or next(iter(MACHINES)), length)
-    for result in results:
-        for call, code in result.run.calls if result.run else ():
-            if code:
-                note(
-                    f"{result.instance.name}: {call.kind} before sample {call.sample} was refused: "
-                    + ", ".join(status.names(code))
-                )
-    write_csv(output, _table(loaded, times + offset, u, results, prefix=len(plan.instances) > 1, full=record is None))
-    if plot is not None:
-        _plot(loaded, plan, times, results, signal or names[0], plot, target)
-    summary = _summary(loaded, plan, times, results, target, output)
-    click.echo(json.dumps(summary, indent=2) if as_json else _sentences(summary))
 
 
 class _Several(click.Command):
@@ -172,39 +107,160 @@ class _Several(click.Command):
         return super().parse_args(ctx, spread)
 
 
-@cli.command(cls=_Several)
+@cli.command()
 @click.argument("model", type=FILE)
-@click.option("--data", type=FILE, multiple=True, required=True, help="Recordings (CSV with units, or MDF4) to learn from.")
-@click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on.")
-@click.option("-o", "--output", type=FILE, required=True, help="Directory for diagnosis.json and model_extended.toml.")
-@click.option("--set", "set_name", default="default", show_default=True, help="Parameter set to start from.")
-@click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
-@click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json.")
-def diagnose(
-    model: Path, data: tuple[Path, ...], holdout: tuple[Path, ...], output: Path, set_name: str, channel: tuple[str, ...], as_json: bool
-) -> None:
-    """Show what the model file MODEL gets wrong, name the cause, extend the model, measure the gain."""
-    from . import diagnosis  # SciPy's parts are slow to load
-    from .measured import load
-
+@click.option("-o", "--output", type=FILE, required=True, help="Directory for the C files; created if need be.")
+def generate(model: Path, output: Path) -> None:
+    """Check the model file MODEL and write its C."""
     loaded = penode_gen.load(model)
-    if set_name not in loaded.sets and loaded.networks:
-        raise UserError(f'--set: the model has no set "{set_name}"; {hint(set_name, loaded.sets)}')
     if output.exists() and not output.is_dir():
         raise UserError(f"{output}: this is a file; name a directory")
     if not output.exists() and not output.absolute().parent.is_dir():
         raise UserError(f"{output}: there is no directory {output.parent}; create it")
-    train, held = load(data, loaded, channel), load(holdout, loaded, channel)
-    found = diagnosis.diagnose(loaded, train, held, output, set_name)
-    text = json.dumps(found.as_json(), indent=2)
-    (output / "diagnosis.json").write_text(text + "\n")
-    click.echo(text if as_json else diagnosis.sentences(loaded, found, output))
+    penode_gen.generate(loaded, output)
+    for suffix in (".h", ".c", "_params.c"):
+        click.echo(str(output / f"{loaded.name}{suffix}"))
 
 
-def _replay(record: Path, model: Any, set_name: str | None) -> tuple[scenarios.Scenario, Any, float, Any]:
+@cli.command(cls=_Several)
+@click.argument("model", type=FILE)
+@click.option("--scenario", type=FILE, help="Scenario file (TOML) to run.")
+@click.option("--input", "record", type=FILE, help="Recording (CSV with units, or MDF) whose inputs drive the model.")
+@click.option(
+    "--on",
+    "target",
+    default="sil",
+    show_default=True,
+    metavar="mil|sil|pil[:machine]",
+    help=f"Exact reference, C on this machine, or C on an emulated one of {', '.join(MACHINES)}.",
+)
+@click.option("-o", "--output", type=FILE, required=True, help="CSV file to write.")
+@click.option("--plot", type=FILE, help="Picture to write as well (.png, .svg, .pdf).")
+@click.option("--signal", help="Signal to plot; the first output if not given.")
+@click.option("--set", "set_name", help="Parameter set for --input.")
+@click.option("--channel", multiple=True, help="What the recording calls an input: x=pos_mm, or x=Weg [mm].")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def simulate(
+    model: Path,
+    scenario: Path | None,
+    record: Path | None,
+    target: str,
+    output: Path,
+    plot: Path | None,
+    signal: str | None,
+    set_name: str | None,
+    channel: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Run the model file MODEL on a scenario or on recorded inputs."""
+    if (scenario is None) == (record is None):
+        raise UserError("simulate needs exactly one of --scenario and --input; name a scenario file or a recording")
+    place, _, machine = target.partition(":")
+    if place not in ("mil", "sil", "pil") or (machine and place != "pil"):
+        raise UserError(f'--on: "{target}" is not known; use mil, sil, pil or pil:MACHINE')
+    if machine and machine not in MACHINES:
+        raise UserError(f'--on: there is no machine "{machine}"; {hint(machine, MACHINES)}')
+    for path in filter(None, (output, plot)):
+        check_writable(path)
+    if plot is not None and plot.suffix not in (".png", ".svg", ".pdf"):
+        raise UserError(f'{plot}: a picture cannot be written as "{plot.suffix}"; end its name in .png, .svg or .pdf')
+    loaded = penode_gen.load(model)
+    names = list(dict.fromkeys([*(s.name for s in (*loaded.outputs, *loaded.sensors)), *loaded.states]))
+    if signal is not None and signal not in names:
+        raise UserError(f'--signal: the model has no signal "{signal}"; {hint(signal, names)}')
+    if channel and scenario is not None:
+        raise UserError("--channel: it names what a recording holds, and a scenario has none; remove it")
+    if set_name is not None and (scenario is not None or set_name not in loaded.sets):
+        raise UserError(
+            "--set: scenarios name their sets themselves; remove it"
+            if scenario is not None
+            else f'--set: the model has no set "{set_name}"; {hint(set_name, loaded.sets)}'
+        )
+    length = int(np.asarray(penode_gen.set_values(loaded, next(iter(loaded.sets)))).size)
+    if scenario is not None:
+        plan = scenarios.load(scenario, loaded, length)
+        times = scenarios.sample_times(plan, loaded.sample_time)
+        offset, u = 0.0, scenarios.sampled(plan, loaded, times)
+    else:
+        plan, times, offset, u = _replay(record, loaded, set_name, channel)
+    _warn_range(loaded, u)
+    results = _run(loaded, plan, times, u, place, machine or next(iter(MACHINES)), length)
+    for result in results:
+        for call, code in result.run.calls if result.run else ():
+            if code:
+                note(
+                    f"{result.instance.name}: {call.kind} before sample {call.sample} was refused: "
+                    + ", ".join(status.names(code))
+                )
+    write_csv(output, _table(loaded, times + offset, u, results, prefix=len(plan.instances) > 1, full=record is None))
+    if plot is not None:
+        _plot(loaded, plan, times, results, signal or names[0], plot, target)
+    summary = _summary(loaded, plan, times, results, target, output)
+    click.echo(json.dumps(summary, indent=2) if as_json else _sentences(summary))
+
+
+@cli.command(cls=_Several)
+@click.argument("model", type=FILE)
+@click.option("--data", type=FILE, multiple=True, required=True, help="Recordings (CSV or MDF4), or folders of them.")
+@click.option("--each", is_flag=True, help="Diagnose each recording by itself, as in a folder.")
+@click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on; not learnt from.")
+@click.option("-o", "--output", type=FILE, required=True, help="Directory for what is found; created if need be.")
+@click.option("--set", "set_name", default="default", show_default=True, help="Parameter set to start from.")
+@click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
+@click.option("--jobs", type=click.IntRange(1), help="Processes for a folder; as many as cores if not given.")
+@click.option("--scheduler", help="Address of a Dask scheduler for a folder, like tcp://host:8786.")
+@click.option("--resume", is_flag=True, help="Keep what DIR has of the same model, recordings and options.")
+@click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json, or diagnoses.json for a table.")
+def diagnose(
+    model: Path,
+    data: tuple[Path, ...],
+    each: bool,
+    holdout: tuple[Path, ...],
+    output: Path,
+    set_name: str,
+    channel: tuple[str, ...],
+    jobs: int | None,
+    scheduler: str | None,
+    resume: bool,
+    as_json: bool,
+) -> None:
+    """Show what the model file MODEL gets wrong, name the cause, extend the model, measure the gain.
+
+    Several files are one study: the same plant with the same cause, one answer. A folder, or files with --each, are as
+    many studies: an answer for each recording in a directory of its own below DIR, and one table over all of them in
+    diagnoses.csv, diagnoses.json and index.html.
+    """
+    from .diagnosis import files, folder, sentences, table  # SciPy's parts are slow to load
+
+    files.check_folder(output)
+    job = files.Job(model, data, holdout, output, set_name, channel)
+    if not each and not any(path.is_dir() for path in data):
+        for given, name in ((jobs, "--jobs"), (scheduler, "--scheduler"), (resume, "--resume")):
+            if given:
+                raise UserError(f"{name}: these recordings are one study; give a folder, or --each for one by one")
+        with staged() as tell:
+            loaded, found = files.run(job, tell=tell)
+        click.echo(json.dumps(found.as_json(), indent=2) if as_json else sentences(loaded, found, output))
+        return
+    if jobs and scheduler:
+        raise UserError("--jobs: the cluster of --scheduler has its own number of processes; leave one of them out")
+    with counted("recordings") as tell:
+        rows = folder.diagnose(job, jobs or len(os.sched_getaffinity(0)), scheduler or "", resume, tell)
+    name = penode_gen.load(model).name
+    click.echo(table.as_json(name, rows) if as_json else table.sentences(name, rows, output))
+    failed = [row.error for row in rows if row.error]
+    if failed:
+        raise UserError(*failed)
+
+
+def _replay(
+    record: Path, model: Any, set_name: str | None, channels: Iterable[str]
+) -> tuple[scenarios.Scenario, Any, float, Any]:
     """A recording as a scenario; its sample times from 0, its first time [s], and its inputs on the model's raster."""
     wanted = {signal.name: signal.unit for signal in model.inputs}
-    raster, u, remarks = recording.on_raster(recording.read(record, [*wanted, "time"]), wanted, model.sample_time)
+    pairs = recording.aliases(channels, [s.name for s in (*model.inputs, *model.sensors, *model.outputs)])
+    tables = recording.read(record, [*wanted, "time"], pairs)
+    raster, u, remarks = recording.on_raster(tables, wanted, model.sample_time)
     for remark in remarks:
         note(f"{record}: {remark}")
     times = np.arange(raster.size) * model.sample_time

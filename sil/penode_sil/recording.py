@@ -152,13 +152,18 @@ def _scale(given: str, unit: str) -> float:
     return factor(given, unit)
 
 
-def aliases(texts: Iterable[str]) -> dict[str, str]:
-    """Texts like `x=pos_mm` or `x=Weg 1 [mm]`: the model's name, the file's name and, if need be, its unit."""
+def aliases(texts: Iterable[str], known: Iterable[str]) -> dict[str, str]:
+    """Texts like `x=pos_mm` or `x=Weg 1 [mm]`: the model's name, which must be known (or time), the file's name and, if
+    need be, its unit."""
     pairs: dict[str, str] = {}
+    known = list(known)
     for text in texts:
         match = ALIAS.match(text)
         if match is None:
             raise UserError(f"channel \"{text}\" is not understood; write the model's name = the file's name [unit]")
+        if match[1] not in (*known, "time"):
+            what = f'channel {match[1]}: the model has no input or sensor "{match[1]}"'
+            raise UserError(f"{what}; {hint(match[1], known)}")
         pairs[match[1]] = match[2] if match[3] is None else f"{match[2]} [{match[3]}]"
     return pairs
 

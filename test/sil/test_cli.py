@@ -114,6 +114,12 @@ def test_recording_in_other_units_and_rate_predicts_all_sensors(penode, folder):
     assert values[500, 1] == pytest.approx(10.0)  # 0.002 cm/ms * 500 ms = 1 cm
 
 
+def test_a_recording_may_call_its_inputs_otherwise(penode, folder):
+    (folder / "r.csv").write_text("t_s,Weg,z [mm]\n" + "".join(f"{0.001 * k:.3f},{0.1 * (k % 7):.1f},0\n" for k in range(50)))
+    penode("simulate", MODEL, "--input", "r.csv", "-o", "p.csv", "--channel", "foot=Weg [cm]", "time=t_s")
+    assert table(folder / "p.csv")[1][:, 1] == pytest.approx(np.arange(50) % 7)
+
+
 def test_prediction_is_a_recording_again(penode, folder):
     (folder / "r.csv").write_text("time [s],foot [mm]\n" + "".join(f"{0.001 * k:.3f},{k % 7}\n" for k in range(50)))
     penode("simulate", MODEL, "--input", "r.csv", "-o", "p.csv")
@@ -135,6 +141,8 @@ WRONG = [
     (["simulate", MODEL, "--input", "bad.csv", "-o", "o.csv"], "bad.csv:3: channel foot has no finite value there"),
     (["simulate", MODEL, "--input", "gap.csv", "-o", "o.csv"], "gap.csv:5: channel time has a gap"),
     (["simulate", MODEL, "--input", "unit.csv", "-o", "o.csv"], "unit.csv:1: channel foot: kg cannot be turned into mm"),
+    (["simulate", MODEL, "--input", "gap.csv", "--channel", "fot=x", "-o", "o.csv"], 'no input or sensor "fot"; did you mean'),
+    (["simulate", MODEL, "--scenario", "s.toml", "--channel", "foot=x", "-o", "o.csv"], "--channel: it names what a recording holds"),
     (["simulate", MODEL, "--input", "gap.csv", "--set", "stif", "-o", "o.csv"], 'no set "stif"; did you mean "stiff"?'),
     (["simulate", "none.toml", "--scenario", "s.toml", "-o", "o.csv"], "none.toml: cannot be read"),
     (["simulate", "s.toml", "--scenario", "s.toml", "-o", "o.csv"], "s.toml"),

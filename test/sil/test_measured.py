@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 import penode_gen
 from penode_sil.errors import UserError
-from penode_sil.measured import load, scale_hint
+from penode_sil.measured import load
 
 N = 8000
 T = np.round(np.arange(N) * 1e-3, 6)
@@ -220,19 +220,6 @@ def test_names_of_the_file_can_be_given(tmp_path, oscillator):
     path = write(tmp_path / "r.csv", {"t_s": T, "Weg_1": FOOT, "acc_m_s2": A})
     (one,) = load([path], oscillator, ["foot=Weg_1 [mm]", "a=acc_m_s2"])
     assert one.u[:, 0] == pytest.approx(FOOT * 1e-3, rel=1e-8, abs=1e-12) and one.z["a"] == pytest.approx(A, rel=1e-8)
-
-
-@pytest.mark.parametrize(
-    "factor, text", [(1e3, "mm and m"), (1e-3, "mm and m"), (1 / 9.80665, "g and m/s^2"), (-1.0, "sign")]
-)
-def test_wrong_units_are_seen_in_the_scale(factor, text):
-    simulated = A + 0.1 * np.roll(A, 30)
-    assert text in scale_hint(factor * A + 9.81, simulated)
-
-
-def test_no_hint_where_units_are_right_or_nothing_is_alike():
-    assert scale_hint(1.3 * A, A) is None and scale_hint(1e3 * A, DRAW.normal(size=N)) is None
-    assert scale_hint(np.zeros(N), A) is None and scale_hint(np.full(N, np.nan), A) is None
 
 
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

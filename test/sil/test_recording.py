@@ -151,10 +151,10 @@ def test_doubts_are_asked(tmp_path, text, expected):
 
 def test_a_channel_may_have_another_name_in_the_file(tmp_path):
     path = write(tmp_path, "t_s,pos_mm,F\n0,1,2\n1,4,5\n")
-    (table,) = read(path, pairs=aliases(["x=pos_mm", "force = F [kN]"]))
+    (table,) = read(path, pairs=aliases(["x=pos_mm", "force = F [kN]"], ["x", "force"]))
     assert table.channel("x", "m").tolist() == [1e-3, 4e-3] and table.channel("force", "N").tolist() == [2e3, 5e3]
     with pytest.raises(UserError, match='channel "x" is not understood; write'):
-        aliases(["x"])
+        aliases(["x"], ["x"])
 
 
 @pytest.fixture

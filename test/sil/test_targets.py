@@ -108,9 +108,10 @@ def test_every_step_costs_the_same(name, machine, show):
         assert run.cost["normal"].most <= 18_000
 
 
-def test_stack_of_a_step_is_bounded(nqvm, show):
+def test_size_build_gives_the_same_bits_on_a_bounded_stack(nqvm, show):
     need("qemu-system-arm", "arm-none-eabi-gcc")
-    run = Pil(nqvm, "m4f", optimise="-Os").run(chirp(50))
+    run = Pil(nqvm, "m4f", optimise="-Os").run(chirp(400))
+    assert run.digest == Sil(nqvm).run(chirp(400)).digest
     show(f"m4f -Os: stack of a step {run.stack} B, {run.cost['normal'].most} instructions")
     assert 0 < run.stack <= 400
 
