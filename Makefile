@@ -9,21 +9,28 @@ Q         := $(if $(V),,@)
 PYTHON    := build/venv/bin/python
 PENODE    := build/venv/bin/penode
 EXPERIMENT := gen/nqvm/nqvm.toml --scenario sil/scenarios/recalibration.toml
+RECORDED  := sil/recordings/friction
+CASES     := 312 # thirteen rounds of the 24 cases of a draw
 
 help: ## Show this text
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 setup: $(addprefix build/setup/,tools python unity cmock) ## Install what is missing; every other target that needs it calls it
 
-run: setup ## The main job: recalibration while it runs, on the host and on an emulated Cortex-M4F, with a picture
+run: setup ## The main job: recalibration while it runs, on the host and a Cortex-M4F; then a diagnosis; with pictures
 	$(Q)mkdir -p build/run
 	$(Q)$(PENODE) simulate $(EXPERIMENT) --on sil -o build/run/sil.csv --plot build/run/recalibration.png
 	$(Q)$(PENODE) simulate $(EXPERIMENT) --on pil:m4f -o build/run/pil.csv
 	$(Q)cmp build/run/sil.csv build/run/pil.csv
 	@echo "host and Cortex-M4F agree to the bit; the picture is build/run/recalibration.png"
+	$(Q)$(PENODE) diagnose $(RECORDED)/model.toml --data $(RECORDED)/train.csv --holdout $(RECORDED)/holdout.csv \
+	    -o build/run/diagnosis
 
 test: setup ## All checks; the last line adds them up
 	$(Q)$(PYTHON) test/tally.py $(SUITES)
+
+prove: setup build/setup/proof ## The proofs: all values, all orders, all statements; each also has to find seeded faults
+	$(Q)$(PYTHON) test/tally.py $(PROVE_STATIC) $(PROVE_DYNAMIC)
 
 figures: setup ## Measure what our steps cost; rewrite the tables of README.md and test/bench/
 	$(Q)$(PYTHON) test/bench/bench.py --ours
@@ -31,15 +38,24 @@ figures: setup ## Measure what our steps cost; rewrite the tables of README.md a
 bench: setup ## The same with the steps of other tools (ten minutes, downloads them)
 	$(Q)$(PYTHON) test/bench/bench.py
 
+campaign: campaign-diagnosis campaign-proofs ## Both campaigns, hours
+
+campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings and let the diagnosis and its rivals look for them
+	$(Q)$(PYTHON) test/diagnosis/campaign.py --cases $(CASES) --jobs $$(nproc) --gate --command "$(PENODE) diagnose" \
+	    --command "PySINDy=build/rivals/bin/python test/diagnosis/rivals/sindy.py" \
+	    --command "neural=build/rivals/bin/python test/diagnosis/rivals/neural.py"
+
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test figures bench clean
+.PHONY: help setup run test prove figures bench campaign campaign-diagnosis clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools
-build/setup/unity build/setup/cmock: build/setup/tools
+build/setup/unity build/setup/cmock build/setup/proof: build/setup/tools
+build/setup/rivals: test/diagnosis/rivals/requirements.txt build/setup/tools
 build/setup/%:
 	$(Q)test/setup.sh $*
 
 include test/test.mk
+include test/prove/prove.mk

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 #
-# setup.sh tools|python|unity|cmock: one part of the set-up each; the Makefile calls it, once. All goes into build/ but
-# the Debian packages of `tools`. Quiet where there is nothing to do; one line that names the remedy where it cannot.
+# setup.sh tools|python|unity|cmock|proof|rivals: one part of the set-up each; the Makefile calls it, once. All goes into build/
+# but the Debian packages of `tools` and `proof`. Quiet where there is nothing to do; one line that names the remedy where it cannot.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -45,19 +45,37 @@ missing_packages()
     python3 -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv
 }
 
-tools()
+# The same for `make prove`.
+missing_proof_packages()
+{
+    command -v frama-c >/dev/null || echo frama-c-base
+    command -v spin >/dev/null || echo spin
+    command -v llvm-cov-19 >/dev/null || echo llvm-19
+}
+
+install() # PART COMMAND: the Debian packages that COMMAND prints
 {
     local missing root
-    missing=$(missing_packages | tr '\n' ' ')
+    missing=$($2 | tr '\n' ' ')
     if [ -n "$missing" ]; then
         echo "setup: installing $missing"
         root=$(as_root) || give_up "cannot install packages here; run as root: apt-get install $missing"
         { $root apt-get update -qq &&
             $root DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $missing; } \
-            >build/setup/tools.log 2>&1 || give_up "apt-get failed, see build/setup/tools.log; needed: $missing"
-        missing=$(missing_packages | tr '\n' ' ')
+            >"build/setup/$1.log" 2>&1 || give_up "apt-get failed, see build/setup/$1.log; needed: $missing"
+        missing=$($2 | tr '\n' ' ')
         [ -z "$missing" ] || give_up "still missing after apt-get: $missing"
     fi
+}
+
+tools()
+{
+    install tools missing_packages
+}
+
+proof()
+{
+    install proof missing_proof_packages
 }
 
 python()
@@ -69,6 +87,15 @@ python()
     { build/venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt &&
         build/venv/bin/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .; } \
         >build/setup/python.log 2>&1 || give_up "pip failed, see build/setup/python.log; is the package index reachable?"
+}
+
+rivals() # of the diagnosis, for `make campaign` only
+{
+    echo "setup: PySINDy into build/rivals"
+    rm -rf build/rivals
+    python3 -m venv build/rivals
+    build/rivals/bin/python -m pip install --quiet --disable-pip-version-check -r test/diagnosis/rivals/requirements.txt \
+        >build/setup/rivals.log 2>&1 || give_up "pip failed, see build/setup/rivals.log; is the package index reachable?"
 }
 
 # Print the Debian archive's own entries (not those of third parties) as entries for source packages.

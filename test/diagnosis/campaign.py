@@ -11,6 +11,7 @@
 import argparse
 import json
 import os
+import resource
 import secrets
 import shlex
 import shutil
@@ -29,16 +30,22 @@ from hidden import cases  # noqa: E402
 ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1")
 
 
+def worked() -> float:
+    """Seconds of processor time of all commands so far."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def diagnose(command: str, folder: Path, recordings: list[Path], timeout: float) -> tuple[dict | None, float, str]:
-    """Runs the command as a user would. Returns the diagnosis or None, seconds, and why there is none."""
+    """Runs the command as a user would. Returns the diagnosis or None, seconds of one core, and why there is none."""
     answer = folder / "diagnosis"
     call = [*shlex.split(command), folder / "model.toml", "--data", *recordings[:-1], "--holdout", recordings[-1], "-o", answer]
-    begin = time.monotonic()
+    begin = worked()
     try:
         done = subprocess.run(list(map(str, call)), capture_output=True, text=True, timeout=timeout, env={**os.environ, **ONE_CORE})
     except subprocess.TimeoutExpired:
-        return None, time.monotonic() - begin, "timeout"
-    seconds = time.monotonic() - begin
+        return None, timeout, "timeout"
+    seconds = worked() - begin
     (folder / "stderr.txt").write_text(done.stderr)
     if done.returncode:
         return None, seconds, f"exit {done.returncode}: {(done.stderr.strip().splitlines() or [''])[-1][:160]}"
@@ -121,18 +128,20 @@ def arguments() -> argparse.ArgumentParser:
         help="called as COMMAND MODEL.toml --data REC... --holdout REC -o DIR (penode diagnose); may be given again")
     add("--simulate", default="", metavar="COMMAND",
         help="measure the gain by COMMAND model_extended.toml --input REC -o OUT.csv, not by what the diagnosis says")
-    add("--timeout", type=float, default=120, help="seconds for one case (120)")
+    add("--timeout", type=float, default=240, help="seconds for one case, by the clock (240)")
     add("--jobs", type=int, default=1, help="cases at the same time (1)")
     add("--out", type=Path, default=Path("build/campaign"), help="folder (build/campaign)")
     add("--keep", action="store_true", help="keep recordings, diagnoses and truths")
     add("--generate", action="store_true", help="write the cases, diagnose nothing")
     add("--gate", action="store_true", help="exit code 1 if the first command fails more often than chance allows (1 in 1000)")
+    add("--brief", action="store_true", help="failures and the gate only, no tables")
     return parse
 
 
 def main() -> int:
     parse = arguments()
     asked = parse.parse_args()
+    begin = time.monotonic()
     seed = secrets.randbelow(10**9) if asked.seed is None else asked.seed
     strata, kinds = set(asked.strata.split(",")), set(filter(None, asked.kinds.split(",")))
     if not strata <= set(cases.STRATA) or not kinds <= set(cases.KINDS):
@@ -156,14 +165,24 @@ def main() -> int:
             if sys.stderr.isatty():
                 print(f"{done} of {len(chosen)}", end="\r", file=sys.stderr)
     tables = {name: score.summary(own) for name, own in rows.items()}
-    for name, own in tables.items():
-        print(f"\n{name}: {commands[name]}\n{score.text(own)}")
+    texts = {name: f"{score.text(own)}\n\n{score.confusion(own)}\n" for name, own in tables.items()}
+    side = score.compare(tables)
+    if not asked.brief:
+        print("".join(f"\n{name}: {commands[name]}\n{own}" for name, own in texts.items()) + f"\n{side}\n")
+    page = [f"# Campaign of {len(chosen)} cases, seed {seed}\n\n{side}\n", *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items())]
+    (asked.out / "campaign.md").write_text("".join(page))
     result = {"seed": seed, "commands": commands, "tables": tables, "rows": rows}
     (asked.out / "campaign.json").write_text(json.dumps(result, indent=1))
     print(f"one case again: --only SEED:INDEX; all rows: {asked.out / 'campaign.json'}")
-    problems = score.gate(next(iter(rows.values()))) if asked.gate else []
-    print("".join(f"gate: {p}\n" for p in problems), end="")
-    return 1 if problems else 0
+    if not asked.gate:
+        return 0
+    own = next(iter(rows.values()))
+    gates = score.gate(own)
+    failed = list(filter(None, gates.values()))
+    print("".join(f"gate: {p}\n" for p in failed), end="")
+    took, right = time.monotonic() - begin, sum(r["right"] for r in own)
+    print(f"{len(gates) - len(failed)} passed, {len(failed)} failed in {took:.0f}s: gates of {len(own)} cases, {right} right, seed {seed}")
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

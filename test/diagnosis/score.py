@@ -3,9 +3,9 @@
 """Scores a diagnosis.json against the truth about its recordings, and adds many scores up to tables."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import permutations
-from math import ceil, comb, sqrt
+from math import ceil, sqrt
 
 OUTSIDE = "outside_taxonomy"
 MOST_ALTERNATIVES = 4  # who lists more has not decided
@@ -125,17 +125,15 @@ def wilson(right: int, n: int, z: float = 1.959964) -> tuple[float, float]:
     return max(0.0, (p + z * z / (2 * n) - half) / middle), min(1.0, (p + z * z / (2 * n) + half) / middle)
 
 
-def allowed_failures(n: int, rate: float, risk: float) -> int:
-    """Least k such that a program which is right with probability `rate` has more than k of n cases wrong less often than `risk`.
+def allowed_failures(rates: Sequence[float], risk: float) -> int:
+    """Least k such that a program which is right in case i with probability rates[i] has more than k cases wrong less often than `risk`.
 
-    Cases are independent, so failures are binomial: P(more than k) = 1 - sum over i <= k of C(n, i) (1 - rate)^i rate^(n - i).
+    Cases are independent: the distribution of the number of failures is the convolution of theirs, binomial where the rates are equal.
     """
-    below = 0.0
-    for k in range(n + 1):
-        below += comb(n, k) * (1 - rate) ** k * rate ** (n - k)
-        if 1 - below < risk:
-            return k
-    return n
+    chance = [1.0]  # of k failures
+    for rate in rates:
+        chance = [rate * a + (1 - rate) * b for a, b in zip([*chance, 0.0], [0.0, *chance])]
+    return next(k for k in range(len(chance)) if sum(chance[k + 1 :]) < risk)
 
 
 def quantile(values: Iterable[float], q: float) -> float | None:
@@ -160,21 +158,20 @@ def summary(rows: Sequence[Mapping]) -> dict:
                 "demanded": DEMANDED[name][0],
                 "outcomes": dict(Counter(r["outcome"] for r in own)),
             }
+    for r in rows:
+        if len(r["kinds"]) <= 1:
+            hidden, answer = r["kinds"] or ["nothing"], [a.split(" at ")[0] for a in r["answer"]]
+            said = answer[0] if len(answer) == 1 else "several" if answer else str(r["verdict"] or r["outcome"])
+            out["confusion"].setdefault(hidden[0], Counter())[said] += 1
     for name in ("single_common", "single_foreign", "hard"):
         for kind in sorted({r["kinds"][0] for r in strata[name]}):
             own = [r for r in strata[name] if r["kinds"][0] == kind]
             instead = Counter(" + ".join(r["answer"]) or str(r["verdict"] or r["outcome"]) for r in own if not r["right"])
             out["kinds"].setdefault(kind, {})[name] = {**_share(own), "instead": dict(instead)}
-            for r in own:
-                answer = (
-                    r["answer"][0].split(" at ")[0]
-                    if len(r["answer"]) == 1
-                    else "several" if r["answer"] else str(r["verdict"] or r["outcome"])
-                )
-                out["confusion"].setdefault(kind, Counter())[answer] += 1
     errors = [e for r in rows for e in r["errors"]]
     covered = [c for r in rows for c in r["covered"]]
     inside = [max(g[1] for g in r["gain"].values()) for r in rows if r["right"] and r["kinds"] and r["gain"] and r.get("inside")]
+    hidden = [max(r["gain"].values(), key=lambda g: g[1]) for r in rows if r["kinds"] and r["gain"] and r.get("inside")]
     worse = [
         r["case"]
         for r in rows
@@ -182,6 +179,7 @@ def summary(rows: Sequence[Mapping]) -> dict:
     ]
     seconds = [r["seconds"] for r in rows]
     out["outcomes"] = dict(Counter(r["outcome"] for r in rows))
+    out["no_answer"] = sum(r["verdict"] is None for r in rows)
     out["parameters"] = {
         "n": len(errors),
         "median_error": quantile((e for _, e in errors), 0.5),
@@ -198,24 +196,32 @@ def summary(rows: Sequence[Mapping]) -> dict:
         "within_5_percent_of_floor": sum(g <= 1.05 for g in inside) / len(inside) if inside else None,
         "ratio_95": quantile(inside, 0.95),
         "outside_made_worse": worse,
+        "all": {  # cases with an effect, rightly named or not, each by its worst signal
+            "n": len(hidden),
+            "before": quantile((before for before, _ in hidden), 0.5),
+            "after": quantile((after for _, after in hidden), 0.5),
+            "share_of_achievable": quantile(((b - a) / (b - 1) for b, a in hidden if b > 1.05), 0.5),
+            "made_worse": sum(after > 1.05 * before for before, after in hidden),
+        },
     }
     out["time"] = {"median": quantile(seconds, 0.5), "q90": quantile(seconds, 0.9), "longest": max(seconds, default=None)}
     return out
 
 
-def gate(rows: Sequence[Mapping], risk: float = 1e-3) -> list[str]:
-    """Strata with more failures than a program at the demanded rates has by chance, all strata together with at most `risk`.
+def gate(rows: Sequence[Mapping], risk: float = 1e-3) -> dict[str, str]:
+    """Groups -> what is wrong in each, empty if nothing: more failures than a program at the demanded rates has by chance.
 
-    The null strata ask for no false alarm in 100; a program with one in 500 is taken as right here.
+    Groups are the strata and, as few cases say little of one stratum, all cases together; each takes an equal part of the risk, so that
+    a right program fails any of them with at most `risk`. The null strata ask for no false alarm in 100; one in 500 is taken as right here.
     """
-    strata = {s: [r for r in rows if r["stratum"] == s] for s in DEMANDED if any(r["stratum"] == s for r in rows)}
-    problems = []
-    for name, own in strata.items():
-        rate = 0.998 if name == "null" else DEMANDED[name][0]
-        wrong, most = sum(not r["right"] for r in own), allowed_failures(len(own), rate, risk / len(strata))
-        if wrong > most:
-            problems.append(f"{name}: {wrong} of {len(own)} wrong, at most {most} can be chance")
-    return problems
+    groups = {s: [r for r in rows if r["stratum"] == s] for s in DEMANDED if any(r["stratum"] == s for r in rows)}
+    groups["all"] = list(rows)
+    found = {}
+    for name, own in groups.items():
+        rates = [0.998 if r["stratum"] == "null" else DEMANDED[r["stratum"]][0] for r in own]
+        wrong, most = sum(not r["right"] for r in own), allowed_failures(rates, risk / len(groups))
+        found[name] = f"{name}: {wrong} of {len(own)} wrong, at most {most} can be chance" if wrong > most else ""
+    return found
 
 
 def _percent(x: float | None, digits: int = 1) -> str:
@@ -247,4 +253,43 @@ def text(out: Mapping) -> str:
         f"hold-out inside the trained range ({g['n']}): {_percent(g['within_5_percent_of_floor'])} within 5 % of the noise floor (asked 95 %)",
         f"time a case: median {t['median']} s, 90 % within {t['q90']} s (asked 10 s), longest {t['longest']} s (asked 40 s)",
     ]
+    return "\n".join(lines)
+
+
+def confusion(out: Mapping) -> str:
+    """Hidden kind x answer as a table, of cases with at most one effect; columns are numbered by the rows, then come other answers."""
+    hidden = sorted(out["confusion"])
+    answers = [*hidden, *sorted({a for own in out["confusion"].values() for a in own} - set(hidden))]
+    lines = [f"{'hidden, number of answer:':<30}" + "".join(f"{i:>4}" for i in range(1, len(answers) + 1))]
+    for i, kind in enumerate(answers, 1):
+        own = out["confusion"].get(kind, {})
+        lines.append((f"{i:>4} {kind:<25}" + "".join(f"{own.get(a, '.'):>4}" for a in answers if own)).rstrip())
+    return "\n".join(lines)
+
+
+def compare(tables: Mapping[str, Mapping]) -> str:
+    """Several commands on the same cases side by side, as a Markdown table."""
+    number = lambda x: "-" if x is None else f"{x:.3g}"  # noqa: E731
+    first = next(iter(tables.values()))
+    lines = ["| | " + " | ".join(tables) + " |", "|---|" + "---|" * len(tables)]
+
+    def row(what: str, cell: Callable[[Mapping], str]) -> None:
+        lines.append(f"| {what} | " + " | ".join(cell(t) for t in tables.values()) + " |")
+
+    def share(stratum: str) -> Callable[[Mapping], str]:
+        return lambda t: f"{t['strata'][stratum]['right']} of {t['strata'][stratum]['n']}, {_percent(t['strata'][stratum]['share'], 0)}"
+
+    for stratum, own in first["strata"].items():
+        row(f"{stratum}: right (asked {_percent(own['demanded'], 0)})", share(stratum))
+    nulls = [s for s in ("null", "null_hard") if s in first["strata"]]
+    row("false alarms on null cases", lambda t: str(sum(t["strata"][s]["outcomes"].get("false alarm", 0) for s in nulls)))
+    row("no answer", lambda t: str(t["no_answer"]))
+    row("parameter error, median", lambda t: _percent(t["parameters"]["median_error"]))
+    row("parameter error, 95 % within", lambda t: _percent(t["parameters"]["error_95"]))
+    row("95 % intervals cover", lambda t: _percent(t["coverage"]["share"]))
+    row("hold-out RMSE / noise floor before, median", lambda t: number(t["gain"]["all"]["before"]))
+    row("hold-out RMSE / noise floor after, median", lambda t: number(t["gain"]["all"]["after"]))
+    row("share of the achievable gain, median", lambda t: _percent(t["gain"]["all"]["share_of_achievable"], 0))
+    row("hold-out made worse", lambda t: f"{t['gain']['all']['made_worse']} of {t['gain']['all']['n']}")
+    row("time a case, median; 90 % within [s]", lambda t: f"{number(t['time']['median'])}; {number(t['time']['q90'])}")
     return "\n".join(lines)

@@ -2,7 +2,9 @@
 # Copyright (c) 2026 the penode authors
 """The scorer, on diagnoses written by hand."""
 
+import itertools
 import json
+import math
 import sys
 
 import pytest
@@ -151,9 +153,19 @@ def test_wilson_interval_is_that_of_scipy(right, n):
 
 @pytest.mark.parametrize("n, rate, risk", [(24, 0.9, 1e-3), (7, 0.6, 1e-4), (100, 0.998, 1e-3), (5, 0.97, 1.25e-4)])
 def test_gate_lets_a_right_program_fail_less_often_than_the_risk(n, rate, risk):
-    k = score.allowed_failures(n, rate, risk)
+    k = score.allowed_failures([rate] * n, risk)
     assert stats.binom.sf(k, n, 1 - rate) < risk
     assert k == 0 or stats.binom.sf(k - 1, n, 1 - rate) >= risk, "and is as strict as that allows"
+
+
+def test_gate_of_unlike_cases_is_that_of_the_enumeration():
+    """All 2^n outcomes of n cases with their chances, added up."""
+    rates, risk = [0.998, 0.97, 0.9, 0.9, 0.85, 0.6], 1e-2
+    chance = [0.0] * (len(rates) + 1)
+    for right in itertools.product((True, False), repeat=len(rates)):
+        chance[right.count(False)] += math.prod(p if r else 1 - p for r, p in zip(right, rates))
+    k = score.allowed_failures(rates, risk)
+    assert sum(chance[k + 1 :]) < risk <= sum(chance[k:])
 
 
 def rows(stratum, right, n):
@@ -172,17 +184,23 @@ def rows(stratum, right, n):
 
 
 def test_gate_names_the_stratum_that_is_too_bad():
-    assert score.gate(rows("single_common", 19, 20) + rows("null", 20, 20)) == []
-    assert score.gate(rows("single_common", 10, 20) + rows("null", 20, 20)) == [
-        "single_common: 10 of 20 wrong, at most 4 can be chance"
-    ]
+    assert score.gate(rows("single_common", 19, 20) + rows("null", 20, 20)) == {"single_common": "", "null": "", "all": ""}
+    found = score.gate(rows("single_common", 10, 20) + rows("null", 20, 20))
+    assert found["single_common"] == "single_common: 10 of 20 wrong, at most 4 can be chance"
+    assert found["null"] == "" and found["all"].startswith("all: 10 of 40 wrong")
 
 
 def test_tables_add_up():
     out = score.summary(rows("single_common", 18, 20) + rows("null", 10, 10))
     assert out["strata"]["single_common"]["right"] == 18 and out["strata"]["null"]["share"] == 1.0
     assert out["kinds"]["coulomb_friction"]["single_common"]["instead"] == {"backlash at damper": 2}
-    assert out["confusion"] == {"coulomb_friction": {"coulomb_friction": 18, "backlash": 2}}
+    assert out["confusion"] == {"coulomb_friction": {"coulomb_friction": 18, "backlash": 2}, "nothing": {"no_discrepancy": 10}}
+    assert [line.split() for line in score.confusion(out).splitlines()[1:]] == [
+        ["1", "coulomb_friction", "18", ".", "2", "."],
+        ["2", "nothing", ".", ".", ".", "10"],
+        ["3", "backlash"],
+        ["4", "no_discrepancy"],
+    ]
     assert (out["time"]["longest"], out["time"]["q90"]) == (19.0, 16.0)
     assert "18 of 20" in score.text(out) and "2x backlash at damper" in score.text(out)
 

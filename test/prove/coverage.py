@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Gate: the unit tests take every line, every branch and every condition (MC/DC) of runtime and models."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import eva
+import gate
+
+WORK = gate.BUILD / "coverage"
+MODELS = WORK / "models"
+UNIT = gate.ROOT / "test" / "unit"
+UNITY = gate.ROOT / "build" / "unity"
+KINDS = ("lines", "branches", "mcdc")
+# A double build and a size build have code of their own.
+BUILDS = {"float": [], "double": ["-DPEN_REAL_DOUBLE"], "size": ["-D__OPTIMIZE_SIZE__"]}
+
+
+def program(build: str, name: str, test: Path, others: list[Path], words: list[str]) -> Path:
+    """Build a Unity test with counters in it, and run it; its path. SystemExit if it fails."""
+    place = WORK / build
+    place.mkdir(parents=True, exist_ok=True)
+    runner, out = place / f"{name}_runner.c", place / name
+    gate.make(["ruby", UNITY / "auto" / "generate_test_runner.rb", test, runner])
+    gate.make([
+        "port/host/cc", "clang-19", "-std=c99", "-O1", "-g", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc",
+        f"-I{MODELS}", "-Itest/unit", f"-I{UNITY}/src", "-include", "unity_config.h", *BUILDS[build], *words,
+        "-o", out, runner, test, UNIT / "unity_output.c", UNITY / "src" / "unity.c", *sorted((gate.ROOT / "src").glob("*.c")), *others,
+    ])  # fmt: skip
+    done = gate.run([out], env=os.environ | {"LLVM_PROFILE_FILE": f"{out}.profraw"})
+    if done.returncode != 0:
+        raise SystemExit(f"FAIL  coverage: {name}, {build}\n{done.stdout}{done.stderr}")
+    return out
+
+
+def unit_tests(build: str) -> list[Path]:
+    """The programs of test/unit."""
+    programs = []
+    for test in sorted(UNIT.glob("test_*.c")):
+        needs = re.search(r"needs: (.*) \*/", test.read_text())
+        others = [MODELS / Path(n).name for n in needs[1].split()] if needs else []
+        programs.append(program(build, test.stem, test, others, []))
+    return programs
+
+
+def refused(model: str) -> str:
+    """What a model says to a set with more pieces than it has room for."""
+    return "PEN_SET_PIECES" if model == "nqvm_folded" else "PEN_OK"
+
+
+def model_tests(build: str) -> list[Path]:
+    """coverage_model.c for each model."""
+    programs = []
+    for model in eva.MODELS:
+        others = [MODELS / f"{model}.c", MODELS / f"{model}_params.c"]
+        test = gate.HERE / "coverage_model.c"
+        programs.append(program(build, f"model_{model}", test, others, [*eva.told(model), f"-DREFUSED={refused(model)}"]))
+    return programs
+
+
+def export(build: str, programs: list[Path], *words: str) -> str:
+    """What llvm-cov has to say about what is ours."""
+    objects = [f"-object={p}" for p in programs]
+    ours = [gate.ROOT / "src", gate.ROOT / "inc", MODELS]
+    data = WORK / build / "all.profdata"
+    done = gate.run(["llvm-cov-19", "export", *words, f"-instr-profile={data}", *objects, "-sources", *ours])
+    if done.returncode != 0:
+        raise SystemExit(f"FAIL  coverage: {build}\n{done.stderr}")
+    return done.stdout
+
+
+def measure(build: str, programs: list[Path]) -> tuple[dict[str, tuple[int, int]], list[str]]:
+    """Covered and all lines, branches and conditions; where something is not covered."""
+    gate.make(["llvm-profdata-19", "merge", "-o", WORK / build / "all.profdata", *(f"{p}.profraw" for p in programs)])
+    found: dict[str, dict[str, tuple[int, int]]] = {}
+    missing = []
+    # Lines of all copies of an inline function together; for branches and conditions one copy has to have them all.
+    for record in export(build, programs, "-format=lcov").split("end_of_record")[:-1]:
+        name = re.search(r"^SF:(.*)", record, re.M)[1]
+        lines = re.findall(r"^DA:(\d+),(\d+)", record, re.M)
+        found[name] = {"lines": (sum(n != "0" for _, n in lines), len(lines))}
+        missing += [f"{build}: {Path(name).name}:{line} never executed" for line, n in lines if n == "0"]
+    for file in json.loads(export(build, programs, "-summary-only", "-show-mcdc-summary"))["data"][0]["files"]:
+        for kind in ("branches", "mcdc"):
+            covered, count = file["summary"][kind]["covered"], file["summary"][kind]["count"]
+            found[file["filename"]][kind] = (covered, count)
+            missing += [f"{build}: {Path(file['filename']).name}: {covered} of {count} {kind}"] if covered != count else []
+    total = {kind: (sum(f[kind][0] for f in found.values()), sum(f[kind][1] for f in found.values())) for kind in KINDS}
+    if 0 in (count for _, count in total.values()):
+        missing.append(f"{build}: nothing measured")
+    return total, missing
+
+
+def main() -> int:
+    shutil.rmtree(WORK, ignore_errors=True)
+    MODELS.mkdir(parents=True)
+    eva.models(MODELS)
+    good, figures = True, {}
+    for build in BUILDS:
+        total, missing = measure(build, [*unit_tests(build), *model_tests(build)])
+        shares = ", ".join(f"{a} of {b} {kind}" for kind, (a, b) in total.items())
+        good &= gate.report(f"coverage, {build}: {shares}", missing)
+        figures[build] = {kind: f"{a} of {b}" for kind, (a, b) in total.items()}
+    gate.keep("coverage", figures)
+    return int(not good)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

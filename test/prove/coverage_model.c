@@ -1,0 +1,284 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+/*
+ * The interface of any generated quarter vehicle, whatever its method and networks: what it refuses, what it holds, what
+ * it keeps, and that a step and a step with derivatives are one. coverage.py builds it once for each model; REFUSED is
+ * what the model says to a set with more pieces than it has room for.
+ */
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include MODEL_HEADER
+
+#include "unity.h"
+
+#define LENGTH MODEL_SIZE(SET_LENGTH)
+#define SPRING MODEL_SIZE(AT_SPRING_NET)
+#define DAMPER MODEL_SIZE(AT_DAMPER_NET)
+
+static MODEL(t)          model;
+static MODEL(t)          twin;
+static MODEL(banks_t)    banks;
+static MODEL(u_t)        u;
+static MODEL(y_t)        y;
+static MODEL(x_t)        x;
+static MODEL(z_t)        z;
+static MODEL(jacobian_t) j;
+static pen_real_t        value[LENGTH];
+static pen_set_t         set;
+static pen_real_t        bad[3]; /* NaN, Inf, -Inf */
+
+void setUp(void)
+{
+    volatile pen_real_t zero = (pen_real_t)0;
+
+    bad[0] = zero / zero;
+    bad[1] = (pen_real_t)1 / zero;
+    bad[2] = (pen_real_t)-1 / zero;
+    u.z_road = (pen_real_t)0.01;
+    memcpy(value, MODEL(set_default).value, sizeof value);
+    set = MODEL(set_default);
+    set.value = value;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(init)(&model, &MODEL(set_default), &banks));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(init)(&twin, &MODEL(set_default), NULL));
+    for (uint32_t k = 0U; k < 20U; k++) {
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(step)(&model, &u, &y));
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(step)(&twin, &u, &y));
+    }
+}
+
+void tearDown(void) {}
+
+static void seal(void)
+{
+    set.head.checksum = pen_set_checksum(value, LENGTH);
+}
+
+static void expect_state(const MODEL(x_t) *expected)
+{
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(get_state)(&model, &x));
+    TEST_ASSERT_EQUAL_MEMORY(expected, &x, sizeof x);
+}
+
+/* One sample of both, the twin with derivatives: the same bits, the same status. */
+static pen_status_t step_both(void)
+{
+    MODEL(y_t) other = y;
+    MODEL(x_t) mine;
+    const pen_status_t status = MODEL(step)(&model, &u, &y);
+
+    TEST_ASSERT_EQUAL_HEX32(status, MODEL(step_jacobian)(&twin, &u, &other, &j));
+    TEST_ASSERT_EQUAL_MEMORY(&y, &other, sizeof y);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(get_state)(&model, &mine));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(get_state)(&twin, &x));
+    TEST_ASSERT_EQUAL_MEMORY(&mine, &x, sizeof x);
+    return status;
+}
+
+/* A saw of 15 teeth that 16 neurons cut: about 240 kinks, more than any room here. */
+static void make_saw(size_t at)
+{
+    pen_real_t *const p = &value[at + 4U];
+
+    value[at + 2U] = (pen_real_t)0.5F * (value[at] + value[at + 1U]); /* teeth from end to end of the envelope */
+    value[at + 3U] = (pen_real_t)2 / (value[at + 1U] - value[at]);
+    memset(p, 0, (32U + 272U + 272U + 17U) * sizeof *p);
+    for (size_t i = 0U; i < 16U; i++) {
+        p[i] = (pen_real_t)1 - ((pen_real_t)i * (pen_real_t)0.125F);
+        p[16U + i] = (pen_real_t)1;
+        p[32U + i] = -(pen_real_t)0.0078125F * ((pen_real_t)i - (pen_real_t)0.5F);
+        for (size_t k = 0U; k < 16U; k++) {
+            const pen_real_t turn = ((i % 2U) == 0U) ? (pen_real_t)2 : (pen_real_t)-2;
+            p[48U + (16U * i) + k] = (i == 0U) ? (pen_real_t)1 : turn;
+        }
+        p[304U + i] = (pen_real_t)1;
+        p[320U + (16U * i) + i] = (pen_real_t)1;
+        p[577U + i] = (pen_real_t)1;
+    }
+    seal();
+}
+
+static void refuse_all(MODEL(t) *self)
+{
+    pen_status_report_t report;
+    pen_set_head_t head = set.head;
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(step)(self, &u, &y));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(step_jacobian)(self, &u, &y, &j));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(get_state)(self, &x));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(set_state)(self, &x));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(sensors)(self, &z));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(status)(self, &report));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_begin)(self, &head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_write)(self, 0U, value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_commit)(self));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_abort)(self));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_select)(self, &set));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_rollback)(self));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_hold)(self, true));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_running)(self, &head));
+}
+
+void test_no_instance_and_one_that_was_not_initialised(void)
+{
+    static MODEL(t) blank;
+    static MODEL(t) untouched;
+
+    refuse_all(NULL);
+    refuse_all(&blank);
+    TEST_ASSERT_EQUAL_MEMORY(&untouched, &blank, sizeof blank);
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(init)(NULL, &MODEL(set_default), &banks));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(init)(&model, NULL, &banks));
+    refuse_all(&model);
+    value[3] += (pen_real_t)1;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CHECKSUM, MODEL(init)(&model, &set, &banks));
+    refuse_all(&model);
+}
+
+void test_missing_arguments(void)
+{
+    MODEL(x_t) kept;
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(get_state)(&model, &kept));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(step)(&model, NULL, &y));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(step)(&model, &u, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(step_jacobian)(&model, NULL, &y, &j));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(step_jacobian)(&model, &u, NULL, &j));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(step_jacobian)(&model, &u, &y, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(get_state)(&model, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(set_state)(&model, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(sensors)(&model, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(status)(&model, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_begin)(&model, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_select)(&model, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_running)(&model, NULL));
+    expect_state(&kept);
+}
+
+void test_a_step_with_derivatives_is_the_same_step(void)
+{
+    for (uint32_t k = 0U; k < 50U; k++) {
+        u.z_road = (pen_real_t)(k % 9U) * (pen_real_t)0.005;
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, step_both());
+    }
+    TEST_ASSERT_TRUE(!(j.y_x[0][0] < (pen_real_t)1) && !(j.y_x[0][0] > (pen_real_t)1)); /* the output is the state */
+}
+
+/* Far outside of what the networks were trained on, either way, near and far: said, and the state still advances. */
+void test_outside_of_the_envelope(void)
+{
+    for (int32_t side = -1; side <= 1; side += 2) {
+        for (int32_t size = 1; size <= 8; size *= 2) {
+            const MODEL(x_t) away = { (pen_real_t)(side * size), (pen_real_t)0, (pen_real_t)(side * size * 4), (pen_real_t)0 };
+            TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(set_state)(&model, &away));
+            TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(set_state)(&twin, &away));
+            TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, MODEL(sensors)(&model, &z));
+            TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, step_both());
+        }
+    }
+}
+
+void test_what_is_not_finite_changes_nothing(void)
+{
+    for (size_t i = 0U; i < 3U; i++) {
+        const MODEL(jacobian_t) kept_j = j;
+        MODEL(x_t) kept;
+        MODEL(x_t) broken;
+
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(get_state)(&model, &kept));
+        u.z_road = bad[i];
+        TEST_ASSERT_EQUAL_HEX32(PEN_INPUT_NONFINITE, step_both() & ~(PEN_OUTSIDE | PEN_SINGULAR));
+        expect_state(&kept);
+        u.z_road = (pen_real_t)0;
+        broken = kept;
+        broken.v_w = bad[i];
+        TEST_ASSERT_EQUAL_HEX32(PEN_STATE_NONFINITE, MODEL(set_state)(&model, &broken));
+        expect_state(&kept);
+        model.row[1][0] = bad[i]; /* what no call does: memory that went bad */
+        twin.row[1][0] = bad[i];
+        TEST_ASSERT_EQUAL_HEX32(PEN_STATE_NONFINITE, step_both() & ~(PEN_OUTSIDE | PEN_SINGULAR));
+        expect_state(&kept);
+        TEST_ASSERT_EQUAL_MEMORY(&kept_j, &j, sizeof j);
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, step_both());
+    }
+}
+
+void test_overflow_inside_changes_nothing(void)
+{
+    const MODEL(x_t) huge = { PEN_REAL_MAX, -PEN_REAL_MAX, PEN_REAL_MAX, -PEN_REAL_MAX };
+    const MODEL(z_t) kept = z;
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(set_state)(&model, &huge));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(set_state)(&twin, &huge));
+    TEST_ASSERT_BITS(PEN_STEP_NONFINITE, PEN_STEP_NONFINITE, MODEL(sensors)(&model, &z));
+    TEST_ASSERT_EQUAL_MEMORY(&kept, &z, sizeof z);
+    TEST_ASSERT_FALSE(pen_advanced(step_both()));
+    expect_state(&huge);
+}
+
+/* Weights that are finite and overflow on the way: in the value, or in the matrix of a linear solve. */
+void test_weights_that_overflow_change_nothing(void)
+{
+    MODEL(x_t) kept;
+
+    for (size_t i = 4U; i < 599U; i++) {
+        value[SPRING + i] = PEN_REAL_MAX * (pen_real_t)0.5F;
+        value[DAMPER + i] = ((i % 2U) == 0U) ? PEN_REAL_MAX : -PEN_REAL_MAX;
+    }
+    seal();
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(get_state)(&model, &kept));
+    if (MODEL(tune_select)(&model, &set) == PEN_OK) { /* a folded model may find too many pieces */
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_select)(&twin, &set));
+        TEST_ASSERT_FALSE(pen_advanced(step_both()));
+        expect_state(&kept);
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_rollback)(&model));
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_rollback)(&twin));
+        TEST_ASSERT_EQUAL_HEX32(PEN_ADOPTED, step_both());
+    }
+}
+
+void test_sets_come_and_go(void)
+{
+    pen_set_head_t head = set.head;
+    pen_status_report_t report;
+
+    head.id = 77U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, MODEL(tune_begin)(&twin, &head)); /* it has no banks */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, MODEL(tune_write)(&model, 0U, value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, MODEL(tune_commit)(&model));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, MODEL(tune_abort)(&model));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_NO_PREVIOUS, MODEL(tune_rollback)(&model));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_begin)(&model, &head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_abort)(&model));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_begin)(&model, &head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_write)(&model, 0U, value, LENGTH));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_commit)(&model));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BUSY, MODEL(tune_select)(&model, &set));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_hold)(&model, true));
+    TEST_ASSERT_EQUAL_HEX32(PEN_ADOPTED | PEN_HELD, MODEL(step)(&model, &u, &y));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_hold)(&model, false));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_running)(&model, &head));
+    TEST_ASSERT_EQUAL_UINT32(77U, head.id);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(status)(&model, &report));
+    TEST_ASSERT_EQUAL_HEX32(PEN_ADOPTED | PEN_HELD | PEN_SET_CLOSED | PEN_SET_NO_PREVIOUS | PEN_SET_BUSY, report.flags);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(step)(&model, &u, &y));
+}
+
+void test_more_pieces_than_room(void)
+{
+    static const size_t at[3] = { SPRING, DAMPER, SPRING };
+
+    for (size_t i = 0U; i < 3U; i++) { /* one network, the other one, both */
+        if (i < 2U) {
+            memcpy(value, MODEL(set_default).value, sizeof value);
+        }
+        make_saw(at[i]);
+        TEST_ASSERT_EQUAL_HEX32(REFUSED, MODEL(tune_select)(&model, &set));
+        TEST_ASSERT_EQUAL_HEX32(REFUSED, MODEL(tune_select)(&twin, &set));
+        TEST_ASSERT_EQUAL_HEX32((REFUSED == PEN_OK) ? PEN_ADOPTED : PEN_OK, step_both() & ~PEN_OUTSIDE);
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(sensors)(&model, &z) & ~PEN_OUTSIDE);
+    }
+    TEST_ASSERT_EQUAL_HEX32(REFUSED, MODEL(init)(&model, &set, NULL));
+}

@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Gate: Frama-C Eva finds nothing that could go wrong in runtime and models, has seen every statement, and finds seeds."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import gate
+
+WORK = gate.BUILD / "eva"
+HARNESS = gate.HERE / "eva"
+
+# What becomes of gen/nqvm/nqvm.toml. The first three stand in gen/nqvm/c as they are.
+MODELS = {
+    "nqvm": [],
+    "nqvm_euler": [],
+    "nqvm_folded": [],
+    "clamped": ['method = "heun"', 'outside = "clamp"', 'input = "held"', "substeps = 2"],
+    "implicit": ['method = "ros1"', 'outside = "clamp"'],
+    "fading": ['method = "ros2"', 'outside = "fade"', "fade_width = 0.5"],
+    "folded_or_not": ['method = "euler"', 'outside = "clamp"', "pieces = 96", 'more_pieces = "layers"'],
+}
+PARTS = ("all_layers", "elements", "networks_of_16", "systems", "folding", "sets")
+
+# How Eva has to look at it: (file, line, what to say before it). It only tells cases apart, so it can hide nothing.
+HINTS = [("pen_fold.c", "        const pen_real_t next = ", "        /*@ split view.neuron < walk->chain->neurons; */\n")]
+
+OPTIONS = [
+    *("-machdep", "gcc_x86_32"),  # 32 bits, as a Cortex-M
+    *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write"),
+    *("-warn-special-float", "none"),  # NaN and Inf are values
+    *("-warn-unsigned-downcast", "-warn-signed-downcast", "-eva-no-show-progress", "-eva-msg-key=-final-states"),
+]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One analysis: a model, or None for the runtime alone, from an entry of the harness on."""
+
+    model: str | None
+    entry: str
+    size_build: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.model or 'runtime'}, {self.entry}{', size build' if self.size_build else ''}"
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What Eva said: alarms with their places, other trouble, statements (reached, all) of each function."""
+
+    alarms: list[str]
+    trouble: list[str]
+    statements: dict[str, tuple[int, int]] = field(default_factory=dict)
+    defined: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Seed:
+    """A fault: in this file, `old` becomes `new`; Eva has to raise an alarm in this run."""
+
+    file: str
+    old: str
+    new: str
+    run: Run
+
+
+MODEL = Run("nqvm_euler", "corrupted")
+ORDER = Run("nqvm_euler", "in_order")
+SEEDS = [
+    Seed("pen_set.c", " || (n > (length - offset))", "", MODEL),
+    Seed("pen_set.c", "(offset > length) || ", "", MODEL),
+    Seed("pen_set.c", "n > (length - offset)", "n > (tuning->slot[0].head.length - offset)", MODEL),
+    Seed("pen_set.c", "    if (bank == NULL) {", "    if (tuning->open != YES) {", MODEL),
+    Seed("pen_set.c", "return (pen_port_load(&tuning->active) & 1U) ^ 1U", "return pen_port_load(&tuning->active) ^ 1U", MODEL),
+    Seed("pen_set.c", "uint32_t active = pen_port_load(&tuning->active) & 1U", "uint32_t active = pen_port_load(&tuning->active)", MODEL),
+    Seed("pen_set.c", "((set == NULL) || (set->value == NULL))", "(set == NULL)", MODEL),
+    Seed("pen_set.c", "(head == NULL) || ", "", MODEL),
+    Seed("pen_set.c", "} else if (tuning->previous.value == NULL) {", "} else if (false) {", ORDER),
+    Seed("pen_set.c", "        tuning->slot[1] = *set;\n", "", ORDER),
+    Seed("pen_set.c", "table[crc & 0x0fU]", "table[crc & 0x1fU]", MODEL),
+    Seed("pen_set.c", "(tuning == NULL) || ", "", Run(None, "sets")),
+    Seed("pen_status.c", "i < flags", "i <= flags", MODEL),
+    Seed("nqvm_euler.c", "self->u[1U - (self->running & 1U)]", "self->u[1U - self->running]", MODEL),
+    Seed("nqvm_euler.c", "(u != NULL) && (y != NULL)", "(u != NULL)", MODEL),
+    Seed("nqvm_euler.c", "(self != NULL) && ", "", MODEL),
+    Seed("nqvm_euler.c", "    pen_status_t status = found;", "    pen_status_t status = PEN_OK;", MODEL),
+    Seed("pen_solve.c", "(n <= PEN_SOLVE_MAX) && ", "", Run(None, "systems")),
+    Seed("pen_solve.c", "for (size_t i = k + 1U; i < n; i++)", "for (size_t i = k + 1U; i <= n; i++)", Run(None, "systems")),
+    Seed("pen_math.c", "(shifted > zero) ? shifted : zero", "shifted", Run(None, "elements")),
+    Seed("pen_math.c", "#define EXP_HIGH 89.0F", "#define EXP_HIGH 189.0F", Run(None, "elements")),
+    Seed("pen_net.c", "(row + 4U) <= n_out", "row < n_out", Run(None, "all_layers")),
+    Seed("pen_fold.c", "const size_t room = capacity - 1U", "const size_t room = capacity", Run(None, "folding")),
+    Seed("pen_fold.c", "        } else if (kink && !flat) {", "        } else if (!flat) {", Run(None, "folding")),
+    Seed("pen_fold.h", "&at[n - 1U]; /* of the two", "&at[n]; /* of the two", Run(None, "folding")),
+]
+
+
+def models(place: Path) -> None:
+    """Copy or generate the C of all models."""
+    for name, lines in MODELS.items():
+        if lines:
+            file = place / f"{name}.toml"
+            base = gate.ROOT / "gen" / "nqvm" / "nqvm.toml"
+            file.write_text("\n".join(["[model]", f'extends = "{base}"', f'name = "{name}"', *lines, ""]))
+            gate.make([Path(sys.executable).parent / "penode", "generate", file, "-o", place])
+        else:
+            for end in (".c", ".h", "_params.c"):
+                shutil.copy(gate.ROOT / "gen" / "nqvm" / "c" / (name + end), place)
+
+
+def told(model: str) -> list[str]:
+    """How the programs here are told which model they are for."""
+    return [f'-DMODEL_HEADER="{model}.h"', f"-DMODEL(name)={model}_##name", f"-DMODEL_SIZE(name)={model.upper()}_##name"]
+
+
+def sources(seed: Seed | None = None) -> Path:
+    """A copy of inc/ and src/ and the models, with the hints and the seed in it; SystemExit if one does not fit."""
+    place = WORK / "copy"
+    shutil.rmtree(place, ignore_errors=True)
+    for part in ("inc", "src"):
+        shutil.copytree(gate.ROOT / part, place / part)
+    for file in (*WORK.glob("*.c"), *WORK.glob("*.h")):
+        shutil.copy(file, place / "src")
+    changes = [(file, old, new + old) for file, old, new in HINTS] + ([(seed.file, seed.old, seed.new)] if seed else [])
+    for name, old, new in changes:
+        (file,) = place.rglob(name)
+        if old not in file.read_text():
+            raise SystemExit(f"FAIL  eva: {name} no longer has: {old.strip()}")
+        file.write_text(file.read_text().replace(old, new))
+    return place
+
+
+def analyse(run: Run, place: Path) -> Seen:
+    """Let Eva look at one run."""
+    words = [f"-I{place}/inc", f"-I{place}/src", "-Iport/template", *(["-D__OPTIMIZE_SIZE__"] if run.size_build else [])]
+    files = sorted((place / "src").glob("pen_*.c"))
+    if run.model:
+        words += [f"'{word}'" for word in told(run.model)]
+        files += [place / "src" / f"{run.model}.c", HARNESS / "model.c"]
+    else:
+        files += [HARNESS / "runtime.c"]
+    # The limits of pen_math.c are volatile only to stop compilers; elsewhere a volatile read may give anything.
+    split = [f"-cpp-extra-args-per-file={place}/src/pen_math.c:-Dvolatile="]
+    last = ["-then", "-metrics", "-metrics-eva-cover"]
+    done = gate.run(["frama-c", f"-cpp-extra-args={' '.join(words)}", *split, *files, "-main", run.entry, *OPTIONS, *last], limit=1800)
+    text = done.stdout + done.stderr
+    alarms = [f"{run}: {' '.join(m.split())}" for m in re.findall(r"^\[eva:alarm\] (.*\n(?:  .*\n)*)", text, re.M)]
+    counted = re.search(r"^  (\d+) alarms? generated", text, re.M)
+    clean = re.search(r"by the Eva analyzer: +0 errors +0 warnings", text) or "No errors or warnings raised" in text
+    unproven = re.findall(r"^ +(?:Assertions|Preconditions) +\d+ valid +(\d+) unknown +(\d+) invalid", text, re.M)
+    whole = done.returncode == 0 and counted and clean and not any(n != "0" for pair in unproven for n in pair)
+    listed = re.search(r"Defined functions \(\d+\)\n.*?\n(.*?)\n *\n", text, re.S)
+    names = re.findall(r"(\w+) \(\d+ calls?\)", listed[1]) if listed else []
+    statements: dict[str, tuple[int, int]] = {}
+    for name, reached, total in re.findall(r"^ +(\w+): (\d+) stmts out of (\d+)", text, re.M):
+        key, now = plain(name), (int(reached), int(total))
+        worst = min(statements.get(key, now), now, key=lambda pair: pair[0] - pair[1])
+        statements[key] = worst
+    trouble = [] if whole and names and statements else [f"{run}: no whole analysis\n{text[-3000:]}"]
+    if counted and int(counted[1]) != len(alarms):
+        trouble.append(f"{run}: {counted[1]} alarms counted, {len(alarms)} read")
+    return Seen(alarms, trouble, statements, frozenset(map(plain, names)))
+
+
+def plain(name: str) -> str:
+    """A function's name in the source: Frama-C numbers those that several files have."""
+    return re.sub(r"_\d+$", "", name)
+
+
+def reached(seen: dict[Run, Seen]) -> tuple[int, list[str]]:
+    """Number of statements in all functions, and what Eva has not reached in any run: of the runtime, or of a model."""
+    harness = {name for file in HARNESS.glob("*.c") for name in re.findall(r"^\w[\w *]*\b(\w+)\([^;]*\)$", file.read_text(), re.M)}
+    runtime = frozenset().union(*(s.defined for run, s in seen.items() if not run.model)) - harness
+    total, missing = 0, []
+    for group in (None, *dict.fromkeys(run.model for run in seen if run.model)):
+        runs = [s for run, s in seen.items() if group in (None, run.model)]
+        wanted = runtime if group is None else frozenset().union(*(s.defined for s in runs)) - runtime - harness
+        for name in sorted(wanted):
+            found = [s.statements[name] for s in runs if name in s.statements]
+            total += max((all_of_it for _, all_of_it in found), default=0)
+            if not any(a == b for a, b in found):
+                missing.append(f"{group or 'runtime'}: {name}: {max(found, default='never called')}")
+    return total, missing
+
+
+def nan() -> list[str]:
+    """What Eva cannot tell about NaN in pen_math.c, tried out."""
+    program = WORK / "nan"
+    sanitize = ["-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
+    gate.make(["gcc", "-O2", "-ffp-contract=off", *sanitize, "-Iinc", "-Iport/template", "-o", program, HARNESS / "nan.c", "src/pen_math.c"])
+    done = gate.run([program])
+    return [] if done.returncode == 0 else [done.stdout + done.stderr]
+
+
+def main(only: Sequence[str]) -> int:
+    shutil.rmtree(WORK, ignore_errors=True)
+    WORK.mkdir(parents=True)
+    models(WORK)
+    runs = [Run(None, part) for part in PARTS] + [Run(None, "networks_of_16", size_build=True)]
+    runs += [ORDER, *(Run(model, "corrupted") for model in MODELS)]
+    good = True
+    place = sources()
+    seen: dict[Run, Seen] = {}
+    for run in (run for run in runs if not only or str(run) in only):
+        seen[run] = analyse(run, place)
+        good &= gate.report(f"eva: {run}", seen[run].alarms + seen[run].trouble)
+    if only:
+        return int(not good)
+    good &= gate.report("eva: every NaN through pen_math.c", nan())
+    total, missing = reached(seen)
+    good &= gate.report(f"eva: {total} statements reached", missing)
+    found = 0
+    for seed in SEEDS:
+        outcome = analyse(seed.run, sources(seed))
+        found += bool(outcome.alarms)
+        name = f"eva: seeded fault in {seed.file}: {' '.join(seed.old.split())} -> {' '.join(seed.new.split()) or 'nothing'}"
+        good &= gate.report(name, [] if outcome.alarms else ["not found", *outcome.trouble])
+    gate.keep("eva", {
+        "alarms": sum(len(s.alarms) for s in seen.values()), "runs": len(seen), "statements": total,
+        "functions not wholly reached": len(missing), "faults": len(SEEDS), "faults found": found,
+    })  # fmt: skip
+    return int(not good)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+/*
+ * For Frama-C: every function of a generated model, in any order, any number of times, with any arguments.
+ *
+ * in_order  starts with an instance of zeros: what a program does that knows nothing of what it calls.
+ * corrupted overwrites the whole instance with any bytes before each call. Its pointers then name any of the buffers, in
+ *           any mix: that a pointer points somewhere is the one thing that no C program can check.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "__fc_builtin.h"
+
+#include MODEL_HEADER
+
+extern volatile uint32_t any; /* each read gives any number */
+
+static MODEL(t) instance;
+static MODEL(banks_t) banks;
+static MODEL(u_t) input;
+static MODEL(y_t) output;
+static MODEL(x_t) state;
+static MODEL(z_t) sensed;
+static MODEL(jacobian_t) jacobian;
+static pen_status_report_t report;
+static pen_set_head_t head;
+static pen_real_t flash[2][MODEL_SIZE(SET_LENGTH)];
+static pen_real_t chunk[MODEL_SIZE(SET_LENGTH)];
+static pen_set_t set;
+
+static void fill(void *at, size_t bytes)
+{
+    Frama_C_make_unknown((char *)at, bytes);
+}
+
+/* NULL or what is asked for */
+#define OR_NULL(pointer) ((any == 0U) ? NULL : (pointer))
+
+static void arguments(void)
+{
+    fill(&input, sizeof input);
+    fill(&state, sizeof state);
+    fill(&head, sizeof head);
+    fill(flash, sizeof flash);
+    fill(chunk, sizeof chunk);
+    fill(&set.head, sizeof set.head);
+    set.value = OR_NULL((any == 0U) ? flash[0] : flash[1]);
+}
+
+static void call(void)
+{
+    MODEL(t) *const self = OR_NULL(&instance);
+    const uint32_t n = any;
+
+    switch (any) {
+    case 0U: MODEL(init)(self, OR_NULL(&set), OR_NULL(&banks)); break;
+    case 1U: MODEL(step)(self, OR_NULL(&input), OR_NULL(&output)); break;
+    case 2U: MODEL(step_jacobian)(self, OR_NULL(&input), OR_NULL(&output), OR_NULL(&jacobian)); break;
+    case 3U: MODEL(get_state)(self, OR_NULL(&state)); break;
+    case 4U: MODEL(set_state)(self, OR_NULL(&state)); break;
+    case 5U: MODEL(sensors)(self, OR_NULL(&sensed)); break;
+    case 6U: MODEL(status)(self, OR_NULL(&report)); break;
+    case 7U: MODEL(tune_begin)(self, OR_NULL(&head)); break;
+    case 8U: MODEL(tune_write)(self, any, (n <= MODEL_SIZE(SET_LENGTH)) ? OR_NULL(chunk) : NULL, n); break;
+    case 9U: MODEL(tune_commit)(self); break;
+    case 10U: MODEL(tune_abort)(self); break;
+    case 11U: MODEL(tune_select)(self, OR_NULL(&set)); break;
+    case 12U: MODEL(tune_rollback)(self); break;
+    case 13U: MODEL(tune_hold)(self, any != 0U); break;
+    default: MODEL(tune_running)(self, OR_NULL(&head)); break;
+    }
+}
+
+void in_order(void)
+{
+    /*@ dynamic_split instance.ready; */
+    /*@ dynamic_split instance.tuning.open; */
+    /*@ dynamic_split instance.tuning.bank[0] == (void *)0; */
+    /*@ dynamic_split instance.tuning.bank[1] == (void *)0; */
+    while (any != 0U) {
+        arguments();
+        call();
+    }
+}
+
+static pen_real_t *buffer(void)
+{
+    pen_real_t *const bank = (any == 0U) ? banks.value[0] : banks.value[1];
+    pen_real_t *const set_value = (any == 0U) ? flash[0] : flash[1];
+
+    return (any == 0U) ? bank : set_value;
+}
+
+void corrupted(void)
+{
+    while (any != 0U) {
+        arguments();
+        fill(&banks, sizeof banks);
+        fill(&instance, sizeof instance);
+        for (size_t i = 0U; i < 2U; i++) {
+            instance.tuning.slot[i].value = buffer();
+            instance.tuning.bank[i] = OR_NULL(buffer());
+            instance.tuning.bank_again[i] = OR_NULL(buffer());
+        }
+        instance.tuning.previous.value = OR_NULL(buffer());
+        call();
+    }
+}

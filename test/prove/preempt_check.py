@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Gate: a step and a tuning call that pre-empt each other at any instruction never tear, lose or reorder a set."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import gate
+
+sys.path.insert(0, str(gate.ROOT / "test" / "bench"))
+import cycles  # noqa: E402
+import penode_gen  # noqa: E402
+from penode_sil.targets import FLAGS, MACHINES, PORT, generated  # noqa: E402
+
+WORK = gate.BUILD / "preempt"
+CORES = ("m3", "m4f", "m33")
+SOURCES = [path for path in sorted((gate.ROOT / "src").glob("*.c")) if path.name != "pen_set.c"]
+SET = gate.ROOT / "src" / "pen_set.c"
+
+# Faults of pen_set.c: see gate.faulty.
+FAULTS = {
+    "begin while a set waits": ("!settled(tuning)", 0, "false"),
+    "select while a set waits": ("!settled(tuning)", 1, "false"),
+    "rollback while a set waits": ("!settled(tuning)", 2, "false"),
+    "pending before the slot is written": ("    tuning->slot[spare] = *ready;", 0, "    pen_port_store(&tuning->pending, YES);\n    tuning->slot[spare] = *ready;"),
+    "pending cleared before active is flipped": ("        active ^= 1U;", 0, "        pen_port_store(&tuning->pending, NO);\n        active ^= 1U;"),
+    "pending forgotten by announce": ("pen_port_store(&tuning->pending, YES);", 0, ""),
+    "active not flipped": ("active ^= 1U;", 0, ""),
+    "not adopted while holding": ("if (pen_port_load(&tuning->pending) == YES) {", 0, "if ((status == PEN_OK) && (pen_port_load(&tuning->pending) == YES)) {"),
+}  # fmt: skip
+
+
+def program(machine: str, name: str, pen_set: Path) -> Path:
+    """preempt.c with small.toml and the runtime, pen_set.c from another place if that is a faulty one."""
+    source = generated(penode_gen.load(gate.HERE / "small" / "small.toml"))
+    elf = WORK / f"{machine}-{name}.elf"
+    elf.parent.mkdir(parents=True, exist_ok=True)
+    gate.make(
+        [PORT / "cc", MACHINES[machine], *FLAGS, "-O2", "-Wall", "-Wextra", "-fno-strict-aliasing", f"-I{source}", f"-I{PORT}",
+         "-o", elf, gate.HERE / "preempt.c", source / "small.c", source / "small_params.c", *SOURCES, pen_set]
+    )  # fmt: skip
+    return elf
+
+
+def interrupted(machine: str, elf: Path) -> tuple[str, int, list[set[int]]]:
+    """What the program says, its exit code, and the addresses at which it interrupted calls and steps."""
+    bits = elf.with_suffix(".bits")
+    done = gate.run([PORT / "run", MACHINES[machine], elf, 1, bits.name], WORK, env=os.environ | {"SHIFT": "10", "LIMIT": "300"})
+    halves = np.unpackbits(np.fromfile(bits, np.uint8), bitorder="little").reshape(2, -1) if done.returncode in (0, 1) else np.zeros((2, 0))
+    return done.stdout + done.stderr, done.returncode, [{2 * int(k) for k in np.flatnonzero(half)} for half in halves]
+
+
+def executed(machine: str, elf: Path, function: str) -> set[int]:
+    """Addresses in the 64 kB of code that what a wrapper (one jump) calls executes when nothing interrupts it."""
+    with cycles.counting(elf, [function], modelled=False) as result:
+        done = gate.run([PORT / "run", MACHINES[machine], elf, 0, "quiet.bits"], WORK)
+        if done.returncode != 0:
+            raise SystemExit(f"FAIL  preempt: {elf.name} without interrupts: {done.stdout}{done.stderr}")
+        counted = result()
+    wrapper = cycles.symbols(elf)[function]
+    places = {counted.code[k].address for k in np.flatnonzero(counted.hits.sum(axis=1))} - {wrapper}
+    return {address & 0xFFFF for address in places}
+
+
+def main() -> int:
+    good, figures = True, {}
+    for machine in CORES:
+        elf = program(machine, "right", SET)
+        said, code, met = interrupted(machine, elf)
+        problems = [said] if code != 0 else []
+        seen = dict(re.findall(r"^(calls|steps) interrupted (\d+)$", said, re.M))
+        row: dict[str, object] = {"runs": {key: int(value) for key, value in seen.items()}, "failures": int(code != 0)}
+        for what, function, pcs in (("calls", "the_call", met[0]), ("steps", "the_step", met[1])):
+            must = executed(machine, elf, function)
+            row[f"addresses of {what}"] = {"executed": len(must), "interrupted": len(must & pcs)}
+            problems += [f"{what}: never interrupted at {address:#x}" for address in sorted(must - pcs)]
+            problems += [] if len(must) > 100 else [f"{what}: only {len(must)} addresses executed"]
+        total = sum(row["runs"].values())
+        good &= gate.report(f"preempt: {machine}: a step in a call, a call in a step, at each of {total} boundaries", problems)
+        figures[machine] = row
+    missed = []
+    for k, (fault, change) in enumerate(FAULTS.items()):
+        copy = WORK / f"fault{k}.c"
+        copy.write_text(gate.faulty(SET.read_text(), change))
+        missed += [f"not found: {fault}"] if interrupted("m4f", program("m4f", f"fault{k}", copy))[1] == 0 else []
+    good &= gate.report(f"preempt: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults of the protocol found", missed)
+    gate.keep("preempt", figures | {"faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
+    return int(not good)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+#
+# The gates of `make prove`, each also a target of its own; README.md beside this file says what each shows.
+
+PROVE_STATIC  := prove-eva prove-coverage
+PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-readers prove-flip prove-longrun prove-stack prove-bits
+
+.PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC)
+
+# -- static -----------------------------------------------------------------------------------------------------------
+
+prove-eva: | $(READY) build/setup/proof ## Frama-C: no undefined behaviour for any bytes, in any order of calls
+	@$(PYTHON) test/prove/eva.py
+prove-coverage: | $(READY) build/setup/proof build/setup/unity ## Every line, branch and condition (MC/DC) taken by a test
+	@$(PYTHON) test/prove/coverage.py
+
+# -- dynamic ----------------------------------------------------------------------------------------------------------
+
+prove-spin: | $(READY) build/setup/proof ## Spin: the exchange of sets, in every order, on one core and on two with weak memory
+	@$(PYTHON) test/prove/spin_check.py
+prove-preempt: | $(READY) ## Emulated cores: step and tuning calls interrupt each other at every instruction
+	@$(PYTHON) test/prove/preempt_check.py
+prove-tsan: | $(READY) ## ThreadSanitizer: one thread steps, one exchanges sets
+	@$(PYTHON) test/prove/tsan_check.py
+prove-status: | $(READY) ## NaN and Inf anywhere: always said, the last good state kept
+	@$(PYTHON) test/prove/status_check.py
+prove-fuzz: | $(READY) ## libFuzzer: any calls of the interface, against an oracle
+	@$(PYTHON) test/prove/fuzz_check.py
+prove-readers: | $(READY) ## Damaged files: every reader takes them or says what is wrong
+	@$(PYTHON) test/prove/readers_check.py
+prove-flip: | $(READY) ## One flipped bit anywhere in an instance or its banks: no write beside them, no hang
+	@$(PYTHON) test/prove/flip_check.py
+prove-longrun: | $(READY) ## Minutes of samples with a set every second: no drift beyond a derived bound, counters right
+	@$(PYTHON) test/prove/longrun_check.py
+prove-stack: | $(READY) ## Each core: no recursion, no call through a pointer, the painted stack within its bound
+	@$(PYTHON) test/prove/stack_check.py
+
+prove-bits: | $(READY) ## exp, tanh, sigmoid, softplus: the same bits on every target
+	@$(PYTHON) test/prove/bits_check.py
+
+# -- the same for hours -----------------------------------------------------------------------------------------------
+
+CAMPAIGN := campaign-status campaign-fuzz campaign-readers campaign-flip campaign-longrun campaign-accuracy
+.PHONY: campaign-proofs $(CAMPAIGN)
+
+campaign-proofs: setup build/setup/proof ## The long proofs: all floats, 10^7 sequences of calls, every bit, a whole day
+	$(Q)$(PYTHON) test/tally.py $(CAMPAIGN)
+campaign-status: | $(READY)
+	@$(PYTHON) test/prove/status_check.py --runs 10000000 --as "status campaign"
+campaign-fuzz: | $(READY)
+	@$(PYTHON) test/prove/fuzz_check.py --runs 5000000 --as "fuzz campaign"
+campaign-readers: | $(READY)
+	@$(PYTHON) test/prove/readers_check.py --files 20000 --seed 2 --as "readers campaign"
+campaign-flip: | $(READY)
+	@$(PYTHON) test/prove/flip_check.py --every 1 --as "flip campaign"
+campaign-longrun: | $(READY)
+	@$(PYTHON) test/prove/longrun_check.py --hours 24 --as "longrun campaign"
+campaign-accuracy: | $(READY)
+	@$(MAKE) accuracy-float STRIDE=1

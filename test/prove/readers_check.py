@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Gate: whatever stands in a file, its reader takes it or says in words what is wrong: model, network, scenario, recording.
+
+Files are made from good ones by changing them at random. One that brings a new message, or is taken, is changed further:
+so the search goes on from what leads somewhere. The random numbers are seeded, a run can be repeated.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import re
+import shutil
+import signal
+import sys
+import tempfile
+import traceback
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import gate
+import numpy as np
+import penode_gen
+from penode_gen.networks import NetworkError
+from penode_gen.read_json import read_json
+from penode_gen.read_onnx import read_onnx
+from penode_sil import measured, scenario
+from penode_sil.errors import UserError
+
+REFUSED = (penode_gen.ModelError, NetworkError, UserError)
+LIMIT = 20  # [s] for one file
+NQVM = gate.ROOT / "gen" / "nqvm"
+WORDS = [
+    *"0 -1 1 2 7 1e308 -1e308 1e-320 1e999 nan inf -inf 10000000000000000000000000000000 0x10 1_0 true false null".split(),
+    *'"" " " "m" "N*s/m" "m^99999" "der(v_b)" "1/0" "x**x**x" "((((" "\u00e9" [] {} [[]] [0] [1,2,3] [nan] , ; = \n \t \r\n \0 . - #'.split(" "),
+]  # fmt: skip
+
+
+@dataclass
+class Reader:
+    """A reader, good files for it, and what became of those made from them."""
+
+    name: str
+    suffix: str
+    read: Callable[[Path], object]
+    files: list[bytes]
+    tried: int = 0
+    taken: int = 0
+    messages: set[str] = field(default_factory=set)
+
+
+def changed(data: bytes, pick: random.Random, binary: bool) -> bytes:
+    """One change: of bits, bytes, a stretch, a line, a number or a word."""
+    at, to = sorted(pick.randrange(len(data) + 1) for _ in range(2))
+    way = pick.randrange(5 if binary else 9)
+    if way == 0:
+        at = min(at, len(data) - 1)
+        return data[:at] + bytes([data[at] ^ (1 << pick.randrange(8))]) + data[at + 1 :] if data else b"?"
+    if way == 1:
+        return data[:at] + pick.randbytes(pick.randrange(1, 9)) + data[at + pick.randrange(9) :]
+    if way == 2:
+        return data[:at] + data[to:] if to - at < 200 else data[:at]
+    if way == 3:
+        return data[:to] + data[at:to][:200] + data[to:]
+    if way == 4:
+        return data[:at] + pick.choice(WORDS).encode() + data[at:]
+    if way in (5, 6):  # a number or a word by another
+        kind = rb"-?\d[\d.eE+-]*" if way == 5 else rb"[A-Za-z_]\w*|\"[^\"\n]*\""
+        found = [m.span() for m in re.finditer(kind, data)] or [(at, to)]
+        start, end = pick.choice(found)
+        other = data[slice(*pick.choice(found))] if pick.random() < 0.5 else pick.choice(WORDS).encode()
+        return data[:start] + other + data[end:]
+    lines = data.split(b"\n")
+    one, other = pick.randrange(len(lines)), pick.randrange(len(lines))
+    if way == 7:
+        lines[one], lines[other] = lines[other], lines[one]
+    else:
+        lines[one : one + 1] = [] if pick.random() < 0.5 else [lines[one], lines[one]]
+    return b"\n".join(lines)
+
+
+def failure(reader: Reader, path: Path) -> str | None:
+    """Read a file; None if it was taken or refused in words, else what happened."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # of numpy: a number went wrong and nobody looked
+            signal.alarm(LIMIT)
+            reader.read(path)
+            reader.taken += 1
+            reader.messages.add("taken")
+    except REFUSED as refusal:
+        text = str(refusal)
+        reader.messages.add(re.sub(r"\d+|'[^']*'|\"[^\"]*\"", "_", text.replace(str(path.parent), ""))[:200])
+        return None if text.strip() and "Traceback" not in text else f"refused without words: {text!r}"
+    except Exception:  # noqa: BLE001: that is what is looked for
+        return traceback.format_exc(limit=-4)
+    finally:
+        signal.alarm(0)
+    return None
+
+
+def search(reader: Reader, tries: int, folder: Path, seed: int = 1) -> list[str]:
+    """Change files of a reader; the failures, with the file kept beside the build."""
+    pick, known, found = random.Random(f"{reader.name} {seed}"), list(reader.files), []
+    for _ in range(tries):
+        data = pick.choice(reader.files) if pick.random() < 0.3 else pick.choice(known)
+        for _ in range(pick.choice((1, 1, 2, 4))):
+            data = changed(data, pick, reader.suffix in (".onnx", ".mf4"))
+        path = folder / f"file{reader.suffix}"
+        path.write_bytes(data)
+        before = len(reader.messages)
+        said = failure(reader, path)
+        reader.tried += 1
+        if said is not None:
+            kept = gate.BUILD / "readers" / f"{reader.name}-{seed}-{reader.tried}{reader.suffix}"
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            kept.write_bytes(data)
+            found.append(f"{kept}:\n{said}")
+        elif len(reader.messages) > before and len(data) < 100_000:
+            known.append(data)
+    return found
+
+
+def readers(folder: Path) -> list[Reader]:
+    """All readers; `folder` gets what the files refer to."""
+    shutil.copytree(NQVM / "networks", folder / "networks", dirs_exist_ok=True)
+    for path in (gate.HERE / "small").iterdir():
+        shutil.copy(path, folder)
+    nqvm = penode_gen.load(NQVM / "nqvm.toml")
+    length = len(penode_gen.set_values(nqvm, "default"))
+    time = np.arange(400) * 1e-3
+    rows = [f"{t:.3f},{1e-3 * np.sin(20 * t):.6g},{np.cos(30 * t):.6g},{-np.sin(9 * t):.6g}" for t in time]
+    csv = "\n".join(["time [s],z_road [m],a_body [m/s^2],a_wheel [m/s^2]", *rows]).encode()
+    german = "\n".join(["t;z_road (mm)", *(f"{t:.3f};{np.sin(t):.4f}".replace(".", ",") for t in time)]).encode()
+    models = [(NQVM / "nqvm.toml").read_bytes(), *(path.read_bytes() for path in sorted((gate.HERE / "small").glob("*.toml")))]
+    return [
+        Reader("model", ".toml", lambda path: penode_gen.render(penode_gen.load(path)), models),
+        Reader("json", ".json", read_json, [path.read_bytes() for path in sorted((gate.HERE / "small").glob("*.json"))]),
+        Reader("onnx", ".onnx", read_onnx, [path.read_bytes() for path in sorted((NQVM / "networks").glob("*.onnx"))]),
+        Reader("scenario", ".toml", lambda path: scenario.load(path, nqvm, length),
+               [path.read_bytes() for path in sorted((gate.ROOT / "sil" / "scenarios").glob("*.toml"))]),
+        Reader("recording", ".csv", lambda path: measured.load([path], nqvm), [csv, german]),
+    ]  # fmt: skip
+
+
+def check(tries: int, seed: int = 1) -> tuple[list[str], dict[str, dict[str, int]]]:
+    """So many files for each reader: failures, and per reader how many files were tried and taken, and messages seen."""
+    signal.signal(signal.SIGALRM, lambda *_: (_ for _ in ()).throw(TimeoutError(f"more than {LIMIT} s")))
+    with tempfile.TemporaryDirectory() as place:
+        every = readers(Path(place))
+        good = [f"{reader.name}: a good file is refused" for reader in every if failure(reader, _put(reader, Path(place))) or not reader.taken]
+        found = good + [problem for reader in every for problem in search(reader, tries, Path(place), seed)]
+    return found, {r.name: {"files": r.tried, "taken": r.taken, "messages": len(r.messages)} for r in every}
+
+
+def _put(reader: Reader, folder: Path) -> Path:
+    """The first good file of a reader."""
+    path = folder / f"file{reader.suffix}"
+    path.write_bytes(reader.files[0])
+    return path
+
+
+def hollow() -> list[str]:
+    """A reader that lets an exception through must be found out."""
+    careless = Reader("careless", ".toml", lambda path: float(path.read_bytes().split(b"=")[1]), [b"a = 1\n"])
+    with tempfile.TemporaryDirectory() as place:
+        return [] if search(careless, 50, Path(place)) else ["a reader that does not catch its errors is not found"]
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--files", type=int, default=500, help="for each reader")
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--as", dest="key", default="readers", help="key in figures.json")
+    given = options.parse_args()
+    problems, seen = check(given.files, given.seed)
+    problems += hollow()
+    total = sum(row["files"] for row in seen.values())
+    good = gate.report(f"readers: {total} damaged files: all taken or refused in words", problems[:20])
+    gate.keep(given.key, seen | {"failures": len(problems)})
+    return int(not good)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,350 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+/*
+ * status RUNS SEED: in each run a good step, then one or two bad numbers somewhere, as if its memory were damaged, then
+ * two steps. A bad number is a NaN, an Inf, or any bits at all. What must hold:
+ *
+ *   input          not finite: PEN_INPUT_NONFINITE, and only then
+ *   state          not finite: PEN_STATE_NONFINITE, and only then; the second copy is back, if that one is good
+ *   weight         NaN: some flag. Inf: some flag, or exactly the step of a weight of LARGE (a neuron that is off)
+ *   folded piece   value or slope: some flag, or exactly the step of the undamaged piece (another one was in use). Where
+ *                  it starts: not finite, another piece may go on in its place; how often that was not flagged is counted
+ *   any of them    no advance: state and outputs to the bit as before; advance: all finite
+ *   afterwards     once weights are as they were the next step is good. After a bad input on top of a damaged one, or
+ *                  one so large that the step overflows, it is the one after that: a step takes two inputs. After damage to both copies of a state, once it is set; to both of an output: init
+ *   calls          a set with NaN or Inf, a state with NaN or Inf: refused by their flag, nothing changes
+ *   counters       every flag of every step is counted
+ *
+ * Exit code 1 and the first failures in words if it does not.
+ */
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include MODEL_HEADER
+
+#define N      MODEL_SIZE(SET_LENGTH)
+#define N_X    MODEL_SIZE(N_X)
+#define N_U    MODEL_SIZE(N_U)
+#define LARGE  ((pen_real_t)1e30)
+#define KEPT   0U
+#define LAST   1U
+#define N_LAST (sizeof(model.row[0]) / sizeof(pen_real_t))
+
+enum { INPUT, STATE, BOTH_STATES, INPUT_BEFORE, WEIGHT, PIECE, STAGED, SET_STATE, PLACES };
+
+static const char *const place_name[PLACES] = { "input",  "state", "both states", "input before",
+                                                "weight", "piece", "staged set",  "set_state" };
+static MODEL(t) model;
+static MODEL(t) saved;
+static MODEL(banks_t) banks;
+static pen_real_t staged[N];
+static unsigned long counted[PEN_STATUS_FLAGS]; /* what steps said */
+static unsigned long hits[PLACES];
+static unsigned long flagged[PLACES];
+static unsigned long misplaced;
+static unsigned long failures;
+static unsigned long run;
+static uint64_t seed;
+
+static uint32_t draw(void)
+{
+    seed ^= seed << 13U;
+    seed ^= seed >> 7U;
+    seed ^= seed << 17U;
+    return (uint32_t)(seed >> 16U);
+}
+
+static pen_real_t between(pen_real_t low, pen_real_t high)
+{
+    return low + ((high - low) * (pen_real_t)(draw() >> 8U) / (pen_real_t)0x1000000);
+}
+
+static pen_real_t of_bits(uint32_t bits)
+{
+    float value;
+
+    memcpy(&value, &bits, sizeof(value));
+    return value;
+}
+
+static pen_real_t bad_number(void)
+{
+    static const uint32_t bits[] = { 0x7F800000U, 0xFF800000U, 0x7FC00000U, 0xFFC00000U, 0x7F800001U, 0xFFFFFFFFU };
+    const uint32_t which = draw() % 8U;
+
+    return (which < 6U) ? of_bits(bits[which]) : (which == 6U) ? of_bits(0x7F800000U | draw()) : of_bits(draw());
+}
+
+static void fail(const char *what, uint32_t place, pen_real_t value, pen_status_t status)
+{
+    if (failures < 10U) {
+        printf("run %lu, %s = %g: %s (status 0x%x)\n", run, place_name[place], (double)value, what, (unsigned int)status);
+    }
+    failures++;
+}
+
+static pen_status_t step(const pen_real_t u[N_U], MODEL(y_t) *y)
+{
+    MODEL(u_t) input;
+    pen_status_t status;
+
+    memcpy(&input, u, sizeof(input));
+    status = MODEL(step)(&model, &input, y);
+    for (uint32_t i = 0U; i < PEN_STATUS_FLAGS; i++) {
+        counted[i] += (status >> i) & 1U;
+    }
+    return status;
+}
+
+static pen_real_t *weights(void)
+{
+    return (pen_real_t *)model.tuning.slot[model.tuning.active].value;
+}
+
+static bool all_finite(const void *values, size_t bytes)
+{
+    bool finite = true;
+
+    for (size_t i = 0U; i < (bytes / sizeof(pen_real_t)); i++) {
+        finite = finite && isfinite(((const pen_real_t *)values)[i]);
+    }
+    return finite;
+}
+
+/* A set through the front door: good, or with a bad value and the checksum that fits it. */
+static pen_status_t stage(const pen_set_t *from, size_t at, pen_real_t value)
+{
+    pen_set_head_t head = from->head;
+    pen_status_t status;
+
+    memcpy(staged, from->value, sizeof(staged));
+    staged[at] = value;
+    head.checksum = pen_set_checksum(staged, N);
+    status = MODEL(tune_begin)(&model, &head);
+    status |= MODEL(tune_write)(&model, 0U, staged, N);
+    status |= MODEL(tune_commit)(&model);
+    return status;
+}
+
+static void check_counters(void)
+{
+    pen_status_report_t report;
+
+    (void)MODEL(status)(&model, &report);
+    for (uint32_t i = 0U; i < PEN_STATUS_STEP; i++) {
+        if (report.times[i] != (uint32_t)counted[i]) {
+            fail("a counter is wrong", 0U, (pen_real_t)i, report.times[i]);
+        }
+    }
+}
+
+static void start(void)
+{
+    static const pen_set_t *const sets[] = { MODEL_SETS };
+    const pen_set_t *const set = sets[draw() % (sizeof(sets) / sizeof(sets[0]))];
+    const pen_real_t u[N_U] = { 0 };
+    MODEL(y_t) y;
+
+    check_counters();
+    memset(counted, 0, sizeof(counted));
+    if ((MODEL(init)(&model, sets[0], &banks) != PEN_OK) || (stage(set, 0U, set->value[0]) != PEN_OK) ||
+        ((step(u, &y) & PEN_ADOPTED) == PEN_OK)) {
+        fail("cannot start", 0U, 0, 0);
+    }
+}
+
+/* One step with a large finite weight, or without the damage, of the same instance as it was before. */
+static pen_status_t other_step(pen_real_t *place, pen_real_t value, const pen_real_t u[N_U], MODEL(x_t) *x)
+{
+    static MODEL(t) other;
+    const pen_real_t damaged = *place;
+    MODEL(u_t) input;
+    MODEL(y_t) y;
+    pen_status_t status;
+
+    *place = value;
+    other = model;
+    model = saved;
+    *place = value; /* the place may be in the instance */
+    memcpy(&input, u, sizeof(input));
+    status = MODEL(step)(&model, &input, &y);
+    (void)MODEL(get_state)(&model, x);
+    model = other;
+    *place = damaged;
+    return status;
+}
+
+static void one_run(void)
+{
+    pen_real_t u[N_U];
+    MODEL(x_t) x;
+    MODEL(x_t) x_after;
+    MODEL(x_t) x_other;
+    MODEL(y_t) y;
+    MODEL(y_t) y_after;
+    const uint32_t place = draw() % PLACES;
+    const uint32_t second = ((draw() % 4U) == 0U) ? (uint32_t)INPUT : place;
+    const pen_real_t value = bad_number();
+    const bool bad = !isfinite(value);
+    pen_real_t *weight = NULL;
+    pen_real_t right = 0;
+    pen_status_t status;
+    pen_status_t must = PEN_OK;
+    bool huge;
+    bool starts = false;
+
+    for (size_t i = 0U; i < N_X; i++) {
+        ((pen_real_t *)&x)[i] = between((pen_real_t)-0.02, (pen_real_t)0.02);
+    }
+    for (size_t i = 0U; i < N_U; i++) {
+        u[i] = between((pen_real_t)-0.02, (pen_real_t)0.02);
+    }
+    status = MODEL(set_state)(&model, &x);
+    status |= step(u, &y);
+    if ((status & ~(PEN_OUTSIDE | PEN_ADOPTED)) != PEN_OK) {
+        fail("a good step is not good", place, 0, status);
+    }
+    (void)MODEL(get_state)(&model, &x);
+    saved = model;
+    hits[place]++;
+    if (place == INPUT) {
+        u[draw() % N_U] = value;
+    } else if (place == STATE) {
+        model.row[LAST][draw() % N_LAST] = value;
+        must |= bad ? PEN_STATE_NONFINITE : PEN_OK;
+    } else if (place == BOTH_STATES) {
+        const size_t at = draw() % N_LAST;
+        model.row[LAST][at] = value;
+        model.row[KEPT][at] = value;
+        must |= bad ? PEN_STATE_NONFINITE : PEN_OK;
+    } else if (place == INPUT_BEFORE) {
+        model.u[0][draw() % N_U] = value;
+    } else if (place == WEIGHT) {
+        weight = &weights()[draw() % N];
+#ifdef MODEL_FOLDED
+    } else if (place == PIECE) {
+        pen_real_t *const pieces = (pen_real_t *)&model.pieces[model.tuning.active];
+        const size_t at = draw() % (sizeof(model.pieces[0]) / sizeof(pen_real_t));
+        starts = (at % 4U) == 0U;
+        weight = ((at % 4U) == 3U) ? NULL : &pieces[at]; /* the fourth word of a piece is its status */
+#endif
+    } else if (place == STAGED) {
+        const pen_status_t refused = stage(&MODEL(set_default), draw() % N, value);
+        if (bad != (refused == PEN_SET_NONFINITE)) {
+            fail("a set with it is not refused for it", place, value, refused);
+        }
+        (void)MODEL(tune_abort)(&model);
+        if ((refused == PEN_OK) || ((MODEL_SIZE(FOLDS) != 0U) && (refused == PEN_SET_PIECES))) {
+            model.tuning.pending = 0U; /* any bits may be a good set: not this time */
+            model.tuning = saved.tuning;
+        }
+    } else if (place == SET_STATE) {
+        MODEL(x_t) wrong = x;
+        ((pen_real_t *)&wrong)[draw() % N_X] = value;
+        status = MODEL(set_state)(&model, &wrong);
+        counted[1] += (status == PEN_STATE_NONFINITE) ? 1U : 0U;
+        if ((status == PEN_STATE_NONFINITE) != bad) {
+            fail("not refused, or for nothing", place, value, status);
+        }
+        if (!bad) {
+            (void)MODEL(set_state)(&model, &x);
+        }
+    } else {
+        /* no pieces */
+    }
+    if (second != place) {
+        u[draw() % N_U] = bad_number();
+    }
+    if (weight != NULL) {
+        right = *weight;
+        *weight = value;
+    }
+    must |= all_finite(u, sizeof(u)) ? PEN_OK : PEN_INPUT_NONFINITE;
+
+    huge = (u[0] > LARGE) || (u[0] < -LARGE);
+    status = step(u, &y_after);
+    (void)MODEL(get_state)(&model, &x_after);
+    flagged[place] += (status != PEN_OK) ? 1U : 0U;
+    if ((status & (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE)) != must) {
+        fail("not said, or said for nothing", place, value, status);
+    }
+    if (pen_advanced(status)) {
+        if (!all_finite(&x_after, sizeof(x_after)) || !all_finite(&y_after, sizeof(y_after))) {
+            fail("went on to numbers that are not finite", place, value, status);
+        }
+    } else if (((place != BOTH_STATES) && ((place != STATE) || bad) && (memcmp(&x, &x_after, sizeof(x)) != 0)) ||
+               ((place != BOTH_STATES) && ((place != STATE) || bad) && (memcmp(&y, &y_after, sizeof(y)) != 0))) {
+        fail("did not keep state and outputs", place, value, status);
+    } else {
+        /* kept */
+    }
+    if ((weight != NULL) && bad && (status == PEN_OK)) {
+        const bool off = (place == WEIGHT) && isinf(value);
+#ifdef MODEL_FOLDED
+        const bool unused = true; /* a step does not read weights, and one piece of each network */
+#else
+        const bool unused = false;
+#endif
+        const pen_real_t instead = (off && !unused) ? copysignf(LARGE, value) : right;
+        if (!off && !unused) {
+            fail("not flagged", place, value, status);
+        } else {
+            const pen_status_t other = other_step(weight, instead, u, &x_other);
+            const bool changed = pen_advanced(other) && (memcmp(&x_other, &x_after, sizeof(x_after)) != 0);
+            if (changed && starts) {
+                misplaced++;
+            } else if (changed) {
+                fail("not flagged, and it changed the step", place, value, status);
+            } else {
+                /* it had no effect */
+            }
+        }
+    }
+
+    if (weight != NULL) {
+        *weight = right;
+    }
+    if ((place == BOTH_STATES) || ((place == STATE) && !bad)) {
+        (void)MODEL(set_state)(&model, &x);
+    }
+    if (!all_finite(&model.row[LAST][N_X], sizeof(y))) {
+        start();
+    }
+    for (size_t i = 0U; i < N_U; i++) {
+        u[i] = between((pen_real_t)-0.02, (pen_real_t)0.02);
+    }
+    if (pen_advanced(status)) {
+        (void)MODEL(set_state)(&model, &x); /* it may have gone anywhere */
+    }
+    if (!all_finite(model.row[KEPT], sizeof(model.row[KEPT]))) {
+        fail("the second copy stays bad", place, value, status);
+    }
+    status = step(u, &y_after);
+    status = (((place == INPUT_BEFORE) || huge) && !pen_advanced(status)) ? step(u, &y_after) : status;
+    if (!pen_advanced(status)) {
+        fail("does not go on", place, value, status);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const unsigned long runs = (argc > 1) ? strtoul(argv[1], NULL, 10) : 1000U;
+
+    seed = ((argc > 2) ? strtoull(argv[2], NULL, 10) : 1U) * 0x9E3779B97F4A7C15U;
+    for (run = 0U; run < runs; run++) {
+        if ((run % 1000U) == 0U) {
+            start();
+        }
+        one_run();
+    }
+    check_counters();
+    for (uint32_t k = 0U; k < PLACES; k++) {
+        printf("%s: %lu, flagged %lu\n", place_name[k], hits[k], flagged[k]);
+    }
+    printf("misplaced %lu\nfailures %lu\n", misplaced, failures);
+    return (failures == 0U) ? 0 : 1;
+}
