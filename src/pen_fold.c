@@ -121,20 +121,21 @@ static view_t look(const walk_t *walk, pen_real_t x, pen_real_t way, bool begin)
 }
 
 /*
- * Walk one way and store the pieces, at most `room` of them: going up from piece[0] on, going down from piece[room - 1] on,
- * where a piece starts at its far end. *looks counts down. Returns how many, or room + 1 if they are more.
+ * Walk one way and store the pieces, at most `room` of them: going up the last room of piece[capacity], going down from
+ * piece[room - 1] on, where a piece starts at its far end. *looks counts down. Returns how many, or room + 1 if they are more.
  */
-static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size_t room, pen_piece_t piece[], bool down, size_t *looks)
+static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size_t capacity, pen_piece_t piece[], size_t room,
+                 bool down, size_t *looks)
 {
     pen_real_t x = centre;
     pen_real_t start = centre;
     pen_status_t status = PEN_OK;
-    size_t count = 0U;
+    size_t left = room;
     bool begin = true;
     bool more = true;
 
-    while (more && (count < room) && (*looks > 0U)) {
-        pen_piece_t *const here = down ? &piece[room - (count + 1U)] : &piece[count];
+    while (more && (left > 0U) && (*looks > 0U)) {
+        pen_piece_t *const here = down ? &piece[left - 1U] : &piece[capacity - left];
         const view_t view = look(walk, x, side->way, begin);
         const pen_real_t next = x + (side->way * view.ahead);
         const bool kink = (view.neuron < walk->chain->neurons) && (pen_port_abs(next) < PEN_REAL_MAX);
@@ -163,9 +164,9 @@ static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size
             more = false;
         }
         here->start = (moved && down) ? start : here->start;
-        count += moved ? 1U : 0U;
+        left -= moved ? 1U : 0U;
     }
-    return more ? (room + 1U) : (count + 1U);
+    return (room + 1U) - (more ? 0U : left);
 }
 
 pen_status_t pen_fold(const pen_chain_t *chain, const pen_real_t p[], bool clamp, pen_real_t line[], bool active[],
@@ -177,14 +178,15 @@ pen_status_t pen_fold(const pen_chain_t *chain, const pen_real_t p[], bool clamp
     const pen_real_t centre = (HALF * p[0]) + (HALF * p[1]);
     size_t looks = capacity + chain->neurons + 4U;
     const size_t room = capacity - 1U;
-    const size_t below = go(&walk, &low, centre, room, piece, true, &looks);
+    const size_t below = go(&walk, &low, centre, capacity, piece, room, true, &looks);
     size_t total = capacity + 1U;
 
     if (below <= room) {
-        for (size_t i = 0U; i < below; i++) {
-            piece[i] = piece[(room - below) + i];
+        const size_t first = room - below;
+        for (size_t i = first; i < room; i++) {
+            piece[i - first] = piece[i];
         }
-        total = below + go(&walk, &high, centre, capacity - below, &piece[below], false, &looks);
+        total = below + go(&walk, &high, centre, capacity, piece, capacity - below, false, &looks);
     }
     if (total <= capacity) {
         for (size_t i = total; i < capacity; i++) {

@@ -7,6 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+MUTATOR=universalmutator==1.14.1
 CMOCK_URL=https://github.com/ThrowTheSwitch/CMock
 CMOCK_TAG=v2.7.0
 CMOCK_COMMIT=6ea503340b1d3fdc0f2bcaf69273ba0160ec83af
@@ -73,9 +74,14 @@ tools()
     install tools missing_packages
 }
 
+# universalmutator brings much of its own, so it gets a place of its own.
 proof()
 {
     install proof missing_proof_packages
+    rm -rf build/proof
+    python3 -m venv build/proof
+    build/proof/bin/python -m pip install --quiet --disable-pip-version-check "$MUTATOR" >build/setup/proof-python.log 2>&1 ||
+        give_up "pip failed, see build/setup/proof-python.log; is the package index reachable?"
 }
 
 python()

@@ -33,7 +33,7 @@ HINTS = [("pen_fold.c", "        const pen_real_t next = ", "        /*@ split v
 
 OPTIONS = [
     *("-machdep", "gcc_x86_32"),  # 32 bits, as a Cortex-M
-    *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write"),
+    *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write,octagon:pen_fold"),
     *("-warn-special-float", "none"),  # NaN and Inf are values
     *("-warn-unsigned-downcast", "-warn-signed-downcast", "-eva-no-show-progress", "-eva-msg-key=-final-states"),
 ]

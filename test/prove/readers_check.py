@@ -23,6 +23,7 @@ from pathlib import Path
 
 import gate
 import numpy as np
+import onnx
 import penode_gen
 from penode_gen.networks import NetworkError
 from penode_gen.read_json import read_json
@@ -82,6 +83,46 @@ def changed(data: bytes, pick: random.Random, binary: bool) -> bytes:
     return b"\n".join(lines)
 
 
+def regraft(data: bytes, pick: random.Random) -> bytes:
+    """One change of what an ONNX file says, if it can be read: damage to its bytes rarely gets beyond the protocol buffer."""
+    try:
+        model = onnx.load_from_string(data)
+    except Exception:  # noqa: BLE001: not ours
+        return data
+    graph = model.graph
+    parts = [graph.node, graph.initializer, graph.input, graph.output, model.opset_import]
+    part = pick.choice([some for some in parts if len(some)] or [graph.node])
+    if not part:
+        return data
+    one, other = pick.choice(part), pick.choice(part)
+    way = pick.randrange(4)
+    if way == 0:
+        part.remove(one)
+    elif way == 1:
+        part.append(other)
+    elif part is graph.node:
+        names = [name for node in graph.node for name in (*node.input, *node.output)] + ["", "nowhere"]
+        if way == 2:
+            one.op_type = pick.choice(["Gemm", "MatMul", "Add", "Relu", "Tanh", "Softplus", "Conv", "Identity", "Reshape", "Flatten", ""])
+        else:
+            where = pick.choice((one.input, one.output))
+            where.append(pick.choice(names))
+            where[pick.randrange(len(where))] = pick.choice(names)
+            one.attribute.extend([onnx.helper.make_attribute(pick.choice(["alpha", "beta", "transA", "transB", "axis"]), pick.choice([0, 1, 2, 0.5]))])
+    elif part is graph.initializer:
+        if way == 2:
+            one.dims[:] = [pick.choice([-1, 0, 1, 3, 16, 2**40]) for _ in range(pick.randrange(4))]
+        else:
+            one.data_type = pick.randrange(20)
+    elif part is model.opset_import:
+        one.version, one.domain = pick.choice([0, 1, 7, 13, 999]), pick.choice(["", "ai.onnx.ml"])
+    else:
+        one.type.tensor_type.elem_type = pick.randrange(20)
+        for size in one.type.tensor_type.shape.dim:
+            size.dim_value = pick.choice([-1, 0, 1, 2, 2**40])
+    return model.SerializeToString()
+
+
 def failure(reader: Reader, path: Path) -> str | None:
     """Read a file; None if it was taken or refused in words, else what happened."""
     try:
@@ -108,7 +149,7 @@ def search(reader: Reader, tries: int, folder: Path, seed: int = 1) -> list[str]
     for _ in range(tries):
         data = pick.choice(reader.files) if pick.random() < 0.3 else pick.choice(known)
         for _ in range(pick.choice((1, 1, 2, 4))):
-            data = changed(data, pick, reader.suffix in (".onnx", ".mf4"))
+            data = regraft(data, pick) if reader.suffix == ".onnx" and pick.random() < 0.7 else changed(data, pick, reader.suffix == ".onnx")
         path = folder / f"file{reader.suffix}"
         path.write_bytes(data)
         before = len(reader.messages)

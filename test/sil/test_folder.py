@@ -150,7 +150,8 @@ def test_a_process_that_dies_takes_only_its_recording_along(place, tmp_path, mon
     if where == "cluster":
         monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))  # its processes must find this module
         dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
-        with dask.config.set({"distributed.scheduler": {"allowed-failures": 0, "worker-saturation": 1.0}}):
+        alone = {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-saturation": 1.0}
+        with dask.config.set(alone):  # one job at a time on a worker, given up when that dies once
             cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", silence_logs=60)
         request.addfinalizer(cluster.close)
         scheduler = cluster.scheduler_address

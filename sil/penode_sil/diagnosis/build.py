@@ -117,5 +117,8 @@ def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recor
 
 def all_free(nuisances: Sequence[Free], found: Extended) -> tuple[Free, ...]:
     """Nuisances, those that a hypothesis set free without their priors, and what the terms add."""
-    loose = tuple(replace(f, sigma=np.inf, low=min(0.0, 10.0 * f.origin), high=max(0.0, 10.0 * f.origin)) if f.target in found.loosened else f for f in nuisances)
-    return loose + found.free
+    loose = (
+        replace(f, sigma=np.inf, low=min(0.0, 10.0 * f.origin), high=max(0.0, 10.0 * f.origin)) if f.target in found.loosened else f
+        for f in nuisances
+    )
+    return (*loose, *found.free)

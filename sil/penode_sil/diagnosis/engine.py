@@ -109,8 +109,9 @@ def diagnose(
     data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(
-        verdict, causes, gain, numbers, explained, evidence, alike, tuple([doubt] * bool(doubt) + notes), data, shown.numbers(), time.perf_counter() - started, shown
-    )
+        verdict, causes, gain, numbers, explained, evidence, alike, tuple([doubt] * bool(doubt) + notes), data,
+        shown.numbers(), time.perf_counter() - started, shown,
+    )  # fmt: skip
 
 
 def advancing(log: Callable[[str], None], tell: Callable[[float, str], None]) -> Callable[[str], None]:

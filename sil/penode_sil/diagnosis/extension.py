@@ -55,8 +55,9 @@ def extends(path: Path) -> str:
 def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> tuple[str, Model]:
     """Text of model_extended.toml, and the model that it describes."""
     model = study.model
+    learnt = ", ".join(f"{c.kind} at {c.where or '?'}" for c in causes)
     lines = [
-        f"# What the recordings taught about {model.path.name}: " + (", ".join(f"{c.kind} at {c.where or '?'}" for c in causes) or "nothing") + ".",
+        f"# What the recordings taught about {model.path.name}: {learnt or 'nothing'}.",
         "", "[model]", extends(model.path.resolve()), f"name = {_toml(model.name + '_extended')}",
         f"sample_time = {_toml(f'{model.sample_time:.12g} s')}", "",
     ]  # fmt: skip
@@ -99,7 +100,10 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     elements = []
     for x in e.built.model.elements[len(model.elements) :]:
         entry: dict[str, object] = {"between": x.ends, "law": x.law}
-        entry |= {"force": named(x.expression)} if x.law == "expression" else {k: named(x.arguments[k]) for k in LAWS[x.law].arguments}
+        if x.law == "expression":
+            entry["force"] = named(x.expression)
+        else:
+            entry |= {k: named(x.arguments[k]) for k in LAWS[x.law].arguments}
         elements.append(f"{named(x.name)} = {_table(entry)}")
     sensors, states, equations = [], [], []
     changed: dict[Signal, str] = {}
@@ -211,7 +215,8 @@ def measure(study: Study, extended: Model, holdout: Sequence[Experiment]) -> tup
         beyond = np.any(np.abs(paths) > np.array(limits), axis=1)
         outside.append(beyond)
         if beyond.any():
-            notes.append(f"{e.name}: {np.mean(beyond):.1%} of the samples move farther or faster than in training; there the gain is extrapolated")
+            share = f"{np.mean(beyond):.1%} of the samples move farther or faster than in training"
+            notes.append(f"{e.name}: {share}; there the gain is extrapolated")
         shown += channels(e, model, before, after, floors, beyond)
     e = study.experiments[0]
     through = study.linear.transfer(e.frequencies[: e.band])[:, :, : len(model.inputs)] * np.array([i.noise for i in model.inputs])
@@ -223,7 +228,8 @@ def measure(study: Study, extended: Model, holdout: Sequence[Experiment]) -> tup
         floor = float(np.sqrt(np.mean(study.levels[0][:, j]) + np.mean(np.sum(np.abs(through[:, j]) ** 2, axis=1))))
         errors = [np.concatenate([r.values[c.good] for c, r in zip(own, each)]) for each in ([c.before for c in own], [c.after for c in own])]
         share, ci95 = achieved(*errors, floor)
-        gains[s.name] = Gain(rms(errors[0]), rms(errors[1]), floor, share, units.si(s.unit), float(np.mean(np.concatenate(outside))), ci95)
+        beyond = float(np.mean(np.concatenate(outside)))
+        gains[s.name] = Gain(rms(errors[0]), rms(errors[1]), floor, share, units.si(s.unit), beyond, ci95)
     return gains, notes, shown
 
 
@@ -247,7 +253,8 @@ def achieved(before: Array, after: Array, floor: float) -> tuple[float | None, t
 
 def followed(model: Model, e: Experiment, start: Array, study: Study) -> Array:
     """Deflection and rate [n, 2 places] of all places in a simulation."""
-    problem = Problem(watched(model, study.places), [widened(e, 2 * len(study.places))], study.metrics[:1], study.set_name, study.linear.fastest)
+    wide = widened(e, 2 * len(study.places))
+    problem = Problem(watched(model, study.places), [wide], study.metrics[:1], study.set_name, study.linear.fastest)
     free = tuple(Free(("start", 0, i), x, 1.0) for i, x in enumerate(start))
     return np.array(problem.simulate(0, free, np.zeros((1, len(free))))[0][0][:, -2 * len(study.places) :])
 

@@ -32,8 +32,8 @@ DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of trial 
 
 @dataclass(frozen=True)
 class Free:
-    """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "skew", sensor index), ("fault", its number), or
-    ("start", recording, state index). `unit` steps of it are natural; a `log` one stays positive. `sigma`: its prior."""
+    """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "skew", sensor index),
+    ("fault", its number), or ("start", recording, state index). `unit` steps of it are natural; a `log` one stays positive. `sigma`: its prior."""
 
     target: str | tuple[str, int] | tuple[str, int, int]
     value: float
@@ -83,7 +83,10 @@ class Fit:
 class Problem:
     """A model against recordings in their metrics."""
 
-    def __init__(self, model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], set_name: str = "default", fastest: float = 0.0, faults: Sequence[Fault] = ()):
+    def __init__(
+        self, model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], set_name: str = "default",
+        fastest: float = 0.0, faults: Sequence[Fault] = (),
+    ):  # fmt: skip
         self.model, self.experiments, self.metrics, self.set_name = model, experiments, metrics, set_name
         self.faults = faults
         causal = causalise(replace(model, interpolation="linear"))

@@ -60,7 +60,9 @@ class Experiment:
         return max(int(np.searchsorted(self.frequencies, min(TOP, 0.4 / self.step))), 2)
 
 
-def prepare(name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_], noise: Array, laws: Sequence[Noise | None]) -> Experiment:
+def prepare(
+    name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_], noise: Array, laws: Sequence[Noise | None]
+) -> Experiment:
     """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors.
 
     Where the noise exceeds the input's own spectrum, the measured input is damped to what is likely (Wiener), and the rest
@@ -127,7 +129,9 @@ class Metric:
         return -4.0 * float(np.sum(np.log(np.abs(np.diagonal(self.root, axis1=1, axis2=2)))))
 
 
-def sensor_levels(e: Experiment, residual: Array, declared: Array, through: NDArray[np.complex128], coloured: bool = True, robust: bool = True) -> Array:
+def sensor_levels(
+    e: Experiment, residual: Array, declared: Array, through: NDArray[np.complex128], coloured: bool = True, robust: bool = True
+) -> Array:
     """Noise variance per sample of each sensor over all frequencies of the band [f, sensors].
 
     What a sensor's record shows by itself, above the band of the signals, is continued below; a slow part is added as the
@@ -157,7 +161,8 @@ def sensor_levels(e: Experiment, residual: Array, declared: Array, through: NDAr
         base = base * max(1.0, (0.75 * sigma) ** 2 / float(np.mean(base)))  # a sensor is hardly better than its data sheet
         bins = np.diff(np.append(edges, band))
         p, b, r = (np.add.reduceat(x[:band], edges) / bins for x in (power[:, j], base, road))
-        room = max((1.25 * sigma) ** 2 if sigma > 0.0 else 4.0 * float(np.mean(base)), 1.1 * float(np.mean(base))) - float(np.mean(base))
+        whole = float(np.mean(base))
+        room = max((1.25 * sigma) ** 2 if sigma > 0.0 else 4.0 * whole, 1.1 * whole) - whole
         best = np.inf, base
         for pole in POLES if coloured else ():
             shape = (1.0 - pole**2) / np.abs(1.0 - pole * np.exp(-1j * omega)) ** 2
@@ -210,7 +215,8 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
             inside = far[a:b]
             y, model = e.y[a:b, j][inside], z[a:b, j][inside]
             sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2)
-            if b - a < longest and np.mean(sinks) > 0.95 and np.min(np.abs(y)) < 0.25 * np.max(np.abs(model)) and np.count_nonzero(inside) > 4:
+            deep = np.min(np.abs(y)) < 0.25 * np.max(np.abs(model))
+            if b - a < longest and np.mean(sinks) > 0.95 and deep and np.count_nonzero(inside) > 4:
                 found[a:b, j] = True
         if np.mean(found[:, j]) > 0.02:
             found[:, j] = False

@@ -32,7 +32,7 @@ class Place:
     ends: tuple[str, str]
     elements: tuple[tuple[str, int], ...]
     role: str
-    trained: tuple[tuple[str, str, float, float, bool], ...] = ()  # element, "s" or "v", range of its network, and whether it is stated
+    trained: tuple[tuple[str, str, float, float, bool], ...] = ()  # element, "s" or "v", range of its network, if it is stated
 
     @property
     def name(self) -> str:
@@ -161,8 +161,9 @@ def linearise(model: Model, found: Sequence[Place], x: Array, u: Array) -> Linea
     probed = extend(model, forces, {}, found)
     seen = [Signal(f"{q}_probe{k}", f"{q}_probe{k}", unit) for k in range(len(found)) for q, unit in (("s", "m"), ("v", "m/s"))]
     probed = replace(
-        probed, interpolation="linear", inputs=(*model.inputs, *(Input(f"at{k}", "N") for k in range(len(found)))), sensors=(*probed.sensors, *seen)
-    )
+        probed, interpolation="linear", inputs=(*model.inputs, *(Input(f"at{k}", "N") for k in range(len(found)))),
+        sensors=(*probed.sensors, *seen),
+    )  # fmt: skip
     system = penode_gen.numeric(probed)
     n_x, n_w = len(probed.states), len(probed.inputs)
     step = np.concatenate(

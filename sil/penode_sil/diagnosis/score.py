@@ -117,7 +117,9 @@ class Regression:
         movable = [i for i, f in enumerate(fit.free) if f.low < f.value < f.high]  # the others stand at their bounds
         free = [fit.free[i] for i in movable]
         priors = np.array([f.unit / f.sigma for f in free])
-        q = np.linalg.qr(np.concatenate([fit.jacobian[:, movable], np.diag(priors)]))[0] if free else np.zeros((len(fit.residual), 0))
+        q = np.zeros((len(fit.residual), 0))
+        if free:
+            q = np.linalg.qr(np.concatenate([fit.jacobian[:, movable], np.diag(priors)]))[0]
         r, offsets = fit.residual, np.array([f.offset for f in free])
         top, low = q[: len(r)], q[len(r) :]
         tx, tr = top.T @ columns, top.T @ r - low.T @ offsets  # columns have no part in the rows of the priors
@@ -252,7 +254,8 @@ def collect(
                         spectra.append(t * accelerations[e])
                 parts[e].append(masked(e, s.answer(np.stack(spectra), k)))
     for j, name in enumerate(sensor_names):
-        faults = list(hy.sensor_faults(j, [s.sensors[:, j] for s in seen], [s.motions[0].t if s.motions else experiments[e].time for e, s in enumerate(seen)], step))
+        times = [s.motions[0].t if s.motions else e.time for e, s in zip(experiments, seen)]
+        faults = list(hy.sensor_faults(j, [s.sensors[:, j] for s in seen], times, step))
         candidates += [Candidate(f.kind, name, f.sign, f.companion, f) for f in faults]
         for e in range(len(seen)):
             rows = np.stack([f.series[e] for f in faults])

@@ -29,15 +29,17 @@ LEAST = 1e-3  # of what has been gained: less, beside a curve, is a matter of it
 CURVES = {  # kinds of one family at one place are one curve with one name
     "coulomb_friction": "friction", "stribeck_friction": "friction", "bouc_wen": "friction",
     "degressive_damper": "damper", "quadratic_damper": "damper", "asymmetric_damper": "damper", "damper_fading": "damper",
-    "cubic_spring": "spring", "asymmetric_spring": "spring", "bump_stop": "spring", "backlash": "spring", "network_extrapolation": "spring",
+    "cubic_spring": "spring", "asymmetric_spring": "spring", "bump_stop": "spring", "backlash": "spring",
+    "network_extrapolation": "spring",
     "tyre_nonlinear": "tyre", "tyre_liftoff": "tyre",
 }  # fmt: skip
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
-    "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "asymmetric_spring": ("k*abs(s)", "linear_spring"),
-    "backlash": ("backlash",), "coulomb_friction": ("coulomb_friction",), "bouc_wen": ("bouc_wen",), "maxwell_bushing": ("maxwell_bushing",),
-    "asymmetric_damper": ("k*abs(v)", "linear_damper"), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
+    "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
+    "asymmetric_spring": ("k*abs(s)", "linear_spring"), "asymmetric_damper": ("k*abs(v)", "linear_damper"),
+    "coulomb_friction": ("coulomb_friction",), "bouc_wen": ("bouc_wen",), "maxwell_bushing": ("maxwell_bushing",),
+    "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
     "degressive_damper": ("-k*(max(v - knee, 0) + min(v + knee, 0))",),
 }  # fmt: skip
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance")  # a formula after all
@@ -110,7 +112,10 @@ def explain(study: Study, terms: Sequence[Term], iterations: int = 10, start: Fi
     built = extended(study.model, study.places, terms, recordings if study.moving else 0, recordings)
     problem = Problem(built.model, study.experiments, study.metrics, study.set_name, study.linear.fastest, built.faults)
     values = {f.target: f.value for f in (start or study.null).free}
-    free = tuple(replace(f, value=values.get(f.target, f.value)) if i < len(study.null.free) else f for i, f in enumerate(all_free(study.null.free, built)))
+    free = [
+        replace(f, value=values.get(f.target, f.value)) if i < len(study.null.free) else f
+        for i, f in enumerate(all_free(study.null.free, built))
+    ]
     near = {i: study.null.jacobian[:, i] for i, f in enumerate(study.null.free) if f.target not in built.loosened}
     fit = problem.solve(problem.eased(free), iterations, 0.5, near)
     gain = study.nothing - loss(study, fit) if np.isfinite(fit.cost) else -np.inf
@@ -129,7 +134,8 @@ def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
         return []
     best = ranked[0][0]
     taken = [x for x in ranked if x[0] > 0.5 * best - NEW][:few]
-    taken += [x for x in ranked if x[1][0] == "network_extrapolation" and x[0] > 0.2 * best and x not in taken]  # known to happen
+    known = [x for x in ranked if x[1][0] == "network_extrapolation" and x[0] > 0.2 * best]  # to happen, of its motion
+    taken += [x for x in known if x not in taken]
     found = [explain(study, terms) for terms in (terms_of(r, chosen) for _, _, chosen in taken) if terms]
     return sorted(found, key=lambda e: -e.score)
 
@@ -171,7 +177,8 @@ def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
         elif isinstance(what, tuple):
             m, k, d = (values[f"{name}_{key}"] for key in ("mass", "stiffness", "damping"))
             w = np.sqrt(k / m)
-            found.append(Term(replace(term.candidate, what=(what[0], what[1], w / (2 * np.pi), d / (2 * w * m))), m, values[f"{name}_cubic"]))
+            what = (what[0], what[1], w / (2 * np.pi), d / (2 * w * m))
+            found.append(Term(replace(term.candidate, what=what), m, values[f"{name}_cubic"]))
         else:
             found.append(term)
     return found

@@ -99,7 +99,8 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
     found = plant.places(model, set_name)
     declared = np.array([s.noise for s in model.sensors])
     free = nuisances(model, experiments)
-    levels = [np.tile(np.where(declared > 0.0, declared, 1e-2 * np.std(e.y, axis=0) + 1e-12) ** 2, (e.band, 1)) for e in experiments]
+    guess = [np.where(declared > 0.0, declared, 1e-2 * np.std(e.y, axis=0) + 1e-12) for e in experiments]
+    levels = [np.tile(sigma**2, (e.band, 1)) for sigma, e in zip(guess, experiments)]
     metrics = [metric(e, l, np.zeros((e.band, len(declared), len(model.inputs)))) for e, l in zip(experiments, levels)]
     problem = Problem(model, experiments, metrics, set_name, 0.0)
     z, x = problem.simulate(0, (), np.zeros((1, 0)), model.states)
@@ -162,7 +163,8 @@ def regression(study: Study, fit: Fit, parameters: Sequence[str]) -> Regression:
 def watch(study: Study, fit: Fit) -> list[Array]:
     """Sensors, then deflection and rate of every place, as a fit simulates them: [n, n_z + 2 places] per recording."""
     more = 2 * len(study.places)
-    problem = Problem(watched(fit.model, study.places), [widened(e, more) for e in study.experiments], study.metrics, study.set_name, faults=fit.faults)
+    wide = [widened(e, more) for e in study.experiments]
+    problem = Problem(watched(fit.model, study.places), wide, study.metrics, study.set_name, faults=fit.faults)
     start = np.zeros((1, len(fit.free)))
     return [np.array(problem.simulate(e, fit.free, start)[0][0]) for e in range(len(study.experiments))]
 

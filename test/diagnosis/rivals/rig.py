@@ -222,8 +222,8 @@ class Rig:
         found = {}
         for i, (k, floor) in enumerate(self.noise.items()):
             if np.isfinite(holdout.seen[k]).any():
-                found[k] = {"before_rmse": float(before[i]), "after_rmse": float(after[i]), "noise_floor": floor,
-                            "share_of_achievable": float((before[i] - after[i]) / max(before[i] - floor, 1e-12))}  # fmt: skip
+                share = float((before[i] - after[i]) / (before[i] - floor)) if before[i] > 1.05 * floor else None
+                found[k] = {"before_rmse": float(before[i]), "after_rmse": float(after[i]), "noise_floor": floor, "share_of_achievable": share}
         return found
 
 
