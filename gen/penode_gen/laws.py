@@ -73,6 +73,12 @@ LAWS: dict[str, Law] = {
     "slack_friction": Law(
         "force*slip^5", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - (v*slip^2 + abs(v)*slip*abs(slip))/2)/presliding")}
     ),
+    # takes from a parallel damper what it loses behind a play and a spring of damping/relaxation in series
+    "loose_damper": Law(
+        "damping*((max(eye - gap, 0) + min(eye + gap, 0))/relaxation - v)",
+        {"damping": "N*s/m", "gap": "m", "relaxation": "s"},
+        {"eye": LawState("m", "v - (max(eye - gap, 0) + min(eye + gap, 0))/relaxation")},
+    ),
     # spring and damper in series, relaxation = damping/stiffness
     "maxwell_bushing": Law(
         "pull", {"stiffness": "N/m", "relaxation": "s"}, {"pull": LawState("N", "stiffness*v - pull/relaxation")}

@@ -170,7 +170,8 @@ def summary(rows: Sequence[Mapping]) -> dict:
             out["kinds"].setdefault(kind, {})[name] = {**_share(own), "instead": dict(instead)}
     errors = [e for r in rows for e in r["errors"]]
     covered = [c for r in rows for c in r["covered"]]
-    inside = [max(g[1] for g in r["gain"].values()) for r in rows if r["right"] and r["kinds"] and r["gain"] and r.get("inside")]
+    named = [r for r in rows if r["right"] and r["answer"] and OUTSIDE not in r["kinds"]]
+    inside = [max(g[1] for g in r["gain"].values()) for r in named if r["gain"] and r.get("inside")]
     hidden = [max(r["gain"].values(), key=lambda g: g[1]) for r in rows if r["kinds"] and r["gain"] and r.get("inside")]
     worse = [
         r["case"]

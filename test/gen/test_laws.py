@@ -45,6 +45,12 @@ def bouc_wen(s: float, v: float, own: np.ndarray) -> tuple[float, list[float]]:
     return 9.0 * slip, [v / 0.01 * (1.0 - (slip**2 if v * slip > 0.0 else 0.0))]
 
 
+def loose_damper(s: float, v: float, own: np.ndarray) -> tuple[float, list[float]]:
+    """The damper slides only while its eye is beyond the play of 2 mm."""
+    slide = np.sign(own[0]) * max(abs(own[0]) - 0.002, 0.0) / 0.03
+    return 6.0 * (slide - v), [v - slide]
+
+
 def absorber(s: float, v: float, own: np.ndarray) -> tuple[float, list[float]]:
     force = 90.0 * (s - own[0]) + 2e4 * (s - own[0]) ** 3 + 0.8 * (v - own[1])
     return force, [own[1], force / 0.4]
@@ -84,6 +90,7 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
         {"cubic": "2e4 N/m^3", "relaxation": "60 ms"}, lambda s, v, own: (2e4 * own[0] ** 3, [v - own[0] / 0.06])
     ),
     "slack_friction": ({"force": "9 N", "presliding": "10 mm"}, lambda s, v, own: (9.0 * own[0] ** 5, bouc_wen(s, v, own)[1])),
+    "loose_damper": ({"damping": "6 N*s/m", "gap": "2 mm", "relaxation": "30 ms"}, loose_damper),
     "maxwell_bushing": ({"stiffness": "300 N/m", "relaxation": "60 ms"}, lambda s, v, own: (own[0], [300.0 * v - own[0] / 0.06])),
     "absorber": ({"mass": "0.4 kg", "stiffness": "90 N/m", "cubic": "2e4 N/m^3", "damping": "0.8 N*s/m"}, absorber),
 }  # fmt: skip

@@ -33,6 +33,7 @@ WHOLE = 0.97  # share that is a whole explanation
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
+FILTER = 0.6  # of what several hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 OUTSIDE = "outside_taxonomy"
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 
@@ -102,7 +103,8 @@ def diagnose(
     held: list[residual.Channel] = []
     if holdout:
         tell(0.85, "measuring the gain")
-        gain, notes, held = extension.measure(study, extended, unused)
+        lost = {c.where for c in causes if c.kind == "sensor_dropout"}
+        gain, notes, held = extension.measure(study, extended, unused, lost)
     tell(0.9, "showing what is wrong")
     whole = best is not None and named is best
     shown = residual.show(study, best.fit if whole else None, extended if whole else None, held)
@@ -198,6 +200,9 @@ def judge(
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     if len(best.groups) > 1 and share < PATCHED and alike > ALIKE:  # several causes, and still no whole: a patchwork
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
+    masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
+    if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < FILTER * best.gain:
+        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     causes = [cause(study, explanations, group) for group in best.groups]
     causes = [c for c in causes if worth(study, c)]
     several = sum(c.kind == "wrong_parameter" for c in causes) > 1  # then it is another vehicle, or another effect

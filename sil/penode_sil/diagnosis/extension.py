@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from ..targets import Sil
 from .build import Term
 from .fit import Free, Problem
 from .hypotheses import Basis, Fault, size
-from .noise import Experiment, metric
+from .noise import Experiment, bursts, metric
 from .plant import anonymous
 from .residual import Channel, channels, noise_floor, rms
 from .result import Cause, Gain, Value
@@ -200,9 +200,12 @@ def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
     return np.concatenate([run.z[:1], run.z]).astype(float)
 
 
-def measure(study: Study, extended: Model, holdout: Sequence[Experiment]) -> tuple[dict[str, Gain], list[str], list[Channel]]:
+def measure(
+    study: Study, extended: Model, holdout: Sequence[Experiment], lost: Collection[str] = ()
+) -> tuple[dict[str, Gain], list[str], list[Channel]]:
     """Errors before and after on held-out recordings, with the generated C; how much of them lies outside of what was
-    seen in training, where a right name says nothing about size; and all of it sample by sample."""
+    seen in training, where a right name says nothing about size; and all of it sample by sample. Sensors `lost` drop out:
+    bursts of theirs do not count."""
     model = study.model
     shown: list[Channel] = []
     floors = noise_floor(study, 0)
@@ -211,6 +214,8 @@ def measure(study: Study, extended: Model, holdout: Sequence[Experiment]) -> tup
     for e in holdout:
         starts = [started(m, e, study) for m in (model, extended)]
         before, after = (deployed(m, e, x, study.set_name) for m, x in zip((model, extended), starts))
+        dropped = bursts([e], [after])[0] & [s.name in lost for s in model.sensors]
+        e = replace(e, good=e.good & ~dropped)
         paths = followed(extended, e, starts[1], study)
         beyond = np.any(np.abs(paths) > np.array(limits), axis=1)
         outside.append(beyond)

@@ -93,7 +93,8 @@ class Problem:
         moving = causal.uses([*causal.rates, *causal.outputs, *causal.sensors], causal.input_rates)
         self.fine = 4 if moving else 2  # see _drive
         step = model.sample_time / self.fine
-        substeps = max(1, int(np.ceil(step * fastest / 0.1)), 4 * any("presliding" in p for p in model.parameters))
+        stiff = any(e.law == "loose_damper" or "presliding" in e.arguments for e in model.elements)
+        substeps = max(1, int(np.ceil(step * fastest / 0.1)), 4 * stiff)
         exact = replace(_folded(model), method="rk4", interpolation="linear", substeps=substeps, sample_time=step)
         self.batch = _compiled(anonymous(exact))
         self.inputs = [_drive(e, self.fine) for e in experiments]

@@ -86,38 +86,49 @@ def size(motions: Sequence[Motion]) -> tuple[float, float]:
     return tuple(float(max(p[k] for p in pairs)) for k in (0, 1))
 
 
-HYSTERESIS = """
+MEMORY = """
 [model]
-name = "hysteresis"
+name = "memory"
 sample_time = "1 s"
 substeps = 4
 [parameters]
 one = { value = 1, unit = "N" }
 width = { value = 1, unit = "m" }
+drag = { value = 1, unit = "N*s/m" }
+gap = { value = 1, unit = "m" }
+lag = { value = 1, unit = "s" }
 [inputs]
 x = { unit = "m" }
 [elements]
 wen = { between = ["x", "ground"], law = "bouc_wen", force = "one", presliding = "width" }
 dahl = { between = ["x", "ground"], law = "dahl_friction", force = "one", presliding = "width" }
+loose = { between = ["x", "ground"], law = "loose_damper", damping = "drag", gap = "gap", relaxation = "lag" }
 [outputs]
+loose = { value = "F_loose", unit = "N" }
 wen = { value = "wen_slip", unit = "1" }
 dahl = { value = "dahl_slip", unit = "1" }
 """
 
 
 @cache
-def _hysteresis() -> Batch:
-    """Both laws with memory of the way, under prescribed motion."""
+def _memory() -> Batch:
+    """Laws with memory under prescribed motion; one sample is one second."""
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "hysteresis.toml"
-        path.write_text(HYSTERESIS)
+        path = Path(folder) / "memory.toml"
+        path.write_text(MEMORY)
         return Batch(penode_gen.load(path))
 
 
 def slips(s: Array, widths: Sequence[float]) -> Array:
     """Slip [2 widths, n] of the laws bouc_wen, then dahl_friction, starting without force."""
-    z = _hysteresis().run((s - s[0])[:, None], parameters={"width": np.asarray(widths)}, outputs=("wen", "dahl")).y
+    z = _memory().run((s - s[0])[:, None], parameters={"width": np.asarray(widths)}, outputs=("wen", "dahl")).y
     return np.clip(np.concatenate([z[:, :, 0], z[:, :, 1]]), -1.0, 1.0)
+
+
+def losses(s: Array, step: float, gaps: Sequence[float], taus: Sequence[float]) -> Array:
+    """Force [pairs, n] of the law loose_damper with damping 1 N*s/m, for pairs of gap and relaxation time."""
+    parameters = {"gap": np.asarray(gaps), "lag": np.asarray(taus) / step}
+    return _memory().run((s - s[0])[:, None], parameters=parameters, outputs=("loose",)).y[:, :, 0] / step
 
 
 def lag(x: Array, tau: float, step: float) -> Array:
@@ -126,6 +137,7 @@ def lag(x: Array, tau: float, step: float) -> Array:
     return lfilter([1.0 - a], [1.0, -a], x)
 
 
+GAPS = (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5)
 GRID = (0.03, 0.06, 0.12, 0.25, 0.5)
 
 
@@ -219,6 +231,14 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
         yield law(
             "maxwell_bushing", "hardening_bushing", ("cubic", "N/m^3"), {"relaxation": (tau, "s")}, 0, lambda s, v, t: (s - lag(s, tau, step)) ** 3, True
         )
+    # a damper behind a spring, or a play, in series
+    stiff = max(0.001, step)
+    ways = [(0.0, tau) for tau in (0.0007, 0.0015, 0.004, 0.012) if tau > 0.3 * step] + [(w * reach, stiff) for w in GAPS]
+    lost = [losses(m.s, step, *zip(*ways)) for m in motions]
+    for row, (gap, tau) in enumerate(ways):
+        kind, known = ("backlash", {}) if gap else ("maxwell_bushing", {"gap": (gap, "m")})
+        shapes = {"relaxation": (tau, "s")} | ({} if known else {"gap": (gap, "m")})
+        yield Basis(kind, place, "loose_damper", d, shapes, 1, tuple(each_lost[row] for each_lost in lost), fixed=known)
     # dampers: odd and slower than linear, odd and faster, even, fading
     for w in (0.06, 0.15, 0.4, 1.0, 2.5):
         a = w * speed
@@ -288,7 +308,7 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
             yield law("bump_stop", name, k, {"gap": (g, "m")}, 1, lambda s, v, t: side * np.maximum(side * s - g, 0.0))
             text = "k*max(s - gap, 0)^2" if side > 0 else "-k*min(s + gap, 0)^2"
             yield law("bump_stop", text, ("k", "N/m^2"), {"gap": (g, "m")}, 1, lambda s, v, t: side * np.maximum(side * s - g, 0.0) ** 2)
-    for w in (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5):
+    for w in GAPS:
         g = w * reach
         yield law("backlash", "backlash", k, {"gap": (g, "m")}, 1, lambda s, v, t: -np.clip(s, -g, g))
         for side, text in ((1, "k*(max(s - gap, 0) - max(s, 0))"), (-1, "k*(min(s + gap, 0) - min(s, 0))")):

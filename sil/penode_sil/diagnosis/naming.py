@@ -35,6 +35,7 @@ DAMPERS = ("asymmetric_damper", "degressive_damper", "quadratic_damper")
 SPRINGS = ("asymmetric_spring", "cubic_spring", "bump_stop", "network_extrapolation")
 QUIET = 0.25  # of the largest force that an element is wrong by: less where its network was trained, and it is not the element
 UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that makes it asymmetric
+STRAIGHT = 0.02  # of the straight part of a curve: less than that beside it, and it is a straight line
 PEAK = 1.08  # friction at low rates over that at high ones that makes it Stribeck's
 Array = NDArray[np.float64]
 Values = Mapping[object, float]
@@ -90,6 +91,24 @@ def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: 
     if found == {"asymmetric_spring"} and _size(even) < UNEVEN * _size(odd):
         return "cubic_spring"
     return "asymmetric_spring" if found == {"cubic_spring"} and _size(even) > UNEVEN * _size(odd) else terms[0].candidate.kind
+
+
+def straight(
+    model: Model, places: Sequence[Place], terms: Sequence[Term], names: Sequence[str], group: Group, values: Values
+) -> str:
+    """The parameter of the linear element that a curve beside it only changes; empty if it is a curve, or there is none."""
+    own = [(t, n) for t, n in zip(terms, names) if t.group == group]
+    if group[0] not in (*DAMPERS, "cubic_spring", "asymmetric_spring"):
+        return ""
+    law, argument = ("linear_damper", "damping") if group[0] in DAMPERS else ("linear_spring", "stiffness")
+    size = {True: 0.0, False: 0.0}  # of what is straight, and of what is not
+    for term, name in own:
+        what = term.candidate.what
+        gain = values.get(f"{name}_{what.gain[0]}", term.gain)
+        size[what.law == law] += abs(gain) * float(np.sqrt(np.mean(np.concatenate(what.series) ** 2)))
+    elements = {name for name, _ in places[own[0][0].candidate.what.place].elements}
+    found = [e.arguments[argument] for e in model.elements if e.law == law and e.name in elements]
+    return found[0] if size[False] < STRAIGHT * size[True] and found and model.parameters[found[0]].tolerance > 0.0 else ""
 
 
 def _beyond(curve: Curve, values: Values, place: Place, reach: float) -> bool:
@@ -165,6 +184,8 @@ def shape(law: str, s: Array, v: Array, a: Mapping[str, float]) -> Array:
             return -np.clip(s, -a["gap"], a["gap"])
         case "liftoff":
             return -np.maximum(s - a["static"], 0.0)
+        case "loose_damper":
+            return np.zeros_like(s)
         case "constant_force" | "growing_force":
             return np.ones_like(s)
         case "falling_friction":
@@ -294,11 +315,17 @@ def functions(
             force = lambda p: float(curve(zero[:1], np.array([speed]), p)[0])  # noqa: E731
             return {"force": ("N", force), "yield_deflection": ("m", lambda p: force(p) / max(stiff(p), 1e-300))}
         case "maxwell_bushing":
-            pairs = [(f"{n}_stiffness", f"{n}_relaxation") for n, t in zip(names, terms) if t.candidate.what.law == "maxwell_bushing"]
-            total = lambda p: sum(p[k] for k, _ in pairs)  # noqa: E731
+            springs = [n for n, t in zip(names, terms) if t.candidate.what.law == "maxwell_bushing"]
+            series = [n for n, t in zip(names, terms) if t.candidate.what.law == "loose_damper"]
+
+            def bushing(p: Values) -> tuple[float, float]:
+                """Stiffnesses in series with a damper, and their dampings, summed."""
+                k = sum(p[f"{n}_stiffness"] for n in springs) + sum(p[f"{n}_damping"] / p[f"{n}_relaxation"] for n in series)
+                return k, sum(p[f"{n}_stiffness"] * p[f"{n}_relaxation"] for n in springs) + sum(p[f"{n}_damping"] for n in series)
+
             return {
-                "stiffness": ("N/m", total),
-                "relaxation_time": ("s", lambda p: sum(p[k] * p[t] for k, t in pairs) / max(total(p), 1e-300)),
+                "stiffness": ("N/m", lambda p: bushing(p)[0]),
+                "relaxation_time": ("s", lambda p: bushing(p)[1] / max(bushing(p)[0], 1e-300)),
             }
         case "tyre_liftoff":
             main = max(range(len(terms)), key=lambda i: terms[i].gain)

@@ -115,8 +115,12 @@ class Metric:
 
     def white(self, spectra: NDArray[np.complex128]) -> Array:
         """Real numbers [..., rows] of unit variance if spectra [..., f, sensors] are those of noise."""
-        w = np.einsum("fij,...fj->...fi", self.root, spectra)
-        w[..., 0, :] /= np.sqrt(2.0)  # the mean has one real part only
+        w = np.empty((*spectra.shape[:-2], *spectra.shape[:-3:-1]), dtype=complex)  # [..., sensors, f]
+        for i in range(w.shape[-2]):  # a triangle
+            w[..., i, :] = self.root[:, i, 0] * spectra[..., 0]
+            for j in range(1, i + 1):
+                w[..., i, :] += self.root[:, i, j] * spectra[..., j]
+        w[..., 0] /= np.sqrt(2.0)  # the mean has one real part only
         flat = w.reshape(*w.shape[:-2], -1)
         return np.concatenate([flat.real, flat.imag], axis=-1)
 
@@ -192,7 +196,8 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
         rough = np.abs(np.diff(r, 2, axis=0, prepend=r[:1], append=r[-1:]))
         usual = 1.4826 * np.median(rough, axis=0) + 1e-300
         wild = rough > 14.0 * usual
-        wild[:20] = wild[-20:] = False  # where rates of inputs are not well known
+        edge = max(20, int(0.1 / e.step))
+        wild[:edge] = wild[-edge:] = False  # where start states and rates of inputs are not well known
         wide = np.stack([np.convolve(w, np.ones(9), "same") > 0 for w in wild.T], axis=1)
         alone = wide & (np.sum(wide, axis=1, keepdims=True) == 1) if wide.shape[1] > 1 else wide
         few = np.mean(wild & alone, axis=0) < 0.01
@@ -216,7 +221,7 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
             y, model = e.y[a:b, j][inside], z[a:b, j][inside]
             sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2)
             deep = np.min(np.abs(y)) < 0.25 * np.max(np.abs(model))
-            if b - a < longest and np.mean(sinks) > 0.95 and deep and np.count_nonzero(inside) > 4:
+            if a > int(0.1 / e.step) and b - a < longest and np.mean(sinks) > 0.95 and deep and np.count_nonzero(inside) > 4:
                 found[a:b, j] = True
         if np.mean(found[:, j]) > 0.02:
             found[:, j] = False

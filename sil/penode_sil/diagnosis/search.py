@@ -17,7 +17,7 @@ import numpy as np
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
 from .hypotheses import Basis, Fault
-from .naming import christened
+from .naming import christened, straight
 from .score import Candidate, Regression
 from .study import Study, loss, regression, requieted
 
@@ -43,6 +43,7 @@ TEXTBOOK = {
     "degressive_damper": ("-k*(max(v - knee, 0) + min(v + knee, 0))",),
 }  # fmt: skip
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance")  # a formula after all
+FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
 Group = tuple[str, str]
 
 
@@ -106,6 +107,21 @@ def pursue(r: Regression, pool: Sequence[int], base: Sequence[int] = (), terms: 
     return gain - start, chosen
 
 
+def pair(r: Regression) -> tuple[float, list[int]]:
+    """Worth and choice of the best two causes that are formulas: a curve may look like both together."""
+    plain = [k for k, c in enumerate(r.candidates) if c.kind in FORMULAS and not c.companion and r.alive[k]]
+    worth = {k: r.gain([k])[0] - cost(r.candidates[k]) for k in plain}
+    plain = [k for k in plain if worth[k] > 0.0]
+    best = 0.0, []
+    for i, k in enumerate(plain):
+        for j in plain[:i]:
+            if (r.candidates[k].kind, r.candidates[k].where) != (r.candidates[j].kind, r.candidates[j].where):
+                found = r.gain([j, k])[0] - sum(cost(r.candidates[x]) for x in (j, k)) - 2.0 * NEW
+                if found > max(best[0], worth[j], worth[k]):
+                    best = found, [j, k]
+    return best
+
+
 def explain(study: Study, terms: Sequence[Term], iterations: int = 10, start: Fit | None = None) -> Explanation:
     """Fit some terms by simulation, with everything else from where a fit has left it."""
     recordings = len(study.experiments)
@@ -136,7 +152,11 @@ def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
     taken = [x for x in ranked if x[0] > 0.5 * best - NEW][:few]
     known = [x for x in ranked if x[1][0] == "network_extrapolation" and x[0] > 0.2 * best]  # to happen, of its motion
     taken += [x for x in known if x not in taken]
-    found = [explain(study, terms) for terms in (terms_of(r, chosen) for _, _, chosen in taken) if terms]
+    choices = [chosen for _, _, chosen in taken]
+    worth, both = pair(r)
+    if worth > 0.7 * best:
+        choices.append(both)
+    found = [explain(study, terms) for terms in (terms_of(r, chosen) for chosen in choices) if terms]
     return sorted(found, key=lambda e: -e.score)
 
 
@@ -232,7 +252,8 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
     bare = requieted(study, study.null, coloured=False)
     bare = replace(bare, nothing=min(study.nothing, loss(bare, bare.null)))
     first = singles(bare, regression(bare, bare.null, parameters), 3)
-    if bare.metrics is not study.metrics:
+    white = bool(first) and first[0].score > 0.0 and requieted(bare, first[0].fit) is bare
+    if bare.metrics is not study.metrics and not white:
         slow = replace(study, nothing=bare.nothing)
         first = sorted([*first, *singles(slow, regression(slow, slow.null, parameters), 2)], key=lambda e: -e.score)
     for e in first:
@@ -289,7 +310,9 @@ def settled(study: Study, e: Explanation) -> Explanation:
 def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Explanation:
     """The explanation with the textbook law of a kind in place of several laws, where it does about as well: its parameters
     are known better."""
+    e = unbent(study, e, log)
     laws = {g: [_law(t) for t in e.terms if t.group == g] for g in e.groups if g[0] in TEXTBOOK}
+    laws = {g: own for g, own in laws.items() if own != ["loose_damper"]}  # one as well
     bent = [g for g, own in laws.items() if len(own) > len(TEXTBOOK[g[0]]) or not set(own) <= set(TEXTBOOK[g[0]])]
     if not bent:
         return e
@@ -303,6 +326,19 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
             simple = explain(study, [*(t for t in e.terms if t.group != group), *new], start=e.fit)
             log(f"  plain {group}: {simple.gain:.0f} for {e.gain:.0f}")
             if set(simple.groups) == set(e.groups) and simple.score > e.score - SLACK:
+                e = simple
+    return e
+
+
+def unbent(study: Study, e: Explanation, log) -> Explanation:
+    """The explanation with the parameter of an element in place of a curve beside it that is a straight line."""
+    for group in e.groups:
+        name = straight(study.model, study.places, e.terms, e.built.names, group, {f.target: f.value for f in e.fit.free})
+        if name and all(t.group != ("wrong_parameter", name) for t in e.terms):
+            term = Term(Candidate("wrong_parameter", name, 0, False, name), 0.0)
+            simple = explain(study, [*(t for t in e.terms if t.group != group), term], start=e.fit)
+            log(f"  straight {group}: {simple.gain:.0f} for {e.gain:.0f}")
+            if simple.score > e.score - SLACK:
                 e = simple
     return e
 
