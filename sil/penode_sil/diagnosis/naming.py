@@ -33,9 +33,11 @@ ELASTIC = 0.04  # of the reach: friction that yields farther before it slides is
 FRICTION = ("coulomb_friction", "stribeck_friction", "bouc_wen")
 DAMPERS = ("asymmetric_damper", "degressive_damper", "quadratic_damper")
 SPRINGS = ("asymmetric_spring", "cubic_spring", "bump_stop", "network_extrapolation")
+TYRES = ("tyre_nonlinear", "tyre_liftoff")
 QUIET = 0.25  # of the largest force that an element is wrong by: less where its network was trained, and it is not the element
 UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that makes it asymmetric
 STRAIGHT = 0.02  # of the straight part of a curve: less than that beside it, and it is a straight line
+FLAT = 0.015  # of what a tyre lacks when stretched: bent by less than that when pressed in, it only loses contact
 PEAK = 1.08  # friction at low rates over that at high ones that makes it Stribeck's
 Array = NDArray[np.float64]
 Values = Mapping[object, float]
@@ -46,7 +48,7 @@ def christened(terms: Sequence[Term], names: Sequence[str], fit: Fit, study: Stu
     together from."""
     values = {f.target: f.value for f in fit.free}
     named = list(terms)
-    for kinds, name in ((FRICTION, _friction), (DAMPERS, _damper), (SPRINGS, _spring)):
+    for kinds, name in ((FRICTION, _friction), (DAMPERS, _damper), (SPRINGS, _spring), (TYRES, _tyre)):
         for place in {t.candidate.what.place for t in terms if t.candidate.kind in kinds}:
             own = [i for i, t in enumerate(terms) if t.candidate.kind in kinds and t.candidate.what.place == place]
             curve = Curve([terms[i] for i in own], [names[i] for i in own])
@@ -91,6 +93,17 @@ def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: 
     if found == {"asymmetric_spring"} and _size(even) < UNEVEN * _size(odd):
         return "cubic_spring"
     return "asymmetric_spring" if found == {"cubic_spring"} and _size(even) > UNEVEN * _size(odd) else terms[0].candidate.kind
+
+
+def _tyre(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
+    if any(t.candidate.kind == "tyre_liftoff" for t in terms):
+        return "tyre_liftoff"
+    s = np.linspace(-reach, reach, 401)
+    f = Curve(terms, names)(s, np.zeros_like(s), values)
+    pressed = s < 0.0
+    slope, level = np.polyfit(s[pressed], f[pressed], 1)
+    off = f - slope * s - level
+    return "tyre_liftoff" if _size(off[pressed]) < -FLAT * off[-1] else "tyre_nonlinear"
 
 
 def straight(
@@ -328,8 +341,16 @@ def functions(
                 "relaxation_time": ("s", lambda p: bushing(p)[1] / max(bushing(p)[0], 1e-300)),
             }
         case "tyre_liftoff":
-            main = max(range(len(terms)), key=lambda i: terms[i].gain)
-            return {"preload": ("N", lambda p: c0(p) * p[f"{names[main]}_static"])}
+            main = max(range(len(terms)), key=lambda i: terms[i].gain * ("static" in terms[i].candidate.what.shapes))
+            if "static" in terms[main].candidate.what.shapes:
+                return {"preload": ("N", lambda p: c0(p) * p[f"{names[main]}_static"])}
+
+            def preload(p: Values) -> float:
+                """Where a bent curve has taken a twentieth of what it takes at last."""
+                f = np.abs(curve(s, zero, p))
+                return c0(p) * float(s[np.flatnonzero((s > 0.0) & (f > 0.05 * f[-1]))[0]])
+
+            return {"preload": ("N", preload)}
         case "tyre_damping":
 
             def damping(p: Values) -> float:
