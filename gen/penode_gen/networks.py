@@ -119,7 +119,7 @@ class Network:
         h = self._inputs(x)
         with np.errstate(over="ignore", invalid="ignore"):
             for layer in self.layers:
-                h = _value(layer, h)
+                h = layer_value(layer, h)
         return h
 
     def jacobian(self, x: ArrayLike) -> NDArray[np.float64]:
@@ -131,8 +131,8 @@ class Network:
                 if isinstance(layer, Affine):
                     j = j * layer.factor[:, np.newaxis]
                 else:
-                    j = _slope(layer, h)[..., np.newaxis] * (layer.weights @ j)
-                h = _value(layer, h)
+                    j = layer_slope(layer, h)[..., np.newaxis] * (layer.weights @ j)
+                h = layer_value(layer, h)
         return j
 
     def _inputs(self, x: ArrayLike) -> NDArray[np.float64]:
@@ -152,7 +152,7 @@ def read_network(path: Path) -> Network:
     return readers[path.suffix.lower()](path)
 
 
-def _value(layer: Layer, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def layer_value(layer: Layer, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Output [..., n_out] of one layer at x [..., n_in]."""
     if isinstance(layer, Affine):
         return (x - layer.shift) * layer.factor if layer.form == "centre" else x * layer.factor + layer.shift
@@ -171,7 +171,7 @@ def _value(layer: Layer, x: NDArray[np.float64]) -> NDArray[np.float64]:
     return z
 
 
-def _slope(layer: Dense, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def layer_slope(layer: Dense, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Slope [..., n_out] of the activation at the layer's input x [..., n_in]."""
     z = x @ layer.weights.T + layer.bias
     match layer.activation:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -19,7 +20,7 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured
-from . import extension, naming, noise, plausible, residual, search
+from . import absorb, extension, nameless, naming, noise, plausible, residual, search
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
 from .search import Explanation
@@ -93,6 +94,15 @@ def diagnose(
     named = None  # what has no name does not go into a model
     if not any(c.kind == OUTSIDE for c in causes):
         named = best if best is not None and causes else search.explain(study, [])
+    unnamed = nameless.fitted(study, best) if verdict == "unexplained" and not doubt else None
+    if unnamed is not None and unused:
+        tell(0.83, "fitting what has no name")
+        worse = extension.measure(study, extension.extend_file(study, unnamed, causes)[1], unused)[0].values()
+        unnamed = None if any(g.after_rmse > 1.01 * g.before_rmse for g in worse) else unnamed
+    named = named or unnamed
+    if unnamed is not None:
+        explained = nameless.share(study, unnamed.fit)
+        notes.append(f"a small network beside {nameless.beside(study, unnamed)} takes a part of it, and has no name")
     text, extended = extension.extend_file(study, named, causes)
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
@@ -104,16 +114,37 @@ def diagnose(
     if holdout:
         tell(0.85, "measuring the gain")
         lost = {c.where for c in causes if c.kind == "sensor_dropout"}
-        gain, notes, held = extension.measure(study, extended, unused, lost)
+        gain, more, held = extension.measure(study, extended, unused, lost)
+        notes += more
+    absorbed: dict[str, object] = {}
+    if learnt := absorb.taught(study, named) if named is not None and named.terms else []:
+        absorbed, more = absorbing(study, named, learnt, unused, output)
+        notes += more
     tell(0.9, "showing what is wrong")
-    whole = best is not None and named is best
-    shown = residual.show(study, best.fit if whole else None, extended if whole else None, held)
+    whole = named is not None and named in (best, unnamed)
+    shown = residual.show(study, named.fit if whole else None, extended if whole else None, held)
     data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(
         verdict, causes, gain, numbers, explained, evidence, alike, tuple([doubt] * bool(doubt) + notes), data,
-        shown.numbers(), time.perf_counter() - started, shown,
+        shown.numbers(), absorbed, time.perf_counter() - started, shown,
     )  # fmt: skip
+
+
+def absorbing(
+    study: Study, e: Explanation, learnt: list[absorb.Taught], unused: Sequence[Experiment], output: Path | None
+) -> tuple[dict[str, object], list[str]]:
+    """The same effect as a parameter set: what goes into diagnosis.json, and a note."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = output or Path(folder)
+        beside = Path(os.path.relpath(study.model.path.resolve(), place.resolve()))
+        model = penode_gen.load(absorb.write(study, e, learnt, beside, place))
+        gain = extension.measure(study, model, unused, (), absorb.SET)[0] if unused else {}
+    names = ", ".join(t.element for t in learnt)
+    said = {"file": absorb.FILE, "set": absorb.SET, "networks": {t.port: {"missing": t.missing} for t in learnt}, "gain": gain}
+    after = ", ".join(f"{k} {g.after_rmse:.3g} {g.unit}" for k, g in gain.items())
+    note = f"{names} can learn it: {absorb.FILE} has a set for the code that runs already"
+    return said, [note + f"; hold-out after: {after}" * bool(after)]
 
 
 def advancing(log: Callable[[str], None], tell: Callable[[float, str], None]) -> Callable[[str], None]:

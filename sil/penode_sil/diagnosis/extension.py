@@ -56,6 +56,8 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     """Text of model_extended.toml, and the model that it describes."""
     model = study.model
     learnt = ", ".join(f"{c.kind} at {c.where or '?'}" for c in causes)
+    if e is not None and not e.terms and e.built.model.elements != model.elements:
+        learnt = "something that is on no list; the element nameless takes what it can of it"
     lines = [
         f"# What the recordings taught about {model.path.name}: {learnt or 'nothing'}.",
         "", "[model]", extends(model.path.resolve()), f"name = {_toml(model.name + '_extended')}",
@@ -201,22 +203,23 @@ def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
 
 
 def measure(
-    study: Study, extended: Model, holdout: Sequence[Experiment], lost: Collection[str] = ()
+    study: Study, extended: Model, holdout: Sequence[Experiment], lost: Collection[str] = (), set_name: str = ""
 ) -> tuple[dict[str, Gain], list[str], list[Channel]]:
     """Errors before and after on held-out recordings, with the generated C; how much of them lies outside of what was
     seen in training, where a right name says nothing about size; and all of it sample by sample. Sensors `lost` drop out:
-    bursts of theirs do not count."""
+    bursts of theirs do not count. `set_name`: parameter set of the extended model, if it is another one."""
     model = study.model
     shown: list[Channel] = []
     floors = noise_floor(study, 0)
     limits = [1.02 * x for k in range(len(study.places)) for x in size([m.motions[k] for m in study.seen])]
     outside, notes = [], []
     for e in holdout:
-        starts = [started(m, e, study) for m in (model, extended)]
-        before, after = (deployed(m, e, x, study.set_name) for m, x in zip((model, extended), starts))
+        both = (study, replace(study, set_name=set_name or study.set_name))
+        starts = [started(m, e, s) for m, s in zip((model, extended), both)]
+        before, after = (deployed(m, e, x, s.set_name) for m, x, s in zip((model, extended), starts, both))
         dropped = bursts([e], [after])[0] & [s.name in lost for s in model.sensors]
         e = replace(e, good=e.good & ~dropped)
-        paths = followed(extended, e, starts[1], study)
+        paths = followed(extended, e, starts[1], both[1])
         beyond = np.any(np.abs(paths) > np.array(limits), axis=1)
         outside.append(beyond)
         if beyond.any():

@@ -85,6 +85,7 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     data: tuple[Recorded, ...] = ()
     residual: dict[str, Any] = field(default_factory=dict)
+    absorbed: dict[str, Any] = field(default_factory=dict)  # the same effect as a set of the running code, see absorb.py
     seconds: float = field(default=0.0, compare=False)
     shown: Any = field(default=None, compare=False, repr=False)
 

@@ -40,6 +40,7 @@ class Seen:
     motions: tuple[Motion, ...]
     sensors: Array
     response: Complex
+    forces: dict[int, Array]  # that explain the residual, at places with elements [n]
     states: Complex | None  # of the states [f, x, places], and of the sensors to a start state [f, sensors, x]:
     free: Complex | None  # None if start states are free anyway
 
@@ -95,7 +96,10 @@ def smooth(
     motions = tuple(Motion(paths[:, 2 * k], paths[:, 2 * k + 1], t) for k in range(len(found)))
     f = e.frequencies[:band]
     states, free = (None, None) if moving or not len(linear.a) else (linear.states(f), linear.free(f, 1.0 / e.step)[:, :n_z])
-    return Seen(motions, simulated + change[:, :n_z], h[:, :n_z, n_u:], states, free)
+    acts = np.zeros((len(e.frequencies), len(acting)), dtype=complex)
+    acts[:band] = w[:, : len(acting)] * np.sqrt(n)
+    forces = dict(zip(acting, fft.irfft(acts, n, axis=0).T))
+    return Seen(motions, simulated + change[:, :n_z], h[:, :n_z, n_u:], forces, states, free)
 
 
 @dataclass(frozen=True, eq=False)
