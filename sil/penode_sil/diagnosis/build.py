@@ -20,6 +20,7 @@ from .plant import Place, extend
 from .score import Candidate
 
 Array = NDArray[np.float64]
+SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3}  # of start states of laws
 BENT = 0.01  # [m] deflection of a hidden mass's spring where its bend would show
 
 
@@ -64,6 +65,7 @@ def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tup
         return Element(name, (body, GROUND), "absorber", arguments), {arguments[k]: v for k, v in values.items()}, free
     gain, unit = what.gain
     shapes = {f"{name}_{key}": value for key, value in what.shapes.items()}
+    least = {f"{name}_{key}": value for key, value in what.least.items()}
     known = {f"{name}_{key}": value for key, value in what.fixed.items()}
     parameters = {f"{name}_{gain}": (term.gain, unit)} | shapes | known
     size = max(abs(term.gain), 1e-12)
@@ -71,7 +73,7 @@ def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tup
     free = [Free(f"{name}_{gain}", term.gain, size, low=low, high=high)]
     for key, (value, _) in shapes.items():
         below, above = (3.0, 10.0) if key.endswith("presliding") else (30.0, 3.0) if key.endswith("transition") else (30.0, 30.0)
-        free.append(Free(key, value, 1.0, log=True, low=value / below, high=value * above))
+        free.append(Free(key, value, 1.0, log=True, low=max(value / below, least.get(key, 0.0)), high=value * above))
     if what.law in LAWS:
         return Element(name, place.ends, what.law, {key: f"{name}_{key}" for key in LAWS[what.law].arguments}), parameters, free
     text = re.sub(r"\b(k|knee|gap|width)\b", lambda m: f"{name}_{m[1]}", what.law)
@@ -107,7 +109,7 @@ def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recor
     if not recordings and any(isinstance(t.candidate.what, Basis) and t.candidate.what.settled for t in terms):
         free += [Free(("start", e, i), x, 1e-3) for e in range(settled) for i, x in enumerate(model.start[: len(model.bodies)])]
     for i, state in enumerate(whole.extra_states[len(model.extra_states) :], len(model.states)):
-        sigma = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3}[state.unit]
+        sigma = SPREAD[state.unit]
         if state.name.endswith(("_faded", "_warm")):  # a damper may be warm already
             free += [Free(("start", e, i), 0.0, 0.1, sigma=0.3, low=0.0, high=1.0) for e in range(recordings)]
         elif not state.name.endswith("_grown"):

@@ -236,7 +236,8 @@ def judge(
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     causes = [cause(study, explanations, group) for group in best.groups]
     causes = [c for c in causes if worth(study, c)]
-    several = sum(c.kind == "wrong_parameter" for c in causes) > 1  # then it is another vehicle, or another effect
+    kinds = [c.kind for c in causes]  # several wrong parameters are another vehicle, several delays another clock
+    several = max(kinds.count("wrong_parameter"), kinds.count("sensor_delay")) > 1
     if several or any(c.kind == "hidden_resonance" and c.parameters["damping_ratio"].value > DAMPED for c in causes):
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     faulty = {(c.kind, c.where) for c in causes}

@@ -20,7 +20,7 @@ from penode_gen.model import Model, Signal
 
 from ..batch import Batch
 from ..targets import Sil
-from .build import Term
+from .build import SPREAD, Term
 from .fit import Free, Problem
 from .hypotheses import Basis, Fault, size
 from .noise import Experiment, bursts, metric
@@ -152,12 +152,16 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
 
 
 def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
-    """Steps a sample, so that none jumps over the presliding of a friction."""
-    what = term.candidate.what
-    if not isinstance(what, Basis) or "presliding" not in what.shapes:
+    """Steps a sample, so that none jumps over the presliding of a friction or the relaxation of a stiff spring."""
+    what, step = term.candidate.what, study.model.sample_time
+    if not isinstance(what, Basis):
+        return 1
+    if what.law == "loose_damper":
+        return int(np.ceil(step / e.fit.value(f"{name}_relaxation")))
+    if "presliding" not in what.shapes:
         return 1
     speed = size([s.motions[what.place] for s in study.seen])[1]
-    return min(int(np.ceil(1.5 * speed * study.model.sample_time / e.fit.value(f"{name}_presliding"))), 100)
+    return min(int(np.ceil(1.5 * speed * step / e.fit.value(f"{name}_presliding"))), 100)
 
 
 def _bent(
@@ -188,7 +192,8 @@ def started(model: Model, e: Experiment, study: Study) -> Array:
     """The start state with which a model fits a recording best, all else given."""
     metrics = [metric(e, study.levels[0][:1].repeat(e.band, 0), np.zeros((e.band, len(model.sensors), len(model.inputs))))]
     problem = Problem(model, [e], metrics, study.set_name, study.linear.fastest)
-    free = tuple(Free(("start", 0, i), x, 1e-3, sigma=1.0) for i, x in enumerate(model.start))
+    spread = [1.0] * (2 * len(model.bodies)) + [SPREAD.get(s.unit, 1.0) for s in model.extra_states]
+    free = tuple(Free(("start", 0, i), x, 1e-3, sigma=s) for i, (x, s) in enumerate(zip(model.start, spread)))
     fit = problem.solve(free, 3)
     return np.array([f.value for f in fit.free])
 

@@ -43,6 +43,7 @@ class Basis:
     companion: bool = False  # may help another of its kind, but is no cause alone
     settled: bool = False  # acted already long before the start
     fixed: dict[str, tuple[float, str]] = field(default_factory=dict)  # shapes that are known
+    least: dict[str, float] = field(default_factory=dict)  # what shapes may be at least: less cannot be told
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,13 +233,14 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
             "maxwell_bushing", "hardening_bushing", ("cubic", "N/m^3"), {"relaxation": (tau, "s")}, 0, lambda s, v, t: (s - lag(s, tau, step)) ** 3, True
         )
     # a damper behind a spring, or a play, in series
-    stiff = max(0.001, step)
-    ways = [(0.0, tau) for tau in (0.0007, 0.0015, 0.004, 0.012) if tau > 0.3 * step] + [(w * reach, stiff) for w in GAPS]
+    ways = [(0.0, tau) for tau in (0.0007, 0.0015, 0.004, 0.012) if tau > 0.3 * step]
+    if not prescribed:
+        ways += [(w * reach, max(0.001, step)) for w in GAPS]
     lost = [losses(m.s, step, *zip(*ways)) for m in motions]
     for row, (gap, tau) in enumerate(ways):
         kind, known = ("backlash", {}) if gap else ("maxwell_bushing", {"gap": (gap, "m")})
         shapes = {"relaxation": (tau, "s")} | ({} if known else {"gap": (gap, "m")})
-        yield Basis(kind, place, "loose_damper", d, shapes, 1, tuple(each_lost[row] for each_lost in lost), fixed=known)
+        yield Basis(kind, place, "loose_damper", d, shapes, 1, tuple(each_lost[row] for each_lost in lost), fixed=known, least={"relaxation": 0.2 * step})
     # dampers: odd and slower than linear, odd and faster, even, fading
     for w in (0.06, 0.15, 0.4, 1.0, 2.5):
         a = w * speed

@@ -24,6 +24,7 @@ from ..errors import UserError
 from .fit import Fit, Problem
 from .noise import Experiment
 from .plant import Place
+from .score import likely
 from .study import Study, watch
 
 Array = NDArray[np.float64]
@@ -274,34 +275,6 @@ def rig(model: Model, places: Sequence[Place]) -> Model:
     )  # fmt: skip
 
 
-def smoother(study: Study, k: int, residual: Array) -> NDArray[np.complex128]:
-    """Gain [f, forces, n_z] from spectra of a residual to those of forces at the places with elements, then of errors
-    of the inputs: their most likely values, with spectra that a residual [n, n_z] itself suggests, smooth over half a
-    hertz."""
-    e, model = study.experiments[k], study.model
-    n_z, n_u = len(model.sensors), len(model.inputs)
-    columns = [n_u + p for p, place in enumerate(study.places) if place.elements] + list(range(n_u))
-    f = e.frequencies[: e.band]
-    g = study.linear.transfer(f)[:, :n_z, columns]
-    r = rfft(np.where(e.good, residual, 0.0), axis=0)[: e.band] / np.sqrt(len(e.time))
-    levels = study.levels[k]
-    prior = np.tile(1.0 / np.median(np.sum(np.abs(g) ** 2 / levels[:, :, None], axis=1), axis=0), (e.band, 1))
-    prior[:, -n_u:] = np.maximum(e.unsure[: e.band], 1e-15) ** 2
-    kernel = np.hanning(2 * max(int(0.5 / f[1]), 3) + 1)
-    weight = np.convolve(np.ones(e.band), kernel, "same")
-    for again in range(9):
-        spread = g * prior[:, None, :]
-        gain = np.conj(np.swapaxes(spread, 1, 2)) @ np.linalg.inv(
-            spread @ np.conj(np.swapaxes(g, 1, 2)) + levels[:, :, None] * np.eye(n_z)
-        )
-        if again < 8:
-            left = prior - np.real(np.einsum("fqi,fiq->fq", gain, spread))
-            power = np.abs((gain @ r[:, :, None])[:, :, 0]) ** 2 + np.maximum(left, 0.0)
-            for q in range(len(columns) - n_u):
-                prior[:, q] = np.maximum(np.convolve(power[:, q], kernel, "same") / weight, 1e-30)
-    return gain
-
-
 def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surface]:
     """Restoring forces of all places with elements, over all recordings; none if their laws need more than motion.
 
@@ -313,9 +286,13 @@ def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surf
     n_z, n_u = len(study.model.sensors), len(study.model.inputs)
     motions, beside, rigs = [], [], []
     for k, (e, simulated) in enumerate(zip(study.experiments, watch(study, fit or study.null))):
-        gain = smoother(study, k, e.y - study.null.simulated[k])
-        w = np.einsum("fqz,fz->fq", gain, rfft(np.where(e.good, e.y - simulated[:, :n_z], 0.0), axis=0)[: e.band])
-        h = study.linear.transfer(e.frequencies[: e.band])[:, n_z:, [n_u + p for p in acting] + list(range(n_u))]
+        nominal, rest = (
+            rfft(np.where(e.good, e.y - z[:, :n_z], 0.0), axis=0)[: e.band] for z in (study.null.simulated[k], simulated)
+        )
+        h = study.linear.transfer(e.frequencies[: e.band])[:, :, [n_u + p for p in acting] + list(range(n_u))]
+        gain = likely(e, study.levels[k], h[:, :n_z], len(acting), nominal / np.sqrt(len(e.time)))
+        w = np.einsum("fqz,fz->fq", gain, rest)
+        h = h[:, n_z:]
         whole = np.zeros((len(e.frequencies), h.shape[1] + len(acting)), dtype=complex)
         whole[: e.band] = np.concatenate([np.einsum("fyq,fq->fy", h, w), w[:, : len(acting)]], axis=1)
         change = irfft(whole, len(e.time), axis=0)

@@ -71,22 +71,7 @@ def smooth(
     columns = [n_u + k for k in acting] + list(range(n_u))
     g = h[:, :n_z, columns]
     r = m.spectrum(np.where(e.good, e.y - simulated, 0.0)) / np.sqrt(n)
-    sensor = levels[:, :, None] * np.eye(n_z)
-    prior = np.empty((band, len(columns)))
-    strength = np.sum(np.abs(g) ** 2 / levels[:, :, None], axis=1)
-    prior[:, : len(acting)] = 1.0 / np.median(strength[:, : len(acting)], axis=0)
-    prior[:, len(acting) :] = np.maximum(e.unsure[:band], 1e-15) ** 2
-    width = max(int(0.5 / (e.frequencies[1])), 3)  # spectra of causes are smooth over half a hertz
-    kernel = np.hanning(2 * width + 1)
-    weight = np.convolve(np.ones(band), kernel, "same")
-    for _ in range(8):
-        gp = g * prior[:, None, :]
-        gain = np.conj(np.swapaxes(gp, 1, 2)) @ np.linalg.inv(gp @ np.conj(np.swapaxes(g, 1, 2)) + sensor)
-        w = (gain @ r[:, :, None])[:, :, 0]
-        left = prior - np.real(np.einsum("fqi,fiq->fq", gain, gp))
-        power = np.abs(w) ** 2 + np.maximum(left, 0.0)
-        for q in range(len(acting)):
-            prior[:, q] = np.maximum(np.convolve(power[:, q], kernel, "same") / weight, 1e-30)
+    w = np.einsum("fqz,fz->fq", likely(e, levels, g, len(acting), r), r)
     moved = np.einsum("fyq,fq->fy", h[:, :, columns], w) * np.sqrt(n)
     whole = np.zeros((len(e.frequencies), moved.shape[1]), dtype=complex)
     whole[:band] = moved
@@ -100,6 +85,29 @@ def smooth(
     acts[:band] = w[:, : len(acting)] * np.sqrt(n)
     forces = dict(zip(acting, fft.irfft(acts, n, axis=0).T))
     return Seen(motions, simulated + change[:, :n_z], h[:, :n_z, n_u:], forces, states, free)
+
+
+def likely(e: Experiment, levels: Array, g: Complex, acting: int, r: Complex) -> Complex:
+    """Gain [f, q, n_z] from spectra of a residual to those of what reaches the sensors through g [f, n_z, q]: `acting` forces
+    first, then errors of the inputs. These are their most likely values; the spectra of the forces are those that spectra r [f, n_z] of
+    a residual suggest, smooth over half a hertz."""
+    band = len(g)
+    sensor = levels[:, :, None] * np.eye(g.shape[1])
+    prior = np.empty((band, g.shape[2]))
+    strength = np.sum(np.abs(g) ** 2 / levels[:, :, None], axis=1)
+    prior[:, :acting] = 1.0 / np.median(strength[:, :acting], axis=0)
+    prior[:, acting:] = np.maximum(e.unsure[:band], 1e-15) ** 2
+    kernel = np.hanning(2 * max(int(0.5 / e.frequencies[1]), 3) + 1)
+    weight = np.convolve(np.ones(band), kernel, "same")
+    for again in range(8):
+        gp = g * prior[:, None, :]
+        gain = np.conj(np.swapaxes(gp, 1, 2)) @ np.linalg.inv(gp @ np.conj(np.swapaxes(g, 1, 2)) + sensor)
+        if again < 7:
+            left = prior - np.real(np.einsum("fqi,fiq->fq", gain, gp))
+            power = np.abs((gain @ r[:, :, None])[:, :, 0]) ** 2 + np.maximum(left, 0.0)
+            for q in range(acting):
+                prior[:, q] = np.maximum(np.convolve(power[:, q], kernel, "same") / weight, 1e-30)
+    return gain
 
 
 @dataclass(frozen=True, eq=False)
