@@ -29,8 +29,10 @@ LAWS: dict[str, Law] = {
     "linear_spring": Law("stiffness*s", {"stiffness": "N/m"}),
     "linear_damper": Law("damping*v", {"damping": "N*s/m"}),
     "constant_force": Law("force", {"force": "N"}),
-    # a load that is put on within some time, from none
-    "growing_force": Law("force*grown", {"force": "N", "time": "s"}, {"grown": LawState("1", "(1 - grown)/time")}),
+    # a load that is put on: half of it at `begin`, most of it within `time` on either side
+    "growing_force": Law(
+        "force*(1 + tanh((elapsed - begin)/time))/2", {"force": "N", "begin": "s", "time": "s"}, {"elapsed": LawState("s", "1")}
+    ),
     "cubic_spring": Law("cubic*s^3", {"cubic": "N/m^3"}),
     # quadratic in the distance to the point of zero stiffness, as in the published case study
     "progressive_spring": Law("(root*(s + lead))^2 - (root*lead)^2", {"root": "N^0.5/m", "lead": "m"}),

@@ -85,7 +85,10 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
         {"force": "9 N", "presliding": "10 mm", "stribeck": "100 mm/s"},
         lambda s, v, own: (9.0 * own[0] / (1.0 + (v / 0.1) ** 2), [(v - abs(v) * own[0]) / 0.01]),
     ),
-    "growing_force": ({"force": "4 N", "time": "300 ms"}, lambda s, v, own: (4.0 * own[0], [(1.0 - own[0]) / 0.3])),
+    "growing_force": (
+        {"force": "4 N", "begin": "500 ms", "time": "300 ms"},
+        lambda s, v, own: (4.0 / (1.0 + np.exp(-2.0 * (own[0] - 0.5) / 0.3)), [1.0]),
+    ),
     "hardening_bushing": (
         {"cubic": "2e4 N/m^3", "relaxation": "60 ms"}, lambda s, v, own: (2e4 * own[0] ** 3, [v - own[0] / 0.06])
     ),

@@ -20,7 +20,7 @@ from .plant import Place, extend
 from .score import Candidate
 
 Array = NDArray[np.float64]
-SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3}  # of start states of laws
+SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3, "s": 1e-3}  # of start states of laws
 BENT = 0.01  # [m] deflection of a hidden mass's spring where its bend would show
 
 
@@ -112,7 +112,7 @@ def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recor
         sigma = SPREAD[state.unit]
         if state.name.endswith(("_faded", "_warm")):  # a damper may be warm already
             free += [Free(("start", e, i), 0.0, 0.1, sigma=0.3, low=0.0, high=1.0) for e in range(recordings)]
-        elif not state.name.endswith("_grown"):
+        elif not state.name.endswith("_elapsed"):
             free += [Free(("start", e, i), 0.0, 0.1 * sigma, sigma=sigma) for e in range(recordings)]
     return Extended(whole, tuple(free), tuple(faults), frozenset(loosened), tuple(names))
 

@@ -321,9 +321,11 @@ def _constant(place: int, motions: Sequence[Motion]) -> Iterator[Basis]:
     ones = tuple(np.ones_like(m.t) for m in motions)
     for settled in (False, True):
         yield Basis("constant_force", place, "constant_force", ("force", "N"), {}, 0, ones, False, settled)
-    for tau in (0.1, 0.3, 1.0):
-        grown = tuple(1.0 - np.exp(-m.t / tau) for m in motions)
-        yield Basis("constant_force", place, "growing_force", ("force", "N"), {"time": (tau, "s")}, 0, grown)
+    for begin in (0.1, 0.2, 0.4, 0.6, 0.9):
+        for share in (0.3, 0.6):
+            grown = tuple(0.5 * (1.0 + np.tanh((m.t - begin) / (share * begin))) for m in motions)
+            shapes = {"begin": (begin, "s"), "time": (share * begin, "s")}
+            yield Basis("constant_force", place, "growing_force", ("force", "N"), shapes, 0, grown)
 
 
 def sensor_faults(sensor: int, signals: Sequence[Array], times: Sequence[Array], step: float) -> Iterator[Fault]:

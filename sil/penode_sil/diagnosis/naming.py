@@ -368,7 +368,7 @@ def functions(
             return {"force_at_peak": ("N", lambda p: float(np.max(np.abs(curve(s, zero, p))))), "edge": ("m", lambda p: edge)}
         case "constant_force":
             sense = 1.0 if any(end in {i.name for i in model.inputs} for end in place.ends) else -1.0
-            return {"force": ("N", lambda p: sense * p[f"{names[0]}_force"])}
+            return {"force": ("N", lambda p: sense * sum(p[f"{n}_force"] for n in names))}  # in the end
     raise AssertionError(f"no parameters are known for {kind}")
 
 

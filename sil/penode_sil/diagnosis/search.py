@@ -68,7 +68,13 @@ class Explanation:
     @property
     def score(self) -> float:
         freedom = sum(cost(t.candidate) for t in self.terms)
-        return self.gain - freedom - NEW * len(self.groups) - FORM * max(self.gain, 0.0) * freedom / COST
+        form = FORM * freedom / COST + (0.0 if exact(self.groups) else LEAST * (len(self.groups) - 1))
+        return self.gain - freedom - NEW * len(self.groups) - form * max(self.gain, 0.0)
+
+
+def exact(groups: Sequence[Group]) -> bool:
+    """Are all of them formulas, that leave nothing of themselves to others?"""
+    return all(kind in EXACT for kind, _ in groups)
 
 
 def cost(c: Candidate) -> float:
@@ -226,7 +232,7 @@ def further(study: Study, e: Explanation, r: Regression) -> list[list[int]]:
     """Choices of one more kind by what no curve of the causes so far can do, from best to worst."""
     taken = family(study, r, e.groups)
     rest, kin = r.beside(taken), set(taken)
-    least = 0.0 if all(kind in EXACT for kind, _ in e.groups) else LEAST * e.gain
+    least = 0.0 if exact(e.groups) else LEAST * e.gain
     found = []
     for pool in pools(r).values():
         if kin.isdisjoint(pool):
