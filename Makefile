@@ -34,9 +34,11 @@ prove: setup build/setup/proof ## The proofs: all values, all orders, all statem
 
 figures: setup ## Measure what our steps cost; rewrite the tables of README.md and test/bench/
 	$(Q)$(PYTHON) test/bench/bench.py --ours
+	$(Q)$(PYTHON) test/prove/promises.py
 
 bench: setup ## The same with the steps of other tools (ten minutes, downloads them)
 	$(Q)$(PYTHON) test/bench/bench.py
+	$(Q)$(PYTHON) test/prove/promises.py
 
 campaign: campaign-diagnosis campaign-proofs ## Both campaigns, hours
 

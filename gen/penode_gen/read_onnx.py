@@ -36,7 +36,7 @@ _REALS = (TensorProto.FLOAT, TensorProto.DOUBLE)
 
 _ANY_BATCH = 1_000_003  # stands for a batch of unknown size: a prime that no reshape of a network mentions
 _SOFTPLUS_EXACT = 15.0  # from here on x and softplus(x) are the same float: log(1 + e^-15) is below half an ulp of 15
-_WIDEST_LONE_ACTIVATION = 4096  # an activation without a dense layer needs an identity matrix
+_WIDEST = 4096  # input, or activation without a dense layer, which needs an identity matrix: beyond it a size is damage
 
 _SIMPLIFY = "simplify or rewrite the graph before the export"
 
@@ -352,6 +352,8 @@ class _Reader:
         width = dims[-1] or next((w for w in map(self.width_wanted, steps) if w), 0)
         if not width:
             raise self.error(f"input '{given.name}' has an unknown length", "export with an input [batch, n], n fixed")
+        if width > _WIDEST:
+            raise self.error(f"input '{given.name}' has {width} values", f"export with at most {_WIDEST}")
         batch = 1 if len(dims) == 1 else dims[0] or _ANY_BATCH
         return (width,) if len(dims) == 1 else (batch, width), batch
 
@@ -555,7 +557,7 @@ class _Chain:
         last = self.layers[-1] if self.layers else None
         if isinstance(last, Dense) and last.activation == "identity":
             self.layers[-1] = replace(last, activation=activation)
-        elif self.width > _WIDEST_LONE_ACTIVATION:
+        elif self.width > _WIDEST:
             raise ValueError(f"an activation of {self.width} values without a dense layer before it")
         else:
             self.layers.append(Dense(np.eye(self.width), np.zeros(self.width), activation))

@@ -89,6 +89,10 @@ def test_input_of_other_rank(tmp_path: Path, shape: list[Any]) -> None:
     refused(tmp_path, model([node("Relu", "x", "y")], {}, shape=shape), f"{len(shape)} axes", "[batch, n]")
 
 
+def test_input_of_damaged_size(tmp_path: Path) -> None:
+    refused(tmp_path, model([node("Neg", "x", "y")], {}, shape=["batch", 2**40]), "input 'x' has 1099511627776 values", "at most 4096")
+
+
 @pytest.mark.parametrize("name", ["FLOAT16", "BFLOAT16", "INT32", "INT64"])
 def test_input_of_other_type(tmp_path: Path, name: str) -> None:
     made = model([node("Relu", "x", "y")], {}, dtype=getattr(TensorProto, name))

@@ -77,6 +77,17 @@ static pen_status_t step_both(void)
     return status;
 }
 
+/* A sample from a state outside of the envelope of both networks. */
+static void step_away(int32_t size)
+{
+    const MODEL(x_t) away = { (pen_real_t)size, (pen_real_t)0, (pen_real_t)(size * 4), (pen_real_t)0 };
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(set_state)(&model, &away));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(set_state)(&twin, &away));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, MODEL(sensors)(&model, &z));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, step_both());
+}
+
 /* A saw of 15 teeth that 16 neurons cut: about 240 kinks, more than any room here. */
 static void make_saw(size_t at)
 {
@@ -171,11 +182,7 @@ void test_outside_of_the_envelope(void)
 {
     for (int32_t side = -1; side <= 1; side += 2) {
         for (int32_t size = 1; size <= 8; size *= 2) {
-            const MODEL(x_t) away = { (pen_real_t)(side * size), (pen_real_t)0, (pen_real_t)(side * size * 4), (pen_real_t)0 };
-            TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(set_state)(&model, &away));
-            TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(set_state)(&twin, &away));
-            TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, MODEL(sensors)(&model, &z));
-            TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, step_both());
+            step_away(side * size);
         }
     }
 }
@@ -279,6 +286,8 @@ void test_more_pieces_than_room(void)
         TEST_ASSERT_EQUAL_HEX32(REFUSED, MODEL(tune_select)(&twin, &set));
         TEST_ASSERT_EQUAL_HEX32((REFUSED == PEN_OK) ? PEN_ADOPTED : PEN_OK, step_both() & ~PEN_OUTSIDE);
         TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(sensors)(&model, &z) & ~PEN_OUTSIDE);
+        step_away(1);
+        step_away(-1);
     }
     TEST_ASSERT_EQUAL_HEX32(REFUSED, MODEL(init)(&model, &set, NULL));
 }

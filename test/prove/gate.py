@@ -10,6 +10,8 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
+import promises
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BUILD = ROOT / "build" / "prove"
@@ -47,10 +49,11 @@ def faulty(text: str, fault: tuple[str, int, str]) -> str:
 
 
 def keep(gate: str, figures: dict[str, object]) -> None:
-    """Put the figures of a gate into figures.json, one key for each gate; others may do so at the same time."""
+    """Put the figures of a gate into figures.json, one key for each, and into PROMISES.md; others may do so at the same time."""
     with open(HERE / "gate.py") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         known = json.loads(FIGURES.read_text()) if FIGURES.exists() else {}
         text = json.dumps(dict(sorted((known | {gate: figures}).items())), indent=1) + "\n"
         if not FIGURES.exists() or FIGURES.read_text() != text:
             FIGURES.write_text(text)
+        promises.PAGE.write_text(promises.page())

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Gate: small faults put into src/ (universalmutator) are found by the unit tests; those that are not stand in a list.
+"""Gate: small faults put into src/ (universalmutator, float build) are found by the unit tests; the rest stand in a list.
 
-mutation.py            every fault: hours
-mutation.py --share N  every N-th fault, and all of the list: minutes
-mutation.py --found F  remember in the file F what was found, and do not try that again: to work on the list
+mutation.py             every fault
+mutation.py --share N   every N-th fault, and all of the list
+mutation.py pen_set.c   those of one file
 
-mutation_survivors.txt names each fault that lives, with the reason. One that changes nothing a caller could see counts as
-none ("equivalent: ..."); of the others at least 95 % have to be found. A fault in the list that is found is a failure, too.
+mutation.toml says of each fault that lives why it may: one that changes nothing a caller could see ("equivalent: ...")
+counts as none; of the others at least 95 % have to be found. A fault in the list that is found is a failure, too.
 """
 
 from __future__ import annotations
@@ -15,13 +15,15 @@ from __future__ import annotations
 import argparse
 import difflib
 import hashlib
-import json
+import math
 import re
 import resource
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,167 +32,195 @@ import eva
 import gate
 
 WORK = gate.BUILD / "mutation"
-LIST = gate.HERE / "mutation_survivors.txt"
+LIST = gate.HERE / "mutation.toml"
 MUTATE = gate.ROOT / "build" / "proof" / "bin" / "mutate"
 LEAST = 0.95
-SECONDS = 20  # of processor time for a test; a good one takes less than one
+SOURCES = sorted((gate.ROOT / "src").glob("*.c"))
+FLAGS = ["-std=c99", "-ffp-contract=off", "-fPIC", "-Werror=implicit-function-declaration", "-Iinc", "-Iport/gnu", "-Isrc"]
 SANITIZE = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
-FLAGS = ["-std=c99", "-ffp-contract=off", "-Iinc", "-Iport/gnu"]
+# A fault that makes the same code as none, however it is compiled, changes nothing.
+COMPILERS = (["gcc", "-O2"], ["gcc", "-O3"], ["clang-19", "-O2"])
 
 
 class Fault(NamedTuple):
-    """One line of a file, before and after."""
+    """One line, before and after, in a function of a file."""
 
     file: str
+    function: str
     old: str
     new: str
 
-    def __str__(self) -> str:
-        return f"{self.file}: {self.old}  ->  {self.new}"
+
+@dataclass(frozen=True)
+class Bench:
+    """Test programs, linked with the runtime as a shared library, which is made again for each fault."""
+
+    place: Path
+    flags: list[str]
+    programs: dict[str, list[object]]
+    seconds: dict[str, int]  # of processor time, five times what a test takes without a fault
+
+
+def compiled(text: str, compiler: list[str]) -> bytes | None:
+    """The object made of a source; None if the compiler refuses."""
+    out = WORK / "compiled.o"
+    words = ["timeout", "60", *compiler, *FLAGS, "-g0", "-x", "c", "-c", "-o", out, "-"]
+    done = subprocess.run(words, cwd=gate.ROOT, input=text.encode(), capture_output=True, check=False)
+    return out.read_bytes() if done.returncode == 0 else None
+
+
+def link(bench: Bench, source: str, mutant: Path) -> bool:
+    """Make the library with a mutant in the place of a source; False if the compiler refuses."""
+    out = bench.place / "mutant.o"
+    objects = [out if file.name == source else bench.place / f"{file.stem}.o" for file in SOURCES]
+    first = gate.run(["gcc", *FLAGS, *bench.flags, "-c", "-o", out, mutant])
+    if first.returncode == 0:
+        gate.make(["gcc", *bench.flags, "-shared", "-o", bench.place / "libruntime.so", *objects])
+    return first.returncode == 0
+
+
+def passes(bench: Bench, name: str) -> bool:
+    """Does a test program end well, in time?"""
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (bench.seconds.get(name, 60), bench.seconds.get(name, 60)))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+    command = [*map(str, bench.programs[name])]
+    quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    return subprocess.run(command, preexec_fn=limit, check=False, **quiet).returncode == 0
+
+
+def bench(name: str, flags: list[str]) -> Bench:
+    """Test programs of test/unit, coverage_model.c of two models, and the comparison with wider arithmetic."""
+    place = WORK / name
+    place.mkdir()
+    unity = coverage.UNITY
+    for source in SOURCES:
+        gate.make(["gcc", *FLAGS, *flags, "-c", "-o", place / f"{source.stem}.o", source])
+    made = Bench(place, flags, {}, {})
+    link(made, SOURCES[0].name, SOURCES[0])
+    linked = ["-L", place, f"-Wl,-rpath,{place}", "-lruntime"]
+    words = [f"-I{coverage.MODELS}", "-Itest/unit", f"-I{unity}/src", "-include", "unity_config.h", "-Isil/firmware"]
+    words += ["-Wl,--wrap=longjmp"]  # with which Unity leaves a test: the first assertion that fails ends the program
+    stop = place / "stop.c"
+    stop.write_text("#include <stdlib.h>\nvoid __wrap_longjmp(void *to, int value) { (void)to; (void)value; abort(); }\n")
+    shared = [stop, unity / "src" / "unity.c", coverage.UNIT / "unity_output.c", gate.ROOT / "port" / "host" / "board.c"]
+    wanted = [(test, None) for test in sorted(coverage.UNIT.glob("test_*.c"))]
+    wanted += [(gate.HERE / "coverage_model.c", model) for model in ("nqvm_folded", "fading")]
+    for test, model in wanted:
+        told = [*eva.told(model), f"-DREFUSED={coverage.refused(model)}"] if model else []
+        needs = re.search(r"needs: (.*) \*/", test.read_text())
+        needed = [f"{model}.c", f"{model}_params.c"] if model else [Path(n).name for n in (needs[1].split() if needs else [])]
+        out = place / (model or test.stem)
+        runner = f"{out}_runner.c"
+        gate.make(["ruby", unity / "auto" / "generate_test_runner.rb", test, runner])
+        sources = [runner, test, *shared, *(coverage.MODELS / file for file in needed)]
+        gate.make(["gcc", "-O1", *FLAGS, *words, *told, *flags, "-o", out, *sources, *linked])
+        made.programs[out.name] = [out]
+    out = place / "accuracy"
+    gate.make(["gcc", "-O2", *FLAGS, *flags, "-pthread", "-o", out, "test/accuracy/pen_math_accuracy.c", *linked, "-lm"])
+    made.programs["accuracy"] = [out, 4099, 1]
+    for program in made.programs:
+        start = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        if not passes(made, program):
+            raise SystemExit(f"FAIL  mutation: {program} fails without a fault")
+        made.seconds[program] = math.ceil(5 * (resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - start) + 0.5)
+    return made
 
 
 def faults(source: Path) -> Iterator[tuple[Fault, Path]]:
     """All mutants of a file that compile, differ from it in what they do, and from each other."""
     place = WORK / source.stem
-    shutil.rmtree(place, ignore_errors=True)
-    place.mkdir(parents=True)
+    place.mkdir()
     gate.make([MUTATE, source, "c", "--noCheck", "--mutantDir", place])
-    seen = {assembly(source)}
     before = source.read_text().splitlines()
+    seen = {compiled(source.read_text(), ["gcc", "-O1"])}
+    texts = {preprocessed(source)}
     for mutant in sorted(place.glob("*.c"), key=lambda path: int(re.findall(r"\d+", path.stem)[-1])):
-        text = assembly(mutant)
-        if text is not None and text not in seen:
-            seen.add(text)
-            lines = list(difflib.unified_diff(before, mutant.read_text().splitlines(), n=0, lineterm=""))[3:]
-            old, new = (" ".join(line[1:].strip() for line in lines if line[0] == sign) for sign in "-+")
-            yield Fault(source.name, old, new), mutant
+        text = preprocessed(mutant)
+        if text is None or text in texts:  # in a comment, or in the double build
+            continue
+        texts.add(text)
+        made = compiled(mutant.read_text(), ["gcc", "-O1"])
+        if made is not None and made not in seen:
+            seen.add(made)
+            yield fault(source.name, before, mutant.read_text().splitlines()), mutant
 
 
-def assembly(source: Path) -> str | None:
-    """A fingerprint of what the compiler makes of a file; None if it refuses."""
-    done = gate.run(["gcc", *FLAGS, "-O2", "-w", "-g0", "-S", "-o", "-", source], errors="replace")
-    return hashlib.sha256(re.sub(r"\.file\t.*", "", done.stdout).encode()).hexdigest() if done.returncode == 0 else None
+def preprocessed(source: Path) -> str | None:
+    """A fingerprint of a source without comments, and of what it does not compile; None if it cannot be read."""
+    done = gate.run(["gcc", *FLAGS, "-E", "-P", source])
+    return hashlib.sha256(done.stdout.encode()).hexdigest() if done.returncode == 0 else None
 
 
-def compiled(source: Path, out: Path, *words: str) -> Path:
-    """An object with sanitizers in it."""
-    gate.make(["gcc", *FLAGS, "-O1", "-w", *SANITIZE, *words, "-c", "-o", out, source])
-    return out
+def fault(file: str, before: list[str], after: list[str]) -> Fault:
+    """What a mutant changes."""
+    lines = list(difflib.unified_diff(before, after, n=0, lineterm=""))[2:]
+    at = int(re.match(r"@@ -(\d+)", lines[0])[1])
+    heads = [m[1] for line in before[:at] if (m := re.match(r"(?!#|typedef)\w[\w *]*?\b(\w+)\(", line))]
+    old, new = (" ".join(line[1:].strip() for line in lines[1:] if line[0] == sign) for sign in "-+")
+    return Fault(file, heads[-1] if heads else "", old, new)
 
 
-def tests() -> dict[str, list[Path]]:
-    """Objects of all test programs, without the runtime: those of test/unit, and coverage_model.c of two models."""
-    unity = coverage.UNITY
-    words = [f"-I{coverage.MODELS}", "-Itest/unit", f"-I{unity}/src", "-include", "unity_config.h", "-Isil/firmware"]
-    shared = [unity / "src" / "unity.c", coverage.UNIT / "unity_output.c", gate.ROOT / "port" / "host" / "board.c"]
-    common = [compiled(source, WORK / f"{source.stem}.o", *words) for source in shared]
-    programs = {}
-    wanted = [(test, None) for test in sorted(coverage.UNIT.glob("test_*.c"))]
-    wanted += [(gate.HERE / "coverage_model.c", model) for model in ("nqvm_folded", "fading")]
-    for test, model in wanted:
-        name = model or test.stem
-        told = [*eva.told(model), f"-DREFUSED={coverage.refused(model)}"] if model else []
-        runner = WORK / f"{name}_runner.c"
-        gate.make(["ruby", unity / "auto" / "generate_test_runner.rb", test, runner])
-        models = re.search(r"needs: (.*) \*/", test.read_text())
-        needs = [coverage.MODELS / Path(n).name for n in (models[1].split() if models else [])]
-        needs += [coverage.MODELS / f"{model}.c", coverage.MODELS / f"{model}_params.c"] if model else []
-        mine = [compiled(source, WORK / f"{name}-{source.stem}.o", *words, *told) for source in (runner, test, *needs)]
-        programs[name] = common + mine
-    return programs
+def lives(mutant: Path, file: str, benches: list[Bench]) -> bool:
+    """Does every test still pass with this fault, and does some compiler make something of it?"""
+    own = f"test_{Path(file).stem}"
+    for place in benches:
+        if not link(place, file, mutant):
+            return False  # so wrong that a sanitizer's compiler sees it
+        for name in sorted(place.programs, key=lambda name: name != own):
+            if (name != "accuracy" or file == "pen_math.c") and not passes(place, name):
+                return False
+    return True
 
 
-def passes(program: Path) -> bool:
-    """Does a test program end well, in time?"""
-
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-
-    done = subprocess.run([program], stdin=subprocess.DEVNULL, capture_output=True, preexec_fn=limit, check=False)
-    return done.returncode == 0
-
-
-def lives(fault: Fault, mutant: Path, programs: dict[str, list[Path]], runtime: dict[str, Path]) -> bool:
-    """Does every test still pass with this fault?"""
-    out = WORK / "mutant.o"
-    try:
-        compiled(mutant, out, "-Isrc")
-    except SystemExit:
-        return False  # so wrong that a sanitizer's compiler sees it
-    objects = [out if name == fault.file else path for name, path in runtime.items()]
-    own = f"test_{Path(fault.file).stem}"
-    for name in sorted(programs, key=lambda name: name != own):
-        program = WORK / "program"
-        gate.make(["gcc", *SANITIZE, "-o", program, *programs[name], *objects])
-        if not passes(program):
-            return False
-    return fault.file != "pen_math.c" or accurate(mutant)
-
-
-def accurate(mutant: Path) -> bool:
-    """Does the comparison with wider arithmetic still pass, for every 4099th number?"""
-    program = WORK / "accuracy"
-    gate.make(["gcc", *FLAGS, "-O2", "-w", "-pthread", "-o", program, "test/accuracy/pen_math_accuracy.c", mutant, "-lm"])
-    return gate.run([program, "4099", "1"], limit=300).returncode == 0
+def same_code(mutant: Path, source: Path) -> bool:
+    """Does a compiler make of it what it makes of the source?"""
+    return any(compiled(mutant.read_text(), words) == compiled(source.read_text(), words) for words in COMPILERS)
 
 
 def listed() -> dict[Fault, str]:
     """The faults that may live, and why."""
-    found, file, old, new = {}, "", "", ""
-    for line in LIST.read_text().splitlines() if LIST.exists() else []:
-        if line.startswith("== "):
-            file = line[3:]
-        elif line.startswith("- "):
-            old = line[2:].strip()
-        elif line.startswith("+"):
-            new = line[1:].strip()
-        elif line.startswith("  "):
-            found[Fault(file, old, new)] = line.strip()
-    return found
+    groups = tomllib.loads(LIST.read_text())["lives"] if LIST.exists() else []
+    return {Fault(g["file"], g["function"], *f): g["why"] for g in groups for f in g["faults"]}
 
 
 def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--share", type=int, default=1)
-    parser.add_argument("--found", type=Path)
     parser.add_argument("files", nargs="*")
     options = parser.parse_args()
-    known = set(json.loads(options.found.read_text())) if options.found and options.found.exists() else set()
-    shutil.rmtree(WORK, ignore_errors=True)
-    shutil.rmtree(coverage.MODELS, ignore_errors=True)
+    whole = options.share == 1 and not options.files
     for place in (WORK, coverage.MODELS):
+        shutil.rmtree(place, ignore_errors=True)
         place.mkdir(parents=True)
     eva.models(coverage.MODELS)
-    programs = tests()
-    sources = sorted((gate.ROOT / "src").glob("*.c"))
-    runtime = {source.name: compiled(source, WORK / f"{source.stem}.o") for source in sources}
+    benches = [bench("plain", ["-O1"]), bench("checked", ["-O1", "-g", *SANITIZE])]
     may_live, good, figures = listed(), True, {}
-    for source in sources:
+    for source in SOURCES:
         if options.files and source.name not in options.files:
             continue
-        alive, total, wrong = {}, 0, []
-        for number, (fault, mutant) in enumerate(faults(source)):
-            if number % options.share and fault not in may_live:
+        mine = {fault for fault in may_live if fault.file == source.name}
+        alive, total, same, wrong = [], 0, 0, []
+        for number, (found, mutant) in enumerate(faults(source)):
+            if number % options.share and found not in mine:
                 continue
             total += 1
-            key = hashlib.sha256(f"{fault}{mutant.name}".encode()).hexdigest()
-            if key in known:
-                continue
-            if lives(fault, mutant, programs, runtime):
-                alive[fault] = may_live.get(fault, "")
-                wrong += [f"lives and is not in the list: {fault}"] if fault not in may_live else []
-            elif fault in may_live:
-                wrong.append(f"is in the list and was found: {fault}")
-            elif options.found:
-                known.add(key)
-                options.found.write_text(json.dumps(sorted(known)))
-        counted = total - sum(why.startswith("equivalent") for why in alive.values())
-        killed = total - len(alive)
+            if lives(mutant, source.name, benches):
+                if same_code(mutant, source):
+                    same += 1
+                else:
+                    alive.append(found)
+        wrong += [f"lives and is not in the list: {f.function}: {[f.old, f.new]}" for f in alive if f not in mine]
+        wrong += [f"is in the list and does not live: {f.function}: {[f.old, f.new]}" for f in mine if f not in alive]
+        equivalent = same + sum(may_live.get(f, "").startswith("equivalent") for f in alive)
+        counted, killed = total - equivalent, total - same - len(alive)
         share = killed / counted if counted else 0.0
-        wrong += [f"found {share:.1%}, at least {LEAST:.0%} wanted"] if share < LEAST else []
-        good &= gate.report(f"mutation: {source.name}: {killed} of {counted} faults found, {total - counted} change nothing", wrong)
-        figures[source.name] = {"found": killed, "of": counted, "equivalent": total - counted}
-    if options.share == 1 and not options.files:
+        wrong += [f"found {share:.1%}, at least {LEAST:.0%} wanted"] if share < LEAST and options.share == 1 else []
+        good &= gate.report(f"mutation: {source.name}: {killed} of {counted} faults found, {equivalent} change nothing", wrong)
+        figures[source.name] = {"found": killed, "of": counted, "equivalent": equivalent}
+    if whole:
         gate.keep("mutation", figures)
     return int(not good)
 

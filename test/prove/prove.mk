@@ -4,7 +4,8 @@
 # The gates of `make prove`, each also a target of its own; README.md beside this file says what each shows.
 
 PROVE_STATIC  := prove-eva prove-coverage
-PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-readers prove-flip prove-longrun prove-stack prove-bits
+PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-readers prove-flip prove-longrun prove-stack prove-bits \
+                 prove-accuracy prove-cost prove-promises
 
 .PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC)
 
@@ -38,14 +39,22 @@ prove-stack: | $(READY) ## Each core: no recursion, no call through a pointer, t
 
 prove-bits: | $(READY) ## exp, tanh, sigmoid, softplus: the same bits on every target
 	@$(PYTHON) test/prove/bits_check.py
+prove-accuracy: | $(READY) ## exp, tanh, sigmoid, softplus: no further off than their header says
+	@$(PYTHON) test/prove/accuracy_check.py
+prove-cost: | $(READY) ## Functions take the instructions that their headers name
+	@$(PYTHON) test/prove/cost_check.py
+prove-promises: | $(READY) ## PROMISES.md: each promise, the test that shows it, the figures of the last run
+	@$(PYTHON) test/prove/promises.py
 
 # -- the same for hours -----------------------------------------------------------------------------------------------
 
-CAMPAIGN := campaign-status campaign-fuzz campaign-readers campaign-flip campaign-longrun campaign-accuracy
+CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-readers campaign-flip campaign-longrun campaign-accuracy
 .PHONY: campaign-proofs $(CAMPAIGN)
 
 campaign-proofs: setup build/setup/proof ## The long proofs: all floats, 10^7 sequences of calls, every bit, a whole day
 	$(Q)$(PYTHON) test/tally.py $(CAMPAIGN)
+campaign-mutation: | $(READY) build/setup/proof build/setup/unity
+	@$(PYTHON) test/prove/mutation.py
 campaign-status: | $(READY)
 	@$(PYTHON) test/prove/status_check.py --runs 10000000 --as "status campaign"
 campaign-fuzz: | $(READY)
@@ -57,4 +66,4 @@ campaign-flip: | $(READY)
 campaign-longrun: | $(READY)
 	@$(PYTHON) test/prove/longrun_check.py --hours 24 --as "longrun campaign"
 campaign-accuracy: | $(READY)
-	@$(MAKE) accuracy-float STRIDE=1
+	@$(PYTHON) test/prove/accuracy_check.py --stride 1 --as "accuracy campaign"

@@ -32,7 +32,7 @@ from penode_sil import measured, scenario
 from penode_sil.errors import UserError
 
 REFUSED = (penode_gen.ModelError, NetworkError, UserError)
-LIMIT = 20  # [s] for one file
+LIMIT = 20  # [s] of the processor for one file
 NQVM = gate.ROOT / "gen" / "nqvm"
 WORDS = [
     *"0 -1 1 2 7 1e308 -1e308 1e-320 1e999 nan inf -inf 10000000000000000000000000000000 0x10 1_0 true false null".split(),
@@ -48,6 +48,7 @@ class Reader:
     suffix: str
     read: Callable[[Path], object]
     files: list[bytes]
+    limit: int = LIMIT
     tried: int = 0
     taken: int = 0
     messages: set[str] = field(default_factory=set)
@@ -128,7 +129,7 @@ def failure(reader: Reader, path: Path) -> str | None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)  # of numpy: a number went wrong and nobody looked
-            signal.alarm(LIMIT)
+            signal.setitimer(signal.ITIMER_PROF, reader.limit)
             reader.read(path)
             reader.taken += 1
             reader.messages.add("taken")
@@ -139,7 +140,7 @@ def failure(reader: Reader, path: Path) -> str | None:
     except Exception:  # noqa: BLE001: that is what is looked for
         return traceback.format_exc(limit=-4)
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
     return None
 
 
@@ -187,9 +188,13 @@ def readers(folder: Path) -> list[Reader]:
     ]  # fmt: skip
 
 
+def _too_long(*_: object) -> None:
+    raise TimeoutError("it takes too long")
+
+
 def check(tries: int, seed: int = 1) -> tuple[list[str], dict[str, dict[str, int]]]:
     """So many files for each reader: failures, and per reader how many files were tried and taken, and messages seen."""
-    signal.signal(signal.SIGALRM, lambda *_: (_ for _ in ()).throw(TimeoutError(f"more than {LIMIT} s")))
+    signal.signal(signal.SIGPROF, _too_long)
     with tempfile.TemporaryDirectory() as place:
         every = readers(Path(place))
         good = [f"{reader.name}: a good file is refused" for reader in every if failure(reader, _put(reader, Path(place))) or not reader.taken]
@@ -204,24 +209,51 @@ def _put(reader: Reader, folder: Path) -> Path:
     return path
 
 
-def hollow() -> list[str]:
-    """A reader that lets an exception through must be found out."""
-    careless = Reader("careless", ".toml", lambda path: float(path.read_bytes().split(b"=")[1]), [b"a = 1\n"])
+def _raises(path: Path) -> object:
+    return float(path.read_bytes().split(b"=")[1])
+
+
+def _says_nothing(path: Path) -> object:
+    raise UserError("")
+
+
+def _shows_a_trace(path: Path) -> object:
+    raise UserError("Traceback (most recent call last): ...")
+
+
+def _computes_nan(path: Path) -> object:
+    return np.float64(len(path.read_bytes())) * np.inf * 0
+
+
+def _hangs(path: Path) -> object:
+    while path.exists():
+        pass
+    return None
+
+
+FAULTS = {"an exception gets out": _raises, "refused without a word": _says_nothing, "a trace instead of words": _shows_a_trace,
+          "goes on with NaN": _computes_nan, "hangs": _hangs}  # fmt: skip
+
+
+def faults_missed() -> list[str]:
+    """Readers that do what none may: those that are not found out."""
+    signal.signal(signal.SIGPROF, _too_long)
     with tempfile.TemporaryDirectory() as place:
-        return [] if search(careless, 50, Path(place)) else ["a reader that does not catch its errors is not found"]
+        return [f"not found: {fault}" for fault, read in FAULTS.items() if not search(Reader("faulty", ".toml", read, [b"a = 1\n"], limit=1), 3, Path(place))]
 
 
 def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--files", type=int, default=500, help="for each reader")
+    options.add_argument("--files", type=int, default=2000, help="for each reader")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--as", dest="key", default="readers", help="key in figures.json")
     given = options.parse_args()
     problems, seen = check(given.files, given.seed)
-    problems += hollow()
     total = sum(row["files"] for row in seen.values())
     good = gate.report(f"readers: {total} damaged files: all taken or refused in words", problems[:20])
-    gate.keep(given.key, seen | {"failures": len(problems)})
+    missed = faults_missed()
+    good &= gate.report(f"readers: {len(FAULTS) - len(missed)} of {len(FAULTS)} faulty readers found", missed)
+    gate.keep(given.key, {"files": total} | seen | {"failures": len(problems), "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
     return int(not good)
 
 

@@ -25,8 +25,8 @@ FAULTS = {
 }  # of pen_set.c: see gate.faulty
 
 
-def torture(model: str, sets: int, port: str = "gnu", pen_set: Path = SET) -> tuple[int, str]:
-    """Exit code and words of tsan.c for a model of small/, a port and a pen_set.c."""
+def torture(model: str, sets: int, port: str = "gnu", pen_set: Path = SET, limit: float = 120) -> tuple[int, str]:
+    """Exit code and words of tsan.c for a model of small/, a port and a pen_set.c; 124 if it is not done within `limit` seconds."""
     loaded = penode_gen.load(gate.HERE / "small" / f"{model}.toml")
     source, elf = generated(loaded), WORK / f"{model}-{port}-{pen_set.stem}"
     elf.parent.mkdir(parents=True, exist_ok=True)
@@ -35,17 +35,17 @@ def torture(model: str, sets: int, port: str = "gnu", pen_set: Path = SET) -> tu
          f"-I{source}", *model_options(loaded), "-o", elf,
          gate.HERE / "tsan.c", source / f"{model}.c", source / f"{model}_params.c", *SOURCES, pen_set]
     )  # fmt: skip
-    done = gate.run([elf, sets], limit=1200, env=os.environ | {"TSAN_OPTIONS": "halt_on_error=1"})
+    done = gate.run([elf, sets], limit=limit, env=os.environ | {"TSAN_OPTIONS": "halt_on_error=1"})
     return done.returncode, done.stdout + done.stderr
 
 
 def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--sets", type=int, default=50_000)
+    options.add_argument("--sets", type=int, default=100_000)
     sets = options.parse_args().sets
     good, figures = True, {}
     for model in ("small", "small_layers"):
-        code, said = torture(model, sets)
+        code, said = torture(model, sets, limit=3600)
         counts = [int(n) for n in re.findall(r"(\d+) (?:adopted|steps|torn)", said)]
         good &= gate.report(f"tsan: {model}: {sets} sets, no race, none torn, lost or out of order", [said] if code or counts[:1] != [sets] else [])
         figures[model] = {"sets": sets, "races": int(code == RACE), "torn": counts[2] if len(counts) == 3 else None}

@@ -17,5 +17,5 @@ def test_damaged_files_are_taken_or_refused_in_words():
     assert all(row["taken"] and row["messages"] > 5 for row in seen.values())
 
 
-def test_a_careless_reader_is_found_out():
-    assert not readers_check.hollow()
+def test_careless_readers_are_found_out():
+    assert not readers_check.faults_missed()
