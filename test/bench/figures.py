@@ -59,6 +59,11 @@ def run_text() -> str:
     return f"```\n{done.stdout.strip()}\n```"
 
 
+def comparable(text: str) -> str:
+    """README.md without what differs from one processor to the next: last digits of the diagnosis, and its time."""
+    return re.sub(r"^quarter: .*?^```$", lambda m: re.sub(r"[ \d.e+-]*\d[ \d.e+-]*", " ", m[0]), text, flags=re.S | re.M)
+
+
 def with_block(text: str, name: str, content: str) -> str:
     """README with the text between <!-- name --> and <!-- end of name --> replaced."""
     block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end of {name} -->)", re.S)
