@@ -171,7 +171,7 @@ static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size
 }
 
 /* Member by member: takes no stack on a Cortex-M, and Frama-C sees that two pieces never overlap in part. */
-static void copy(pen_piece_t *to, const pen_piece_t *from)
+static void copy_piece(pen_piece_t *to, const pen_piece_t *from)
 {
     to->start = from->start;
     to->offset = from->offset;
@@ -193,13 +193,13 @@ pen_status_t pen_fold(const pen_chain_t *chain, const pen_real_t p[], bool clamp
     if (left > 0U) {
         const size_t first = left - 1U;
         for (size_t i = first; i < room; i++) {
-            copy(&piece[i - first], &piece[i]);
+            copy_piece(&piece[i - first], &piece[i]);
         }
         left = go(&walk, &high, centre, capacity, piece, left, false, &looks);
     }
     if (left > 0U) {
         for (size_t i = (capacity - left) + 1U; i < capacity; i++) {
-            copy(&piece[i], &piece[capacity - left]);
+            copy_piece(&piece[i], &piece[capacity - left]);
         }
         piece[0].start = centre;
     }
