@@ -172,7 +172,7 @@ def numpy_loop(model: penode_gen.Model, u: np.ndarray) -> np.ndarray:
 def scipy_loop(model: penode_gen.Model, u: np.ndarray) -> np.ndarray:
     """States [n, 4] by solve_ivp with one step a sample: the tolerances never reject one."""
     f, times = numpy_rates(model), np.arange(len(u)) * model.sample_time
-    right = lambda t, x: f(t, x, np.interp(t, times, u[:, 0]))  # noqa: E731
+    right = lambda t, x: f(t, x, np.interp(t, times, u[:, 0]))
     h = model.sample_time
     return solve_ivp(right, (0.0, times[-1]), np.zeros(4), "RK45", times, first_step=h, max_step=h, rtol=1e3, atol=1e3).y.T
 

@@ -33,7 +33,7 @@ import penode_gen
 import programs
 import report
 import worst_case
-from figures import CORES, README, ROOT, accuracy, comparable, hostile_inputs, run_text, with_block
+from figures import CORES, README, ROOT, accuracy, hostile_inputs, run_text, same, with_block
 from programs import Program
 from reference import same_step
 
@@ -296,11 +296,11 @@ def worse(new: list[Figures], kept: list[Figures]) -> list[str]:
 
 def check(figures: Figures) -> list[str]:
     """What is wrong with the code, or with what README.md says of it."""
-    wanted = lambda row: row["real"] == "float" and (row["machine"] == "m4f" or row["method"] == "RK4")  # noqa: E731
+    wanted = lambda row: row["real"] == "float" and (row["machine"] == "m4f" or row["method"] == "RK4")
     found = worse(our_figures(lambda text: None, wanted), figures["ours"]) + batch.too_slow(figures["batch"])
     if figures["accuracy"] != accuracy():
         found.append(f"accuracy: {accuracy()} instead of {figures['accuracy']}; run make figures")
-    if comparable(shown(figures)) != comparable(README.read_text()):
+    if not same(shown(figures), README.read_text()):
         found.append("README.md: what it shows is not what make run and the figures give; run make figures")
     return found
 

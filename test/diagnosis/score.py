@@ -240,7 +240,7 @@ def text(out: Mapping) -> str:
         )
     lines += ["", f"{'kind':<20}{'common':>9}{'foreign':>10}{'hard':>9}  answered instead"]
     for kind, own in out["kinds"].items():
-        cell = lambda name: f"{own[name]['right']}/{own[name]['n']}" if name in own else "-"  # noqa: E731
+        cell = lambda name: f"{own[name]['right']}/{own[name]['n']}" if name in own else "-"
         instead = sum((Counter(s["instead"]) for s in own.values()), Counter())
         lines.append(
             f"{kind:<20}{cell('single_common'):>9}{cell('single_foreign'):>10}{cell('hard'):>9}  "
@@ -270,7 +270,7 @@ def confusion(out: Mapping) -> str:
 
 def compare(tables: Mapping[str, Mapping]) -> str:
     """Several commands on the same cases side by side, as a Markdown table."""
-    number = lambda x: "-" if x is None else f"{x:.3g}"  # noqa: E731
+    number = lambda x: "-" if x is None else f"{x:.3g}"
     first = next(iter(tables.values()))
     lines = ["| | " + " | ".join(tables) + " |", "|---|" + "---|" * len(tables)]
 

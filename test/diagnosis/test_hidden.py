@@ -73,7 +73,7 @@ def test_quarter_vehicle_against_scipy(extra, kind):
 
     Tables are cubic over points 0.24 % apart in the argument, so a curve with a width of eight points or more errs below 1e-6.
     """
-    road = lambda t: 5e-3 * np.sin(2 * np.pi * 8 * t) * (1 - np.exp(-5 * np.maximum(t, 0))) ** 3  # noqa: E731
+    road = lambda t: 5e-3 * np.sin(2 * np.pi * 8 * t) * (1 - np.exp(-5 * np.maximum(t, 0))) ** 3
     world = a_plant("quarter", CAR).world()
     curve = (lambda x: extra(x, 0)) if kind == Kind.DEFLECTION_CURVE else (lambda x: extra(0, x))
     motion = simulate(replace(world, laws={**world.laws, "extra": Law(kind, 0, 1, (), curve)}), road(knots(3.0)))

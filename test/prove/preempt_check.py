@@ -14,9 +14,9 @@ import numpy as np
 import gate
 
 sys.path.insert(0, str(gate.ROOT / "test" / "bench"))
-import cycles  # noqa: E402
-import penode_gen  # noqa: E402
-from penode_sil.targets import FLAGS, MACHINES, PORT, generated  # noqa: E402
+import cycles
+import penode_gen
+from penode_sil.targets import FLAGS, MACHINES, PORT, generated
 
 WORK = gate.BUILD / "preempt"
 CORES = ("m3", "m4f", "m33")

@@ -12,9 +12,9 @@ import gate
 import numpy as np
 
 sys.path.insert(0, str(gate.ROOT / "test" / "bench"))
-import penode_gen  # noqa: E402
-import programs  # noqa: E402
-from penode_sil.targets import MACHINES, PORT  # noqa: E402
+import penode_gen
+import programs
+from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "stack"
 SOURCE = gate.HERE / "stack.c"

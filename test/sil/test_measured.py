@@ -146,7 +146,7 @@ def test_rounded_stamps_are_a_regular_clock_and_scattered_ones_are_said(record, 
 
 def test_faster_rows_are_filtered_alike_and_bad_ones_spread_no_further_than_the_filter(tmp_path, oscillator):
     time = np.arange(16_000) * 5e-4
-    wave = lambda phase: np.sin(2.0 * np.pi * 40.0 * time + phase)  # noqa: E731
+    wave = lambda phase: np.sin(2.0 * np.pi * 40.0 * time + phase)
     a = wave(0.5) + 0.05 * np.random.default_rng(2).normal(size=time.size)
     a[4000:4010] = np.nan
     path = write(tmp_path / "r.csv", {"t_s": time, "foot_mm": wave(0.0), "a_m_s2": a, "z_mm": wave(2.0)})

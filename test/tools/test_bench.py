@@ -19,13 +19,14 @@ import penode_gen
 BENCH = Path(__file__).resolve().parents[1] / "bench"
 sys.path.insert(0, str(BENCH))
 
-import bench  # noqa: E402  (needs the path above)
-import cortex_m4  # noqa: E402
-import peers  # noqa: E402
-import programs  # noqa: E402
-import reference  # noqa: E402
-import report  # noqa: E402
-import worst_case  # noqa: E402
+import bench  # needs the path above
+import cortex_m4
+import figures
+import peers
+import programs
+import reference
+import report
+import worst_case
 
 
 def assembled(text: str, folder: Path, entry: str = "f") -> Path:
@@ -163,3 +164,14 @@ def test_ten_thousand_steps_cost_the_same_in_the_figures() -> None:
     for row in rows:
         calls[row["evaluator"], row["machine"]] = calls.get((row["evaluator"], row["machine"]), 0) + row["calls"]
     assert len(calls) == len(CASES) * len(worst_case.FPU) and min(calls.values()) >= 10_000
+
+
+def test_readme_is_compared_to_the_word_and_to_two_percent_of_a_number():
+    """Seconds are another machine's; nothing but the diagnosis has any room."""
+    kept = "Price 730\n```\nquarter: explained\n  force   46.691 N  [46.407, 46.976]\n  100.0% explained, 4.8 s\n```\n"
+    assert figures.same(kept, kept)
+    assert figures.same(kept.replace("46.691", "46.712").replace("4.8 s", "17 s"), kept)
+    assert not figures.same(kept.replace("46.691", "48.2"), kept)
+    assert not figures.same(kept.replace("force", "moment"), kept)
+    assert not figures.same(kept.replace("730", "731"), kept)
+    assert not figures.same(kept.replace("100.0% explained, 4.8 s", ""), kept)

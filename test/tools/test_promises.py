@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "prove"))
-import promises  # noqa: E402
+import promises
 
 
 def test_every_row_names_tests_that_exist_and_every_public_function_has_a_row():

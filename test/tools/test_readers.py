@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "prove"))
-import readers_check  # noqa: E402
+import readers_check
 
 
 def test_damaged_files_are_taken_or_refused_in_words():

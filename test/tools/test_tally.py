@@ -10,7 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from tally import Count, count_line, verdict  # noqa: E402  (needs the path above)
+from tally import Count, count_line, verdict  # needs the path above
 
 
 @pytest.mark.parametrize(

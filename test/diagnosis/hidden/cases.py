@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import faults, forces, outside, plants  # noqa: F401 (the forms register themselves)
+from . import faults, forces, outside, plants  # the forms register themselves
 from .bench import NOTHING, Bench, draw_bench, reach
 from .effects import FORMS, OUTSIDE, Change, Form, places
 from .plants import SIGNALS

@@ -96,7 +96,7 @@ def scale(r: Rng, at: Place, shape: Callable[[np.ndarray, np.ndarray], np.ndarra
     up = way(r)
 
     def build(size: float) -> Change:
-        seen = lambda x, _, rate: x * (1 + up * size * shape(x / at.peak, times(x, rate) / at.duration))  # noqa: E731
+        seen = lambda x, _, rate: x * (1 + up * size * shape(x / at.peak, times(x, rate) / at.duration))
         return Change({"scale": 1 + up * size}, sensor={at.where: seen})
 
     return build

@@ -213,7 +213,7 @@ def fading(r: Rng, at: Place, kept: Callable[[np.ndarray, float], np.ndarray]) -
     cooling = logarithmic(r, 0.5, 5) * at.duration
 
     def build(size: float) -> Change:
-        ratio = lambda heat: np.maximum(kept(np.maximum(heat, 0) / at.heat, size), 0.05)  # noqa: E731
+        ratio = lambda heat: np.maximum(kept(np.maximum(heat, 0) / at.heat, size), 0.05)
         law = at.law(Kind.HEATED, at.damping, cooling, curve=ratio, scale=at.heat * 0.1, reach=at.heat * 20)
         return Change({}, {"damper": law}, memory=lambda q: {"loss": float(1 - ratio(np.array(q["damper"])))})
 
@@ -265,7 +265,7 @@ def branches(at: Place, seconds: np.ndarray, share: np.ndarray, bend: float = 0.
 
     def build(size: float) -> Change:
         truth = {"stiffness": size * at.stiffness, **({"relaxation_time": float(seconds[0])} if len(seconds) == 1 else {})}
-        curve = lambda s, k: k * s * (1 + bend * np.minimum((s / at.s) ** 2, 10))  # noqa: E731
+        curve = lambda s, k: k * s * (1 + bend * np.minimum((s / at.s) ** 2, 10))
         k = size * at.stiffness * share
         return Change(
             truth, {f"hidden {i}": at.law(Kind.SERIES, k[i] * t, curve=partial(curve, k=k[i])) for i, t in enumerate(seconds)}
@@ -331,7 +331,7 @@ def power_lost(over: np.ndarray, load: float, p: float) -> np.ndarray:
 def power_contact(r: Rng, at: Place) -> Build:
     def build(size: float) -> Change:
         p, depth = 1 + size, at.s * 1.6 * (1 + size)  # m, at which the contact would be lost
-        total = lambda s: at.stiffness * depth / p * (1 - np.maximum(1 - s / depth, 0) ** p)  # noqa: E731
+        total = lambda s: at.stiffness * depth / p * (1 - np.maximum(1 - s / depth, 0) ** p)
         return Change({"exponent": p}, {"hidden": at.law(Kind.DEFLECTION_CURVE, curve=lambda s: total(s) - at.stiffness * s)})
 
     return build

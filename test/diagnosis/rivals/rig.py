@@ -108,14 +108,14 @@ class Rig:
             names |= {f"der_{b['position']}": x[n + i], f"der_{b['velocity']}": acceleration[i]}
         moved = [(at[a][0] - at[b][0], at[a][1] - at[b][1]) for a, b in self.places]
         seen = [eval(re.sub(r"der\((\w+)\)", r"der_\1", s), {"__builtins__": {}}, names) for s in self.sensors.values()]
-        return np.array([*x[n:], *acceleration]).reshape(2 * n, -1), np.array([m[0] for m in moved] + [m[1] for m in moved]), np.array(seen)
+        return np.array([*x[n:], *acceleration]).reshape(2 * n, len(u[0])), np.array([m[0] for m in moved] + [m[1] for m in moved]), np.array(seen)
 
     def linear(self, values: Mapping[str, float]) -> Linear:
         """The matrices, column by column from unit vectors."""
         n, p = 2 * len(self.bodies), len(self.places)
         points = np.eye(n + 2 + p)
         rate, moved, seen = self._evaluate(values, points[:n], points[n : n + 2], points[n + 2 :])
-        cut = lambda m: (m[:, :n], m[:, n : n + 2], m[:, n + 2 :])  # noqa: E731
+        cut = lambda m: (m[:, :n], m[:, n : n + 2], m[:, n + 2 :])
         (a, b, g), (s, su, _), (c, e, h) = cut(rate), cut(moved), cut(seen)
         return Linear(a, b, g, s, su, c, e, h)
 
@@ -191,6 +191,8 @@ class Rig:
     def start(self, given: Recording, seconds: float = 3.0, lin: Linear | None = None) -> np.ndarray:
         """State (n, 1) at the first sample, by linear least squares over the first seconds; rest has a prior, so that noise moves little."""
         n = 2 * len(self.bodies)
+        if n == 0:  # prescribed motion has no state
+            return np.zeros((0, 1))
         first = int(seconds / given.step)
         short = Recording(given.step, given.given[:first], {k: y[:first] for k, y in given.seen.items()})
         lanes = np.hstack([np.zeros((n, 1)), 1e-3 * np.eye(n)])
