@@ -76,7 +76,7 @@ def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tup
         free.append(Free(key, value, 1.0, log=True, low=max(value / below, least.get(key, 0.0)), high=value * above))
     if what.law in LAWS:
         return Element(name, place.ends, what.law, {key: f"{name}_{key}" for key in LAWS[what.law].arguments}), parameters, free
-    text = re.sub(r"\b(k|knee|gap|width)\b", lambda m: f"{name}_{m[1]}", what.law)
+    text = re.sub(rf"\b({'|'.join((gain, *what.shapes, *what.fixed))})\b", lambda m: f"{name}_{m[1]}", what.law)
     return Element(name, place.ends, "expression", expression=text), parameters, free
 
 

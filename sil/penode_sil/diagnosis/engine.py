@@ -69,7 +69,7 @@ def diagnose(
     faults = broken_sensors(model, train, study, bursts)
     tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
-    if study.moving and search.at_rest(other, study):
+    if study.moving and search.at_rest(other, study, explanations[0] if explanations else None, log):
         other, found = search.search(other, log)
         costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -138,6 +139,7 @@ def lag(x: Array, tau: float, step: float) -> Array:
     return lfilter([1.0 - a], [1.0, -a], x)
 
 
+STRIBECK = "force*tanh(v/knee)*(1 + rise*exp(-(v/width)^2))"  # the textbook's, with a knee
 GAPS = (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5)
 GRID = (0.03, 0.06, 0.12, 0.25, 0.5)
 
@@ -214,6 +216,12 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
         yield law(
             "stribeck_friction", "2.3316439815971242*k*exp(-(v/width)^2)*v/width", ("k", "N"), {"width": (a, "m/s")}, 1,
             lambda s, v, t: 2.3316439815971242 * np.exp(-((v / a) ** 2)) * v / a,
+        )  # fmt: skip
+    for w, fall, rise in product((0.005, 0.015), (0.03, 0.06, 0.12, 0.2), (0.4, 1.2)):
+        a, b = w * speed, fall * speed
+        yield law(
+            "stribeck_friction", STRIBECK, n, {"knee": (a, "m/s"), "width": (b, "m/s"), "rise": (rise, "1")}, 1,
+            lambda s, v, t: np.tanh(v / a) * (1.0 + rise * np.exp(-((v / b) ** 2))),
         )  # fmt: skip
     for w in (0.003, 0.01, 0.03):
         for fall in (0.02, 0.06, 0.2):

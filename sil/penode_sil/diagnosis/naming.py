@@ -19,7 +19,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from .build import Term
-from .hypotheses import Basis, Fault, size
+from .hypotheses import STRIBECK, Basis, Fault, size
 from .plant import Place
 from .fit import Fit
 from .result import Value
@@ -205,7 +205,7 @@ def shape(law: str, s: Array, v: Array, a: Mapping[str, float]) -> Array:
             return np.sign(v) / (1.0 + (v / a["stribeck"]) ** 2)
         case "fading_damper" | "heating_damper":
             return v
-    words = {"s": s, "v": v, "k": 1.0, "abs": np.abs, "exp": np.exp, "max": np.maximum, "min": np.minimum} | dict(a)
+    words = {"s": s, "v": v, "k": 1.0, "force": 1.0, "abs": np.abs, "exp": np.exp, "tanh": np.tanh, "max": np.maximum, "min": np.minimum} | dict(a)
     return eval(law.replace("^", "**"), {"__builtins__": {}}, words)  # one of our own texts
 
 
@@ -240,14 +240,21 @@ def functions(
     v = np.linspace(-speed, speed, 401)
     s = np.linspace(-reach, reach, 401)
     zero = np.zeros_like(v)
-    d0 = lambda p: nominal(model, place, "linear_damper", "damping", p)  # noqa: E731
-    c0 = lambda p: nominal(model, place, "linear_spring", "stiffness", p)  # noqa: E731
+    d0 = lambda p: nominal(model, place, "linear_damper", "damping", p)
+    c0 = lambda p: nominal(model, place, "linear_spring", "stiffness", p)
     up = v[v > 0.0]
     flat = np.zeros_like(up)
     match kind:
         case "coulomb_friction":
             return {"force": ("N", lambda p: float(curve(zero[:1], np.array([speed]), p)[0]))}
         case "stribeck_friction":
+            if [t.candidate.what.law for t in terms] == [STRIBECK]:
+                n = names[0]
+                return {
+                    "breakaway": ("N", lambda p: p[f"{n}_force"] * (1.0 + p[f"{n}_rise"])),
+                    "coulomb": ("N", lambda p: p[f"{n}_force"]),
+                    "stribeck_rate": ("m/s", lambda p: p[f"{n}_width"]),
+                }
             fine = np.geomspace(1e-4 * speed, speed, 600)
             fz = np.zeros_like(fine)
 
@@ -324,8 +331,8 @@ def functions(
             return {"loss": ("1", loss)}
         case "bouc_wen":
             pairs = [(f"{n}_force", f"{n}_presliding") for n, t in zip(names, terms) if "presliding" in t.candidate.what.shapes]
-            stiff = lambda p: sum(p[f] / p[w] for f, w in pairs)  # noqa: E731
-            force = lambda p: float(curve(zero[:1], np.array([speed]), p)[0])  # noqa: E731
+            stiff = lambda p: sum(p[f] / p[w] for f, w in pairs)
+            force = lambda p: float(curve(zero[:1], np.array([speed]), p)[0])
             return {"force": ("N", force), "yield_deflection": ("m", lambda p: force(p) / max(stiff(p), 1e-300))}
         case "maxwell_bushing":
             springs = [n for n, t in zip(names, terms) if t.candidate.what.law == "maxwell_bushing"]

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 RESONANCES = np.geomspace(0.5, 40.0, 36)  # [Hz] of hidden masses that are tried
 DAMPINGS = (0.03, 0.1, 0.3)  # and their damping ratios
+FEW = 200  # samples of a sensor that are taken out one by one, sooner than by a transform
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,10 +123,10 @@ class Candidate:
 
 
 class Regression:
-    """Whitened columns of all candidates against the whitened residual of a fit, its free values projected out."""
+    """Whitened effects [candidates, rows] of all candidates against the whitened residual of a fit, its free values projected out."""
 
-    def __init__(self, fit: Fit, candidates: Sequence[Candidate], columns: Array):
-        self.candidates, self.columns = tuple(candidates), columns
+    def __init__(self, fit: Fit, candidates: Sequence[Candidate], effects: Array):
+        self.candidates, self.effects = tuple(candidates), effects
         movable = [i for i, f in enumerate(fit.free) if f.low < f.value < f.high]  # the others stand at their bounds
         free = [fit.free[i] for i in movable]
         priors = np.array([f.unit / f.sigma for f in free])
@@ -134,12 +135,12 @@ class Regression:
             q = np.linalg.qr(np.concatenate([fit.jacobian[:, movable], np.diag(priors)]))[0]
         r, offsets = fit.residual, np.array([f.offset for f in free])
         top, low = q[: len(r)], q[len(r) :]
-        tx, tr = top.T @ columns, top.T @ r - low.T @ offsets  # columns have no part in the rows of the priors
-        self.gram = columns.T @ columns - tx.T @ tx
-        self.slope = columns.T @ r - tx.T @ tr
+        xt, tr = effects @ top, top.T @ r - low.T @ offsets  # effects have no part in the rows of the priors
+        whole = effects @ effects.T
+        self.gram = whole - xt @ xt.T
+        self.slope = effects @ r - xt @ tr
         self.scale = np.sqrt(np.maximum(np.diag(self.gram), 1e-300))
-        self.raw = np.einsum("ij,ij->j", columns, columns)
-        self.alive = np.diag(self.gram) > 1e-9 * self.raw  # what nuisances do not imitate altogether
+        self.alive = np.diag(self.gram) > 1e-9 * np.diag(whole)  # what nuisances do not imitate altogether
         self.gram /= np.outer(self.scale, self.scale)
         self.slope /= self.scale
         self.chi2 = float(r @ r + offsets @ offsets - tr @ tr)
@@ -166,8 +167,8 @@ class Regression:
         return float(2.0 * x @ slope - x @ gram @ x), found
 
     def without(self, fit: Fit) -> Regression:
-        """The same columns against another residual and other free values."""
-        return Regression(fit, self.candidates, self.columns)
+        """The same effects against another residual and other free values."""
+        return Regression(fit, self.candidates, self.effects)
 
     def beside(self, taken: Sequence[int]) -> Regression:
         """The regression with these columns free in size and sign, so that only what none of them can do is left."""
@@ -225,19 +226,23 @@ def collect(
     model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], seen: Sequence[Seen], found: Sequence[Place],
     sensor_names: Sequence[str], fit: Fit, parameters: Sequence[str],
 ) -> tuple[list[Candidate], Array]:  # fmt: skip
-    """All candidates and their whitened columns [rows, candidates]."""
+    """All candidates and their whitened effects [candidates, rows]."""
     candidates: list[Candidate] = []
     parts: list[list[Array]] = [[] for _ in experiments]
     step = experiments[0].step
 
     def masked(e: int, spectra: Complex) -> Array:
-        """Whitened columns of effects given as spectra [k, f, sensors]; samples that do not count are taken out."""
-        good = experiments[e].good
-        if not good.all():
-            n, band = len(good), experiments[e].band
-            whole = np.zeros((len(spectra), n // 2 + 1, good.shape[1]), dtype=complex)
-            whole[:, :band] = spectra
-            return metrics[e](fft.irfft(whole, n, axis=1) * good)
+        """Whitened effects from their spectra [k, f, sensors]; samples that do not count are taken out."""
+        good, band = experiments[e].good, experiments[e].band
+        for j in np.flatnonzero(~good.all(axis=0)):
+            bad = np.flatnonzero(~good[:, j])
+            if len(bad) <= FEW:
+                turn = np.exp(-2j * np.pi / len(good) * (np.outer(np.arange(band), bad) % len(good)))
+                twice = np.where(np.arange(band) > 0, 2.0, 1.0)[:, None] / len(good)
+                spectra[:, :, j] -= (spectra[:, :, j] @ (np.conj(turn) * twice)).real @ turn.T
+            else:
+                signals = fft.irfft(spectra[:, :, j], len(good), axis=1)
+                spectra[:, :, j] = fft.rfft(signals * good[:, j], axis=1)[:, :band]
         return metrics[e].white(spectra)
 
     for k, place in enumerate(found):
@@ -251,32 +256,25 @@ def collect(
                 phi = fft.rfft(rows, axis=1)[:, : experiments[e].band]
                 parts[e].append(masked(e, s.answer(phi, k, [b.settled for b in laws])))
         if body is not None:
-            bands = [experiments[e].frequencies[: experiments[e].band] for e in range(len(seen))]
-            accelerations = [fft.rfft(np.gradient(m.v, step))[: len(f)] for m, f in zip(motions, bands)]
-            for f0 in RESONANCES:
-                for zeta in DAMPINGS:
-                    candidates.append(Candidate("hidden_resonance", body, 1, False, ("absorber", k, float(f0), zeta)))
-            for e, s in enumerate(seen):
-                f = bands[e]
-                spectra = []
-                for f0 in RESONANCES:
-                    for zeta in DAMPINGS:
-                        x = f / f0
-                        t = (1.0 + 2j * zeta * x) / (1.0 - x**2 + 2j * zeta * x)
-                        spectra.append(t * accelerations[e])
-                parts[e].append(masked(e, s.answer(np.stack(spectra), k)))
+            tried = [(float(f0), zeta) for f0 in RESONANCES for zeta in DAMPINGS]
+            candidates += [Candidate("hidden_resonance", body, 1, False, ("absorber", k, *both)) for both in tried]
+            for e, (s, m) in enumerate(zip(seen, motions)):
+                x = experiments[e].frequencies[: experiments[e].band] / np.array(tried)[:, :1]
+                damped = 2j * np.array(tried)[:, 1:] * x
+                pull = (1.0 + damped) / (1.0 - x**2 + damped) * fft.rfft(np.gradient(m.v, step))[: x.shape[1]]
+                parts[e].append(masked(e, s.answer(pull, k)))
     for j, name in enumerate(sensor_names):
         times = [s.motions[0].t if s.motions else e.time for e, s in zip(experiments, seen)]
         faults = list(hy.sensor_faults(j, [s.sensors[:, j] for s in seen], times, step))
         candidates += [Candidate(f.kind, name, f.sign, f.companion, f) for f in faults]
-        for e in range(len(seen)):
-            rows = np.stack([f.series[e] for f in faults])
-            columns = np.zeros((len(faults), rows.shape[1], len(sensor_names)))
-            columns[:, :, j] = rows * experiments[e].good[:, j]
-            parts[e].append(metrics[e](columns))
-    stacked = np.concatenate([np.concatenate(p, axis=0) for p in parts], axis=1).T
+        for e, x in enumerate(experiments):
+            spectra = np.zeros((len(faults), x.band, len(sensor_names)), dtype=complex)
+            spectra[:, :, j] = fft.rfft(np.stack([f.series[e] for f in faults]) * x.good[:, j], axis=1)[:, : x.band]
+            parts[e].append(metrics[e].white(spectra))
     index = {f.target: i for i, f in enumerate(fit.free)}
     chosen = [p for p in parameters if p in index]
     candidates += [Candidate("wrong_parameter", p, 0, False, p) for p in chosen]
-    stacked = np.concatenate([stacked, fit.jacobian[:, [index[p] for p in chosen]]], axis=1)
-    return candidates, stacked
+    ends = np.cumsum([p[0].shape[1] for p in parts])[:-1]
+    for own, rows in zip(parts, np.split(fit.jacobian[:, [index[p] for p in chosen]].T, ends, axis=1)):
+        own.append(rows)
+    return candidates, np.concatenate([np.concatenate(p) for p in parts], axis=1) if len(parts) > 1 else np.concatenate(parts[0])

@@ -16,7 +16,7 @@ import numpy as np
 
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
-from .hypotheses import Basis, Fault
+from .hypotheses import STRIBECK, Basis, Fault
 from .naming import christened, straight
 from .score import Candidate, Regression
 from .study import Study, loss, regression, requieted
@@ -34,12 +34,13 @@ CURVES = {  # kinds of one family at one place are one curve with one name
     "tyre_nonlinear": "tyre", "tyre_liftoff": "tyre",
 }  # fmt: skip
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
+NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
     "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
     "asymmetric_spring": ("k*abs(s)", "linear_spring"), "asymmetric_damper": ("k*abs(v)", "linear_damper"),
     "coulomb_friction": ("coulomb_friction",), "bouc_wen": ("bouc_wen",), "maxwell_bushing": ("maxwell_bushing",),
-    "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
+    "stribeck_friction": (STRIBECK,), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
     "degressive_damper": ("-k*(max(v - knee, 0) + min(v + knee, 0))",),
 }  # fmt: skip
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance")  # a formula after all
@@ -210,12 +211,20 @@ def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
     return found
 
 
-def at_rest(rest: Study, free: Study) -> bool:
-    """Is a start in motion better explained by a load that was put on at the start?"""
+def at_rest(rest: Study, free: Study, best: Explanation | None, log) -> bool:
+    """May a start in motion be a load that was put on at the start, alone or beside the causes that were found?"""
     r = regression(rest, rest.null, [])
-    loads = [k for k, c in enumerate(r.candidates) if c.kind == "constant_force"]
-    gains = [r.gain([k])[0] for k in loads]
-    return bool(gains) and max(gains) > 0.8 * (rest.null.cost - free.null.cost)
+    gains = {k: r.gain([k])[0] for k, c in enumerate(r.candidates) if c.kind == "constant_force"}
+    if not gains or max(gains.values()) < 0.8 * (rest.null.cost - free.null.cost):
+        return False
+    rest = replace(rest, nothing=loss(rest, rest.null))
+    load = terms_of(r, [max(gains, key=gains.__getitem__)])
+    others = [t for t in best.terms if t.candidate.kind != "constant_force"] if best else []
+    ways = [others, load, [*load, *others]] if others else [[], load]
+    idle, *loaded = (rest.nothing - (explain(rest, terms).score if terms else 0.0) for terms in ways)
+    moving = free.nothing - (best.score if best else 0.0)
+    log(f"at rest {idle:.0f}, with a load {min(loaded):.0f}, moving {moving:.0f}")
+    return min(loaded) < min(idle - NEW, moving + NEAR * (rest.nothing - moving) + NEW)
 
 
 def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:

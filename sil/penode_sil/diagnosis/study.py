@@ -156,8 +156,7 @@ def regression(study: Study, fit: Fit, parameters: Sequence[str]) -> Regression:
     """All hypotheses beside a fit."""
     seen = look(study, fit)
     names = [s.name for s in study.model.sensors]
-    candidates, columns = collect(study.model, study.experiments, study.metrics, seen, study.places, names, fit, parameters)
-    return Regression(fit, candidates, columns)
+    return Regression(fit, *collect(study.model, study.experiments, study.metrics, seen, study.places, names, fit, parameters))
 
 
 def watch(study: Study, fit: Fit) -> list[Array]:
