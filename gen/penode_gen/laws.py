@@ -64,6 +64,11 @@ LAWS: dict[str, Law] = {
     "bouc_wen": Law(
         "force*slip", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - (v*slip^2 + abs(v)*slip*abs(slip))/2)/presliding")}
     ),
+    # the same with other loops: bend 0 .. 1.4 for exponents 1 .. 2.5; share of what the rate's sign does, 1 for loops of Dahl
+    "bouc_wen_loop": Law(
+        "force*slip", {"force": "N", "presliding": "m", "bend": "1", "share": "1"},
+        {"slip": LawState("1", "(v - (share*abs(v)*slip + (1 - share)*v*abs(slip))*(1 - bend + bend*abs(slip)))/presliding")},
+    ),  # fmt: skip
     # hysteresis of Dahl: ever softer after a reversal
     "dahl_friction": Law("force*slip", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - abs(v)*slip)/presliding")}),
     # the part of a dry friction that is there at low rates only, with the memory of Dahl's

@@ -94,9 +94,12 @@ def score(
     }
     if diagnosis is None:
         return row
-    causes = diagnosis.get("causes") or []
-    what = outcome(truth, causes, diagnosis.get("verdict"))
-    row |= {"answer": [" at ".join(_named(c)) for c in causes], "verdict": diagnosis.get("verdict"), "right": what == "right", "outcome": what}
+    causes, verdict = diagnosis.get("causes") or [], diagnosis.get("verdict")
+    if truth.get("coarse"):  # neither asked for nor wrong
+        others = [c for c in causes if _named(c)[0] != "integration_error"]
+        causes, verdict = others, "no_discrepancy" if causes and not others else verdict
+    what = outcome(truth, causes, verdict)
+    row |= {"answer": [" at ".join(_named(c)) for c in causes], "verdict": verdict, "right": what == "right", "outcome": what}
     pairs = pairing(causes, truth["effects"], truth["bound"]) if what == "right" else None
     for i, k in (pairs or {}).items():
         effect, said = truth["effects"][k], causes[i].get("parameters") or {}

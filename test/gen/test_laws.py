@@ -92,6 +92,13 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
     "hardening_bushing": (
         {"cubic": "2e4 N/m^3", "relaxation": "60 ms"}, lambda s, v, own: (2e4 * own[0] ** 3, [v - own[0] / 0.06])
     ),
+    "bouc_wen_loop": (
+        {"force": "9 N", "presliding": "10 mm", "bend": "0.7", "share": "0.6"},
+        lambda s, v, own: (
+            9.0 * own[0],
+            [(v - (0.6 * abs(v) * own[0] + 0.4 * v * abs(own[0])) * (0.3 + 0.7 * abs(own[0]))) / 0.01],
+        ),
+    ),
     "slack_friction": ({"force": "9 N", "presliding": "10 mm"}, lambda s, v, own: (9.0 * own[0] ** 5, bouc_wen(s, v, own)[1])),
     "loose_damper": ({"damping": "6 N*s/m", "gap": "2 mm", "relaxation": "30 ms"}, loose_damper),
     "maxwell_bushing": ({"stiffness": "300 N/m", "relaxation": "60 ms"}, lambda s, v, own: (own[0], [300.0 * v - own[0] / 0.06])),

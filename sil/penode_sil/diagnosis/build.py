@@ -24,6 +24,9 @@ SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3, "s": 1e-3}  # of start st
 BENT = 0.01  # [m] deflection of a hidden mass's spring where its bend would show
 
 
+RANGES = {"presliding": (3.0, 10.0), "transition": (30.0, 3.0), "bend": (30.0, 2.2), "share": (1.3, 1.54)}  # of shapes, down and up
+
+
 @dataclass(frozen=True, eq=False)
 class Term:
     """A candidate with the gain that the regression gave it."""
@@ -72,7 +75,7 @@ def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tup
     low, high = (0.0, np.inf) if what.sign > 0 else (-np.inf, 0.0) if what.sign < 0 else (-np.inf, np.inf)
     free = [Free(f"{name}_{gain}", term.gain, size, low=low, high=high)]
     for key, (value, _) in shapes.items():
-        below, above = (3.0, 10.0) if key.endswith("presliding") else (30.0, 3.0) if key.endswith("transition") else (30.0, 30.0)
+        below, above = RANGES.get(key.removeprefix(f"{name}_"), (30.0, 30.0))
         free.append(Free(key, value, 1.0, log=True, low=max(value / below, least.get(key, 0.0)), high=value * above))
     if what.law in LAWS:
         return Element(name, place.ends, what.law, {key: f"{name}_{key}" for key in LAWS[what.law].arguments}), parameters, free

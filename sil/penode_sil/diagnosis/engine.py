@@ -69,8 +69,9 @@ def diagnose(
     faults = broken_sensors(model, train, study, bursts)
     tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
-    if study.moving and search.at_rest(other, study, explanations[0] if explanations else None, log):
-        other, found = search.search(other, log)
+    if study.moving:
+        other, found = search.at_rest(other, study, explanations[0] if explanations else None, log)
+    if study.moving and found:
         costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
         if costs[1] < costs[0] + MOVING * len(model.states) * len(experiments):
@@ -177,12 +178,14 @@ def broken_sensors(model: Model, train: Sequence[Measured], study: Study, bursts
         unit = units.si(sensor.unit)
         clipped, dropped, railed, total = 0, 0, 0, 0
         rails: dict[str, float] = {}
+        quantum = 0.0
         for k, m in enumerate(train):
             channel = m.quality.channels.get(sensor.name)
             if channel is None:
                 continue
             n = len(study.experiments[k].time)
             total += n
+            quantum = max(quantum, channel.quantum)
             sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
             flagged = ~m.mask[sensor.name][:n]
             off = np.abs(m.z[sensor.name][:n] - study.null.simulated[k][:, j]) > 4.0 * sigma
@@ -203,7 +206,8 @@ def broken_sensors(model: Model, train: Sequence[Measured], study: Study, bursts
         dropped += 0 if clipped >= FEW else railed
         if clipped >= FEW:
             sizes = {"limit": max(map(abs, rails.values())), **rails}
-            exact = {k: Value(x, unit, (x - 0.002 * abs(x), x + 0.002 * abs(x))) for k, x in sizes.items()}
+            sure = {k: 0.002 * abs(x) + 0.5 * quantum for k, x in sizes.items()}
+            exact = {k: Value(x, unit, (x - sure[k], x + sure[k])) for k, x in sizes.items()}
             found.append(Cause("sensor_clipping", sensor.name, exact, 0.99))
         if dropped >= FEW:
             share = dropped / total

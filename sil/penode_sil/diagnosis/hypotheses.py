@@ -98,17 +98,21 @@ one = { value = 1, unit = "N" }
 width = { value = 1, unit = "m" }
 drag = { value = 1, unit = "N*s/m" }
 gap = { value = 1, unit = "m" }
+bend = { value = 0.7, unit = "1" }
+share = { value = 0.65, unit = "1" }
 lag = { value = 1, unit = "s" }
 [inputs]
 x = { unit = "m" }
 [elements]
 wen = { between = ["x", "ground"], law = "bouc_wen", force = "one", presliding = "width" }
 dahl = { between = ["x", "ground"], law = "dahl_friction", force = "one", presliding = "width" }
+loop = { between = ["x", "ground"], law = "bouc_wen_loop", force = "one", presliding = "width", bend = "bend", share = "share" }
 loose = { between = ["x", "ground"], law = "loose_damper", damping = "drag", gap = "gap", relaxation = "lag" }
 [outputs]
 loose = { value = "F_loose", unit = "N" }
 wen = { value = "wen_slip", unit = "1" }
 dahl = { value = "dahl_slip", unit = "1" }
+loop = { value = "loop_slip", unit = "1" }
 """
 
 
@@ -122,9 +126,9 @@ def _memory() -> Batch:
 
 
 def slips(s: Array, widths: Sequence[float]) -> Array:
-    """Slip [2 widths, n] of the laws bouc_wen, then dahl_friction, starting without force."""
-    z = _memory().run((s - s[0])[:, None], parameters={"width": np.asarray(widths)}, outputs=("wen", "dahl")).y
-    return np.clip(np.concatenate([z[:, :, 0], z[:, :, 1]]), -1.0, 1.0)
+    """Slip [3 widths, n] of the laws bouc_wen, dahl_friction and, about between them, bouc_wen_loop, starting without force."""
+    z = _memory().run((s - s[0])[:, None], parameters={"width": np.asarray(widths)}, outputs=("wen", "dahl", "loop")).y
+    return np.clip(np.concatenate([z[:, :, k] for k in range(3)]), -1.0, 1.0)
 
 
 def losses(s: Array, step: float, gaps: Sequence[float], taus: Sequence[float]) -> Array:
@@ -140,6 +144,15 @@ def lag(x: Array, tau: float, step: float) -> Array:
 
 
 STRIBECK = "force*tanh(v/knee)*(1 + rise*exp(-(v/width)^2))"  # the textbook's, with a knee
+BENDS = {x: f"k*(knee*(softplus(2*{x}/knee) - 0.6931471805599453) - {x})" for x in "sv"}  # slope -k here, k there, and tanh between
+KNEE = "-k*round*(softplus((v - knee)/round) - softplus((-v - knee)/round))"  # of a damper, rounded
+
+
+def bent(x: Array, knee: float) -> Array:
+    """The law BENDS for k = 1."""
+    return knee * (np.logaddexp(0.0, 2.0 * x / knee) - np.log(2.0)) - x
+
+
 GAPS = (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5)
 GRID = (0.03, 0.06, 0.12, 0.25, 0.5)
 
@@ -205,9 +218,10 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
     widths = [w * reach for w in (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)]
     widths = [w for w in widths if w > 0.3 * speed * step]  # a sample must not jump over it
     slipped = [slips(m.s, widths) if widths else np.empty((0, len(m.s))) for m in motions]
-    for row, (name, a) in enumerate([(name, a) for name in ("bouc_wen", "dahl_friction") for a in widths]):
+    for row, (name, a) in enumerate(product(("bouc_wen", "dahl_friction", "bouc_wen_loop"), widths)):
         kind = "coulomb_friction" if a < 0.05 * reach else "bouc_wen"
-        yield Basis(kind, place, name, n, {"presliding": (a, "m")}, 1, tuple(each_slip[row] for each_slip in slipped))
+        shapes = {"presliding": (a, "m")} | ({"bend": (0.7, "1"), "share": (0.65, "1")} if name == "bouc_wen_loop" else {})
+        yield Basis(kind, place, name, n, shapes, 1, tuple(each_slip[row] for each_slip in slipped))
         if name == "bouc_wen" and kind == name and prescribed:  # a play shows in series with friction where no mass is in between
             flat = tuple(each_slip[row] ** 5 for each_slip in slipped)
             yield Basis("backlash", place, "slack_friction", n, {"presliding": (a, "m")}, 1, flat)
@@ -262,6 +276,11 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
             lambda s, v, t: np.clip(v, -a, a) - v,
         )  # fmt: skip
         if w > 0.1:
+            b = 0.1 * a
+            yield law(
+                "degressive_damper", KNEE, ("k", "N*s/m"), {"knee": (a, "m/s"), "round": (b, "m/s")}, 1,
+                lambda s, v, t: -b * (np.logaddexp(0.0, (v - a) / b) - np.logaddexp(0.0, (-v - a) / b)),
+            )  # fmt: skip
             yield law(
                 "quadratic_damper", "k*(max(v - knee, 0) + min(v + knee, 0))", ("k", "N*s/m"), {"knee": (a, "m/s")}, 1,
                 lambda s, v, t: v - np.clip(v, -a, a),
@@ -272,6 +291,8 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
     yield law("quadratic_damper", "linear_damper", d, {}, 0, lambda s, v, t: v, True)
     for sign in (1, -1):
         yield law("asymmetric_damper", "k*abs(v)", ("k", "N*s/m"), {}, sign, lambda s, v, t: np.abs(v))
+        a = 0.01 * speed
+        yield law("asymmetric_damper", BENDS["v"], ("k", "N*s/m"), {"knee": (a, "m/s")}, sign, lambda s, v, t: bent(v, a))
         yield law("asymmetric_damper", "k*v^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: v * v)
         yield law("asymmetric_damper", "k*max(v, 0)^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: np.maximum(v, 0.0) ** 2)
         yield law("asymmetric_damper", "k*min(v, 0)^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: np.minimum(v, 0.0) ** 2)
@@ -302,6 +323,8 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
         yield law("cubic_spring", "k*s*abs(s)", ("k", "N/m^2"), {}, sign, lambda s, v, t: s * np.abs(s))
         yield law("cubic_spring", "k*s^5", ("k", "N/m^5"), {}, sign, lambda s, v, t: s**5)
         yield law("asymmetric_spring", "k*abs(s)", ("k", "N/m"), {}, sign, lambda s, v, t: np.abs(s))
+        a = 0.01 * reach
+        yield law("asymmetric_spring", BENDS["s"], ("k", "N/m"), {"knee": (a, "m")}, sign, lambda s, v, t: bent(s, a))
         yield law("asymmetric_spring", "k*max(s, 0)^2", ("k", "N/m^2"), {}, sign, lambda s, v, t: np.maximum(s, 0.0) ** 2)
         yield law("asymmetric_spring", "k*min(s, 0)^2", ("k", "N/m^2"), {}, sign, lambda s, v, t: np.minimum(s, 0.0) ** 2)
         yield law("asymmetric_spring", "k*max(s, 0)^3", ("k", "N/m^3"), {}, sign, lambda s, v, t: np.maximum(s, 0.0) ** 3)

@@ -36,6 +36,7 @@ SPRINGS = ("asymmetric_spring", "cubic_spring", "bump_stop", "network_extrapolat
 TYRES = ("tyre_nonlinear", "tyre_liftoff")
 QUIET = 0.25  # of the largest force that an element is wrong by: less where its network was trained, and it is not the element
 UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that makes it asymmetric
+EDGE = 0.03  # of the reach: a stop that acts from nearer than that to the middle is a spring of two stiffnesses
 STRAIGHT = 0.02  # of the straight part of a curve: less than that beside it, and it is a straight line
 FLAT = 0.015  # of what a tyre lacks when stretched: bent by less than that when pressed in, it only loses contact
 PEAK = 1.08  # friction at low rates over that at high ones that makes it Stribeck's
@@ -88,6 +89,9 @@ def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: 
     s = np.linspace(-reach, reach, 401)
     odd, even = _parts(s, Curve(terms, names)(s, np.zeros_like(s), values))
     found = {t.candidate.kind for t in terms}
+    gaps = [abs(values.get(f"{n}_gap", reach)) for t, n in zip(terms, names) if t.candidate.kind == "bump_stop"]
+    if gaps and max(gaps) < EDGE * reach:
+        return "asymmetric_spring"
     if found & {"bump_stop", "network_extrapolation"}:
         return terms[0].candidate.kind
     if found == {"asymmetric_spring"} and _size(even) < UNEVEN * _size(odd):
@@ -179,7 +183,7 @@ def shape(law: str, s: Array, v: Array, a: Mapping[str, float]) -> Array:
             return v
         case "coulomb_friction":
             return np.tanh(v / a["transition"])
-        case "bouc_wen" | "dahl_friction" | "slack_friction":
+        case "bouc_wen" | "bouc_wen_loop" | "dahl_friction" | "slack_friction":
             return np.sign(v)
         case "degressive_damper":
             return -v * np.abs(v) / (a["knee"] + np.abs(v))
@@ -205,7 +209,7 @@ def shape(law: str, s: Array, v: Array, a: Mapping[str, float]) -> Array:
             return np.sign(v) / (1.0 + (v / a["stribeck"]) ** 2)
         case "fading_damper" | "heating_damper":
             return v
-    words = {"s": s, "v": v, "k": 1.0, "force": 1.0, "abs": np.abs, "exp": np.exp, "tanh": np.tanh, "max": np.maximum, "min": np.minimum} | dict(a)
+    words = {"softplus": lambda x: np.logaddexp(0.0, x)} | {"s": s, "v": v, "k": 1.0, "force": 1.0, "abs": np.abs, "exp": np.exp, "tanh": np.tanh, "max": np.maximum, "min": np.minimum} | dict(a)
     return eval(law.replace("^", "**"), {"__builtins__": {}}, words)  # one of our own texts
 
 
@@ -276,7 +280,7 @@ def functions(
         case "cubic_spring":
             return {"cubic": ("N/m^3", lambda p: line(s**3, curve(s, zero, p), s))}
         case "asymmetric_spring":
-            return {"difference": ("N/m", lambda p: -2.0 * line(np.abs(s), curve(s, zero, p), s))}
+            return {"difference": ("N/m", lambda p: -2.0 * line(np.abs(s), curve(s, zero, p), s, np.ones_like(s)))}
         case "bump_stop":
             ends = np.array([-reach, reach])
             main = max(range(len(terms)), key=lambda i: np.max(np.abs(Curve(terms[i : i + 1], names[i : i + 1])(ends, 0.0 * ends, {}))))
@@ -295,8 +299,8 @@ def functions(
             return {"gap": ("m", lambda p: 1.4 * p[f"{n}_presliding"] if slack else 2.0 * p[f"{n}_gap"])}
         case "asymmetric_damper":
             return {
-                "rebound": ("N*s/m", lambda p: d0(p) + line(up, curve(flat, up, p))),
-                "compression": ("N*s/m", lambda p: d0(p) + line(-up, curve(flat, -up, p))),
+                "rebound": ("N*s/m", lambda p: d0(p) + line(up, curve(flat, up, p), np.ones_like(up))),
+                "compression": ("N*s/m", lambda p: d0(p) + line(-up, curve(flat, -up, p), np.ones_like(up))),
             }
         case "degressive_damper":
             low = np.linspace(0.0, 0.05 * speed, 20)[1:]

@@ -16,7 +16,7 @@ import numpy as np
 
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
-from .hypotheses import STRIBECK, Basis, Fault
+from .hypotheses import BENDS, KNEE, STRIBECK, Basis, Fault
 from .naming import christened, straight
 from .score import Candidate, Regression
 from .study import Study, loss, regression, requieted
@@ -38,11 +38,12 @@ NEAR = 0.1  # of what there is to be explained: two explanations that differ les
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
     "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
-    "asymmetric_spring": ("k*abs(s)", "linear_spring"), "asymmetric_damper": ("k*abs(v)", "linear_damper"),
-    "coulomb_friction": ("coulomb_friction",), "bouc_wen": ("bouc_wen",), "maxwell_bushing": ("maxwell_bushing",),
+    "asymmetric_spring": (BENDS["s"], "linear_spring"), "asymmetric_damper": (BENDS["v"], "linear_damper"),
+    "coulomb_friction": ("coulomb_friction",), "bouc_wen": ("bouc_wen_loop",), "maxwell_bushing": ("maxwell_bushing",),
     "stribeck_friction": (STRIBECK,), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
-    "degressive_damper": ("-k*(max(v - knee, 0) + min(v + knee, 0))",),
+    "degressive_damper": (KNEE,),
 }  # fmt: skip
+TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance")  # a formula after all
 FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
 Group = tuple[str, str]
@@ -211,20 +212,24 @@ def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
     return found
 
 
-def at_rest(rest: Study, free: Study, best: Explanation | None, log) -> bool:
-    """May a start in motion be a load that was put on at the start, alone or beside the causes that were found?"""
+def at_rest(rest: Study, free: Study, best: Explanation | None, log) -> tuple[Study, list[Explanation]]:
+    """Explanations of a start in motion by a load that was put on at the start, alone or beside the causes that were found,
+    and the study with the noise they leave; none where such a load is out of the question."""
     r = regression(rest, rest.null, [])
     gains = {k: r.gain([k])[0] for k, c in enumerate(r.candidates) if c.kind == "constant_force"}
     if not gains or max(gains.values()) < 0.8 * (rest.null.cost - free.null.cost):
-        return False
+        return rest, []
     rest = replace(rest, nothing=loss(rest, rest.null))
     load = terms_of(r, [max(gains, key=gains.__getitem__)])
     others = [t for t in best.terms if t.candidate.kind != "constant_force"] if best else []
-    ways = [others, load, [*load, *others]] if others else [[], load]
-    idle, *loaded = (rest.nothing - (explain(rest, terms).score if terms else 0.0) for terms in ways)
-    moving = free.nothing - (best.score if best else 0.0)
-    log(f"at rest {idle:.0f}, with a load {min(loaded):.0f}, moving {moving:.0f}")
-    return min(loaded) < min(idle - NEW, moving + NEAR * (rest.nothing - moving) + NEW)
+    loaded = max((explain(rest, terms) for terms in ([load, [*load, *others]] if others else [load])), key=lambda e: e.score)
+    idle = explain(rest, others).score if others else 0.0
+    moving = rest.nothing - free.nothing + (best.score if best else 0.0)
+    log(f"at rest {idle:.0f}, with a load {loaded.score:.0f}, moving {moving:.0f}")
+    if loaded.score < max(idle + NEW, (1.0 - NEAR) * moving - NEW):
+        return rest, []
+    quiet = requieted(rest, loaded.fit)
+    return grow(quiet, [explain(quiet, loaded.terms, 4, loaded.fit)], log)
 
 
 def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:
@@ -295,7 +300,7 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
             e = e.whole()
             e, r = refine(here, e, regression(here, e.fit, parameters), parameters)
             done.append(e)
-            log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f}")
+            log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f} {[_law(t) for t in e.terms]}")
             for new in [terms_of(r, chosen) for chosen in further(here, e, r)[:2]]:
                 if not new:
                     continue
@@ -336,11 +341,14 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
     for group in bent:
         pool = [k for k in pools(r).get(group, []) if _law(Term(r.candidates[k], 0.0)) in TEXTBOOK[group[0]]]
         without = r.without(missing(whole, group))
-        new = terms_of(without, pursue(without, pool, terms=len(TEXTBOOK[group[0]]))[1])
+        chosen = pursue(without, pool, terms=len(TEXTBOOK[group[0]]))[1]
+        if group[0] in TWO and len(chosen) == 1:
+            chosen += [k for k in pool if without.candidates[k].companion]
+        new = terms_of(without, chosen)
         if new:
             simple = explain(study, [*(t for t in e.terms if t.group != group), *new], start=e.fit)
             log(f"  plain {group}: {simple.gain:.0f} for {e.gain:.0f}")
-            if set(simple.groups) == set(e.groups) and simple.score > e.score - SLACK:
+            if set(simple.groups) == set(e.groups) and (simple.gain > e.gain - SLACK or simple.score > e.score - SLACK):
                 e = simple
     return e
 
