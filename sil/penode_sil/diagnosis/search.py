@@ -51,13 +51,15 @@ Group = tuple[str, str]
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """Some causes, fitted. `gain`: fall of the loss against the null fit; `score`: less what its freedom is worth."""
+    """Some causes, fitted. `gain`: fall of the loss against the null fit, `formulas` the part of it that causes had taken which are
+    formulas and leave no form to mend; `score`: gain less what the freedom is worth."""
 
     terms: tuple[Term, ...]
     built: Extended
     problem: Problem
     fit: Fit
     gain: float
+    formulas: float = 0.0
 
     def whole(self) -> Explanation:
         """With all derivatives."""
@@ -70,8 +72,8 @@ class Explanation:
     @property
     def score(self) -> float:
         freedom = sum(cost(t.candidate) for t in self.terms)
-        form = FORM * freedom / COST + (0.0 if exact(self.groups) else LEAST * (len(self.groups) - 1))
-        return self.gain - freedom - NEW * len(self.groups) - form * max(self.gain, 0.0)
+        form = 0.0 if exact(self.groups) else FORM * freedom / COST + LEAST * (len(self.groups) - 1)
+        return self.gain - freedom - NEW * len(self.groups) - form * max(self.gain - self.formulas, 0.0)
 
 
 def exact(groups: Sequence[Group]) -> bool:
@@ -130,7 +132,9 @@ def pair(r: Regression) -> tuple[float, list[int]]:
     return best
 
 
-def explain(study: Study, terms: Sequence[Term], iterations: int = 10, start: Fit | None = None) -> Explanation:
+def explain(
+    study: Study, terms: Sequence[Term], iterations: int = 10, start: Fit | None = None, formulas: float = 0.0
+) -> Explanation:
     """Fit some terms by simulation, with everything else from where a fit has left it."""
     recordings = len(study.experiments)
     built = extended(study.model, study.places, terms, recordings if study.moving else 0, recordings)
@@ -143,7 +147,7 @@ def explain(study: Study, terms: Sequence[Term], iterations: int = 10, start: Fi
     near = {i: study.null.jacobian[:, i] for i, f in enumerate(study.null.free) if f.target not in built.loosened}
     fit = problem.solve(problem.eased(free), iterations, 0.5, near)
     gain = study.nothing - loss(study, fit) if np.isfinite(fit.cost) else -np.inf
-    return Explanation(christened(fitted(terms, built, fit), built.names, fit, study), built, problem, fit, gain)
+    return Explanation(christened(fitted(terms, built, fit), built.names, fit, study), built, problem, fit, gain, formulas)
 
 
 def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
@@ -174,12 +178,14 @@ def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str
         best = None
         for group in e.groups:
             if sum(t.group == group for t in e.terms) < TERMS + 1:
-                gain, chosen = pursue(r, pools(r).get(group, []), terms=1)
+                own = {(t.candidate.what.what, t.candidate.what.shape) for t in e.terms if t.group == group and isinstance(t.candidate.what, Fault)}
+                pool = [k for k in pools(r).get(group, []) if _fault(r.candidates[k]) not in own]
+                gain, chosen = pursue(r, pool, terms=1)
                 if chosen and gain > max(cost(r.candidates[chosen[0]]), 2e-3 * e.gain) and (best is None or gain > best[0]):
                     best = gain, chosen[0], r.gain(chosen)[1][0]
         if best is None:
             break
-        wider = explain(study, [*e.terms, Term(r.candidates[best[1]], float(best[2]))], start=e.fit)
+        wider = explain(study, [*e.terms, Term(r.candidates[best[1]], float(best[2]))], start=e.fit, formulas=e.formulas)
         if wider.score < e.score + 2e-3 * e.gain:
             break
         e = wider.whole()
@@ -217,19 +223,22 @@ def at_rest(rest: Study, free: Study, best: Explanation | None, log) -> tuple[St
     and the study with the noise they leave; none where such a load is out of the question."""
     r = regression(rest, rest.null, [])
     gains = {k: r.gain([k])[0] for k, c in enumerate(r.candidates) if c.kind == "constant_force"}
-    if not gains or max(gains.values()) < 0.8 * (rest.null.cost - free.null.cost):
+    gains = {k: g for k, g in gains.items() if g > 0.8 * (rest.null.cost - free.null.cost)}
+    if not gains:
         return rest, []
     rest = replace(rest, nothing=loss(rest, rest.null))
-    load = terms_of(r, [max(gains, key=gains.__getitem__)])
+    loads = {r.candidates[k].where: terms_of(r, [k]) for k in sorted(gains, key=gains.__getitem__)}.values()  # the best of each place
     others = [t for t in best.terms if t.candidate.kind != "constant_force"] if best else []
-    loaded = max((explain(rest, terms) for terms in ([load, [*load, *others]] if others else [load])), key=lambda e: e.score)
+    ways = [[*load, *more] for load in loads for more in ([[], others] if others else [[]])]
+    beam = sorted((explain(rest, terms) for terms in ways), key=lambda e: -e.score)
+    loaded = beam[0]
     idle = explain(rest, others).score if others else 0.0
     moving = rest.nothing - free.nothing + (best.score if best else 0.0)
     log(f"at rest {idle:.0f}, with a load {loaded.score:.0f}, moving {moving:.0f}")
     if loaded.score < max(idle + NEW, (1.0 - NEAR) * moving - NEW):
         return rest, []
     quiet = requieted(rest, loaded.fit)
-    return grow(quiet, [explain(quiet, loaded.terms, 4, loaded.fit)], log)
+    return grow(quiet, [explain(quiet, e.terms, 4, e.fit) for e in beam[:2]], log)
 
 
 def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:
@@ -296,7 +305,7 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
         for e in [b for b in beam[:2] if b.gain > 0.7 * beam[0].gain]:
             here = requieted(study, e.fit)
             if here is not study:
-                e = explain(here, e.terms, 4, e.fit)
+                e = explain(here, e.terms, 4, e.fit, e.formulas)
             e = e.whole()
             e, r = refine(here, e, regression(here, e.fit, parameters), parameters)
             done.append(e)
@@ -304,7 +313,7 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
             for new in [terms_of(r, chosen) for chosen in further(here, e, r)[:2]]:
                 if not new:
                     continue
-                more = explain(here, [*e.terms, *new], start=e.fit)
+                more = explain(here, [*e.terms, *new], start=e.fit, formulas=e.gain if exact(e.groups) else e.formulas)
                 log(f"  + {more.groups[-1]} -> {more.gain:.0f}")
                 if more.score > e.score:
                     grown.append(more)
@@ -346,7 +355,7 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
             chosen += [k for k in pool if without.candidates[k].companion]
         new = terms_of(without, chosen)
         if new:
-            simple = explain(study, [*(t for t in e.terms if t.group != group), *new], start=e.fit)
+            simple = explain(study, [*(t for t in e.terms if t.group != group), *new], start=e.fit, formulas=e.formulas)
             log(f"  plain {group}: {simple.gain:.0f} for {e.gain:.0f}")
             if set(simple.groups) == set(e.groups) and (simple.gain > e.gain - SLACK or simple.score > e.score - SLACK):
                 e = simple
@@ -359,11 +368,15 @@ def unbent(study: Study, e: Explanation, log) -> Explanation:
         name = straight(study.model, study.places, e.terms, e.built.names, group, {f.target: f.value for f in e.fit.free})
         if name and all(t.group != ("wrong_parameter", name) for t in e.terms):
             term = Term(Candidate("wrong_parameter", name, 0, False, name), 0.0)
-            simple = explain(study, [*(t for t in e.terms if t.group != group), term], start=e.fit)
+            simple = explain(study, [*(t for t in e.terms if t.group != group), term], start=e.fit, formulas=e.formulas)
             log(f"  straight {group}: {simple.gain:.0f} for {e.gain:.0f}")
             if simple.score > e.score - SLACK:
                 e = simple
     return e
+
+
+def _fault(c: Candidate) -> tuple[str, float] | None:
+    return (c.what.what, c.what.shape) if isinstance(c.what, Fault) else None
 
 
 def _law(t: Term) -> str:
@@ -388,7 +401,7 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
             if not new:
                 continue
             kept = [t for t in e.terms if t.group != group]
-            found.append(explain(study, [*kept, *new], start=e.fit))
+            found.append(explain(study, [*kept, *new], start=e.fit, formulas=e.formulas))
             log(f"  {group} for {found[-1].groups[-1]}: {found[-1].gain:.0f}")
     return found
 
