@@ -49,7 +49,7 @@ class BatchRun:
 class _Job(ctypes.Structure):
     """batch_t"""
 
-    _fields_ = [(name, ctypes.c_size_t) for name in ("samples", "runs", "input_runs")]
+    _fields_ = [(name, ctypes.c_size_t) for name in ("samples", "every", "runs", "input_runs")]
     _fields_ += [(name, ctypes.c_void_p) for name in ("u", "p", "w")]
     _fields_ += [("set_length", ctypes.c_size_t), ("start", ctypes.c_void_p), ("count", ctypes.c_size_t * 3)]
     _fields_ += [("which", ctypes.c_void_p * 3), ("kept", ctypes.c_void_p * 3)]
@@ -76,13 +76,15 @@ class Batch:
         sensors: Sequence[str] | None = None,
         outputs: Sequence[str] = (),
         states: Sequence[str] = (),
+        every: int = 1,
         threads: int = 1,
     ) -> BatchRun:
         """Step through the inputs from x0 (sample 0), all quantities in SI.
 
         u [n, n_u], or [runs, n, n_u]; x0 [n_x] or [runs, n_x], the model's start if not given; a parameter's value, one
         or [runs], replaces that of the model file or set; `sets` [set length] or [runs, set length] replaces the values
-        of the named set (see penode_gen.set_values). Kept are the named sensors (all if not said), outputs and states.
+        of the named set (see penode_gen.set_values). Kept are the named sensors (all if not said), outputs and states, of
+        one in `every` samples from the first on; sensors of the others are not computed.
         Raises UserError for unknown names, ValueError for shapes and a start that is not finite.
         """
         model, dtype = self.model, self.dtype
@@ -109,9 +111,9 @@ class Batch:
             self._columns("output", outputs, [s.name for s in model.outputs]),
             self._columns("sensor", sensors, [s.name for s in model.sensors]),
         )
-        kept = [np.empty((n, len(columns), padded), dtype=dtype) for columns in wanted]
+        kept = [np.empty((-(-n // every), len(columns), padded), dtype=dtype) for columns in wanted]
         first = np.empty((2, padded), dtype=np.int64 if dtype == np.float64 else np.int32)
-        job = _Job(samples=n, runs=padded, input_runs=padded if u.ndim == 3 else 1, set_length=default.size)
+        job = _Job(samples=n, every=every, runs=padded, input_runs=padded if u.ndim == 3 else 1, set_length=default.size)
         job.u, job.p, job.w, job.start = (a.ctypes.data for a in (u, p, values, start))
         job.first_bad, job.first_outside = (a.ctypes.data for a in first)
         job.count = tuple(map(len, wanted))

@@ -242,6 +242,16 @@ def test_signals_are_kept_in_the_order_asked_for(nqvm):
     assert batch.run(u, sensors=()).z.shape == (1, 50, 0)
 
 
+@pytest.mark.parametrize("every", [3, 4, 1000])
+def test_one_sample_in_some_is_the_same_sample(nqvm, every):
+    """From the first on; what is kept does not change what happens."""
+    u = 0.01 * np.sin(np.arange(101) * 0.05)[:, None]
+    batch = Batch(nqvm)
+    whole, some = (batch.run(u, outputs=("z_b",), states=("z_b", "v_b"), every=n) for n in (1, every))
+    for name in ("x", "y", "z"):
+        assert np.array_equal(getattr(some, name), getattr(whole, name)[:, ::every])
+
+
 def test_central_differences_over_lanes(oscillator, show):
     """Against the derivative of the same RK4 step by complex steps in NumPy, which is exact to rounding.
 

@@ -112,32 +112,33 @@ class Problem:
                     start[:, f.target[2]] = values
             else:
                 faults.append((f.target[0], f.target[1], values))
-        run = self.batch.run(self.inputs[e], x0=start, parameters=parameters, set_name=self.set_name, states=states)
-        z = run.z[:, :: self.fine]
-        if self.fine == 4 and z.shape[1] > 2:
-            z[:, 0] = 2.0 * z[:, 1] - z[:, 2]  # the step knows no rate of an input at its first sample
+        run = self.batch.run(self.inputs[e], x0=start, parameters=parameters, set_name=self.set_name, states=states, every=self.fine)
+        z = np.ascontiguousarray(np.moveaxis(run.z, 1, 2))  # [runs, n_z, n], as what follows likes it
+        if self.fine == 4 and z.shape[2] > 2:
+            z[:, :, 0] = 2.0 * z[:, :, 1] - z[:, :, 2]  # the step knows no rate of an input at its first sample
         z[run.first_bad >= 0] = 1e30
         for what, j, values in faults:
-            column = np.moveaxis(z[:, :, j if what != "fault" else 0], 0, -1)
-            if what == "scale":
-                column *= 1.0 + values
-            elif what == "bias":
-                column += values
-            elif what == "skew":
-                column -= values * np.gradient(column[:, :1], self.experiments[e].step, axis=0)  # of all runs about the same
-            elif what == "fault":
+            if what == "fault":
                 fault = self.faults[j]
-                signal = z[:, :, fault.sensor]
-                signal += values[:, None] * fault.of(signal, e)
+                z[:, fault.sensor] += values[:, None] * fault.of(z[:, fault.sensor], e)
+            elif what == "scale":
+                z[:, j] *= 1.0 + values[:, None]
+            elif what == "bias":
+                z[:, j] += values[:, None]
+            elif what == "skew":  # of all runs about the same
+                z[:, j] -= values[:, None] * np.gradient(z[0, j], self.experiments[e].step)
             elif what == "delay":
-                column[:] = delayed(column, values, self.experiments[e].step)
-        return z, run.x[:, :: self.fine]
+                z[:, j] = delayed(z[:, j].T, values, self.experiments[e].step).T
+        return np.moveaxis(z, 1, 2), run.x
 
     def residuals(self, e: int, z: Array) -> Array:
         """Whitened residuals [runs, rows]."""
-        experiment = self.experiments[e]
-        with np.errstate(invalid="ignore"):
-            return self.metrics[e](np.where(experiment.good, experiment.y - z, 0.0))
+        y, good = self.experiments[e].y.T, self.experiments[e].good.T
+        rows = np.empty((len(z), *y.shape))  # as the transforms like them
+        np.subtract(y, np.moveaxis(z, 1, 2), out=rows)
+        if not good.all():
+            rows *= good
+        return self.metrics[e](np.moveaxis(rows, 1, 2))
 
     def solve(self, free: Sequence[Free], iterations: int = 12, close: float = 0.05, known: Mapping[int, Array] = {}) -> Fit:
         """The best free values from those given on, by damped Gauss-Newton; stops when a step gains less than `close`.

@@ -121,8 +121,7 @@ class Metric:
             for j in range(1, i + 1):
                 w[..., i, :] += self.root[:, i, j] * spectra[..., j]
         w[..., 0] /= np.sqrt(2.0)  # the mean has one real part only
-        flat = w.reshape(*w.shape[:-2], -1)
-        return np.concatenate([flat.real, flat.imag], axis=-1)
+        return w.reshape(*w.shape[:-2], -1).view(float)
 
     def __call__(self, r: Array) -> Array:
         return self.white(self.spectrum(r))

@@ -50,10 +50,10 @@ class Seen:
         spectra = force[:, :, None] * self.response[None, :, :, place]
         if self.states is not None and self.free is not None:
             # what is periodic is not at rest at the start: take that start away
-            start = np.einsum("kf,fx->kx", force, self.states[:, :, place]) * 2.0 - force[:, :1] * self.states[0, :, place]
+            start = force @ self.states[:, :, place] * 2.0 - force[:, :1] * self.states[0, :, place]
             if settled:
                 start[np.array(settled)] = 0.0
-            spectra = spectra - np.einsum("kx,fsx->kfs", start.real / self.n, self.free)
+            spectra -= np.tensordot(start.real / self.n, self.free, axes=(1, 2))
         return spectra
 
     @property
