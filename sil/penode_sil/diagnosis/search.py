@@ -72,8 +72,10 @@ class Explanation:
     @property
     def score(self) -> float:
         freedom = sum(cost(t.candidate) for t in self.terms)
-        form = 0.0 if exact(self.groups) else FORM * freedom / COST + LEAST * (len(self.groups) - 1)
-        return self.gain - freedom - NEW * len(self.groups) - form * max(self.gain - self.formulas, 0.0)
+        form = 0.0
+        if not exact(self.groups):
+            form = FORM * freedom / COST * (self.gain - self.formulas) + LEAST * (len(self.groups) - 1) * self.gain
+        return self.gain - freedom - NEW * len(self.groups) - max(form, 0.0)
 
 
 def exact(groups: Sequence[Group]) -> bool:
@@ -228,7 +230,7 @@ def at_rest(rest: Study, free: Study, best: Explanation | None, log) -> tuple[St
         return rest, []
     rest = replace(rest, nothing=loss(rest, rest.null))
     loads = {r.candidates[k].where: terms_of(r, [k]) for k in sorted(gains, key=gains.__getitem__)}.values()  # the best of each place
-    others = [t for t in best.terms if t.candidate.kind != "constant_force"] if best else []
+    others = [t for t in best.terms if t.candidate.kind not in ("constant_force", "sensor_bias")] if best else []  # of which a load is one
     ways = [[*load, *more] for load in loads for more in ([[], others] if others else [[]])]
     beam = sorted((explain(rest, terms) for terms in ways), key=lambda e: -e.score)
     loaded = beam[0]
