@@ -139,8 +139,9 @@ static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size
         pen_piece_t *const here = down ? &piece[left - 1U] : &piece[capacity - left];
         const view_t view = look(walk, x, side->way, begin);
         const pen_real_t next = x + (side->way * view.ahead);
-        const bool kink = (view.neuron < walk->chain->neurons) && (pen_port_abs(next) < PEN_REAL_MAX);
-        const bool beyond = kink && ((side->way * (side->edge - next)) > ZERO); /* is the edge */
+        const size_t kink = (pen_port_abs(next) < PEN_REAL_MAX) ? view.neuron : walk->chain->neurons;
+        /* is the edge beyond the kink? */
+        const bool beyond = (kink < walk->chain->neurons) && ((side->way * (side->edge - next)) > ZERO);
         const bool leaving = (status == PEN_OK) && !beyond && (pen_port_abs(side->edge) < PEN_REAL_MAX);
         const bool flat = side->clamp && (status != PEN_OK);
         bool moved = false; /* else a piece without length, or the last one */
@@ -156,9 +157,9 @@ static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size
             status = PEN_OUTSIDE;
             start = side->start;
             x = side->edge;
-        } else if (kink && !flat) {
+        } else if ((kink < walk->chain->neurons) && !flat) {
             moved = ((side->way * (next - x)) > ZERO);
-            walk->active[view.neuron] = !walk->active[view.neuron];
+            walk->active[kink] = !walk->active[kink];
             start = moved ? next : start; /* a kink on the edge of the envelope leaves its start beyond the edge */
             x = next;
         } else {

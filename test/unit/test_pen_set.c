@@ -11,12 +11,16 @@
 #define LAYOUT 0x12345678U
 
 static pen_tuning_t tuning;
-static pen_real_t   bank0[N];
-static pen_real_t   bank1[N];
+static pen_real_t   memory[4U * N]; /* below the banks, the banks, above them */
 static pen_real_t   first_value[N];
 static pen_real_t   other_value[N];
 static pen_set_t    first;
 static pen_set_t    other;
+
+static pen_real_t *const below = &memory[0];
+static pen_real_t *const bank0 = &memory[N];
+static pen_real_t *const bank1 = &memory[2U * N];
+static pen_real_t *const above = &memory[3U * N];
 
 static void fill(pen_set_t *set, pen_real_t value[], uint32_t id)
 {
@@ -34,9 +38,8 @@ void setUp(void)
 {
     fill(&first, first_value, 1U);
     fill(&other, other_value, 2U);
-    for (uint32_t i = 0U; i < N; i++) {
-        bank0[i] = (pen_real_t)-1;
-        bank1[i] = (pen_real_t)-1;
+    for (uint32_t i = 0U; i < (4U * N); i++) {
+        memory[i] = (pen_real_t)-1;
     }
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_init(&tuning, LAYOUT, N, &first, bank0, bank1));
 }
@@ -373,32 +376,95 @@ void test_hold_does_not_keep_a_set_from_being_adopted(void)
 /* What a bit that flips in the instance can do to its addresses: nothing is written, nothing is committed. */
 void test_damaged_addresses_of_the_banks(void)
 {
-    static pen_real_t elsewhere[N];
+    pen_real_t *const elsewhere[2] = { below, above };
     pen_set_t set;
     pen_real_t value[N];
 
     fill(&set, value, 6U);
-    for (size_t i = 0U; i < 2U; i++) {
-        pen_real_t *const kept = tuning.bank[i];
-        tuning.bank[i] = elsewhere;
-        TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
-        tuning.bank[i] = kept;
+    for (size_t e = 0U; e < 2U; e++) {
+        for (size_t i = 0U; i < 2U; i++) {
+            pen_real_t *const kept = tuning.bank[i];
+            tuning.bank[i] = elsewhere[e];
+            TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
+            tuning.bank[i] = kept;
+        }
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, N));
+        tuning.bank[0] = elsewhere[e]; /* the open one */
+        TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, value, N));
+        TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, commit());
+        tuning.bank[0] = bank0;
+        tuning.slot[1].value = elsewhere[e];
+        TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, value, N));
+        TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, commit());
+        for (size_t i = 0U; i < N; i++) {
+            TEST_ASSERT_TRUE(elsewhere[e][i] == (pen_real_t)-1);
+        }
+        tuning.slot[1].value = bank0;
     }
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, value, N));
-    tuning.bank[0] = elsewhere; /* the open one */
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, value, N));
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, commit());
-    tuning.bank[0] = bank0;
-    tuning.slot[1].value = elsewhere;
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, value, N));
-    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, commit());
-    for (size_t i = 0U; i < N; i++) {
-        TEST_ASSERT_TRUE(!(elsewhere[i] < (pen_real_t)0) && !(elsewhere[i] > (pen_real_t)0));
-    }
-    tuning.slot[1].value = bank0;
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, commit());
     expect_adoption(6U);
+}
+
+/* Which of the banks lies lower in memory does not matter. */
+void test_banks_in_either_order(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_init(&tuning, LAYOUT, N, &first, bank1, bank0));
+    for (uint32_t id = 3U; id < 8U; id++) {
+        stage(id);
+        expect_adoption(id);
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, roll_back());
+        expect_adoption((id == 3U) ? 1U : (id - 1U));
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, roll_back());
+        expect_adoption(id);
+    }
+}
+
+/* Whatever the instance held: after init no set is open, none waits, nothing holds, and slot 0 runs. */
+void test_init_leaves_nothing_of_what_was_there(void)
+{
+    uint32_t slot = 9U;
+
+    stage(3U);
+    expect_adoption(3U);
+    tuning.slot[0].value = bank0;
+    tuning.slot[1].value = bank0;
+    tuning.open = 1U;
+    tuning.pending = 1U;
+    tuning.hold = PEN_HELD;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_init(&tuning, LAYOUT, N, &first, bank0, bank1));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_abort(&tuning));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_NO_PREVIOUS, roll_back());
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_adopt(&tuning, &slot));
+    TEST_ASSERT_EQUAL_UINT32(0U, slot);
+    tuning.open = 1U; /* by a flipped bit: the set is not the caller's to write to */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, first_value, N));
+    TEST_ASSERT_TRUE(bank0[0] == (pen_real_t)300);
+}
+
+/* Words that are none of those the code writes: still one of two slots, nothing adopted, nothing open, one flag. */
+void test_damaged_words(void)
+{
+    uint32_t slot = 9U;
+
+    tuning.active = 0x80000000U;
+    TEST_ASSERT_EQUAL_UINT32(1U, pen_tuning_spare(&tuning));
+    TEST_ASSERT_EQUAL_UINT32(1U, pen_tuning_running(&tuning).id);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_adopt(&tuning, &slot));
+    TEST_ASSERT_EQUAL_UINT32(0U, slot);
+    tuning.active = 0U;
+    tuning.pending = 2U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_adopt(&tuning, &slot));
+    TEST_ASSERT_EQUAL_UINT32(0U, slot);
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BUSY, pen_tuning_begin(&tuning, LAYOUT, N, &other.head));
+    tuning.pending = 0U;
+    tuning.hold = UINT32_MAX;
+    TEST_ASSERT_EQUAL_HEX32(PEN_HELD, pen_tuning_adopt(&tuning, &slot));
+    pen_tuning_hold(&tuning, false);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &other.head));
+    tuning.open = 2U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_write(&tuning, N, 0U, other_value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_CLOSED, pen_tuning_abort(&tuning));
 }
 
 /* Layout and length count as the code names them, whatever lies in the instance. */
