@@ -74,8 +74,9 @@ def diagnose(
     if study.moving and found:
         costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
-        same = bool(explanations) and set(found[0].groups) == set(explanations[0].groups)  # then the one with the alternatives
-        if not same and costs[1] < costs[0] + MOVING * len(model.states) * len(experiments):
+        told = [set(e.groups) for e in explanations if e.score > explanations[0].score - search.NEW]
+        spare = 0.0 if set(found[0].groups) in told else MOVING * len(model.states) * len(experiments)
+        if costs[1] < costs[0] + spare:
             study, explanations = other, found
     best = explanations[0] if explanations else None
     if best is not None:  # bursts that a cause explains were none

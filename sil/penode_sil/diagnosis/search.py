@@ -73,7 +73,8 @@ class Explanation:
     def score(self) -> float:
         freedom = sum(cost(t.candidate) for t in self.terms)
         form = 0.0
-        if not exact(self.groups):
+        plain = len(self.terms) == len(self.groups) and all(kind in (*EXACT, *FORMULAS) for kind, _ in self.groups)
+        if not plain and not exact(self.groups):
             form = FORM * freedom / COST * (self.gain - self.formulas) + LEAST * (len(self.groups) - 1) * self.gain
         return self.gain - freedom - NEW * len(self.groups) - max(form, 0.0)
 
@@ -230,11 +231,12 @@ def at_rest(rest: Study, free: Study, best: Explanation | None, log) -> tuple[St
         return rest, []
     rest = replace(rest, nothing=loss(rest, rest.null))
     loads = {r.candidates[k].where: terms_of(r, [k]) for k in sorted(gains, key=gains.__getitem__)}.values()  # the best of each place
-    others = [t for t in best.terms if t.candidate.kind not in ("constant_force", "sensor_bias")] if best else []  # of which a load is one
+    unloaded = [t for t in best.terms if t.candidate.kind != "constant_force"] if best else []
+    others = [t for t in unloaded if t.candidate.kind != "sensor_bias"]  # in motion, a load looks like one
     ways = [[*load, *more] for load in loads for more in ([[], others] if others else [[]])]
     beam = sorted((explain(rest, terms) for terms in ways), key=lambda e: -e.score)
     loaded = beam[0]
-    idle = explain(rest, others).score if others else 0.0
+    idle = explain(rest, unloaded).score if unloaded else 0.0
     moving = rest.nothing - free.nothing + (best.score if best else 0.0)
     log(f"at rest {idle:.0f}, with a load {loaded.score:.0f}, moving {moving:.0f}")
     if loaded.score < max(idle + NEW, (1.0 - NEAR) * moving - NEW):
