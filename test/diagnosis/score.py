@@ -95,9 +95,6 @@ def score(
     if diagnosis is None:
         return row
     causes, verdict = diagnosis.get("causes") or [], diagnosis.get("verdict")
-    if truth.get("coarse"):  # neither asked for nor wrong
-        others = [c for c in causes if _named(c)[0] != "integration_error"]
-        causes, verdict = others, "no_discrepancy" if causes and not others else verdict
     what = outcome(truth, causes, verdict)
     row |= {"answer": [" at ".join(_named(c)) for c in causes], "verdict": verdict, "right": what == "right", "outcome": what}
     pairs = pairing(causes, truth["effects"], truth["bound"]) if what == "right" else None

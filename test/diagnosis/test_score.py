@@ -242,17 +242,6 @@ def test_extended_model_is_simulated_again(tmp_path):
     assert campaign.simulated("true", tmp_path / "no_model.toml", recording) == {}
 
 
-def test_a_step_that_errs_by_itself_may_be_named_and_need_not():
-    """Truths say `coarse` where the step of the model file is wrong by more than the noise; elsewhere the name is one too many."""
-    both, step = cause("coulomb_friction", "damper"), cause("integration_error", "law")
-    assert score.score(truth(FRICTION), said(both, step), 1.0)["outcome"] == "extra name"
-    assert score.score(truth(FRICTION, coarse=True), said(both, step), 1.0)["outcome"] == "right"
-    assert score.score(truth(FRICTION, coarse=True), said(both), 1.0)["outcome"] == "right"
-    assert score.score(truth(stratum="null", coarse=True), said(step), 1.0)["outcome"] == "right"
-    assert score.score(truth(stratum="null"), said(step), 1.0)["outcome"] == "false alarm"
-    assert score.score(truth(stratum="null", coarse=True), said(both, step), 1.0)["outcome"] == "false alarm"
-
-
 def test_the_floor_is_asked_of_rightly_named_cases():
     """Not of cases where a faint effect was rightly left without a name, nor of effects outside of the list."""
     gain = {"a_body": {"before_rmse": 0.05, "after_rmse": 0.05}}

@@ -22,8 +22,6 @@ from .score import Candidate
 Array = NDArray[np.float64]
 SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3, "s": 1e-3}  # of start states of laws
 BENT = 0.01  # [m] deflection of a hidden mass's spring where its bend would show
-
-
 RANGES = {"presliding": (3.0, 10.0), "transition": (30.0, 3.0), "bend": (30.0, 2.2), "share": (1.3, 1.54)}  # of shapes, down and up
 
 

@@ -181,7 +181,7 @@ def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str
         best = None
         for group in e.groups:
             if sum(t.group == group for t in e.terms) < TERMS + 1:
-                own = {(t.candidate.what.what, t.candidate.what.shape) for t in e.terms if t.group == group and isinstance(t.candidate.what, Fault)}
+                own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
                 pool = [k for k in pools(r).get(group, []) if _fault(r.candidates[k]) not in own]
                 gain, chosen = pursue(r, pool, terms=1)
                 if chosen and gain > max(cost(r.candidates[chosen[0]]), 2e-3 * e.gain) and (best is None or gain > best[0]):

@@ -160,17 +160,6 @@ class Bench:
                 )
         return found
 
-    @cached_property
-    def coarse(self) -> bool:
-        """Whether the step of the model file errs by most of the noise or more: under prescribed motion it has no rate but the
-        difference of two samples. Then integration_error is true as well, whatever else is hidden."""
-        if self.plant.kind != "law":
-            return False
-        every, wrong = int(RATE / self.rate), []
-        for z, v in (d.at_signals for d in self.training):
-            wrong.append(self.plant.true["d"] * (v[every::every] - np.diff(z[::every]) * self.rate))
-        return float(np.sqrt(np.mean(np.concatenate(wrong) ** 2))) > 0.8 * self.noise["force"].rms
-
     def left(self, x: np.ndarray, free: Sequence[np.ndarray] = ()) -> float:
         """Chi-square of a whitened difference after the model is re-fitted within its tolerances, and `free` directions freely."""
         known = [(y, 0.4 * self.plant.tolerance[p]) for p, y in self.of_parameters.items()]

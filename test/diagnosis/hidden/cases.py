@@ -165,7 +165,6 @@ class Case:
             "plant": bench.plant.kind,
             "effects": found,
             "bound": BOUND,
-            "coarse": bench.coarse,
             "true_parameters": dict(bench.plant.true),
             "recordings": {d.file: d.label for d in bench.drives},
             "noise": {bench.plant.names[s]: n.rms for s, n in bench.noise.items()},
