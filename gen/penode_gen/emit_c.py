@@ -166,6 +166,7 @@ class _Emitter:
             "states": [{"name": s, "unit": self._unit(s), "start": literal(x)} for s, x in zip(model.states, model.start)],
             "n_x": len(model.states), "n_q": causal.n_mechanical, "n_u": len(model.inputs), "n_drive": len(self.drive),
             "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
+            "parabola": self.uses_input_rate and model.input_rate == "parabola",
             "functions": functions, "constants": self._constants(), "networks": self.networks,
             "network_lines": {c.name: self._network_lines(c) for c in self.networks},
             "bend_lines": {c.name: _by_value(c, self._bend_lines(c)) for c in self.networks if self._bent(c, functions)},

@@ -9,6 +9,7 @@ from .networks import Network
 
 METHODS = ("euler", "heun", "rk4", "ros1", "ros2")
 INTERPOLATIONS = ("held", "linear")
+INPUT_RATES = ("chord", "parabola")
 OUTSIDE = ("extrapolate", "clamp", "fade")
 MORE_PIECES = ("refuse", "layers")
 GROUND = "ground"
@@ -141,6 +142,7 @@ class Model:
     method: str
     substeps: int
     interpolation: str
+    input_rate: str  # at a sample
     outside: str
     fade_width: float
     pieces: int  # room for the straight pieces of a folded network; 0: evaluate layer by layer

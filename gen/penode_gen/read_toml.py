@@ -62,7 +62,7 @@ _REQUIRED = {
     "sensors": ("value", "unit"),
 }
 _MODEL = {
-    "extends": str, "name": str, "description": str, "sample_time": str, "method": str, "substeps": int, "input": str, "outside": str,
+    "extends": str, "name": str, "description": str, "sample_time": str, "method": str, "substeps": int, "input": str, "input_rate": str, "outside": str,
     "fade_width": (int, float), "pieces": int, "more_pieces": str,
 }  # fmt: skip
 
@@ -290,7 +290,10 @@ class _Reader:
         sample_time = self.quantity(("model", "sample_time"), head.get("sample_time", "1 s"), "s")
         if sample_time < 1e-9 or sample_time > 86400.0:
             self.problem(("model", "sample_time"), f"{head['sample_time']} is out of range", "give a time from 1 ns to 1 day, such as '1 ms'")
-        for key, default, choices in (("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS), ("outside", "extrapolate", m.OUTSIDE), ("more_pieces", "refuse", m.MORE_PIECES)):
+        for key, default, choices in (
+            ("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS), ("input_rate", "chord", m.INPUT_RATES),
+            ("outside", "extrapolate", m.OUTSIDE), ("more_pieces", "refuse", m.MORE_PIECES),
+        ):  # fmt: skip
             if head.setdefault(key, default) not in choices:
                 self.problem(("model", key), f"'{head[key]}' is unknown", f"choose one of {', '.join(choices)}")
         if not 1 <= head.setdefault("substeps", 1) <= 1000:
@@ -323,7 +326,7 @@ class _Reader:
             raise m.ModelError(self.problems)
         return m.Model(
             name=head["name"], description=head.get("description", ""), sample_time=sample_time, method=head["method"],
-            substeps=head["substeps"], interpolation=head["input"], outside=head["outside"], fade_width=float(head["fade_width"]),
+            substeps=head["substeps"], interpolation=head["input"], input_rate=head["input_rate"], outside=head["outside"], fade_width=float(head["fade_width"]),
             pieces=room(head["pieces"]), more_pieces=head["more_pieces"], parameters=parameters, inputs=inputs, bodies=bodies, elements=elements, extra_states=states, variables=variables,
             equations=equations, networks=networks, outputs=outputs, sensors=sensors, sets=sets, path=self.path,
             digest=self.digest.hexdigest(),

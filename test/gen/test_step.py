@@ -47,10 +47,44 @@ def test_order_of_convergence(tmp_path, method, input, show):
     assert abs(orders[-1] - ORDERS[method]) < 0.1
 
 
-def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: bool) -> dict[str, np.ndarray]:
-    """The parts of the jacobian struct by name."""
+LAW = """
+[model]
+name = "law"
+sample_time = "{h} s"
+input_rate = "{rate}"
+[inputs]
+z = {{ unit = "m" }}
+[elements]
+damper = {{ between = ["z", "ground"], law = "linear_damper", damping = "2 N*s/m" }}
+[outputs]
+F = {{ value = "F_damper", unit = "N" }}
+"""
+
+
+@pytest.mark.parametrize("rate, order, share", [("chord", 1, 1 / 2), ("parabola", 2, 1 / 3)])
+def test_rate_of_an_input_at_a_sample(tmp_path, rate, order, share):
+    """Of a sine at 5 Hz the chord errs by h/2 of the second derivative, the parabola by h^2/3 of the third (Taylor at the
+    sample); what that leaves out is a share of 2 pi f h = 0.06 at most. Two samples make a chord; a bad one is passed over."""
+    omega = 2 * math.pi * 5
+    for h in (2e-3, 1e-3):
+        path = tmp_path / f"{rate}_{h}.toml"
+        path.write_text(LAW.format(h=h, rate=rate))
+        sil, t = Sil(penode_gen.load(path), np.float64), np.arange(500) * h
+        z = np.sin(omega * t)
+        y = sil.run(z[:, None]).y[:, 0]
+        assert y[0] == 0.0 and y[1] == pytest.approx(2 * (z[1] - z[0]) / h, rel=1e-12)
+        error = np.max(np.abs(y[2:] - 2 * omega * np.cos(omega * t[2:])))
+        assert error == pytest.approx(share * 2 * omega * (omega * h) ** order, rel=omega * h)
+        broken = z.copy()
+        broken[100] = np.nan
+        run = sil.run(broken[:, None])
+        assert run.status[100] & 0x1 and run.y[100, 0] == y[99] and np.array_equal(run.y[103:, 0], y[103:])
+
+
+def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: int) -> dict[str, np.ndarray]:
+    """The parts of the jacobian struct by name; `moving`: how many inputs before this one the outputs depend on themselves."""
     shapes = {"x_x": (n_x, n_x), "x_u_before": (n_x, n_u), "x_u": (n_x, n_u), "y_x": (n_y, n_x), "y_u": (n_y, n_u)}
-    shapes |= {"y_u_before": (n_y, n_u)} if moving else {}
+    shapes |= {name: (n_y, n_u) for name in ("y_u_before", "y_u_earlier")[:moving]}
     parts, at = {}, 0
     for name, (rows, columns) in shapes.items():
         parts[name] = jacobian[at : at + rows * columns].reshape(rows, columns)
@@ -59,20 +93,24 @@ def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: bool) ->
 
 
 @pytest.mark.parametrize("outside", ["extrapolate", "clamp", "fade"])
-@pytest.mark.parametrize("input", ["linear", "held"])
+@pytest.mark.parametrize("input, rate, moving", [("linear", "chord", 1), ("held", "chord", 0), ("linear", "parabola", 2)])
 @pytest.mark.parametrize("method", ORDERS)
-def test_step_jacobian_against_differences(tmp_path, method, input, outside):
+def test_step_jacobian_against_differences(tmp_path, method, input, rate, moving, outside):
     """Central differences of the discrete step in double, at random states inside, on and outside of the envelope."""
-    moving = input == "linear"
-    model = penode_gen.load(models.rich(tmp_path, method, 5e-3, input, outside, substeps=2, low=-0.3, high=0.3))
+    model = penode_gen.load(models.rich(tmp_path, method, 5e-3, input, outside, substeps=2, low=-0.3, high=0.3, rate=rate))
     sil, draw = Sil(model, np.float64), np.random.default_rng(11)
     n_x, n_u, n_y = 3, 2, 2
-    size = n_x * n_x + 2 * n_x * n_u + n_y * n_x + n_y * n_u * (2 if moving else 1)
+    size = n_x * n_x + 2 * n_x * n_u + n_y * n_x + n_y * n_u * (1 + moving)
 
-    def step(x, before, now):
+    def started(x, earlier, before):
         instance = sil.instance()
+        instance.step(earlier)
         instance.step(before)
         instance.set_state(x)
+        return instance
+
+    def step(x, earlier, before, now):
+        instance = started(x, earlier, before)
         state, y, status = instance.step(now)
         assert status in (0, EXTRA)
         return np.concatenate([state, y])
@@ -83,29 +121,29 @@ def test_step_jacobian_against_differences(tmp_path, method, input, outside):
         return (function(at + d) - function(at - d)) / 2e-5
 
     for _ in range(6):
-        x, before, now = draw.uniform(-0.5, 0.5, n_x), draw.uniform(-1, 1, n_u) * [1, 0.1], draw.uniform(-1, 1, n_u) * [1, 0.1]
-        instance = sil.instance()
-        instance.step(before)
-        instance.set_state(x)
+        x, (earlier, before, now) = draw.uniform(-0.5, 0.5, n_x), draw.uniform(-1, 1, (3, n_u)) * [1, 0.1]
+        instance = started(x, earlier, before)
         y, found, status = instance.step_jacobian(now, size)
         assert status in (0, EXTRA)
-        plain = step(x, before, now)
+        plain = step(x, earlier, before, now)
         assert np.array_equal(instance.get_state(), plain[:n_x]) and np.array_equal(y, plain[n_x:])  # to the bit
         j = flatten(found, n_x, n_u, n_y, moving)
         # differences: third derivative (about 1e3) * 1e-10 / 6 + rounding 1e-16 / 1e-5 * values of 1e2; relative 1e-6
         tolerance = dict(rtol=1e-6, atol=2e-7)
         for i in range(n_x):
-            column = difference(lambda v: step(v, before, now), x, i)
+            column = difference(lambda v: step(v, earlier, before, now), x, i)
             np.testing.assert_allclose(j["x_x"][:, i], column[:n_x], **tolerance)
             np.testing.assert_allclose((j["y_x"] @ j["x_x"])[:, i], column[n_x:], rtol=1e-6, atol=1e-5)
         for i in range(n_u):
-            column = difference(lambda v: step(x, v, now), before, i)
+            column = difference(lambda v: step(x, earlier, v, now), before, i)
             np.testing.assert_allclose(j["x_u_before"][:, i], column[:n_x], **tolerance)
             direct = j["y_u_before"][:, i] if moving else 0.0
             np.testing.assert_allclose((j["y_x"] @ j["x_u_before"])[:, i] + direct, column[n_x:], rtol=1e-6, atol=1e-5)
-            column = difference(lambda v: step(x, before, v), now, i)
+            column = difference(lambda v: step(x, earlier, before, v), now, i)
             np.testing.assert_allclose(j["x_u"][:, i], column[:n_x], **tolerance)
             np.testing.assert_allclose((j["y_x"] @ j["x_u"])[:, i] + j["y_u"][:, i], column[n_x:], rtol=1e-6, atol=1e-5)
+            column = difference(lambda v: step(x, v, before, now), earlier, i)
+            np.testing.assert_allclose(j["y_u_earlier"][:, i] if moving == 2 else 0.0, column[n_x:], rtol=1e-6, atol=1e-5)
 
 
 @pytest.mark.parametrize("method", ["rk4", "ros1", "ros2"])
@@ -128,7 +166,7 @@ def test_jacobian_through_relu_networks(tmp_path, method):
         first = start(x)
         _, found, status = first.step_jacobian(now, 4 * 4 + 4 + 4 + 2 * 4 + 2)
         assert status == 0
-        j = flatten(found, 4, 1, 2, False)
+        j = flatten(found, 4, 1, 2, 0)
         for i in range(4):
             d = np.eye(4)[i] * 1e-9
             column = (start(x + d).step(now)[0] - start(x - d).step(now)[0]) / 2e-9

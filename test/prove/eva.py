@@ -16,13 +16,14 @@ import gate
 WORK = gate.BUILD / "eva"
 HARNESS = gate.HERE / "eva"
 
+WET = 'wet_tyre = { between = ["wheel", "z_road"], law = "linear_damper", damping = "100 N*s/m" }'
 # What becomes of gen/nqvm/nqvm.toml. The first three stand in gen/nqvm/c as they are.
 MODELS = {
     "nqvm": [],
     "nqvm_euler": [],
     "nqvm_folded": [],
     "clamped": ['method = "heun"', 'outside = "clamp"', 'input = "held"', "substeps = 2"],
-    "implicit": ['method = "ros1"', 'outside = "clamp"'],
+    "implicit": ['method = "ros1"', 'outside = "clamp"', 'input_rate = "parabola"', "[elements]", WET],
     "fading": ['method = "ros2"', 'outside = "fade"', "fade_width = 0.5"],
     "folded_or_not": ['method = "euler"', 'outside = "clamp"', "pieces = 96", 'more_pieces = "layers"'],
 }

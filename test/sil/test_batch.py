@@ -151,6 +151,7 @@ def everything(model) -> dict[str, tuple[str, ...]]:
         ("ros1", "held", "extrapolate", 2, "relu", "pieces = 96"),
         ("ros2", "linear", "clamp", 1, "sigmoid", 'pieces = 8\nmore_pieces = "layers"'),
         ("ros2", "held", "fade", 3, "step"),
+        ("rk4", "linear", "extrapolate", 1, "tanh", 'input_rate = "parabola"'),
     ],
 )
 def test_each_lane_has_the_bits_of_the_step(tmp_path, choices, dtype):

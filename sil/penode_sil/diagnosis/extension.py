@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 import penode_gen
 from penode_gen import units
+from penode_gen.causalise import causalise
 from penode_gen.laws import LAWS
 from penode_gen.model import Model, Signal
 
@@ -72,8 +73,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         if substeps > model.substeps:
             lines.insert(-1, f"substeps = {substeps}")
     if e is None:
-        text = "\n".join(lines)
-        return text, _load(text)
+        return _rated(study, "\n".join(lines))
     values = {f.target: f.value for f in e.fit.free}
     taken = {*model.parameters, *model.states, *(x.name for x in model.elements), *(s.name for s in model.sensors)}
     rename = {}
@@ -147,8 +147,21 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     ):  # fmt: skip
         if entries:
             lines += [f"[{title}]", *entries, ""]
-    text = "\n".join(lines)
-    return text, _load(text)
+    return _rated(study, "\n".join(lines))
+
+
+def _rated(study: Study, text: str) -> tuple[str, Model]:
+    """The model of a text; outputs see the rate of an input by a parabola if the C then meets the first recording better."""
+    model = _load(text)
+    causal = causalise(model)
+    if (model.interpolation, model.input_rate) != ("linear", "chord") or not causal.uses([*causal.outputs, *causal.sensors], causal.input_rates):
+        return text, model
+    head = text.index("sample_time =")
+    better = text[:head] + 'input_rate = "parabola"\n' + text[head:]
+    e = study.experiments[0]
+    start, scale = started(model, e, study), np.sqrt(np.mean(study.levels[0], axis=0))
+    pair = ((text, model), (better, _load(better)))
+    return min(pair, key=lambda p: rms(((deployed(p[1], e, start, study.set_name) - e.y) * e.good / scale).ravel()))
 
 
 def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
