@@ -9,8 +9,9 @@ in `Quality.problems`. What cannot be used at all is a UserError.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +77,28 @@ class Measured:
     def title(self) -> str:
         """The file's name, with the part if there are several."""
         return f"{self.path.name}, part {self.part}" if self.part else self.path.name
+
+
+def told_of_rails(recordings: Sequence[Measured]) -> list[Measured]:
+    """The recordings, with the rails that a sensor shows in one of them known in all: there they may be touched too rarely."""
+    rails: dict[tuple[str, str], float] = {}
+    for m in recordings:
+        for name, side in product(m.z, ("low", "high")):
+            rail = getattr(m.quality.channels[name], side)
+            rails |= {(name, side): rail} if rail is not None else {}
+    return [_railed(m, rails) for m in recordings]
+
+
+def _railed(m: Measured, rails: dict[tuple[str, str], float]) -> Measured:
+    channels, mask = dict(m.quality.channels), dict(m.mask)
+    for (name, side), rail in rails.items():
+        if name in m.z and getattr(channels[name], side) is None:
+            at = mask[name] & (np.abs(m.z[name] - rail) < 1e-9 * abs(rail))
+            beyond = (m.z[name] - rail) * (1.0 if side == "high" else -1.0) > 1e-9 * abs(rail)
+            if at.any() and not np.any(beyond & mask[name]):
+                channels[name] = replace(channels[name], saturated=channels[name].saturated + int(at.sum()), **{side: rail})
+                mask[name] = mask[name] & ~at
+    return replace(m, mask=mask, quality=replace(m.quality, channels=channels))
 
 
 def load(paths: Iterable[Path], model: Any, channels: Iterable[str] = ()) -> list[Measured]:

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Index = NDArray[np.int64]
 CHANCE = 1e-3  # a run of equal samples counts if one as long is rarer than this in a whole recording
+PILE = 30  # samples at the extreme of a channel that may be a rail
 SPIKE = 12.0  # a sample is a spike beyond so many standard deviations; the noise of 1e9 samples reaches 6.2
 HARM = 2.5  # quanta: a row that ends in a smaller step does no harm, and may be a flat turn
 NEAR = 16  # samples on each side that say how a channel usually moves there
@@ -69,7 +70,12 @@ def _edge(x: Array, first: Index, last: Index, kink: Flags, edge: float, grain: 
     cut = np.sum((x[first] == edge) & (last - first >= 2) & kink)
     if edge != 0.0 and cut and cut >= 0.2 * rows:
         return float(edge)
-    if edge != 0.0 and at.size >= 8 and at.size > 3 * np.sum((x != edge) & (np.abs(x - edge) < 1.5 * grain)):
+    beside = np.sum((x != edge) & (np.abs(x - edge) < 2.5 * grain))
+    if edge != 0.0 and rows >= 3 and at.size > max(PILE, 5 * beside, 5 * np.sum(np.diff(at, prepend=-2) > 1)):
+        before = x[at[np.diff(at, prepend=-2) > 1] - 1]  # a sine that stays for several samples has 2.4 times as many at its peak
+        if np.nanmedian(np.abs(before - edge)) < 0.1 * np.nanmax(np.abs(x - edge)):  # not switched to it
+            return float(edge)
+    if edge != 0.0 and at.size >= 8 and at.size > 3 * beside:
         some = at[:: max(1, at.size // 256)]
         bend, twist = (_median(np.append(np.diff(x, n), [np.nan] * n), _near(some, some, x.size)) for n in (2, 3))
         if np.mean((twist > bend) & (bend > 1.5 * grain)) > 0.5:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 import penode_gen
 from penode_sil import diagnosis
@@ -204,6 +205,21 @@ def test_sound_vehicle_has_no_cause(model, sound):
     found = diagnosis.diagnose(model, sound)
     assert found.verdict == "no_discrepancy" and found.causes == ()
     json.dumps(found.as_json())
+
+
+def test_noise_floor_is_that_of_coloured_sensors(tmp_path, model):
+    """White noise and half as much with a time constant of 20 samples: their RMS, not the density at low frequencies, is what no
+    model is below. 10 s hold 250 independent values of the slow part, which know the RMS to 0.2 / sqrt(500) = 1 %; its
+    form is one of ten poles, and what is slower than the vehicle is shared out between noise and parameters."""
+    paths, rng = [], np.random.default_rng(8)
+    for seed in (7, 8):
+        z = road(seed)
+        slow = {k: lfilter([1.0], [1.0, -0.95], rng.standard_normal(SAMPLES)) * np.sqrt(0.25 * (1.0 - 0.95**2)) for k in NOISE}
+        sensors = {k: y + NOISE[k] * slow[k] for k, y in drive(z, lambda s, v: 0.0).items()}
+        paths.append(record(tmp_path / f"{seed}.csv", z, sensors, seed))
+    found = diagnosis.diagnose(model, load(paths[:1], model), load(paths[1:], model))
+    for name, gain in found.gain.items():
+        assert gain.noise_floor == pytest.approx(np.sqrt(1.25) * NOISE[name], rel=0.06), name
 
 
 MEASURED = Path(__file__).resolve().parents[3] / "shared" / "measured"

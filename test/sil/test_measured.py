@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 import penode_gen
 from penode_sil.errors import UserError
-from penode_sil.measured import load
+from penode_sil.measured import load, told_of_rails
 
 N = 8000
 T = np.round(np.arange(N) * 1e-3, 6)
@@ -161,6 +161,18 @@ def test_faster_rows_are_filtered_alike_and_bad_ones_spread_no_further_than_the_
     # white noise of 1 kHz, of which 0 to 450 Hz (the filter's middle) stay: its density stays what it was
     law = one.quality.channels["a"].noise
     assert law.density(np.array([200.0]), 1e-3)[0] == pytest.approx(2.0 * 5e-4 * 0.05**2, rel=0.12)
+
+
+def test_a_rail_is_known_in_all_recordings_of_a_sensor(record, oscillator):
+    """Cut off at 9 mm for long in one, for a single sample in another: masked in both. A third goes beyond: another sensor."""
+    rarely = 8.99 * Z / np.max(Z)
+    top = int(np.argmax(rarely))
+    rarely[top] = 9.0
+    recordings = [load([record(f"{name}.csv", z=z)], oscillator)[0] for name, z in (("long", np.minimum(Z, 9.0)), ("rarely", rarely), ("beyond", Z))]
+    assert recordings[0].quality.channels["z"].high == pytest.approx(9e-3) and recordings[1].mask["z"].all()
+    long, short, beyond = told_of_rails(recordings)
+    assert np.array_equal(long.mask["z"], recordings[0].mask["z"]) and beyond.mask["z"].all()
+    assert np.flatnonzero(~short.mask["z"]).tolist() == [top] and short.quality.channels["z"].saturated == 1
 
 
 def test_a_slower_sensor_counts_once_per_row(tmp_path, oscillator):

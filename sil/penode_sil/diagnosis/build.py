@@ -22,6 +22,7 @@ from .score import Candidate
 Array = NDArray[np.float64]
 SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3, "s": 1e-3}  # of start states of laws
 BENT = 0.01  # [m] deflection of a hidden mass's spring where its bend would show
+SLOWEST = 5.0  # [s] relaxation: what takes longer is a load
 RANGES = {"presliding": (3.0, 10.0), "transition": (30.0, 3.0), "bend": (30.0, 2.2), "share": (1.3, 1.54)}  # of shapes, down and up
 
 
@@ -74,7 +75,8 @@ def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tup
     free = [Free(f"{name}_{gain}", term.gain, size, low=low, high=high)]
     for key, (value, _) in shapes.items():
         below, above = RANGES.get(key.removeprefix(f"{name}_"), (30.0, 30.0))
-        free.append(Free(key, value, 1.0, log=True, low=max(value / below, least.get(key, 0.0)), high=value * above))
+        most = SLOWEST if key == f"{name}_relaxation" else np.inf
+        free.append(Free(key, value, 1.0, log=True, low=max(value / below, least.get(key, 0.0)), high=min(value * above, most)))
     if what.law in LAWS:
         return Element(name, place.ends, what.law, {key: f"{name}_{key}" for key in LAWS[what.law].arguments}), parameters, free
     text = re.sub(rf"\b({'|'.join((gain, *what.shapes, *what.fixed))})\b", lambda m: f"{name}_{m[1]}", what.law)

@@ -19,7 +19,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from ..errors import UserError
-from ..measured import Measured
+from ..measured import Measured, told_of_rails
 from . import absorb, extension, nameless, naming, noise, plausible, residual, search
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
@@ -28,14 +28,20 @@ from .study import MOVING, SKEW, Study, begin, look
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it
+STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
 ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
 PATCHED = 0.985  # share that several causes must take away if sensors still share a residual
 WHOLE = 0.97  # share that is a whole explanation
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
+IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
 FILTER = 0.6  # of what several hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 OUTSIDE = "outside_taxonomy"
+SIZES = {  # what is positive by its nature: a cause of which that is not sure stands for something else
+    "tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "stribeck_friction": "breakaway",
+    "hidden_resonance": "mass", "maxwell_bushing": "stiffness", "bump_stop": "stiffness",
+}  # fmt: skip
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 
 
@@ -59,6 +65,8 @@ def diagnose(
     started = time.perf_counter()
     log = advancing(log, tell)
     tell(0.0, "fitting the model as it is")
+    both = told_of_rails([*train, *holdout])
+    train, holdout = both[: len(train)], both[len(train) :]
     experiments, unused = ([experiment(m, model) for m in ms] for ms in (train, holdout))
     if problems := plausible.misfits(model, [*experiments, *unused], set_name):
         raise UserError(*problems)
@@ -75,7 +83,7 @@ def diagnose(
         costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
         told = [set(e.groups) for e in explanations if e.score > explanations[0].score - search.NEW]
-        spare = 0.0 if set(found[0].groups) in told else MOVING * len(model.states) * len(experiments)
+        spare = (IDLE if set(found[0].groups) in told else MOVING) * len(model.states) * len(experiments)
         if costs[1] < costs[0] + spare:
             study, explanations = other, found
     best = explanations[0] if explanations else None
@@ -85,14 +93,18 @@ def diagnose(
     tell(SEARCH[1], "weighing them against numerics")
     study = replace(study, seen=look(study, best.fit if best else study.null))
     numbers, step = extension.numerics(study)
-    alike = noise.kinship(study.experiments, study.metrics, best.fit.simulated if best else study.null.simulated)
-    log(f"kinship {alike:.1f}")
-    causes, verdict, explained, evidence = judge(study, explanations, faults, alike)
+    kinship, shared = noise.kinship(study.experiments, study.metrics, best.fit.simulated if best else study.null.simulated)
+    log(f"kinship {kinship:.1f}, shared {shared:.0f}")
+    tone = noise.tone(study.experiments, best.fit.simulated if best else study.null.simulated)
+    log(str(tone))
+    causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.purity > noise.PURE)
     if doubt := plausible.doubt(study, best, verdict):
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
     notes: list[str] = []
+    if tone.purity > noise.PURE:
+        notes.append(f"{model.sensors[tone.sensor].name} has a tone of its own at {tone.frequency:.0f} Hz: an engine, a wheel, the mains?")
     gain: dict[str, Gain] = {}
     named = None  # what has no name does not go into a model
     if not any(c.kind == OUTSIDE for c in causes):
@@ -129,7 +141,7 @@ def diagnose(
     data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(
-        verdict, causes, gain, numbers, explained, evidence, alike, tuple([doubt] * bool(doubt) + notes), data,
+        verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), data,
         shown.numbers(), absorbed, time.perf_counter() - started, shown,
     )  # fmt: skip
 
@@ -202,7 +214,8 @@ def broken_sensors(model: Model, train: Sequence[Measured], study: Study, bursts
                 else:  # a rail that the signal was not near
                     railed += np.count_nonzero(at)
             lost = channel.held + channel.missing + channel.spikes
-            if lost and (channel.missing or np.count_nonzero(flagged & off) > 0.2 * lost):
+            still = channel.held > max(FEW, STILL * n) and channel.quantum < 0.3 * sigma  # noise does not repeat itself
+            if lost and (channel.missing or still or np.count_nonzero(flagged & off) > 0.2 * lost):
                 dropped += lost
             dropped += int(np.count_nonzero(bursts[k][:n, j])) if len(bursts) > k else 0
         dropped += 0 if clipped >= FEW else railed
@@ -218,19 +231,20 @@ def broken_sensors(model: Model, train: Sequence[Measured], study: Study, bursts
 
 
 def judge(
-    study: Study, explanations: Sequence[Explanation], faults: list[Cause], alike: float
+    study: Study, explanations: Sequence[Explanation], faults: list[Cause], alike: float, shared: float, pure: bool
 ) -> tuple[tuple[Cause, ...], str, float, float]:
-    """Causes, verdict, share explained, and the evidence that there is anything at all; `alike`: see noise.kinship."""
+    """Causes, verdict, share explained, and the evidence that there is anything at all; `alike`, `shared`: see
+    noise.kinship; `pure`: a tone is left."""
     rows = len(study.null.residual) * float(np.mean([np.mean(e.good) for e in study.experiments]))
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)
     if not explanations:
-        if evidence > DOUBT and excess > 0.15 * rows or alike > ALIKE:
+        if evidence > DOUBT and excess > 0.15 * rows or alike > ALIKE or pure:
             return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0, evidence
         verdict = "explained" if faults else "not_identifiable" if evidence > DOUBT else "no_discrepancy"
         return tuple(faults), verdict, 1.0, evidence
     best = explanations[0]
-    left = max(best.fit.chi2 - rows, 0.0)  # in the noise that the best explanation leaves
+    left = max(best.fit.chi2 - rows, shared if alike > ALIKE else 0.0, 0.0)  # in the noise that the best explanation leaves
     gained = study.null.cost - best.fit.cost
     share = gained / (gained + left) if gained + left > 0.0 else 1.0
     if share < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > ALIKE):
@@ -242,13 +256,15 @@ def judge(
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     causes = [cause(study, explanations, group) for group in best.groups]
     causes = [c for c in causes if worth(study, c)]
+    if any(c.parameters[SIZES[c.kind]].ci95[0] <= 0.0 for c in causes if c.kind in SIZES):
+        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     kinds = [c.kind for c in causes]  # several wrong parameters are another vehicle, several delays another clock
     several = max(kinds.count("wrong_parameter"), kinds.count("sensor_delay")) > 1
     if several or any(c.kind == "hidden_resonance" and c.parameters["damping_ratio"].value > DAMPED for c in causes):
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     faulty = {(c.kind, c.where) for c in causes}
     causes += [f for f in faults if (f.kind, f.where) not in faulty]
-    whole = share > WHOLE or left < 0.15 * rows
+    whole = (share > WHOLE or left < 0.15 * rows) and not pure
     return tuple(causes), ("explained" if whole else "partly_explained") if causes else "no_discrepancy", share, evidence
 
 

@@ -26,7 +26,7 @@ from .fit import Free, Problem
 from .hypotheses import Basis, Fault, size
 from .noise import Experiment, bursts, metric
 from .plant import anonymous
-from .residual import Channel, channels, noise_floor, rms
+from .residual import Channel, channels, noise_floor, noise_rms, rms
 from .result import Cause, Gain, Value
 from .search import Explanation
 from .study import Study, watched, widened
@@ -244,14 +244,13 @@ def measure(
             share = f"{np.mean(beyond):.1%} of the samples move farther or faster than in training"
             notes.append(f"{e.name}: {share}; there the gain is extrapolated")
         shown += channels(e, model, before, after, floors, beyond)
-    e = study.experiments[0]
-    through = study.linear.transfer(e.frequencies[: e.band])[:, :, : len(model.inputs)] * np.array([i.noise for i in model.inputs])
+    noise = noise_rms(study)
     gains = {}
     for j, s in enumerate(model.sensors):
         own = [c for c in shown if c.sensor == s.name]
         if not own:
             continue
-        floor = float(np.sqrt(np.mean(study.levels[0][:, j]) + np.mean(np.sum(np.abs(through[:, j]) ** 2, axis=1))))
+        floor = float(noise[j])
         errors = [np.concatenate([r.values[c.good] for c, r in zip(own, each)]) for each in ([c.before for c in own], [c.after for c in own])]
         share, ci95 = achieved(*errors, floor)
         beyond = float(np.mean(np.concatenate(outside)))

@@ -178,6 +178,12 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
         yield law("tyre_damping", "linear_damper", d, {}, 1, lambda s, v, t: v)
         for tau in (0.002, 0.006, 0.02, 0.06):
             yield law("tyre_damping", "maxwell_bushing", k, {"relaxation": (tau, "s")}, 1, lambda s, v, t: s - lag(s, tau, step))
+        yield law("tyre_damping", "quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, 0, lambda s, v, t: v * np.abs(v), True)
+        for w in (0.05, 0.2, 0.8):
+            a = w * speed
+            yield law(
+                "tyre_damping", "degressive_damper", d, {"knee": (a, "m/s")}, 0, lambda s, v, t: -v * np.abs(v) / (a + np.abs(v)), True
+            )
         top = max(float(np.quantile(m.s, 0.9995)) for m in motions)
         for share in (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9):
             g = share * top

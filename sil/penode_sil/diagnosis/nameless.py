@@ -64,7 +64,7 @@ def fitted(study: Study, best: Explanation | None) -> Explanation | None:
 
 def share(study: Study, fit: Fit) -> float:
     """What a fit takes away of the avoidable residual."""
-    return (study.null.cost - fit.cost) / max(study.null.cost - len(study.null.residual), 1.0)
+    return min((study.null.cost - fit.cost) / max(study.null.cost - len(study.null.residual), 1.0), 1.0)
 
 
 def beside(study: Study, e: Explanation) -> str:

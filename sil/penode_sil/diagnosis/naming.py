@@ -364,12 +364,12 @@ def functions(
             return {"preload": ("N", preload)}
         case "tyre_damping":
 
+            lagging = [n for t, n in zip(terms, names) if t.candidate.what.law == "maxwell_bushing"]
+            rest = [(t, n) for t, n in zip(terms, names) if n not in lagging]
+            at_once = Curve([t for t, _ in rest], [n for _, n in rest])
+
             def damping(p: Values) -> float:
-                total = 0.0
-                for t, n in zip(terms, names):
-                    b = t.candidate.what
-                    total += p[f"{n}_damping"] if b.law == "linear_damper" else p[f"{n}_stiffness"] * p[f"{n}_relaxation"]
-                return total
+                return line(v, at_once(zero, v, p)) + sum(p[f"{n}_stiffness"] * p[f"{n}_relaxation"] for n in lagging)
 
             return {"damping": ("N*s/m", damping)}
         case "tyre_nonlinear":

@@ -23,6 +23,8 @@ from ..noise import Noise
 Array = NDArray[np.float64]
 POLES = (0.0, 0.3, 0.5, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985)  # of slow noise, per sample
 BINS = 16  # of a spectrum in which coherence is estimated
+HALF = 8  # bins to either side that say how loud it is around a tone
+PURE = 40.0  # see Tone: noise has 16 at most
 PARTS = (0.1, 2.0, 6.0, 20.0)  # [Hz] from which to which coherence is added up
 TOP = 100.0  # [Hz] what vehicles do above it is not looked at, but for the noise
 
@@ -227,9 +229,63 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
     return found
 
 
-def kinship(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> float:
+@dataclass(frozen=True)
+class Tone:
+    """The purest tone in any residual: how far it stands out of the spectrum around it, its frequency [Hz], and its sensor."""
+
+    purity: float = 0.0
+    frequency: float = 0.0
+    sensor: int = 0
+
+
+def tone(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> Tone:
+    """The purest tone that residuals have and inputs have not: noise that makes one comes from a machine.
+
+    Recordings under a sine or a sweep do not count: there, an error of a model or a quantum is a tone as well.
+    """
+    found = [Tone()]
+    for e, z in zip(experiments, simulated):
+        if not _swept(e.u, e.step):
+            found += _tones(np.where(e.good, e.y - z, 0.0), e.step)
+    return max(found, key=lambda t: t.purity)
+
+
+def _swept(inputs: Array, step: float) -> bool:
+    """Is an input [n, any] a sine, most of the time, though one whose frequency may change?"""
+    size = int(round(1.0 / step))
+    window = np.hanning(size)[:, None]
+    shares = []
+    for x in (inputs[a : a + size + 1] for a in range(0, len(inputs) - size, size // 2)):
+        power = np.abs(fft.rfft(np.diff(x, axis=0) * window, axis=0)[: int(TOP)]) ** 2
+        near = np.lib.stride_tricks.sliding_window_view(power, 5, axis=0).sum(axis=-1)
+        shares.append(np.max(near, axis=0) / np.maximum(np.sum(power, axis=0), 1e-300))
+    return bool(shares) and bool(np.any(np.median(shares, axis=0) > 0.9))
+
+
+def _tones(signals: Array, step: float) -> list[Tone]:
+    """The purest tone of each signal [n, any], up to 0.4 of the sampling frequency.
+
+    In each second it is the highest bin of the periodogram, in medians of the HALF bins to either side; what counts is the
+    median over time, so that its frequency may wander. Noise of any smooth colour has the logarithm of the number of bins, 6,
+    and the scatter of that median makes it 9 to 16.
+    """
+    size = int(round(1.0 / step))
+    top = int(0.4 * size)
+    if len(signals) < 3 * size or top < 6 * HALF:
+        return []
+    window = np.hanning(size)[:, None]
+    parts = [signals[a : a + size] for a in range(0, len(signals) - size + 1, size // 2)]
+    power = np.array([np.abs(fft.rfft((x - x.mean(axis=0)) * window, axis=0)[: top + HALF]) ** 2 for x in parts])
+    around = np.lib.stride_tricks.sliding_window_view(power, 2 * HALF + 1, axis=1)
+    beside = np.median(np.delete(around, [HALF - 1, HALF, HALF + 1], axis=-1), axis=-1) / np.log(2.0)
+    ratio = power[:, HALF:top] / np.maximum(beside, 1e-300)
+    purity, peak = np.median(np.max(ratio, axis=1), axis=0), np.median(np.argmax(ratio, axis=1), axis=0)
+    return [Tone(float(p), float(k + HALF) / (size * step), j) for j, (p, k) in enumerate(zip(purity, peak))]
+
+
+def kinship(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> tuple[float, float]:
     """How much the residuals of different sensors are alike, in standard deviations of what independent noise makes, in that
-    part of the spectrum where they are most alike.
+    part of the spectrum where they are most alike; and in all of it the chi-square beyond what such noise makes.
 
     Noise of sensors has nothing in common (what the inputs' noise has, the metrics take out), so coherence between two of
     them is the mark of something that moves the plant. Over B bins, -2 (B - 1) log(1 - coherence) is chi-square of 2.
@@ -250,4 +306,4 @@ def kinship(experiments: Sequence[Experiment], metrics: Sequence[Metric], simula
                         coherence = float(np.abs(s[i, j]) ** 2 / max(power[i] * power[j], 1e-300))
                         found[part] -= 2.0 * (len(band) - 1) * np.log1p(-min(coherence, 1.0 - 1e-12))
                         freedom[part] += 2.0
-    return float(np.max((found - freedom) / np.sqrt(2.0 * np.maximum(freedom, 1.0))))
+    return float(np.max((found - freedom) / np.sqrt(2.0 * np.maximum(freedom, 1.0)))), float(np.sum(np.maximum(found - freedom, 0.0)))

@@ -255,6 +255,18 @@ def noise_floor(study: Study, k: int) -> tuple[Array, Array]:
     return f, study.levels[k] + np.sum(np.abs(through * e.unsure[: e.band, None, :]) ** 2, axis=2)
 
 
+def noise_rms(study: Study) -> Array:
+    """RMS [n_z] of what measurement alone leaves in the first recording: of the sensors, and of the inputs as they were measured.
+
+    Above the band a sensor's noise is what its own record shows, or goes on evenly if that shows none.
+    """
+    e, level = study.experiments[0], study.levels[0]
+    beyond = np.where(np.isfinite(e.quiet), e.quiet, level[-1])[e.band :]
+    through = study.linear.transfer(e.frequencies)[:, : len(study.model.sensors), : len(study.model.inputs)]
+    driven = np.sum(np.abs(through * np.array([i.noise for i in study.model.inputs])) ** 2, axis=2)
+    return np.sqrt(np.mean(np.concatenate([level, beyond]), axis=0) + np.mean(driven, axis=0))
+
+
 def rig(model: Model, places: Sequence[Place]) -> Model:
     """The elements of places alone, each place under prescribed deflection `s_place0`...; sensors are their forces
     [N]."""

@@ -34,6 +34,7 @@ CURVES = {  # kinds of one family at one place are one curve with one name
     "tyre_nonlinear": "tyre", "tyre_liftoff": "tyre",
 }  # fmt: skip
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
+SMALL = 0.03  # of all that was gained: a cause worth less than that may be a remainder of another
 NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
@@ -330,7 +331,10 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
         study = requieted(study, done[0].fit)
     if done and len(done[0].groups) > 1:
         done = sorted(done + exchanged(study, done[0], parameters, log), key=lambda e: -e.score)
-    return study, [settled(study, plain(study, done[0], parameters, log)), *done[1:]] if done else []
+    if not done:
+        return study, []
+    best = settled(study, plain(study, done[0], parameters, log))
+    return study, [best, *done[1:], *equals(study, best, parameters, log)]
 
 
 def settled(study: Study, e: Explanation) -> Explanation:
@@ -395,18 +399,41 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
     for group in e.groups:
         without = r.without(missing(e, group))
         worth = without.chi2 - r.chi2
+        kept = [t for t in e.terms if t.group != group]
+        if worth < SMALL * e.gain:  # it may have stood in for what another cause can do by itself
+            alone = explain(study, kept, start=e.fit, formulas=e.formulas).whole()
+            found.append(refine(study, alone, regression(study, alone.fit, parameters), parameters)[0])
+            log(f"  without {group}: {found[-1].gain:.0f} for {e.gain:.0f}, x{len(found[-1].terms)}")
         ranked = []
         for other, pool in pools(r).items():
             if other not in e.groups:
                 gain, chosen = pursue(without, pool)
                 if chosen and gain > RIVAL * worth:
-                    ranked.append((gain, chosen))
+                    ranked.append((gain - sum(cost(r.candidates[c]) for c in chosen), chosen))
         for new in [terms_of(without, chosen) for _, chosen in sorted(ranked, key=lambda x: -x[0])[:2]]:
             if not new:
                 continue
-            kept = [t for t in e.terms if t.group != group]
             found.append(explain(study, [*kept, *new], start=e.fit, formulas=e.formulas))
             log(f"  {group} for {found[-1].groups[-1]}: {found[-1].gain:.0f}")
+    return found
+
+
+def equals(study: Study, e: Explanation, parameters: Sequence[str], log) -> list[Explanation]:
+    """The explanation with a load or a bias, beside other causes, exchanged for the one of its like that does about as well."""
+    loads = [g for g in e.groups if g[0] in ("constant_force", "sensor_bias")]
+    if not loads or len(e.groups) == 1:
+        return []
+    e = e.whole()
+    r = regression(study, e.fit, parameters)
+    found = []
+    for group in loads:
+        without = r.without(missing(e, group))
+        alike = [k for k, c in enumerate(r.candidates) if c.kind in ("constant_force", "sensor_bias") and (c.kind, c.where) not in e.groups]
+        gain, chosen = pursue(without, alike, terms=1)
+        if chosen and gain > RIVAL * (without.chi2 - r.chi2):
+            kept = [t for t in e.terms if t.group != group]
+            found.append(explain(study, [*kept, *terms_of(without, chosen)], start=e.fit, formulas=e.formulas))
+            log(f"  {group} as {found[-1].groups[-1]}: {found[-1].gain:.0f} for {e.gain:.0f}")
     return found
 
 
