@@ -131,6 +131,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--timeout", type=float, default=240, help="seconds for one case, by the clock (240)")
     add("--jobs", type=int, default=1, help="cases at the same time (1)")
     add("--out", type=Path, default=Path("build/campaign"), help="folder (build/campaign)")
+    add("--page", type=Path, help="write the tables there too")
     add("--keep", action="store_true", help="keep recordings, diagnoses and truths")
     add("--generate", action="store_true", help="write the cases, diagnose nothing")
     add("--gate", action="store_true", help="exit code 1 if the first command fails more often than chance allows (1 in 1000)")
@@ -170,7 +171,8 @@ def main() -> int:
     if not asked.brief:
         print("".join(f"\n{name}: {commands[name]}\n{own}" for name, own in texts.items()) + f"\n{side}\n")
     page = [f"# Campaign of {len(chosen)} cases, seed {seed}\n\n{side}\n", *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items())]
-    (asked.out / "campaign.md").write_text("".join(page))
+    for path in filter(None, (asked.out / "campaign.md", asked.page)):
+        path.write_text("".join(page))
     result = {"seed": seed, "commands": commands, "tables": tables, "rows": rows}
     (asked.out / "campaign.json").write_text(json.dumps(result, indent=1))
     print(f"one case again: --only SEED:INDEX; all rows: {asked.out / 'campaign.json'}")
