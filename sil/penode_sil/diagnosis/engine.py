@@ -40,7 +40,7 @@ FILTER = 0.6  # of what several hidden masses gain: where one gains less, they a
 OUTSIDE = "outside_taxonomy"
 SIZES = {  # what is positive by its nature: a cause of which that is not sure stands for something else
     "tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "stribeck_friction": "breakaway",
-    "hidden_resonance": "mass", "maxwell_bushing": "stiffness", "bump_stop": "stiffness",
+    "hidden_resonance": "mass", "maxwell_bushing": "stiffness",
 }  # fmt: skip
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 

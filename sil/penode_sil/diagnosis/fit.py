@@ -89,9 +89,7 @@ class Problem:
     ):  # fmt: skip
         self.model, self.experiments, self.metrics, self.set_name = model, experiments, metrics, set_name
         self.faults = faults
-        causal = causalise(replace(model, interpolation="linear"))
-        moving = causal.uses([*causal.rates, *causal.outputs, *causal.sensors], causal.input_rates)
-        self.fine = 4 if moving else 2  # see _drive
+        self.fine = 4 if _moving(model) else 2  # see _drive
         step = model.sample_time / self.fine
         stiff = any(e.law == "loose_damper" or "presliding" in e.arguments for e in model.elements)
         substeps = max(1, int(np.ceil(step * fastest / 0.1)), 4 * stiff)
@@ -233,12 +231,26 @@ def _folded(model: Model) -> Model:
 
 
 _BATCHES: dict[tuple[object, ...], Batch] = {}
+_MOVING: dict[tuple[object, ...], bool] = {}
+
+
+def _structure(model: Model) -> tuple[object, ...]:
+    """What models share that differ in values of parameters only."""
+    return repr(replace(model, parameters={}, sets={}, networks={})), tuple(model.parameters), id(model.networks)
+
+
+def _moving(model: Model) -> bool:
+    """Does anything in it depend on the rate of an input?"""
+    key = _structure(model)
+    if key not in _MOVING:
+        causal = causalise(replace(model, interpolation="linear"))
+        _MOVING[key] = causal.uses([*causal.rates, *causal.outputs, *causal.sensors], causal.input_rates)
+    return _MOVING[key]
 
 
 def _compiled(model: Model) -> Batch:
-    """The batch library of a model; models that differ in values of parameters only share one."""
-    shape = replace(model, parameters={}, sets={}, networks={})
-    key = repr(shape), tuple(model.parameters), id(model.networks)
+    """The batch library of a model."""
+    key = _structure(model)
     if key not in _BATCHES:
         _BATCHES[key] = Batch(model)
     found = copy(_BATCHES[key])

@@ -22,6 +22,7 @@ from penode_gen import fold, laws
 from penode_gen.model import GROUND, Element, Input, Model, Parameter, Signal, State
 
 Array = NDArray[np.float64]
+KEPT = 8  # transfers that are kept: two or three for each recording
 
 
 @dataclass(frozen=True)
@@ -128,10 +129,21 @@ class Linear:
     n_sensors: int
 
     def transfer(self, f: Array) -> NDArray[np.complex128]:
-        """Responses [f, y, w] at frequencies [Hz]."""
-        jw = 2j * np.pi * f[:, None, None]
-        inner = np.linalg.solve(self._pencil(f), self.b + jw * self.b1) if len(self.a) else 0.0
-        return (self.c @ inner if len(self.a) else 0.0) + self.d + jw * self.d1
+        """Responses [f, y, w] at frequencies [Hz]. The last few are kept: not to be written to."""
+        key = f.tobytes()
+        if key not in self._kept:
+            jw = 2j * np.pi * f[:, None, None]
+            inner = np.linalg.solve(self._pencil(f), self.b + jw * self.b1) if len(self.a) else 0.0
+            found = (self.c @ inner if len(self.a) else 0.0) + self.d + jw * self.d1
+            found.flags.writeable = False
+            if len(self._kept) == KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = found
+        return self._kept[key]
+
+    @cached_property
+    def _kept(self) -> dict[bytes, NDArray[np.complex128]]:
+        return {}
 
     def states(self, f: Array) -> NDArray[np.complex128]:
         """Responses [f, x, places] of the states to forces at the places."""
