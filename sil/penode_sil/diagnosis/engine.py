@@ -38,10 +38,8 @@ DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
 FILTER = 0.6  # of what several hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 OUTSIDE = "outside_taxonomy"
-SIZES = {  # what is positive by its nature: a cause of which that is not sure stands for something else
-    "tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "stribeck_friction": "breakaway",
-    "hidden_resonance": "mass", "maxwell_bushing": "stiffness",
-}  # fmt: skip
+# What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
+SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force"}
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 
 
