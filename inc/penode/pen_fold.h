@@ -62,7 +62,8 @@ typedef struct {
  * @param active    [chain->neurons] work space
  * @param capacity  of piece[], at least 4; all of it is written
  * @return PEN_OK; PEN_SET_PIECES if there are more pieces than capacity (piece[] is undefined)
- * Cost: a piece takes one evaluation with its derivative; at most capacity + chain->neurons + 4 of them for any weights.
+ * Cost: a piece takes one evaluation with its derivative; at most capacity + chain->neurons + 4 of them for any weights. A
+ * network that would take more, because neurons switch between two neighbouring numbers, is refused as well.
  */
 pen_status_t pen_fold(const pen_chain_t *chain, const pen_real_t p[], bool clamp, pen_real_t line[], bool active[],
                       size_t capacity, pen_piece_t piece[]);

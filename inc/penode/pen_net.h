@@ -108,7 +108,7 @@ void pen_clamp(size_t n, const pen_real_t range[], const pen_real_t x[], pen_rea
  */
 pen_real_t pen_fade(size_t n, const pen_real_t range[], pen_real_t width, const pen_real_t x[]);
 
-/** Derivatives of pen_clamp's y[i] and of pen_fade along x[i]; 0 on the edges' far side. */
+/** Derivatives of pen_clamp's y[i] and of pen_fade along x[i]: at an edge that of the inside, 0 where trust ends. */
 pen_real_t pen_clamp_slope(size_t n, const pen_real_t range[], const pen_real_t x[], size_t i);
 pen_real_t pen_fade_slope(size_t n, const pen_real_t range[], pen_real_t width, const pen_real_t x[], size_t i);
 

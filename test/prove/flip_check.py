@@ -8,6 +8,7 @@ import argparse
 import os
 import re
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import gate
@@ -15,6 +16,7 @@ import penode_gen
 from penode_sil.targets import FLAGS, generated, model_options
 
 WORK = gate.BUILD / "flip"
+MODELS = ("nqvm", "nqvm_folded")
 SET = gate.ROOT / "src" / "pen_set.c"
 EVERY = 101  # bits of the banks, and ten times as many of the instance
 
@@ -47,8 +49,9 @@ def main() -> int:
     options.add_argument("--as", dest="key", default="flip", help="key in figures.json")
     given = options.parse_args()
     problems, figures, total = [], {}, 0
-    for name in ("nqvm", "nqvm_folded"):
-        code, said = campaign(name, given.every)
+    with ThreadPoolExecutor() as pool:
+        results = list(pool.map(lambda name: campaign(name, given.every), MODELS))
+    for name, (code, said) in zip(MODELS, results, strict=True):
         counts = {what: int(n) for what, n in re.findall(r"^([a-z ]+): (\d+)$", said, re.M)}
         total += sum(counts.values())
         figures[name] = counts

@@ -8,6 +8,7 @@ import argparse
 import re
 import shutil
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import gate
@@ -17,6 +18,7 @@ from penode_sil.targets import FLAGS, generated, model_options
 WORK = gate.BUILD / "fuzz"
 SET = gate.ROOT / "src" / "pen_set.c"
 FAULT_RUNS = 60_000
+MODELS = ("small", "small_layers")
 
 # Faults of pen_set.c: see gate.faulty.
 FAULTS = {
@@ -84,9 +86,11 @@ def main() -> int:
     options.add_argument("--as", dest="key", default="fuzz", help="key in figures.json")
     given = options.parse_args()
     problems, total = [], 0
-    for model in ("small", "small_layers"):
+    for model in MODELS:
         shutil.rmtree(WORK / f"corpus-{model}", ignore_errors=True)
-        code, runs, said = fuzz(program(model), given.runs, WORK / f"corpus-{model}")
+    with ThreadPoolExecutor() as pool:
+        results = list(pool.map(lambda model: fuzz(program(model), given.runs, WORK / f"corpus-{model}"), MODELS))
+    for model, (code, runs, said) in zip(MODELS, results, strict=True):
         total += runs
         problems += [f"{model}:\n{said[-3000:]}"] if code else []
     good = gate.report(f"fuzz: {total} sequences of calls: each as the oracle says", problems)

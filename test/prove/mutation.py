@@ -160,6 +160,8 @@ def fault(file: str, before: list[str], after: list[str]) -> Fault:
     at = int(re.match(r"@@ -(\d+)", lines[0])[1])
     heads = [m[1] for line in before[:at] if (m := re.match(r"(?!#|typedef)\w[\w *]*?\b(\w+)\(", line))]
     old, new = (" ".join(line[1:].strip() for line in lines[1:] if line[0] == sign) for sign in "-+")
+    if not old:  # a line more, after this one
+        old, new = before[at - 1].strip(), f"{before[at - 1].strip()} {new}"
     return Fault(file, heads[-1] if heads else "", old, new)
 
 

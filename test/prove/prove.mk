@@ -3,7 +3,7 @@
 #
 # The gates of `make prove`, each also a target of its own; README.md beside this file says what each shows.
 
-PROVE_STATIC  := prove-eva prove-coverage
+PROVE_STATIC  := prove-rules prove-eva prove-coverage
 PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-readers prove-flip prove-longrun prove-stack prove-bits \
                  prove-accuracy prove-cost prove-promises
 
@@ -11,6 +11,8 @@ PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz pro
 
 # -- static -----------------------------------------------------------------------------------------------------------
 
+prove-rules: | $(READY) ## MISRA and names from outside, counted
+	@$(PYTHON) test/prove/rules_check.py
 prove-eva: | $(READY) build/setup/proof ## Frama-C: no undefined behaviour for any bytes, in any order of calls
 	@$(PYTHON) test/prove/eva.py
 prove-coverage: | $(READY) build/setup/proof build/setup/unity ## Every line, branch and condition (MC/DC) taken by a test
@@ -46,7 +48,7 @@ prove-cost: | $(READY) ## Functions take the instructions that their headers nam
 prove-promises: | $(READY) ## PROMISES.md: each promise, the test that shows it, the figures of the last run
 	@$(PYTHON) test/prove/promises.py
 
-# -- the same for hours -----------------------------------------------------------------------------------------------
+# -- the same in full -------------------------------------------------------------------------------------------------
 
 CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-readers campaign-flip campaign-longrun campaign-accuracy
 .PHONY: campaign-proofs $(CAMPAIGN)

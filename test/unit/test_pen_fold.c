@@ -32,6 +32,15 @@ static pen_real_t value(size_t capacity, pen_real_t x, pen_status_t *status)
     return pen_fold_value(piece, pen_fold_find(capacity, piece, x), x, status);
 }
 
+static void expect(size_t capacity, pen_real_t x, pen_real_t expected, pen_status_t expected_status)
+{
+    pen_status_t status;
+    const pen_real_t y = value(capacity, x, &status);
+
+    TEST_ASSERT_TRUE(!(y > expected) && !(y < expected));
+    TEST_ASSERT_EQUAL_HEX32(expected_status, status);
+}
+
 /* max(0, x + 1) - 2 max(0, x) + max(0, x - 1): a tent from -1 to 1 of height 1. Then envelope and layers. */
 static const pen_layer_t tent_layer[2] = { { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_DENSE, 3U, 1U } };
 static const pen_chain_t tent = { tent_layer, 2U, 3U, 3U };
@@ -118,6 +127,44 @@ void test_too_many_pieces(void)
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, tent_value, false, line, active, 8U, piece)); /* 4, 2 edges, the centre */
 }
 
+/* The tent in an envelope from kink to kink, with a kink at its centre: four pieces, so room for four is enough. */
+void test_kinks_on_the_edges_and_at_the_centre_take_no_room(void)
+{
+    pen_real_t p[12];
+
+    for (size_t i = 0U; i < 12U; i++) {
+        p[i] = tent_value[i];
+    }
+    p[0] = (pen_real_t)-1;
+    p[1] = (pen_real_t)1;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, false, line, active, 4U, piece));
+    expect(4U, (pen_real_t)-2, (pen_real_t)0, PEN_OUTSIDE);
+    expect(4U, (pen_real_t)-1, (pen_real_t)0, PEN_OK);
+    expect(4U, (pen_real_t)-0.5F, (pen_real_t)0.5F, PEN_OK);
+    expect(4U, (pen_real_t)0, (pen_real_t)1, PEN_OK);
+    expect(4U, (pen_real_t)0.75F, (pen_real_t)0.25F, PEN_OK);
+    expect(4U, (pen_real_t)1, (pen_real_t)0, PEN_OK);
+    expect(4U, (pen_real_t)2, (pen_real_t)0, PEN_OUTSIDE);
+}
+
+/* max(0, x + 1) - max(0, x) - max(0, x): five pieces and the centre, not six, although three neurons switch. */
+void test_neurons_that_switch_at_one_place_end_one_piece(void)
+{
+    static const pen_real_t p[12] = {
+        (pen_real_t)-3, (pen_real_t)2,
+        (pen_real_t)1, (pen_real_t)1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)0, (pen_real_t)1,
+        (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)-1,
+    };
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, false, line, active, 6U, piece));
+    expect(6U, (pen_real_t)-5, (pen_real_t)0, PEN_OUTSIDE);
+    expect(6U, (pen_real_t)-2, (pen_real_t)0, PEN_OK);
+    expect(6U, (pen_real_t)-0.75F, (pen_real_t)0.25F, PEN_OK);
+    expect(6U, (pen_real_t)-0.25F, (pen_real_t)0.75F, PEN_OK);
+    expect(6U, (pen_real_t)2, (pen_real_t)-1, PEN_OK);
+    expect(6U, (pen_real_t)5, (pen_real_t)-4, PEN_OUTSIDE);
+}
+
 /* The look-up against going through the table, for every capacity it is made for. */
 void test_find(void)
 {
@@ -191,28 +238,36 @@ void test_random_networks_against_their_layers(void)
     TEST_ASSERT_GREATER_THAN_UINT32(30U, folded);
 }
 
-/* The tent between a scaling of the input and one of the output: 4 tent((x - 2) / 2) + 1, a tent from 0 to 4. */
+/* The tent between a scaling of the input and one of the output: 4 tent((x - 2) / 2) + 1, a tent from 0 to 4. Between its
+ * layers, three values are scaled there and back. */
 void test_scaled_input_and_output(void)
 {
-    static const pen_layer_t layer[4] = {
-        { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_DENSE, 3U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U }
+    static const pen_layer_t layer[6] = {
+        { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_CENTRE, 3U, 3U }, { PEN_LAYER_RESCALE, 3U, 3U },
+        { PEN_LAYER_DENSE, 3U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U }
     };
-    static const pen_chain_t chain = { layer, 4U, 3U, 3U };
+    static const pen_chain_t chain = { layer, 6U, 3U, 3U };
+    static const pen_real_t there_and_back[12] = {
+        (pen_real_t)1, (pen_real_t)2, (pen_real_t)3, (pen_real_t)2, (pen_real_t)4, (pen_real_t)0.5F,
+        (pen_real_t)0.5F, (pen_real_t)0.25F, (pen_real_t)2, (pen_real_t)1, (pen_real_t)2, (pen_real_t)3
+    };
     static const pen_real_t x[5] = { (pen_real_t)-1, (pen_real_t)1, (pen_real_t)2, (pen_real_t)3.5F, (pen_real_t)5 };
     static const pen_real_t expected[5] = { (pen_real_t)1, (pen_real_t)3, (pen_real_t)5, (pen_real_t)2, (pen_real_t)1 };
-    pen_real_t p[16] = { (pen_real_t)-4, (pen_real_t)8, (pen_real_t)2, (pen_real_t)0.5F };
+    pen_real_t p[28] = { (pen_real_t)-4, (pen_real_t)8, (pen_real_t)2, (pen_real_t)0.5F };
 
-    for (size_t i = 0U; i < 10U; i++) {
+    for (size_t i = 0U; i < 6U; i++) {
         p[4U + i] = tent_value[2U + i];
+        p[10U + i] = there_and_back[i];
+        p[16U + i] = there_and_back[6U + i];
     }
-    p[14] = (pen_real_t)4;
-    p[15] = (pen_real_t)1;
+    for (size_t i = 0U; i < 4U; i++) {
+        p[22U + i] = tent_value[8U + i];
+    }
+    p[26] = (pen_real_t)4;
+    p[27] = (pen_real_t)1;
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&chain, p, false, line, active, 12U, piece));
     for (size_t i = 0U; i < 5U; i++) {
-        pen_status_t status;
-        const pen_real_t y = value(12U, x[i], &status);
-        TEST_ASSERT_TRUE(!(y > expected[i]) && !(y < expected[i]));
-        TEST_ASSERT_EQUAL_HEX32(PEN_OK, status);
+        expect(12U, x[i], expected[i], PEN_OK);
     }
 }
 
@@ -233,34 +288,31 @@ void test_an_envelope_that_ends_at_zero(void)
     TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, status);
 }
 
-/* An envelope of all numbers has no edges; a kink beyond all numbers is none. */
+/* An envelope of all numbers has no edges; a kink at the largest number, or beyond, is none. */
 void test_without_edges_and_without_an_end(void)
 {
     static const pen_layer_t one_layer[2] = { { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_DENSE, 1U, 1U } };
     static const pen_chain_t one = { one_layer, 2U, 1U, 1U };
-    const pen_real_t far[6] = {
+    const pen_real_t last[6] = { (pen_real_t)-1, (pen_real_t)1, PEN_REAL_MAX, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1 };
+    const pen_real_t beyond[6] = {
         (pen_real_t)-1, (pen_real_t)1, PEN_REAL_MAX * (pen_real_t)0.5F, -PEN_REAL_MIN, (pen_real_t)0, (pen_real_t)1
     };
     pen_real_t p[12];
-    pen_status_t status;
-    pen_real_t y;
 
     for (size_t i = 0U; i < 12U; i++) {
         p[i] = tent_value[i];
     }
     p[0] = -PEN_REAL_MAX;
     p[1] = PEN_REAL_MAX;
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, false, line, active, 6U, piece)); /* 3 kinks, the centre */
-    y = value(6U, (pen_real_t)-1e30F, &status);
-    TEST_ASSERT_TRUE(!(y > (pen_real_t)0) && !(y < (pen_real_t)0));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, status);
-    y = value(6U, (pen_real_t)0.25F, &status);
-    TEST_ASSERT_TRUE(!(y > (pen_real_t)0.75F) && !(y < (pen_real_t)0.75F));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, false, line, active, 4U, piece)); /* 3 kinks, one at the centre */
+    expect(4U, (pen_real_t)-1e30F, (pen_real_t)0, PEN_OK);
+    expect(4U, (pen_real_t)0.25F, (pen_real_t)0.75F, PEN_OK);
+    expect(4U, (pen_real_t)1e30F, (pen_real_t)0, PEN_OK);
 
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&one, far, false, line, active, 4U, piece));
-    y = value(4U, (pen_real_t)9, &status);
-    TEST_ASSERT_TRUE(!(y > far[2]) && !(y < far[2]));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE, status);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&one, last, false, line, active, 4U, piece)); /* 2 edges, the centre */
+    expect(4U, (pen_real_t)9, last[2], PEN_OUTSIDE);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&one, beyond, false, line, active, 4U, piece));
+    expect(4U, (pen_real_t)9, beyond[2], PEN_OUTSIDE);
 }
 
 /* All kinks on one side of the centre: the room is used up on the way down, or on the way up. */
@@ -304,4 +356,32 @@ void test_kinks_closer_than_numbers(void)
         p[309U + i] = (pen_real_t)1;
     }
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_PIECES, pen_fold(&chain, p, false, line, active, 12U, piece));
+}
+
+/*
+ * Two neurons cut a zigzag of four kinks four times each: twelve kinks between 1 and the next number. With two edges and two
+ * ends that takes 16 evaluations, which is what is allowed for six pieces and six neurons; for five pieces it is one too many,
+ * although only four have a length.
+ */
+void test_no_more_evaluations_than_allowed(void)
+{
+    static const pen_layer_t layer[4] = {
+        { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 4U }, { PEN_LAYER_RELU, 4U, 2U }, { PEN_LAYER_DENSE, 2U, 1U }
+    };
+    static const pen_chain_t chain = { layer, 4U, 4U, 6U };
+    const pen_real_t tooth = PEN_REAL_EPSILON / (pen_real_t)64;
+    const pen_real_t p[25] = {
+        (pen_real_t)0, (pen_real_t)2, (pen_real_t)1, (pen_real_t)1,
+        -tooth, (pen_real_t)-2 * tooth, (pen_real_t)-3 * tooth, (pen_real_t)-4 * tooth,
+        (pen_real_t)1, (pen_real_t)1, (pen_real_t)1, (pen_real_t)1,
+        (pen_real_t)-0.25F * tooth, (pen_real_t)1, (pen_real_t)-2, (pen_real_t)2, (pen_real_t)-2,
+        (pen_real_t)-0.5F * tooth, (pen_real_t)1, (pen_real_t)-2, (pen_real_t)2, (pen_real_t)-2,
+        (pen_real_t)3, (pen_real_t)1, (pen_real_t)1,
+    };
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&chain, p, false, line, active, 6U, piece));
+    expect(6U, (pen_real_t)0.5F, (pen_real_t)3, PEN_OK);
+    expect(6U, (pen_real_t)1.5F, (pen_real_t)3, PEN_OK);
+    expect(6U, (pen_real_t)3, (pen_real_t)3, PEN_OUTSIDE);
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_PIECES, pen_fold(&chain, p, false, line, active, 5U, piece));
 }

@@ -192,6 +192,17 @@ void test_short_set_is_refused_and_can_be_completed(void)
     expect_adoption(6U);
 }
 
+/* What was written to the set before does not count for this one, even in the same bank. */
+void test_each_set_is_written_from_the_start(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &other.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, other_value, N));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &other.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_SHORT, commit());
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write(&tuning, N, N - 1U, other_value, 1U));
+    expect_running(1U);
+}
+
 void test_wrong_checksum_is_refused_and_the_chunk_can_be_sent_again(void)
 {
     pen_set_t set;
@@ -328,6 +339,57 @@ void test_rollback_is_kept_while_a_bank_is_free_and_given_up_when_not(void)
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &set.head));
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_NO_PREVIOUS, roll_back());
     expect_running(5U);
+}
+
+/* Wherever in memory the banks and a set in flash lie, after any five exchanges: a new set takes the way back only if that and
+ * the running set fill both banks. */
+void test_the_way_back_wherever_sets_lie(void)
+{
+    static const uint32_t place[6][3] = { { 0U, 1U, 2U }, { 0U, 2U, 1U }, { 1U, 0U, 2U }, { 1U, 2U, 0U }, { 2U, 0U, 1U }, { 2U, 1U, 0U } };
+
+    for (uint32_t at = 0U; at < (6U * 243U); at++) {
+        pen_real_t *const flash = &memory[N * place[at % 6U][2]];
+        uint32_t running = 2U; /* the id, and whether it lies in a bank */
+        uint32_t previous = 0U;
+        bool running_in_bank = false;
+        bool previous_in_bank = false;
+        uint32_t exchanges = at / 6U;
+
+        fill(&other, flash, 2U);
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_init(&tuning, LAYOUT, N, &other, &memory[N * place[at % 6U][0]],
+                                                        &memory[N * place[at % 6U][1]]));
+        for (uint32_t k = 0U; k < 5U; k++) {
+            const uint32_t kind = (previous == 0U) ? (exchanges % 2U) : (exchanges % 3U); /* no way back at first */
+            const uint32_t before = running;
+            const bool before_in_bank = running_in_bank;
+            if (kind == 0U) {
+                stage(3U + k);
+                running = 3U + k;
+                running_in_bank = true;
+            } else if (kind == 1U) {
+                TEST_ASSERT_EQUAL_HEX32(PEN_OK, choose(&other));
+                running = 2U;
+                running_in_bank = false;
+            } else {
+                TEST_ASSERT_EQUAL_HEX32(PEN_OK, roll_back());
+                running = previous;
+                running_in_bank = previous_in_bank;
+            }
+            expect_adoption(running);
+            previous = before;
+            previous_in_bank = before_in_bank;
+            exchanges /= 3U;
+        }
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &first.head));
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_write(&tuning, N, 0U, first_value, N));
+        if (!running_in_bank || !previous_in_bank) {
+            TEST_ASSERT_EQUAL_HEX32(PEN_OK, roll_back());
+            expect_adoption(previous);
+        } else {
+            TEST_ASSERT_EQUAL_HEX32(PEN_SET_NO_PREVIOUS, roll_back());
+            expect_running(running);
+        }
+    }
 }
 
 void test_select_borrows_a_set_and_drops_an_open_one(void)
