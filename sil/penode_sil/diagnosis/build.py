@@ -21,6 +21,7 @@ from .score import Candidate
 
 Array = NDArray[np.float64]
 SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3, "s": 1e-3}  # of start states of laws
+HEAVIEST = 0.5  # of its body: a hidden mass beyond that is another vehicle
 BENT = 0.01  # [m] deflection of a hidden mass's spring where its bend would show
 SLOWEST = 5.0  # [s] relaxation: what takes longer is a load
 RANGES = {"presliding": (3.0, 10.0), "transition": (30.0, 3.0), "bend": (30.0, 2.2), "share": (1.3, 1.54)}  # of shapes, down and up
@@ -51,7 +52,7 @@ class Extended:
     names: tuple[str, ...]
 
 
-def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tuple[float, str]], list[Free]]:
+def element(term: Term, place: Place, name: str, model: Model) -> tuple[Element, dict[str, tuple[float, str]], list[Free]]:
     """The element of a force law, its parameters, and what is free in it."""
     what = term.candidate.what
     if not isinstance(what, Basis):  # an absorber
@@ -59,12 +60,13 @@ def element(term: Term, place: Place, name: str) -> tuple[Element, dict[str, tup
         w, m = 2.0 * np.pi * f0, max(term.gain, 1e-9)
         values = {"mass": (m, "kg"), "stiffness": (m * w * w, "N/m"), "damping": (2.0 * zeta * w * m, "N*s/m")}
         arguments = {key: f"{name}_{key}" for key in values}
-        body = next(b for b in place.ends if b != GROUND)
-        free = [Free(arguments[key], v, 1.0, log=True, low=1e-9) for key, (v, _) in values.items()]
+        body = next(b for b in model.bodies if b.name in place.ends)
+        most = {"mass": max(HEAVIEST * model.parameters[body.mass].value, m)}
+        free = [Free(arguments[key], v, 1.0, log=True, low=1e-9, high=most.get(key, np.inf)) for key, (v, _) in values.items()]
         values["cubic"] = (term.bend, "N/m^3")
         free.append(Free(f"{name}_cubic", term.bend, 0.03 * m * w * w / BENT**2))
         arguments = {key: f"{name}_{key}" for key in values}
-        return Element(name, (body, GROUND), "absorber", arguments), {arguments[k]: v for k, v in values.items()}, free
+        return Element(name, (body.name, GROUND), "absorber", arguments), {arguments[k]: v for k, v in values.items()}, free
     gain, unit = what.gain
     shapes = {f"{name}_{key}": value for key, value in what.shapes.items()}
     least = {f"{name}_{key}": value for key, value in what.least.items()}
@@ -103,7 +105,7 @@ def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recor
                 faults.append(what)
         else:
             place = places[what.place if isinstance(what, Basis) else what[1]]
-            one, values, own = element(term, place, names[-1])
+            one, values, own = element(term, place, names[-1], model)
             elements.append(one)
             where.append(place)
             parameters |= values

@@ -176,7 +176,7 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
     k, d, n = ("stiffness", "N/m"), ("damping", "N*s/m"), ("force", "N")
     if p.role == "tyre":
         yield law("tyre_damping", "linear_damper", d, {}, 1, lambda s, v, t: v)
-        for tau in (0.002, 0.006, 0.02, 0.06):
+        for tau in (0.0007, 0.002, 0.006, 0.02, 0.06):
             yield law("tyre_damping", "maxwell_bushing", k, {"relaxation": (tau, "s")}, 1, lambda s, v, t: s - lag(s, tau, step))
         yield law("tyre_damping", "quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, 0, lambda s, v, t: v * np.abs(v), True)
         for w in (0.05, 0.2, 0.8):
