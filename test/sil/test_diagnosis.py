@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from scipy.signal import lfilter
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import hypotheses, noise, plant, study
+from penode_sil.diagnosis import extension, hypotheses, noise, plant, study
 from penode_sil.diagnosis.engine import experiment
 from penode_sil.diagnosis.fit import Problem
 from penode_sil.measured import load
@@ -205,6 +206,14 @@ def test_sound_vehicle_has_no_cause(model, sound):
     found = diagnosis.diagnose(model, sound)
     assert found.verdict == "no_discrepancy" and found.causes == ()
     json.dumps(found.as_json())
+
+
+def test_a_small_mass_gets_steps_that_it_is_stable_in(model):
+    """A rate of 2560 1/s at 2 ms is beyond the 2.785 of Runge-Kutta; a step is to be at most 1 of it."""
+    values = {"x0_mass": 5.0, "x0_stiffness": 7e4, "x0_damping": 12_800.0}
+    term = SimpleNamespace(candidate=SimpleNamespace(what=("absorber", 0, 19.0, 1.0)))
+    fitted = SimpleNamespace(fit=SimpleNamespace(value=values.__getitem__))
+    assert extension._fine(SimpleNamespace(model=model), term, "x0", fitted) == 6
 
 
 def test_noise_floor_is_that_of_coloured_sensors(tmp_path, model):

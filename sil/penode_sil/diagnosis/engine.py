@@ -128,7 +128,7 @@ def diagnose(
         tell(0.85, "measuring the gain")
         lost = {c.where for c in causes if c.kind == "sensor_dropout"}
         gain, more, held = extension.measure(study, extended, unused, lost)
-        notes += more
+        notes += more + [f"{s} gets worse by the extended model: do not use it" for s, g in gain.items() if g.after_rmse > 1.05 * g.before_rmse]
     absorbed: dict[str, object] = {}
     if learnt := absorb.taught(study, named) if named is not None and named.terms else []:
         absorbed, more = absorbing(study, named, learnt, unused, output)

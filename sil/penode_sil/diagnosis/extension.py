@@ -165,12 +165,15 @@ def _rated(study: Study, text: str) -> tuple[str, Model]:
 
 
 def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
-    """Steps a sample, so that none jumps over the presliding of a friction or the relaxation of a stiff spring."""
+    """Steps a sample, so that none jumps over the presliding of a friction, a relaxation, or the motion of a small mass."""
     what, step = term.candidate.what, study.model.sample_time
+    if isinstance(what, tuple):
+        m, k, d = (e.fit.value(f"{name}_{key}") for key in ("mass", "stiffness", "damping"))
+        return min(int(np.ceil(step * max(d / m, np.sqrt(k / m)))), 100)
     if not isinstance(what, Basis):
         return 1
-    if what.law == "loose_damper":
-        return int(np.ceil(step / e.fit.value(f"{name}_relaxation")))
+    if "relaxation" in what.shapes:
+        return min(int(np.ceil(step / e.fit.value(f"{name}_relaxation"))), 100)
     if "presliding" not in what.shapes:
         return 1
     speed = size([s.motions[what.place] for s in study.seen])[1]
