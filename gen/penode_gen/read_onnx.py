@@ -121,7 +121,7 @@ class _Reader:
         """call(*arguments), with whatever numpy says about its numbers turned into an error of this node."""
         try:
             return call(*arguments)
-        except (ValueError, TypeError, IndexError, OverflowError, ZeroDivisionError) as error:
+        except (ValueError, TypeError, LookupError, OverflowError, ZeroDivisionError) as error:
             raise self.node_error(index, node, _line(error), "mend the node, or export the network again") from None
 
     # ---- what the graph holds ----
@@ -141,7 +141,7 @@ class _Reader:
         for tensor in self.graph.initializer:
             try:
                 self.constants[tensor.name] = numpy_helper.to_array(tensor)
-            except (ValueError, TypeError, RuntimeError, OSError) as error:
+            except (ValueError, TypeError, KeyError, RuntimeError, OSError) as error:
                 raise self.error(f"weights '{tensor.name}': {_line(error)}", "export the network again") from None
         for index, node in self.nodes:
             if node.op_type == "Constant":

@@ -61,6 +61,7 @@ _REQUIRED = {
     "outputs": ("value", "unit"),
     "sensors": ("value", "unit"),
 }
+ROOM = 4096  # pieces of a folded network, at most
 _MODEL = {
     "extends": str, "name": str, "description": str, "sample_time": str, "method": str, "substeps": int, "input": str, "input_rate": str, "outside": str,
     "fade_width": (int, float), "pieces": int, "more_pieces": str,
@@ -300,8 +301,8 @@ class _Reader:
             self.problem(("model", "substeps"), f"{head['substeps']} is out of range", "give 1 to 1000")
         if not 1e-6 <= head.setdefault("fade_width", 0.1) <= 100.0:
             self.problem(("model", "fade_width"), "is out of range", "give the fading distance in widths of the envelope, 1e-6 to 100")
-        if head.setdefault("pieces", 0) != 0 and not 4 <= head["pieces"] <= 4096:
-            self.problem(("model", "pieces"), f"{head['pieces']} is out of range", "give room for 4 to 4096 pieces, or 0 to evaluate layer by layer")
+        if head.setdefault("pieces", 0) != 0 and not 4 <= head["pieces"] <= ROOM:
+            self.problem(("model", "pieces"), f"{head['pieces']} is out of range", f"give room for 4 to {ROOM} pieces, or 0 to evaluate layer by layer")
 
         parameters = self.parameters()
         inputs = tuple(self.inputs())
@@ -527,7 +528,7 @@ class _Reader:
 
     def folds(self, head: dict[str, Any], sets: dict[str, m.ParameterSet]) -> None:
         """Check that there is something to fold, and room for it."""
-        where, given = ("model", "pieces"), room(head["pieces"])
+        where, given = ("model", "pieces"), room(min(head["pieces"], ROOM))
         if given == 0 or not sets:
             return
         if head["outside"] == "fade":

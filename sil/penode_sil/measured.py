@@ -178,7 +178,7 @@ class _Taken:
 
 def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
     """The times that all clocks cover, one sample time apart."""
-    first, last = max(c.time[0] for c in clocks), min(c.time[-1] for c in clocks)
+    first, last = float(max(c.time[0] for c in clocks)), float(min(c.time[-1] for c in clocks))
     count = max(0, int(min((last - first) / step + 1e-3, 1e12)) + 1)
     if count < SHORTEST:
         raise UserError(

@@ -264,6 +264,9 @@ def on_raster(time: float, sample_time: float, table: _Table, key: str) -> float
     """The sample's time nearest to `time`; a problem if it is another one. NaN stays NaN."""
     if math.isnan(time):
         return time
+    if not math.isfinite(time / sample_time):
+        table.complain(key, f"{time:g} s is more samples than there are numbers", "give a shorter time")
+        return math.nan
     ticks = round(time / sample_time)
     if abs(time / sample_time - ticks) > 1e-6:
         table.complain(

@@ -210,6 +210,11 @@ def test_random_networks(tmp_path, seed, show):
     compare(network, tmp_path, show, capacity=256, clamp=given and seed % 4 == 0)
 
 
+def test_more_room_than_there_may_be(tmp_path):
+    with pytest.raises(penode_gen.ModelError, match="99999 is out of range; give room for 4 to 4096 pieces"):
+        model(tmp_path, read_network(FILES[0]), "pieces = 99999")
+
+
 def test_counting_pieces_beforehand(tmp_path):
     """The generator's count, in float64, is what the target finds (kinks closer than a float are one there)."""
     for path in FILES[:3]:

@@ -120,6 +120,12 @@ def test_weights_shorter_than_their_shape(tmp_path: Path) -> None:
     refused(tmp_path, made)
 
 
+def test_weights_of_no_known_type(tmp_path: Path) -> None:
+    made = model(MLP, MLP_CONSTANTS)
+    made.graph.initializer[0].data_type = 65
+    refused(tmp_path, made)
+
+
 def test_sparse_weights(tmp_path: Path) -> None:
     made = model([node("Gemm", "x w", "y")], {})
     values = numpy_helper.from_array(np.ones(1), "w")

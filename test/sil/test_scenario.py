@@ -127,6 +127,7 @@ WRONG = [
     ('set = "stiff"', 'set = "stif"', r'instance\[2\].set: "stif" is not known; did you mean "stiff"\?'),
     ('time = "1 s"', 'time = "-1 s"', r"exchange\[1\].time: '-1 s' is negative; give at least 0 s"),
     ('time = "1 s"', 'time = "1.0005 s"', r"exchange\[1\].time: 1.0005 s is not on the raster"),
+    ('time = "1 s"', 'time = "1e308 s"', r"exchange\[1\].time: 1e\+308 s is more samples than there are numbers; give a shorter time"),
     ('time = "1 s"', 'time = "4 s"', r"exchange\[1\].time: 4 s is not before the end at 3 s"),
     ('time = "1500 ms"', 'time = "500 ms"', r"exchange\[2\].time: staging would begin at 0.5 s, before 1.001 s"),
     ('how = "select"', 'how = "rollback"\nchunk = 3', r"exchange\[1\].how: there is nothing to roll back to"),
