@@ -141,6 +141,7 @@ class _Emitter:
         self.at = sets.offsets(model)
         everything = [*self.causal.rates, *self.causal.outputs, *self.causal.sensors]
         self.uses_input_rate = self.causal.uses(everything, self.causal.input_rates)
+        self.parabola = self.uses_input_rate and model.input_rate == "parabola"
         self.drive = self.causal.inputs + (self.causal.input_rates if self.uses_input_rate else ())
         self.networks = self._network_code()
         self.code_of = {user: code for code in self.networks for user in code.users}
@@ -166,7 +167,7 @@ class _Emitter:
             "states": [{"name": s, "unit": self._unit(s), "start": literal(x)} for s, x in zip(model.states, model.start)],
             "n_x": len(model.states), "n_q": causal.n_mechanical, "n_u": len(model.inputs), "n_drive": len(self.drive),
             "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
-            "parabola": self.uses_input_rate and model.input_rate == "parabola",
+            "parabola": self.parabola,
             "functions": functions, "constants": self._constants(), "networks": self.networks,
             "network_lines": {c.name: self._network_lines(c) for c in self.networks},
             "bend_lines": {c.name: _by_value(c, self._bend_lines(c)) for c in self.networks if self._bent(c, functions)},

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from penode_sil.diagnosis.noise import PURE, Experiment, tone
+from penode_sil.diagnosis.noise import PURE, Experiment, Tone, tone
 
 
 def recording(u: np.ndarray, y: np.ndarray, step: float) -> Experiment:
@@ -44,6 +44,12 @@ def test_a_tone_is_found_though_its_frequency_wanders(swing):
     found = tone([recording(road(draw, len(t)), y, 1e-3)], [np.zeros_like(y)])
     assert found.purity > PURE and found.sensor == 1
     assert found.frequency == pytest.approx(31.0, rel=0.02 + swing)  # half a bin, and how far it wanders
+
+
+@pytest.mark.parametrize("step", [0.02, 0.2, 1.0, 10.0])
+def test_a_slow_raster_has_none(step):
+    y = np.random.default_rng(5).normal(size=(2000, 1))
+    assert tone([recording(y[:, 0], y, step)], [np.zeros_like(y)]) == Tone()
 
 
 def test_under_a_sine_nothing_is_told():

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 import penode_gen
 from penode_gen import units
-from penode_gen.causalise import causalise
 from penode_gen.laws import LAWS
 from penode_gen.model import Model, Signal
 
 from ..batch import Batch
 from ..targets import Sil
 from .build import SPREAD, Term
-from .fit import Free, Problem
+from .fit import Free, Problem, moving
 from .hypotheses import Basis, Fault, size
 from .noise import Experiment, bursts, metric
 from .plant import anonymous
@@ -153,8 +152,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
 def _rated(study: Study, text: str) -> tuple[str, Model]:
     """The model of a text; outputs see the rate of an input by a parabola if the C then meets the first recording better."""
     model = _load(text)
-    causal = causalise(model)
-    if (model.interpolation, model.input_rate) != ("linear", "chord") or not causal.uses([*causal.outputs, *causal.sensors], causal.input_rates):
+    if (model.interpolation, model.input_rate) != ("linear", "chord") or not moving(model):
         return text, model
     head = text.index("sample_time =")
     better = text[:head] + 'input_rate = "parabola"\n' + text[head:]

@@ -89,7 +89,7 @@ class Problem:
     ):  # fmt: skip
         self.model, self.experiments, self.metrics, self.set_name = model, experiments, metrics, set_name
         self.faults = faults
-        self.fine = 4 if _moving(model) else 2  # see _drive
+        self.fine = 4 if moving(model) else 2  # see _drive
         step = model.sample_time / self.fine
         stiff = any(e.law == "loose_damper" or "presliding" in e.arguments for e in model.elements)
         substeps = max(1, int(np.ceil(step * fastest / 0.1)), 4 * stiff)
@@ -239,7 +239,7 @@ def _structure(model: Model) -> tuple[object, ...]:
     return repr(replace(model, parameters={}, sets={}, networks={})), tuple(model.parameters), id(model.networks)
 
 
-def _moving(model: Model) -> bool:
+def moving(model: Model) -> bool:
     """Does anything in it depend on the rate of an input?"""
     key = _structure(model)
     if key not in _MOVING:

@@ -241,11 +241,13 @@ class Tone:
 def tone(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> Tone:
     """The purest tone that residuals have and inputs have not: noise that makes one comes from a machine.
 
-    Recordings under a sine or a sweep do not count: there, an error of a model or a quantum is a tone as well.
+    Recordings under a sine or a sweep do not count: there, an error of a model or a quantum is a tone as well. Nor do those of
+    less than 120 Hz or 3 s, which have too few bins or seconds.
     """
     found = [Tone()]
     for e, z in zip(experiments, simulated):
-        if not _swept(e.u, e.step):
+        second = int(round(1.0 / e.step))  # samples
+        if 0.4 * second >= 6 * HALF and len(e.time) >= 3 * second and not _swept(e.u, e.step):
             found += _tones(np.where(e.good, e.y - z, 0.0), e.step)
     return max(found, key=lambda t: t.purity)
 
@@ -271,8 +273,6 @@ def _tones(signals: Array, step: float) -> list[Tone]:
     """
     size = int(round(1.0 / step))
     top = int(0.4 * size)
-    if len(signals) < 3 * size or top < 6 * HALF:
-        return []
     window = np.hanning(size)[:, None]
     parts = [signals[a : a + size] for a in range(0, len(signals) - size + 1, size // 2)]
     power = np.array([np.abs(fft.rfft((x - x.mean(axis=0)) * window, axis=0)[: top + HALF]) ** 2 for x in parts])
