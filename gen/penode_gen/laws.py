@@ -53,7 +53,10 @@ LAWS: dict[str, Law] = {
     "degressive_damper": Law("-damping*v*abs(v)/(knee + abs(v))", {"damping": "N*s/m", "knee": "m/s"}),
     # come with time, or with the work done: damping below zero is a damper that fades
     "fading_damper": Law("damping*faded*v", {"damping": "N*s/m", "time": "s"}, {"faded": LawState("1", "(1 - faded)/time")}),
-    "heating_damper": Law("damping*warm*v", {"damping": "N*s/m", "work": "m^2/s"}, {"warm": LawState("1", "(1 - warm)*v^2/work")}),
+    # warmed by the work that it does, cooled by the air
+    "heating_damper": Law(
+        "damping*warm*v", {"damping": "N*s/m", "work": "m^2/s", "cooling": "s"}, {"warm": LawState("1", "(1 - warm)*v^2/work - warm/cooling")}
+    ),
     "coulomb_friction": Law("force*tanh(v/transition)", {"force": "N", "transition": "m/s"}),
     # Modelica.Mechanics.Translational friction in its smooth form: breakaway peak at `breakaway_rate`, then Coulomb
     "stribeck_friction": Law(

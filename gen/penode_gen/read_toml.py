@@ -317,7 +317,8 @@ class _Reader:
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
         self.folds(head, sets)
         self.unique(parameters, inputs, bodies, elements, states, variables, networks)
-        self.shown((*outputs, *sensors), {*(i.name for i in inputs), *(s.name for s in states), *(b.position for b in bodies), *(b.velocity for b in bodies)}, len(outputs))
+        moving = {*(s.name for s in states), *(b.position for b in bodies), *(b.velocity for b in bodies)}
+        self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs))
         self.macros(parameters, networks, name)
         for section, entries in (("inputs", inputs), ("outputs", outputs)):
             if not entries and not self.data.get(section):
@@ -643,11 +644,12 @@ class _Reader:
             if i.name in {b.name for b in bodies}:
                 self.problem(("inputs", i.name), f"'{i.name}' is taken by the body of that name", "rename one: an element could mean either")
 
-    def shown(self, signals: tuple[m.Signal, ...], known: set[str], n_outputs: int) -> None:
-        """In tables of results, a name stands for one quantity."""
-        first: dict[str, str] = {name: name for name in known}
+    def shown(self, signals: tuple[m.Signal, ...], inputs: set[str], states: set[str], n_outputs: int) -> None:
+        """In tables of results, a name stands for one quantity; that of a state also for what measures it, however well."""
+        first: dict[str, str] = {name: name for name in inputs}
         for n, s in enumerate(signals):
-            if s.expression and first.setdefault(s.name, s.expression.strip()) != s.expression.strip():
+            other = s.name in states and not re.search(rf"\b{s.name}\b", s.expression)
+            if s.expression and (other or first.setdefault(s.name, s.expression.strip()) != s.expression.strip()):
                 self.problem(("outputs" if n < n_outputs else "sensors", s.name), f"'{s.name}' is already the name of another quantity", "rename one")
 
     def expressions(self, elements, equations, signals, networks: dict[str, m.NetworkPort], n_outputs: int) -> None:

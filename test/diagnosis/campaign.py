@@ -123,6 +123,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--seed", type=int, help="of the draw; default: a new one, which is printed")
     add("--only", action="append", default=[], metavar="SEED:INDEX", help="just this case; may be given again")
     add("--strata", default=",".join(cases.STRATA), help="take these only: " + ", ".join(cases.STRATA))
+    add("--nulls", type=int, default=0, help="go on until so many cases had nothing hidden in them")
     add("--kinds", default="", help="take only cases with one of these kinds")
     add("--command", action="append", default=[], metavar="[NAME=]COMMAND",
         help="called as COMMAND MODEL.toml --data REC... --holdout REC -o DIR (penode diagnose); may be given again")
@@ -148,6 +149,9 @@ def main() -> int:
     if not strata <= set(cases.STRATA) or not kinds <= set(cases.KINDS):
         parse.error(f"unknown: {', '.join((strata - set(cases.STRATA)) | (kinds - set(cases.KINDS)))}")
     chosen = [tuple(map(int, one.split(":"))) for one in asked.only] or choose(seed, asked.cases, strata, kinds)
+    if asked.nulls and not asked.only:
+        nulls = choose(seed, asked.nulls, {"null", "null_hard"}, set())
+        chosen += [one for one in nulls if one not in chosen]
     print(f"{len(chosen)} cases, seed {chosen[0][0] if chosen else seed}", flush=True)
     asked.out.mkdir(parents=True, exist_ok=True)
     commands = dict(c.split("=", 1) if "=" in c.split()[0] else ("diagnose", c) for c in asked.command or ["penode diagnose"])

@@ -73,7 +73,10 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
     "compression_damper": ({"damping": "6 N*s/m"}, plain(lambda s, v: 6.0 * v if v < 0.0 else 0.0)),
     "degressive_damper": ({"damping": "-9 N*s/m", "knee": "0.2 m/s"}, plain(lambda s, v: 9.0 * v * (1.0 - 1.0 / (1.0 + abs(v) / 0.2)))),
     "fading_damper": ({"damping": "12 N*s/m", "time": "0.4 s"}, lambda s, v, own: (12.0 * own[0] * v, [(1.0 - own[0]) / 0.4])),
-    "heating_damper": ({"damping": "12 N*s/m", "work": "30 cm^2/s"}, lambda s, v, own: (12.0 * own[0] * v, [(1.0 - own[0]) * v * v / 0.003])),
+    "heating_damper": (
+        {"damping": "12 N*s/m", "work": "30 cm^2/s", "cooling": "3 s"},
+        lambda s, v, own: (12.0 * own[0] * v, [(1.0 - own[0]) * v * v / 0.003 - own[0] / 3.0]),
+    ),
     "coulomb_friction": ({"force": "2 N", "transition": "0.05 m/s"}, plain(lambda s, v: 2.0 * np.tanh(v / 0.05))),
     "stribeck_friction": (
         {"breakaway": "3 N", "coulomb": "2 N", "stribeck": "0.1 m/s", "transition": "0.05 m/s"},

@@ -157,6 +157,7 @@ FAULTS = [
     ("tau = {", 'set_length = { value = 1, unit = "1" }\ntau = {', "GOOD_SET_LENGTH is already taken"),
     ("tau = {", 'damp_damping = { value = 1, unit = "1" }\ntau = {', "'damp_damping', which there is already", at("damp =")),
     ('load = { value = "F_foot"', 'q = { value = "F_foot"', "sensors.q: 'q' is already the name of another quantity"),
+    ('load = { value = "F_foot"', 'z = { value = "2*z"', "sensors.z: 'z' is already the name of another quantity"),
     # units
     ('unit = "N/mm"', 'unit = "N/mn"', "parameters.k: unknown unit 'N/mn'; write it like"),
     ('unit = "N/mm"', 'unit = "N/mm^9^9^9^9"', "unknown unit"),

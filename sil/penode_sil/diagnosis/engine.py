@@ -76,12 +76,13 @@ def diagnose(
     tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
     if study.moving:
-        other, found = search.at_rest(other, study, explanations[0] if explanations else None, log)
+        equals = [e for e in explanations if e.score > explanations[0].score - search.NEW]
+        other, found = search.at_rest(other, study, equals, log)
     if study.moving and found:
         costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
-        told = [set(e.groups) for e in explanations if e.score > explanations[0].score - search.NEW]
-        spare = (IDLE if set(found[0].groups) in told else MOVING) * len(model.states) * len(experiments)
+        told = set(found[0].groups) in (set(e.groups) for e in equals)
+        spare = (IDLE if told else MOVING) * len(model.states) * len(experiments)
         if costs[1] < costs[0] + spare:
             study, explanations = other, found
     best = explanations[0] if explanations else None

@@ -8,9 +8,11 @@ import re
 import tempfile
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
+from numpy.polynomial import Legendre, Polynomial
 from numpy.typing import NDArray
 
 import penode_gen
@@ -47,6 +49,11 @@ def _toml(value: object) -> str:
     return repr(float(f"{value:.7g}"))
 
 
+def _unlike(stem: str, taken: Collection[str]) -> str:
+    """A name that is not taken: the stem, or the stem with a number."""
+    return next(name for name in chain([stem], (f"{stem}_{n}" for n in count(2))) if name not in taken)
+
+
 def extends(path: Path) -> str:
     """The line that names the nominal model file."""
     return f"extends = {_toml(path.as_posix())}"
@@ -68,7 +75,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     if e is not None:
         substeps = max([1, *(_fine(study, t, n, e) for t, n in zip(e.terms, e.built.names))])
         delays = [f.value for f in e.fit.free if f.target[0] == "delay" and f.value > 0.02 * model.sample_time]
-        substeps = max([substeps, *(int(np.ceil(2.0 * model.sample_time / d)) for d in delays)])
+        substeps = max([substeps, *(int(np.ceil(np.sqrt(12.0) * model.sample_time / d)) for d in delays)])
         if substeps > model.substeps:
             lines.insert(-1, f"substeps = {substeps}")
     if e is None:
@@ -78,11 +85,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     rename = {}
     for term, name in zip(e.terms, e.built.names):
         stem = term.candidate.kind.replace("network_extrapolation", "beyond_range")  # network_ is the generator's own
-        new, number = stem, 1
-        while new in taken or new in rename.values():
-            number += 1
-            new = f"{stem}_{number}"
-        rename[name] = new
+        rename[name] = _unlike(stem, {*taken, *rename.values()})
 
     def named(text: str) -> str:
         return re.sub(r"\b((?:F_)?)(x\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
@@ -107,34 +110,42 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
             entry |= {k: named(x.arguments[k]) for k in LAWS[x.law].arguments}
         elements.append(f"{named(x.name)} = {_table(entry)}")
     sensors, states, equations = [], [], []
+    age, recorded = _unlike("age", taken), _unlike("recorded", taken)
     changed: dict[Signal, str] = {}
     for j, (s, old) in enumerate(zip(e.built.model.sensors, model.sensors)):
         expression = named(s.expression)
         unit = units.si(s.unit)
-        bent = _bent(e, values, j, f"({expression})", s.name, unit, parameters)
+        bent = _bent(e, values, j, f"({expression})", s.name, unit, f"min({age}/{recorded}, 1)", parameters)
         if bent:
             expression = f"{expression} + {bent}"
         if values.get(("delay", j), 0.0) > 0.02 * model.sample_time:
-            parameters.append(f"delay_{s.name} = {_table({'value': max(values[('delay', j)], 1e-9), 'unit': 's'})}")
-            states.append(f"late_{s.name} = {_table({'unit': unit})}")
-            equations.append(f"late_{s.name} = {_toml(f'der(late_{s.name})*delay_{s.name} = 2*({expression} - late_{s.name})')}")
-            expression = f"2*late_{s.name} - ({expression})"
+            delay, late, rate = (f"{what}_{s.name}" for what in ("delay", "late", "late_rate"))  # Pade's of order 2
+            parameters.append(f"{delay} = {_table({'value': max(values[('delay', j)], 1e-9), 'unit': 's'})}")
+            states += [f"{name} = {_table({'unit': unit})}" for name in (late, rate)]
+            equations.append(f"{late} = {_toml(f'der({late})*{delay} = {rate}')}")
+            equations.append(f"{rate} = {_toml(f'der({rate})*{delay} = 12*({expression} - {late}) - 6*{rate}')}")
+            expression = f"{expression} - {rate}"
         if ("scale", j) in values:
             parameters.append(f"gain_{s.name} = {_table({'value': 1.0 + values[('scale', j)], 'unit': '1'})}")
             expression = f"gain_{s.name}*({expression})"
         if ("bias", j) in values:
             parameters.append(f"bias_{s.name} = {_table({'value': values[('bias', j)], 'unit': unit})}")
             expression = f"{expression} + bias_{s.name}"
+        if drift := _drift(e, values, j, s.name, unit, f"min({age}/{recorded}, 1)", parameters):
+            expression = f"{expression} + {drift}"
         rails = next((c.parameters for c in causes if (c.kind, c.where) == ("sensor_clipping", s.name)), {})
         for side, cut in (("high", "min"), ("low", "max")):
             if side in rails:
                 parameters.append(f"{side}_{s.name} = {_table({'value': rails[side].value, 'unit': unit})}")
                 expression = f"{cut}({expression}, {side}_{s.name})"
-        if expression != old.expression and s.name in model.states:
-            lines[0] += f" The sensor {s.name} has the name of a state, so its fault cannot be written here: rename it."
-        elif expression != old.expression:
+        if expression != old.expression:
             changed[s] = expression
             sensors.append(f"{s.name} = {_table({'value': expression, 'unit': s.unit, 'noise': s.noise / units.factor(s.unit)})}")
+    if any(re.search(rf"\b{age}\b", expression) for expression in changed.values()):
+        last = max(float(x.time[-1] - x.time[0]) for x in study.experiments)
+        parameters.append(f"{recorded} = {_table({'value': last, 'unit': 's', 'description': 'the longest recording of the training'})}")
+        states.append(f"{age} = {_table({'unit': 's', 'description': 'since the start'})}")
+        equations.append(f"{age} = {_toml(f'der({age}) = 1')}")
     measured = {s.name: entry for s, entry in changed.items()}  # one name means one quantity
     outputs = [
         f"{s.name} = {_table({'value': measured.get(s.name, named(s.expression)), 'unit': s.unit})}"
@@ -178,21 +189,38 @@ def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
     return min(int(np.ceil(1.5 * speed * step / e.fit.value(f"{name}_presliding"))), 100)
 
 
-def _bent(
-    e: Explanation, values: dict[object, float], sensor: int, signal: str, name: str, unit: str, parameters: list[str]
-) -> str:
-    """What a scale of two sides or a bent one adds to a signal; drifts belong to their recording, not to the model."""
+def _series(e: Explanation, values: dict[object, float], sensor: int) -> list[tuple[Fault, float]]:
+    """What faults of a sensor there are beside bias, scale and delay, each with its gain."""
     faults = [t.candidate.what for t in e.terms if isinstance(t.candidate.what, Fault)]
     series = [f for f in faults if f.what not in ("bias", "scale", "delay")]
+    return [(f, values[("fault", i)]) for i, f in enumerate(series) if f.sensor == sensor]
+
+
+def _bent(
+    e: Explanation, values: dict[object, float], sensor: int, signal: str, name: str, unit: str, share: str, parameters: list[str]
+) -> str:
+    """What a scale of two sides, a bent or a drifting one adds to a signal; `share` of the recording is over."""
     parts = []
-    for i, f in enumerate(series):
-        k = values[("fault", i)]
-        if f.sensor == sensor and f.what == "scale_side":
+    for f, k in _series(e, values, sensor):
+        if f.what == "scale_side":
             parts.append(f"{k:.7g}*abs{signal}")
-        if f.sensor == sensor and f.what == "scale_bend":
+        if f.what == "scale_bend":
             parts.append(f"{k:.7g}*{signal}^3/curve_{name}^2")
             parameters.append(f"curve_{name} = {_table({'value': f.shape, 'unit': unit})}")
+        if f.what == "scale_drift":
+            parts.append(f"{k:.7g}*{signal}*({share} - 0.5)")
     return " + ".join(parts)
+
+
+def _drift(e: Explanation, values: dict[object, float], sensor: int, name: str, unit: str, share: str, parameters: list[str]) -> str:
+    """What a bias changes by while a recording goes on; after the longest one of the training it stays."""
+    own = _series(e, values, sensor)
+    slow = sum((k * Legendre.basis(int(f.shape), domain=(0.0, 1.0)) for f, k in own if f.what == "drift"), Legendre([0.0], domain=(0.0, 1.0)))
+    parts = [(c, f"*{share}{f'^{power}' if power > 1 else ''}" if power else "") for power, c in enumerate(slow.convert(kind=Polynomial).coef) if c]
+    parts += [(k, f"*(1 - exp(-{f.shape:.7g}*{share}))") for f, k in own if f.what == "warming"]
+    named = [f"drift_{name}_{n}" for n in range(1, len(parts) + 1)]
+    parameters += [f"{own} = {_table({'value': size, 'unit': unit})}" for own, (size, _) in zip(named, parts)]
+    return " + ".join(own + shape for own, (_, shape) in zip(named, parts))
 
 
 def _load(text: str) -> Model:
@@ -217,8 +245,10 @@ def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
     instance = Sil(model).instance(set_name)
     if len(start):
         instance.set_state(start)
-    run = instance.run(e.u[1:])
-    return np.concatenate([run.z[:1], run.z]).astype(float)
+    z = instance.run(e.u).z.astype(float)
+    if moving(model):
+        z[0] = 2.0 * z[1] - z[2]  # the step knows no rate of an input at its first sample
+    return z
 
 
 def measure(

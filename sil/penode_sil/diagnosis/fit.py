@@ -92,7 +92,7 @@ class Problem:
         self.fine = 4 if moving(model) else 2  # see _drive
         step = model.sample_time / self.fine
         stiff = any(e.law == "loose_damper" or "presliding" in e.arguments for e in model.elements)
-        substeps = max(1, int(np.ceil(step * fastest / 0.1)), 4 * stiff)
+        substeps = max(1, int(np.ceil(step * fastest / 0.1)), 4 * stiff, -(-model.substeps // self.fine))
         exact = replace(_folded(model), method="rk4", interpolation="linear", input_rate="chord", substeps=substeps, sample_time=step)
         self.batch = _compiled(anonymous(exact))
         self.inputs = [_drive(e, self.fine) for e in experiments]

@@ -17,6 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
@@ -67,7 +68,7 @@ class Fault:
             case "scale_bend":
                 return y**3 / max(self.shape, 1e-300) ** 2
             case "scale_drift":
-                return y * (np.arange(y.shape[-1]) / y.shape[-1] - 0.5)
+                return y * (np.arange(y.shape[-1]) / max(map(len, self.series)) - 0.5)
             case "clip":
                 return -np.sign(self.shape) * np.maximum(np.sign(self.shape) * y - abs(self.shape), 0.0)
         return self.series[recording]
@@ -141,6 +142,13 @@ def lag(x: Array, tau: float, step: float) -> Array:
     """First-order lag of x."""
     a = np.exp(-step / tau)
     return lfilter([1.0 - a], [1.0, -a], x)
+
+
+def warm(v: Array, t: Array, work: float, cooling: float) -> Array:
+    """State of the law heating_damper along rates v at times t, from cold."""
+    heated = v * v * (t[1] - t[0]) / work
+    grown = np.cumsum(heated) + t / cooling
+    return np.exp(-grown) * np.cumsum(np.exp(grown) * heated)
 
 
 STRIBECK = "force*tanh(v/knee)*(1 + rise*exp(-(v/width)^2))"  # the textbook's, with a knee
@@ -317,12 +325,10 @@ def force_laws(place: int, p: Place, motions: Sequence[Motion], step: float, pre
                 "damper_fading", "fading_damper", d, {"time": (a, "s")}, sign, lambda s, v, t: v * (1.0 - np.exp(-t / a))
             )
         work = max(float(np.trapezoid(m.v**2, m.t)) for m in motions)
-        for w in (0.3, 1.0, 10.0):
-            a = w * work
-            yield law(
-                "damper_fading", "heating_damper", d, {"work": (a, "m^2/s")}, sign,
-                lambda s, v, t: v * (1.0 - np.exp(-np.cumsum(v * v) * (t[1] - t[0]) / a)),
-            )  # fmt: skip
+        for w, cool in ((0.3, 10.0), (1.0, 10.0), (10.0, 10.0), (10.0, 1.0)):
+            a, b = w * work, cool * last
+            shapes = {"work": (a, "m^2/s"), "cooling": (b, "s")}
+            yield law("damper_fading", "heating_damper", d, shapes, sign, lambda s, v, t: v * warm(v, t, a, b))
     # springs: odd and faster or slower than linear, even, beyond a gap, missing within a gap
     for sign in (1, -1):
         yield law("cubic_spring", "cubic_spring", ("cubic", "N/m^3"), {}, sign, lambda s, v, t: s**3)
@@ -383,10 +389,9 @@ def sensor_faults(sensor: int, signals: Sequence[Array], times: Sequence[Array],
     # slow or bent forms of the same
     last = max(float(t[-1]) for t in times)
     for w in (0.1, 0.3):
-        yield fault("sensor_bias", "warming", 0, lambda y, t: 1.0 - np.exp(-t / (w * last)), w * last, True)
-    yield fault("sensor_bias", "drift", 0, lambda y, t: t / last - 0.5, 0.0, True)
-    for m in (1, 2, 3):
-        yield fault("sensor_bias", "drift", 0, lambda y, t: np.cos(m * np.pi * t / last), float(m), True)
+        yield fault("sensor_bias", "warming", 0, lambda y, t: 1.0 - np.exp(-t / (w * last)), 1.0 / w, True)
+    for m in (1, 2, 3, 4):
+        yield fault("sensor_bias", "drift", 0, lambda y, t: Legendre.basis(m, (0.0, last))(t), float(m), True)
     yield fault("sensor_scale", "scale_drift", 0, lambda y, t: y * (t / last - 0.5), 0.0, True)
     yield fault("sensor_scale", "scale_side", 0, lambda y, t: np.abs(y), 0.0, True)
     yield fault("sensor_scale", "scale_bend", 0, lambda y, t: y**3 / max(top, 1e-300) ** 2, top, True)

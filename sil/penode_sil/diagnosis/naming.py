@@ -19,7 +19,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from .build import Term
-from .hypotheses import STRIBECK, Basis, Fault, size
+from .hypotheses import STRIBECK, Basis, Fault, size, warm
 from .plant import Place
 from .fit import Fit
 from .result import Value
@@ -323,13 +323,16 @@ def functions(
 
             def loss(p: Values) -> float:
                 m = study.seen[0].motions[what.place]
-                work = float(np.trapezoid(m.v**2, m.t))
                 total = 0.0
                 for t, n in zip(terms, names):
-                    slow, scale = ("faded", f"{n}_time") if t.candidate.what.law == "fading_damper" else ("warm", f"{n}_work")
-                    done = (m.t[-1] if slow == "faded" else work) / p[scale]
+                    if t.candidate.what.law == "fading_damper":
+                        slow, end, kept = "faded", 1.0 - np.exp(-m.t[-1] / p[f"{n}_time"]), np.exp(-m.t[-1] / p[f"{n}_time"])
+                    else:
+                        work, cooling = p[f"{n}_work"], p[f"{n}_cooling"]
+                        slow, end = "warm", warm(m.v, m.t, work, cooling)[-1]
+                        kept = np.exp(-np.trapezoid(m.v**2, m.t) / work - m.t[-1] / cooling)
                     before = p.get(("start", 0, e.built.model.states.index(f"{n}_{slow}")), 0.0)
-                    total += p[f"{n}_damping"] * (1.0 - (1.0 - before) * np.exp(-done))
+                    total += p[f"{n}_damping"] * (end + kept * before)
                 return -total / d0(p)
 
             return {"loss": ("1", loss)}

@@ -22,6 +22,7 @@ from .score import Candidate, Regression
 from .study import Study, loss, regression, requieted
 
 TERMS = 3  # elementary laws of one kind
+WANDERING = 5  # and of a bias, which may go any slow way
 COST = 10.0  # chi2 that an elementary law must gain for each of its numbers, and the choice among many
 NEW = 50.0  # chi2 that a further kind must gain beyond that
 FORM = 7e-4  # of what has been gained: a number more must gain that, or it only mends the form
@@ -42,7 +43,7 @@ TEXTBOOK = {
     "asymmetric_spring": (BENDS["s"], "linear_spring"), "asymmetric_damper": (BENDS["v"], "linear_damper"),
     "coulomb_friction": ("coulomb_friction",), "bouc_wen": ("bouc_wen_loop",), "maxwell_bushing": ("maxwell_bushing",),
     "stribeck_friction": (STRIBECK,), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
-    "degressive_damper": (KNEE,),
+    "degressive_damper": (KNEE,), "damper_fading": ("heating_damper",),
 }  # fmt: skip
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance")  # a formula after all
@@ -102,13 +103,19 @@ def pools(r: Regression) -> dict[Group, list[int]]:
     return found
 
 
-def pursue(r: Regression, pool: Sequence[int], base: Sequence[int] = (), terms: int = TERMS) -> tuple[float, list[int]]:
-    """Gain and choice of up to `terms` candidates of a pool beside `base`, the best next one at a time."""
+def room(kind: str) -> int:
+    """How many elementary laws a kind may take at first."""
+    return WANDERING if kind == "sensor_bias" else TERMS
+
+
+def pursue(r: Regression, pool: Sequence[int], base: Sequence[int] = (), terms: int = TERMS, alone: bool = True) -> tuple[float, list[int]]:
+    """Gain and choice of up to `terms` candidates of a pool beside `base`, the best next one at a time; not `alone`: beside others of
+    their kind, so the first may be a companion."""
     chosen: list[int] = []
     costs = {p: cost(r.candidates[p]) for p in pool}
     gain = start = r.gain(base)[0] if base else 0.0
-    for _ in range(terms):
-        usable = [p for p in pool if p not in chosen and (chosen or not r.candidates[p].companion)]
+    while len(chosen) < (room(r.candidates[chosen[0]].kind) if chosen and terms == TERMS else terms):
+        usable = [p for p in pool if p not in chosen and (chosen or not alone or not r.candidates[p].companion)]
         if chosen and r.candidates[chosen[0]].kind == "hidden_resonance":
             break  # one mass; a second would be any filter
         step, best = r.best_single([*base, *chosen], usable, costs)
@@ -181,10 +188,10 @@ def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str
     for _ in range(2):
         best = None
         for group in e.groups:
-            if sum(t.group == group for t in e.terms) < TERMS + 1:
+            if sum(t.group == group for t in e.terms) < room(group[0]) + 1:
                 own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
                 pool = [k for k in pools(r).get(group, []) if _fault(r.candidates[k]) not in own]
-                gain, chosen = pursue(r, pool, terms=1)
+                gain, chosen = pursue(r, pool, terms=1, alone=group[0] != "sensor_bias")
                 if chosen and gain > max(cost(r.candidates[chosen[0]]), 2e-3 * e.gain) and (best is None or gain > best[0]):
                     best = gain, chosen[0], r.gain(chosen)[1][0]
         if best is None:
@@ -222,9 +229,10 @@ def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
     return found
 
 
-def at_rest(rest: Study, free: Study, best: Explanation | None, log) -> tuple[Study, list[Explanation]]:
-    """Explanations of a start in motion by a load that was put on at the start, alone or beside the causes that were found,
-    and the study with the noise they leave; none where such a load is out of the question."""
+def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple[Study, list[Explanation]]:
+    """Explanations of a start in motion by a load that was put on at the start, alone or beside the causes that were found, or by
+    the bias of a sensor that looks like one, and the study with the noise they leave; none where such a load is out of the
+    question. `told`: what is about as good in motion, from best to worst."""
     r = regression(rest, rest.null, [])
     gains = {k: r.gain([k])[0] for k, c in enumerate(r.candidates) if c.kind == "constant_force"}
     gains = {k: g for k, g in gains.items() if g > 0.8 * (rest.null.cost - free.null.cost)}
@@ -232,18 +240,18 @@ def at_rest(rest: Study, free: Study, best: Explanation | None, log) -> tuple[St
         return rest, []
     rest = replace(rest, nothing=loss(rest, rest.null))
     loads = {r.candidates[k].where: terms_of(r, [k]) for k in sorted(gains, key=gains.__getitem__)}.values()  # the best of each place
-    unloaded = [t for t in best.terms if t.candidate.kind != "constant_force"] if best else []
+    unloaded = [t for e in told[:1] for t in e.terms if t.candidate.kind != "constant_force"]
     others = [t for t in unloaded if t.candidate.kind != "sensor_bias"]  # in motion, a load looks like one
     ways = [[*load, *more] for load in loads for more in ([[], others] if others else [[]])]
-    beam = sorted((explain(rest, terms) for terms in ways), key=lambda e: -e.score)
-    loaded = beam[0]
-    idle = explain(rest, unloaded).score if unloaded else 0.0
-    moving = rest.nothing - free.nothing + (best.score if best else 0.0)
-    log(f"at rest {idle:.0f}, with a load {loaded.score:.0f}, moving {moving:.0f}")
-    if loaded.score < max(idle + NEW, (1.0 - NEAR) * moving - NEW):
+    biased = [list(e.terms) for e in told if {"constant_force", "sensor_bias"} & {g[0] for g in e.groups} == {"sensor_bias"}]
+    beam = sorted((explain(rest, terms) for terms in [*ways, *biased[:1]]), key=lambda e: -e.score)
+    idle = explain(rest, unloaded).score if unloaded and unloaded not in biased else 0.0
+    moving = rest.nothing - free.nothing + (told[0].score if told else 0.0)
+    log(f"at rest {idle:.0f}, with {beam[0].groups} {beam[0].score:.0f}, moving {moving:.0f}")
+    if beam[0].score < max(idle + NEW, (1.0 - NEAR) * moving - NEW):
         return rest, []
-    quiet = requieted(rest, loaded.fit)
-    return grow(quiet, [explain(quiet, e.terms, 4, e.fit) for e in beam[:2]], log)
+    quiet = requieted(rest, beam[0].fit)
+    return grow(quiet, [explain(quiet, e.terms, 4, e.fit) for e in beam[:3]], log)
 
 
 def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:
@@ -295,8 +303,11 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
     if not first or first[0].score <= 0.0:
         return study, []
     quiet = requieted(bare, first[0].fit)
-    beam = first if quiet is bare else singles(quiet, regression(quiet, quiet.null, parameters)) or first
-    return grow(quiet, beam, log)
+    if quiet is bare:
+        return grow(quiet, first, log)
+    again = [*singles(quiet, regression(quiet, quiet.null, parameters)), explain(quiet, first[0].terms, start=first[0].fit)]
+    best = {e.groups: e for e in sorted(again, key=lambda e: e.score)}
+    return grow(quiet, list(best.values())[::-1], log)
 
 
 def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Explanation]]:

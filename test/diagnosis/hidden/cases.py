@@ -113,9 +113,10 @@ class Case:
                     continue
                 tried.append((kind, where, y))
         found: dict[tuple[str, str], float] = {}
+        hidden = {(e.form.kind, e.where) for e in self.effects}  # an answer names nothing twice
         for kind, where, y in tried:
-            left = bench.left(x, [*others, y])
-            if left < APART and (kind, where) != (effect.form.kind, effect.where):
+            left = bench.left(x, [*others, y]) if (kind, where) not in hidden else np.inf
+            if left < APART:
                 found[kind, where] = min(left, found.get((kind, where), np.inf))
         answers = [{**self.answer(*key), "left": round(left, 1)} for key, left in found.items()]
         if ("sensor_bias", "deflection") in found and effect.form.kind == "constant_force":  # then a preload of the spring too
