@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""From explanations to a verdict: what each rule of the judge lets through and what it does not."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from penode_sil.diagnosis import engine
+from penode_sil.diagnosis.result import Cause, Value
+
+ROWS = 10_000
+STUDY = SimpleNamespace(
+    null=SimpleNamespace(residual=np.zeros(ROWS), cost=5.0 * ROWS),
+    experiments=[SimpleNamespace(good=np.ones((ROWS, 1), bool))],
+    model=SimpleNamespace(
+        sample_time=1e-3, parameters={"c": SimpleNamespace(value=100.0, tolerance=0.01), "m": SimpleNamespace(value=400.0)},
+        bodies=[SimpleNamespace(name="body", mass="m")],
+    ),
+)  # fmt: skip
+QUIET = SimpleNamespace(**vars(STUDY) | {"null": SimpleNamespace(residual=np.zeros(ROWS), cost=float(ROWS))})
+DROPOUT = Cause("sensor_dropout", "a", {"share": Value(0.01, "1", (0.009, 0.011))}, 0.99)
+SIGMA = np.sqrt(2.0 * ROWS)  # of chi2
+
+
+def found(*groups: tuple[str, str], left: float = 0.0, score: float = 1000.0, gain: float = 1000.0):
+    """An explanation by groups that leaves `left` of chi2 beyond the noise."""
+    fit = SimpleNamespace(chi2=ROWS + left, cost=ROWS + left)
+    terms = [SimpleNamespace(group=g, candidate=SimpleNamespace(kind=g[0])) for g in groups]
+    return SimpleNamespace(groups=groups, terms=terms, fit=fit, score=score, gain=gain)
+
+
+@pytest.fixture
+def values(monkeypatch):
+    """What parameters have been found: {kind: {name: (value, low, high)}}; a test may change it."""
+    said: dict[str, dict[str, tuple[float, float, float]]] = {}
+    made = lambda study, best, group: {k: Value(v, "1", (low, high)) for k, (v, low, high) in said.get(group[0], {}).items()}
+    monkeypatch.setattr(engine.naming, "values", made)
+    return said
+
+
+def judged(*explanations, study=STUDY, faults=(), alike=0.0, shared=0.0, pure=False):
+    causes, verdict, _, _ = engine.judge(study, explanations, list(faults), alike, shared, pure)
+    return [c.kind for c in causes], verdict
+
+
+OUT = ([engine.OUTSIDE], "unexplained")
+
+
+def test_nothing_found(values):
+    """Six deviations of chi2 are a discrepancy, fifteen hundredths of it or a tone or a kinship one that has no name."""
+    assert judged(study=QUIET) == ([], "no_discrepancy")
+    assert judged(study=QUIET, faults=[DROPOUT]) == (["sensor_dropout"], "explained")
+    for sigmas, verdict in ((5.9, "no_discrepancy"), (6.1, "not_identifiable")):
+        doubtful = SimpleNamespace(**vars(QUIET) | {"null": SimpleNamespace(residual=np.zeros(ROWS), cost=ROWS + sigmas * SIGMA)})
+        assert judged(study=doubtful) == ([], verdict)
+    assert judged(study=QUIET, pure=True) == OUT
+    assert judged(study=QUIET, alike=engine.ALIKE + 0.1) == OUT
+    assert judged() == OUT
+
+
+def test_a_cause_has_to_take_most_of_it_away(values):
+    assert judged(found(("bump_stop", "spring"))) == (["bump_stop"], "explained")
+    gap = 4.0 * ROWS  # that could be gained
+    assert judged(found(("bump_stop", "spring"), left=0.14 * ROWS)) == (["bump_stop"], "explained")  # near the noise
+    assert judged(found(("bump_stop", "spring"), left=0.05 * gap)) == (["bump_stop"], "partly_explained")
+    assert judged(found(("bump_stop", "spring"), left=0.16 * gap)) == OUT
+    assert judged(found(("bump_stop", "spring")), pure=True) == (["bump_stop"], "partly_explained")
+
+
+def test_what_sensors_share_is_no_noise(values):
+    assert judged(found(("bump_stop", "spring")), alike=engine.ALIKE + 0.1, shared=0.2 * 4.0 * ROWS) == OUT
+    assert judged(found(("bump_stop", "spring")), alike=engine.ALIKE - 0.1, shared=0.2 * 4.0 * ROWS) == (["bump_stop"], "explained")
+    patchwork = found(("bump_stop", "spring"), ("quadratic_damper", "damper"))
+    assert judged(patchwork, alike=engine.ALIKE + 0.1, shared=0.02 * 4.0 * ROWS) == OUT
+    assert judged(patchwork, alike=engine.ALIKE + 0.1, shared=0.01 * 4.0 * ROWS)[1] == "explained"
+
+
+@pytest.mark.parametrize("kind", engine.SIZES)
+def test_a_size_that_may_be_zero_stands_for_something_else(values, kind):
+    name = engine.SIZES[kind]
+    values[kind] = {name: (1.0, 0.1, 1.9)}
+    assert judged(found((kind, "damper"))) == ([kind], "explained")
+    values[kind] = {name: (1.0, -0.1, 2.1)}
+    assert judged(found((kind, "damper"))) == OUT
+
+
+def test_several_wrong_parameters_are_another_vehicle_and_delays_another_clock(values):
+    values["wrong_parameter"] = {"c": (120.0, 119.0, 121.0)}
+    values["sensor_delay"] = {"delay": (0.01, 0.009, 0.011)}
+    for kind in ("wrong_parameter", "sensor_delay"):
+        assert judged(found((kind, "a"))) == ([kind], "explained")
+        assert judged(found((kind, "a"), (kind, "b"))) == OUT
+
+
+def test_a_resonance_needs_little_damping_and_one_mass(values, monkeypatch):
+    mass = ("hidden_resonance", "body")
+    for ratio, answer in ((0.1, ([mass[0]], "explained")), (engine.DAMPED + 0.01, OUT)):
+        values[mass[0]] = {"mass": (5.0, 4.0, 6.0), "damping_ratio": (ratio, 0.0, 1.0)}
+        assert judged(found(mass)) == answer
+    values[mass[0]] = {"mass": (5.0, 4.0, 6.0), "damping_ratio": (0.1, 0.0, 1.0)}
+    two = found(mass)
+    two.terms *= 2
+    for share, answer in ((0.5, OUT), (0.7, ([mass[0]], "explained"))):
+        monkeypatch.setattr(engine.search, "explain", lambda study, terms: found(mass, gain=share * two.gain))
+        assert judged(two) == answer
+
+
+@pytest.mark.parametrize(
+    "kind, small, large",
+    [
+        ("sensor_scale", {"scale": 1.004}, {"scale": 0.994}),
+        ("sensor_delay", {"delay": 1.9 * engine.SKEW * 1e-3}, {"delay": 2.1 * engine.SKEW * 1e-3}),
+        ("wrong_parameter", {"c": 100.9}, {"c": 98.9}),
+        ("hidden_resonance", {"mass": 0.7, "damping_ratio": 0.1}, {"mass": 0.9, "damping_ratio": 0.1}),
+    ],
+)
+def test_what_is_significant_may_be_too_small(values, kind, small, large):
+    """Half a per cent of a scale, two skews of a sample, the tolerance, two thousandths of the body."""
+    for size, answer in ((small, ([], "no_discrepancy")), (large, ([kind], "explained"))):
+        values[kind] = {k: (v, 0.99 * v, 1.01 * v) for k, v in size.items()}
+        assert judged(found((kind, "body"))) == answer
+
+
+def test_faults_are_said_beside_causes_and_once(values):
+    assert judged(found(("bump_stop", "spring")), faults=[DROPOUT]) == (["bump_stop", "sensor_dropout"], "explained")
+    assert judged(found(("sensor_dropout", "a")), faults=[DROPOUT]) == (["sensor_dropout"], "explained")
+
+
+def test_alternatives_are_near_and_take_one_place(values):
+    """Behind by less than 50 of score; with another name for the one cause."""
+    best = found(("bump_stop", "spring"), score=1000.0)
+    near, far = found(("cubic_spring", "spring"), score=951.0), found(("backlash", "spring"), score=949.0)
+    both = found(("asymmetric_spring", "spring"), ("sensor_scale", "a"), score=999.0)
+    (cause,), _, _, _ = engine.judge(STUDY, [best, near, far, both], [], 0.0, 0.0, False)
+    assert [o.kind for o in cause.alternatives] == ["cubic_spring"]
+    assert 0.5 < cause.confidence < 0.99
