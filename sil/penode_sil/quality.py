@@ -89,7 +89,7 @@ def quantisation(values: Array) -> float:
     levels, count = np.unique(values, return_counts=True)
     often = count > 1
     often &= count > 0.05 * (np.median(count[often]) if often.any() else 0.0)
-    if np.sum(often) > 2:
+    if np.sum(often) > 2 and np.sum(count[often]) > 0.5 * values.size:  # a sensor that holds a few values is no coarse one
         levels = levels[often]  # outliers need not lie on a step
     if levels.size < 2 or (values.size < 4 * levels.size and levels.size < 32):
         return 0.0

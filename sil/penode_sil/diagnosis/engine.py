@@ -28,6 +28,7 @@ from .study import MOVING, SKEW, Study, begin, look
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it
+WILD = 2.0  # standard deviations of the noise that bursts have together: one sample in nine that is far out
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
 ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
 PATCHED = 0.985  # share that several causes must take away if sensors still share a residual
@@ -72,7 +73,7 @@ def diagnose(
     bursts = noise.bursts(study.experiments, study.null.simulated)
     if any(b.any() for b in bursts):
         study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, bursts)], set_name)
-    faults = broken_sensors(model, train, study, bursts)
+    faults = broken_sensors(model, train, study, study.null.simulated, bursts)
     tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
     if study.moving:
@@ -86,9 +87,9 @@ def diagnose(
         if costs[1] < costs[0] + spare:
             study, explanations = other, found
     best = explanations[0] if explanations else None
-    if best is not None:  # bursts that a cause explains were none
+    if best is not None:  # bursts and spikes that a cause explains were none
         kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
-        faults = broken_sensors(model, train, study, kept)
+        faults = broken_sensors(model, train, study, best.fit.simulated, kept)
     tell(SEARCH[1], "weighing them against numerics")
     study = replace(study, seen=look(study, best.fit if best else study.null))
     numbers, step = extension.numerics(study)
@@ -180,12 +181,15 @@ def still_wild(study: Study, e: Explanation, bursts: Sequence[NDArray[np.bool_]]
     for k, b in enumerate(bursts):
         b = b[: len(study.experiments[k].time)]
         sums = [np.sum(np.where(b, (study.experiments[k].y - f.simulated[k]) ** 2, 0.0), axis=0) for f in (e.fit, study.null)]
-        found.append((sums[0] > 0.5 * sums[1])[None, :])
+        noise_there = np.sum(b, axis=0) * np.mean(study.levels[k], axis=0)
+        found.append((sums[0] > np.maximum(0.5 * sums[1], WILD**2 * noise_there))[None, :])
     return found
 
 
-def broken_sensors(model: Model, train: Sequence[Measured], study: Study, bursts: Sequence[NDArray[np.bool_]]) -> list[Cause]:
-    """Sensors that clip or drop out, by what their samples show and the model agrees with: it goes on where they stop."""
+def broken_sensors(
+    model: Model, train: Sequence[Measured], study: Study, simulated: Sequence[Array], bursts: Sequence[NDArray[np.bool_]]
+) -> list[Cause]:
+    """Sensors that clip or drop out, by what their samples show and a simulation agrees with: it goes on where they stop."""
     found = []
     for j, sensor in enumerate(model.sensors):
         unit = units.si(sensor.unit)
@@ -201,12 +205,12 @@ def broken_sensors(model: Model, train: Sequence[Measured], study: Study, bursts
             quantum = max(quantum, channel.quantum)
             sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
             flagged = ~m.mask[sensor.name][:n]
-            off = np.abs(m.z[sensor.name][:n] - study.null.simulated[k][:, j]) > 4.0 * sigma
+            off = np.abs(m.z[sensor.name][:n] - simulated[k][:, j]) > 4.0 * sigma
             for side, name, rail in ((-1.0, "low", channel.low), (1.0, "high", channel.high)):
                 if rail is None:
                     continue
                 at = flagged & (np.abs(m.z[sensor.name][:n] - rail) < 1e-6 * abs(rail))
-                beyond = side * (study.null.simulated[k][at, j] - rail) > -4.0 * sigma
+                beyond = side * (simulated[k][at, j] - rail) > -4.0 * sigma
                 if np.mean(beyond) > 0.5:
                     clipped += np.count_nonzero(at)
                     rails[name] = rail

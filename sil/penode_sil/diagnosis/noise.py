@@ -189,16 +189,19 @@ def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Met
     return Metric(len(e.time), root)
 
 
+LAST = 8  # samples: so far the end of a spline is felt
+
+
 def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> list[NDArray[np.bool_]]:
     """Samples [n, n_z] of short bursts that one sensor alone shows: against neighbours far beyond its usual roughness."""
     found = []
     for e, z in zip(experiments, simulated):
         r = np.where(e.good, e.y - z, 0.0)
         rough = np.abs(np.diff(r, 2, axis=0, prepend=r[:1], append=r[-1:]))
-        usual = 1.4826 * np.median(rough, axis=0) + 1e-300
+        # at least a tenth of the samples of a coarse sensor steps by a quantum
+        usual = np.maximum(1.4826 * np.median(rough, axis=0), np.quantile(rough, 0.9, axis=0) / 1.645) + 1e-300
         wild = rough > 14.0 * usual
-        edge = max(20, int(0.1 / e.step))
-        wild[:edge] = wild[-edge:] = False  # where start states and rates of inputs are not well known
+        wild[: max(20, int(0.1 / e.step))] = wild[-LAST:] = False  # where start states and rates of inputs are not well known
         wide = np.stack([np.convolve(w, np.ones(9), "same") > 0 for w in wild.T], axis=1)
         alone = wide & (np.sum(wide, axis=1, keepdims=True) == 1) if wide.shape[1] > 1 else wide
         few = np.mean(wild & alone, axis=0) < 0.01

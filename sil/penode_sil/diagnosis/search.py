@@ -76,7 +76,8 @@ class Explanation:
         freedom = sum(cost(t.candidate) for t in self.terms)
         form = 0.0
         plain = len(self.terms) == len(self.groups) and all(kind in (*EXACT, *FORMULAS) for kind, _ in self.groups)
-        if not plain and not exact(self.groups):
+        slow = all(kind == "sensor_bias" or kind in EXACT for kind, _ in self.groups)  # a bias is no form, however it wanders
+        if not plain and not slow:
             form = FORM * freedom / COST * (self.gain - self.formulas) + LEAST * (len(self.groups) - 1) * self.gain
         return self.gain - freedom - NEW * len(self.groups) - max(form, 0.0)
 
@@ -90,9 +91,8 @@ def cost(c: Candidate) -> float:
     """What the freedom of an elementary law is worth in chi2."""
     if isinstance(c.what, tuple):
         return 4.0 * COST  # three numbers, found among hundreds of places in the spectrum
-    if c.kind == "constant_force":
-        return 1.5 * COST  # where a bias explains as much, it is the bias
-    return COST * (1 + len(c.what.shapes) if isinstance(c.what, Basis) else 1)
+    own = 1.5 if c.kind == "constant_force" else 1.0  # where a bias explains as much, it is the bias
+    return COST * (own + (len(c.what.shapes) if isinstance(c.what, Basis) else 0))
 
 
 def pools(r: Regression) -> dict[Group, list[int]]:
