@@ -143,6 +143,15 @@ def test_quantum_is_found_and_none_is_invented(bits):
     assert quantisation(x) == 0.0 and quantisation(x[:20]) == 0.0
 
 
+def test_values_that_a_fine_sensor_froze_at_are_no_steps_of_a_coarse_one():
+    x = np.cumsum(np.random.default_rng(6).standard_normal(13_000))
+    for at, long in ((2000, 25), (7000, 6), (9000, 33)):
+        x[at : at + long] = x[at]
+    found = examine(x)
+    assert found.quantum == 0.0
+    assert [np.count_nonzero(found.held[at : at + long]) for at, long in ((2000, 25), (7000, 6), (9000, 33))] == [24, 5, 32]
+
+
 def test_constant_and_empty_channels():
     assert examine(np.full(100, 3.0)).constant and not examine(np.full(100, np.nan)).constant
     assert not examine(np.empty(0)).any.size

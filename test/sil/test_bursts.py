@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Bursts that one sensor alone shows are found wherever they are, and a sensor that is noisier in motion has none."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace as Simple
+
+import numpy as np
+import pytest
+
+from penode_sil.diagnosis.engine import WILD, still_wild
+from penode_sil.diagnosis.noise import Experiment, bursts
+
+STEP, N = 2e-3, 10_000
+T = np.arange(N) * STEP
+MOVE = np.sin(2.0 * np.pi * T) + 0.3 * np.sin(2.0 * np.pi * 7.0 * T)
+
+
+def recording(y: np.ndarray) -> Experiment:
+    u, none = np.zeros((N, 1)), np.zeros((N // 2 + 1, 1))
+    return Experiment("", T, u, y, np.ones(y.shape, bool), u, u, none, none)
+
+
+def noisy(seed: int) -> np.ndarray:
+    return np.stack([MOVE, MOVE], axis=1) + 0.01 * np.random.default_rng(seed).normal(size=(N, 2))
+
+
+@pytest.mark.parametrize("first", [3000, N - 30])
+def test_a_burst_is_found(first):
+    """Six samples of ten times the signal, at least eight from the end; padded by four on either side."""
+    y = noisy(1)
+    y[first : first + 6, 0] += 10.0 * np.random.default_rng(2).uniform(-1.0, 1.0, 6)
+    (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
+    assert found[first : first + 6, 0].all() and not found[:, 1].any()
+    assert not found[: first - 6, 0].any() and not found[first + 12 :, 0].any()
+
+
+@pytest.mark.parametrize("louder", [6.0, 9.0, 12.0])
+def test_a_sensor_that_is_noisier_in_motion_has_none(louder):
+    """As one of a coarse converter is: at rest it says the same again and again. Beyond 14 deviations at rest are up to 1 % of all."""
+    draw = np.random.default_rng(3)
+    size = np.where(T < 0.6 * T[-1], 1.0, louder)
+    y = np.stack([MOVE + 1e-3 * size * draw.normal(size=N), MOVE], axis=1)
+    (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
+    assert not found.any()
+
+
+def test_what_is_no_more_than_noise_is_not_wild():
+    """Bursts that an explanation leaves are some if they stand out of the noise, and were not halved."""
+    wild = np.zeros((N, 2), bool)
+    wild[100:120, 0] = True
+    y = np.zeros((N, 2))
+    study = Simple(experiments=[recording(y)], levels=[np.ones((5, 2))])
+    for before, after, said in ((10.0, 9.0, True), (10.0, 5.0, False), (1.2, 1.0, False), (10.0, 0.9 * WILD, False)):
+        study.null = Simple(simulated=[np.full((N, 2), before)])
+        (found,) = still_wild(study, Simple(fit=Simple(simulated=[np.full((N, 2), after)])), [wild])
+        assert found.tolist() == [[said, False]]
