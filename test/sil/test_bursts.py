@@ -36,6 +36,17 @@ def test_a_burst_is_found(first):
     assert not found[: first - 6, 0].any() and not found[first + 12 :, 0].any()
 
 
+def test_a_signal_that_fades_is_found_though_the_motion_turns():
+    """Fades from the last value on, to a tenth in 23 samples, while the motion goes through zero."""
+    y = noisy(4)
+    zero = 3250  # where the motion turns, fast
+    first = zero - 31
+    y[first : first + 50, 0] = y[first - 1, 0] * np.exp(-np.arange(50) / 10.0)
+    (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
+    far = np.abs(y[:, 0] - MOVE) > 0.06
+    assert found[far, 0].all() and not found[:, 1].any() and np.count_nonzero(found) < 60
+
+
 @pytest.mark.parametrize("louder", [6.0, 9.0, 12.0])
 def test_a_sensor_that_is_noisier_in_motion_has_none(louder):
     """As one of a coarse converter is: at rest it says the same again and again. Beyond 14 deviations at rest are up to 1 % of all."""

@@ -223,7 +223,7 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
         for a, b in zip(edges[::2], edges[1::2]):
             inside = far[a:b]
             y, model = e.y[a:b, j][inside], z[a:b, j][inside]
-            sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2)
+            sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2) | (np.abs(y) < 0.05 * np.max(np.abs(model)))
             deep = np.min(np.abs(y)) < 0.25 * np.max(np.abs(model))
             if a > int(0.1 / e.step) and b - a < longest and np.mean(sinks) > 0.95 and deep and np.count_nonzero(inside) > 4:
                 found[a:b, j] = True
