@@ -31,8 +31,8 @@ FAULTS = {
     "steps not counted": ("model", ("pen_status_note_step(&self->log, result);", 0, "")),
     "values of a set not checked": ("pen_set.c", ("!pen_finite(length, set->value)", 0, "false")),
     "patrol stands still": ("model", ("self->patrol = at + 1U;", 0, "")),
-    "patrol leaves out the last number": ("model", ("self->patrol < SMALL_RK4_8_PATROL", 0, "self->patrol < (SMALL_RK4_8_PATROL - 1U)")),
-    "patrol leaves out the last piece": ("model", ("(at < SMALL_RK4_8_PIECES) ? at : (SMALL_RK4_8_PIECES - 1U)", 0, "(at < (SMALL_RK4_8_PIECES - 1U)) ? at : 0U")),
+    "patrol leaves out the last number": ("model", ("self->patrol % SMALL_RK4_8_PATROL", 0, "self->patrol % (SMALL_RK4_8_PATROL - 1U)")),
+    "patrol leaves out the last piece": ("model", ("at % SMALL_RK4_8_PIECES", 0, "at % (SMALL_RK4_8_PIECES - 1U)")),
     "patrol does not look at starts": ("model", ("doubt *= of_net->start;", 0, "")),
     "finite whatever comes": ("pen_math.h", ("return sum >= (pen_real_t)0;", 0, "return (sum >= (pen_real_t)0) || true;")),
 }  # fmt: skip

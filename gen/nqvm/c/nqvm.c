@@ -380,7 +380,8 @@ static pen_real_t advance(const nqvm_t *self)
 /* Look at one number of the set in force; the next step looks at the next. */
 static pen_status_t patrol(nqvm_t *self, uint32_t slot)
 {
-    const uint32_t at = (self->patrol < NQVM_PATROL) ? self->patrol : 0U; /* whatever its memory has become */
+    /* whatever its memory has become; no branch, as a comparison may be */
+    const uint32_t at = self->patrol % NQVM_PATROL;
     const pen_real_t value = self->tuning.slot[slot].value[at];
     pen_real_t doubt = value - value; /* 0, or NaN if it is not finite */
 

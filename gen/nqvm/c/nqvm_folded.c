@@ -349,9 +349,10 @@ static pen_real_t advance(const nqvm_folded_t *self)
 /* Look at one number of the set in force, and at one piece of each network; the next step looks at the next. */
 static pen_status_t patrol(nqvm_folded_t *self, uint32_t slot)
 {
-    const uint32_t at = (self->patrol < NQVM_FOLDED_PATROL) ? self->patrol : 0U; /* whatever its memory has become */
+    /* whatever its memory has become; no branch, as a comparison may be */
+    const uint32_t at = self->patrol % NQVM_FOLDED_PATROL;
     const pen_real_t value = self->tuning.slot[slot].value[at];
-    const uint32_t k = (at < NQVM_FOLDED_PIECES) ? at : (NQVM_FOLDED_PIECES - 1U);
+    const uint32_t k = at % NQVM_FOLDED_PIECES;
     const pen_piece_t *const of_spring_net = &self->pieces[slot].spring_net[k];
     const pen_piece_t *const of_damper_net = &self->pieces[slot].damper_net[k];
     pen_real_t doubt = value - value; /* 0, or NaN if it is not finite */
