@@ -47,6 +47,20 @@ def test_a_signal_that_fades_is_found_though_the_motion_turns():
     assert found[far, 0].all() and not found[:, 1].any() and np.count_nonzero(found) < 60
 
 
+@pytest.mark.parametrize("quantum", [0.0, 0.03, 0.1])
+def test_a_frozen_value_is_found_and_a_coarse_one_is_none(quantum):
+    """A coarse sensor repeats values while it moves by less than a quantum; noise and rounding are within 6 of their deviations."""
+    y = noisy(5)
+    y = quantum * np.round(y / quantum) if quantum else y
+    assert not bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])[0].any()
+    for first in (2000, 7010):
+        y[first : first + 40, 0] = y[first, 0]
+    (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
+    for first in (2000, 7010):
+        assert found[first + 1 : first + 40, 0].all()
+    assert not found[:, 1].any() and np.count_nonzero(found) < 2 * 60
+
+
 @pytest.mark.parametrize("louder", [6.0, 9.0, 12.0])
 def test_a_sensor_that_is_noisier_in_motion_has_none(louder):
     """As one of a coarse converter is: at rest it says the same again and again. Beyond 14 deviations at rest are up to 1 % of all."""

@@ -207,7 +207,22 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
         few = np.mean(wild & alone, axis=0) < 0.01
         many = np.sum(wild & alone, axis=0) >= np.where(np.max(rough, axis=0) > 30.0 * usual, 2, 5)
         often = np.mean(e.good, axis=0) > 0.5  # a sensor slower than the raster has no neighbours to be far beyond
-        found.append(((alone & few & many) | _sunken(e, z, r)) & often)
+        found.append(((alone & few & many) | _sunken(e, z, r) | _frozen(e, z, r)) & often)
+    return found
+
+
+def _frozen(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
+    """Samples that repeat a value while the model moves by more than any coarse sensor would let pass."""
+    usual = 1.4826 * np.median(np.abs(r), axis=0) + 1e-300
+    found = np.zeros(r.shape, dtype=bool)
+    for j in range(r.shape[1]):
+        same = np.concatenate([[0], (np.diff(e.y[:, j]) == 0.0).astype(np.int8), [0]])
+        edges = np.flatnonzero(np.diff(same))
+        for a, b in zip(edges[::2], edges[1::2]):
+            if b - a >= 4 and np.ptp(z[a : b + 1, j]) > 6.0 * usual[j] and e.good[a : b + 1, j].any():
+                found[a + 1 : b + 1, j] = True
+        if np.mean(found[:, j]) > 0.2:  # that is no sensor at all, or slower than the raster
+            found[:, j] = False
     return found
 
 
