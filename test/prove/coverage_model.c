@@ -212,27 +212,6 @@ void test_what_is_not_finite_changes_nothing(void)
     }
 }
 
-/* A bound of an envelope, and of a folded network any weight, is not met by a step: the patrol finds it, once a round. */
-void test_the_patrol_comes_round(void)
-{
-    uint32_t times = 0U;
-
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_select)(&model, &set));
-    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_select)(&twin, &set));
-    TEST_ASSERT_EQUAL_HEX32(PEN_ADOPTED, step_both());
-    value[SPRING] = bad[2];
-    for (uint32_t k = 0U; k < (2U * MODEL_SIZE(PATROL)); k++) {
-        const pen_status_t status = step_both();
-        TEST_ASSERT_EQUAL_HEX32(PEN_OK, status & ~PEN_WEIGHT_NONFINITE);
-        times += (status == PEN_WEIGHT_NONFINITE) ? 1U : 0U;
-    }
-    TEST_ASSERT_EQUAL_UINT32(2U, times);
-    value[SPRING] = MODEL(set_default).value[SPRING];
-    for (uint32_t k = 0U; k < MODEL_SIZE(PATROL); k++) {
-        TEST_ASSERT_EQUAL_HEX32(PEN_OK, step_both());
-    }
-}
-
 void test_overflow_inside_changes_nothing(void)
 {
     const MODEL(x_t) huge = { PEN_REAL_MAX, -PEN_REAL_MAX, PEN_REAL_MAX, -PEN_REAL_MAX };
