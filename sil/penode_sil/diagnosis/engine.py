@@ -34,13 +34,14 @@ ALIKE = 7.0  # standard deviations by which sensors may share a residual that is
 PATCHED = 0.985  # share that several causes must take away if sensors still share a residual
 WHOLE = 0.97  # share that is a whole explanation
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
+CLEAR = 0.02  # of what a start in motion explains: a load that leaves less than that of it is the simpler cause
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
-FILTER = 0.6  # of what several hidden masses gain: where one gains less, they are a filter that stands for other dynamics
+FILTER = 0.93  # of what several hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 OUTSIDE = "outside_taxonomy"
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
-SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force"}
+SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "maxwell_bushing": "stiffness", "hidden_resonance": "frequency"}
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 
 
@@ -78,12 +79,15 @@ def diagnose(
     study, explanations = search.search(study, log)
     if study.moving:
         equals = [e for e in explanations if e.score > explanations[0].score - search.NEW]
+        moved = other.null.cost - study.null.cost
         other, found = search.at_rest(other, study, equals, log)
     if study.moving and found:
         costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
         told = set(found[0].groups) in (set(e.groups) for e in equals)
-        spare = (IDLE if told else MOVING) * len(model.states) * len(experiments)
+        starts = len(model.states) * len(experiments)
+        price = search.NEW + (search.FORM * starts + search.LEAST) * found[0].gain  # a start in motion is a cause like others
+        spare = IDLE * starts if told else MOVING * starts + min(price, CLEAR * moved)
         if costs[1] < costs[0] + spare:
             study, explanations = other, found
     best = explanations[0] if explanations else None

@@ -19,7 +19,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from .build import Term
-from .hypotheses import STRIBECK, Basis, Fault, size, warm
+from .hypotheses import STRIBECK, Basis, Fault, lag, size, warm
 from .plant import Place
 from .fit import Fit
 from .result import Value
@@ -366,13 +366,17 @@ def functions(
 
             return {"preload": ("N", preload)}
         case "tyre_damping":
-
             lagging = [n for t, n in zip(terms, names) if t.candidate.what.law == "maxwell_bushing"]
-            rest = [(t, n) for t, n in zip(terms, names) if n not in lagging]
-            at_once = Curve([t for t, _ in rest], [n for _, n in rest])
+            at_once = Curve([t for t, n in zip(terms, names) if n not in lagging], [n for n in names if n not in lagging])
+            met = [m.motions[what.place] for m in study.seen]
 
             def damping(p: Values) -> float:
-                return line(v, at_once(zero, v, p)) + sum(p[f"{n}_stiffness"] * p[f"{n}_relaxation"] for n in lagging)
+                """Of the linear damper that takes as much work from the motion that was met."""
+                work = 0.0
+                for m in met:
+                    late = sum(p[f"{n}_stiffness"] * (m.s - m.s[0] - lag(m.s - m.s[0], p[f"{n}_relaxation"], m.t[1] - m.t[0])) for n in lagging)
+                    work += float(m.v @ (at_once(np.zeros_like(m.v), m.v, p) + late))
+                return work / sum(float(m.v @ m.v) for m in met)
 
             return {"damping": ("N*s/m", damping)}
         case "tyre_nonlinear":

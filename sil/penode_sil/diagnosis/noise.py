@@ -22,6 +22,8 @@ from ..noise import Noise
 
 Array = NDArray[np.float64]
 POLES = (0.0, 0.3, 0.5, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985)  # of slow noise, per sample
+SHARES = (0.03, 0.06, 0.12, 0.25, 0.5, 0.75, 1.0)  # of it in the room that there is, and by how much finer from the best
+FINER = (1.2, 1.1, 1.05, 1.025)
 BINS = 16  # of a spectrum in which coherence is estimated
 HALF = 8  # bins to either side that say how loud it is around a tone
 PURE = 40.0  # see Tone: noise has 16 at most
@@ -168,16 +170,21 @@ def sensor_levels(
         p, b, r = (np.add.reduceat(x[:band], edges) / bins for x in (power[:, j], base, road))
         whole = float(np.mean(base))
         room = max((1.25 * sigma) ** 2 if sigma > 0.0 else 4.0 * whole, 1.1 * whole) - whole
-        best = np.inf, base
-        for pole in POLES if coloured else ():
-            shape = (1.0 - pole**2) / np.abs(1.0 - pole * np.exp(-1j * omega)) ** 2
-            c = np.add.reduceat(shape[:band], edges) / bins
-            for share in (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 0.75, 1.0):
-                s = b + r + share * room * c
-                loss = float(np.sum(bins * (np.log(s) + (np.minimum(p / s, 12.0) if robust else p / s))))
-                if loss < best[0] - 2.0:
-                    best = loss, base + share * room * shape
-        found[:, j] = best[1][:band]
+        shapes = [(1.0 - pole**2) / np.abs(1.0 - pole * np.exp(-1j * omega)) ** 2 for pole in POLES]
+        means = [np.add.reduceat(shape[:band], edges) / bins for shape in shapes]
+
+        def loss(k: int, share: float) -> float:
+            s = b + r + share * room * means[k]
+            return float(np.sum(bins * (np.log(s) + (np.minimum(p / s, 12.0) if robust else p / s))))
+
+        best = loss(0, 0.0), 0, 0.0
+        for k in range(len(POLES)) if coloured else ():
+            for share in SHARES:
+                if (new := loss(k, share)) < best[0] - 2.0:
+                    best = new, k, share
+        for finer in FINER if best[2] else ():
+            best = min(best, *((loss(best[1], x), best[1], x) for x in (best[2] / finer, min(best[2] * finer, 1.0))))
+        found[:, j] = (base + best[2] * room * shapes[best[1]])[:band]
     return found
 
 

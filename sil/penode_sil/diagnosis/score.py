@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 RESONANCES = np.geomspace(0.5, 40.0, 36)  # [Hz] of hidden masses that are tried
 DAMPINGS = (0.03, 0.1, 0.3)  # and their damping ratios
+COARSE = 0.002  # [s] step at which forces along a motion are looked at, if their recordings have a finer one
 FEW = 200  # samples of a sensor that are taken out one by one, sooner than by a transform
 
 
@@ -229,7 +230,9 @@ def collect(
     """All candidates and their whitened effects [candidates, rows]."""
     candidates: list[Candidate] = []
     parts: list[list[Array]] = [[] for _ in experiments]
-    step = experiments[0].step
+    most = max(int(COARSE / experiments[0].step + 1e-6), 1)
+    every = max(q for q in range(1, most + 1) if all(len(x.time) % q == 0 for x in experiments))
+    step = every * experiments[0].step
 
     def masked(e: int, spectra: Complex) -> Array:
         """Whitened effects from their spectra [k, f, sensors]; samples that do not count are taken out."""
@@ -241,19 +244,20 @@ def collect(
                 twice = np.where(np.arange(band) > 0, 2.0, 1.0)[:, None] / len(good)
                 spectra[:, :, j] -= (spectra[:, :, j] @ (np.conj(turn) * twice)).real @ turn.T
             else:
-                signals = fft.irfft(spectra[:, :, j], len(good), axis=1)
-                spectra[:, :, j] = fft.rfft(signals * good[:, j], axis=1)[:, :band]
+                signals = fft.irfft(spectra[:, :, j].astype(np.complex64), len(good), axis=1)  # quicker, and fine enough for a column
+                signals *= good[:, j]
+                spectra[:, :, j] = fft.rfft(signals, axis=1)[:, :band]
         return metrics[e].white(spectra)
 
     for k, place in enumerate(found):
-        motions = [s.motions[k] for s in seen]
+        motions = [Motion(m.s[::every], m.v[::every], m.t[::every]) for m in (s.motions[k] for s in seen)]
         laws = list(hy.force_laws(k, place, motions, step, not {b.name for b in model.bodies} & set(place.ends)))
         body = next((b.name for b in model.bodies if set(place.ends) == {b.name, GROUND}), None)
         if laws:
             candidates += [Candidate(b.kind, where(b.kind, place, model), b.sign, b.companion, b) for b in laws]
             for e, s in enumerate(seen):
                 rows = np.stack([b.series[e] for b in laws])
-                phi = fft.rfft(rows, axis=1)[:, : experiments[e].band]
+                phi = every * fft.rfft(rows, axis=1)[:, : experiments[e].band]
                 parts[e].append(masked(e, s.answer(phi, k, [b.settled for b in laws])))
         if body is not None:
             tried = [(float(f0), zeta) for f0 in RESONANCES for zeta in DAMPINGS]
@@ -261,7 +265,7 @@ def collect(
             for e, (s, m) in enumerate(zip(seen, motions)):
                 x = experiments[e].frequencies[: experiments[e].band] / np.array(tried)[:, :1]
                 damped = 2j * np.array(tried)[:, 1:] * x
-                pull = (1.0 + damped) / (1.0 - x**2 + damped) * fft.rfft(np.gradient(m.v, step))[: x.shape[1]]
+                pull = (1.0 + damped) / (1.0 - x**2 + damped) * every * fft.rfft(np.gradient(m.v, step))[: x.shape[1]]
                 parts[e].append(masked(e, s.answer(pull, k)))
     for j, name in enumerate(sensor_names):
         times = [s.motions[0].t if s.motions else e.time for e, s in zip(experiments, seen)]

@@ -36,6 +36,7 @@ CURVES = {  # kinds of one family at one place are one curve with one name
 }  # fmt: skip
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
 SMALL = 0.03  # of all that was gained: a cause worth less than that may be a remainder of another
+PART = 0.1  # of the size a law has alone: left to it where its companions do the rest
 NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
@@ -72,14 +73,23 @@ class Explanation:
         return tuple(dict.fromkeys(t.group for t in self.terms))
 
     @property
+    def freedom(self) -> float:
+        """What its numbers are worth in chi2."""
+        return sum(cost(t.candidate) for t in self.terms)
+
+    @property
+    def price(self) -> float:
+        """And its causes."""
+        return self.freedom + NEW * len(self.groups)
+
+    @property
     def score(self) -> float:
-        freedom = sum(cost(t.candidate) for t in self.terms)
         form = 0.0
         plain = len(self.terms) == len(self.groups) and all(kind in (*EXACT, *FORMULAS) for kind, _ in self.groups)
         slow = all(kind == "sensor_bias" or kind in EXACT for kind, _ in self.groups)  # a bias is no form, however it wanders
         if not plain and not slow:
-            form = FORM * freedom / COST * (self.gain - self.formulas) + LEAST * (len(self.groups) - 1) * self.gain
-        return self.gain - freedom - NEW * len(self.groups) - max(form, 0.0)
+            form = FORM * self.freedom / COST * (self.gain - self.formulas) + LEAST * (len(self.groups) - 1) * self.gain
+        return self.gain - self.price - max(form, 0.0)
 
 
 def exact(groups: Sequence[Group]) -> bool:
@@ -280,10 +290,14 @@ def further(study: Study, e: Explanation, r: Regression) -> list[list[int]]:
 
 
 def terms_of(r: Regression, chosen: Sequence[int]) -> list[Term]:
-    """The chosen candidates with the sizes that the regression gives them; none if only companions are left."""
+    """The chosen candidates with the sizes that the regression gives them. Where only companions are left, the first of the others
+    keeps a part of what it has alone; none if that is nothing."""
     _, gains = r.gain(chosen)
-    found = [Term(r.candidates[c], float(g)) for c, g in zip(chosen, gains) if g != 0.0]
-    return found if any(not t.candidate.companion for t in found) else []
+    alone = [c for c in chosen if not r.candidates[c].companion][:1]
+    if all(g == 0.0 or r.candidates[c].companion for c, g in zip(chosen, gains)):
+        small = PART * r.gain(alone)[1] if alone else np.zeros(1)
+        gains = np.where([c in alone for c in chosen], small, gains) if small[0] else np.zeros(len(chosen))
+    return [Term(r.candidates[c], float(g)) for c, g in zip(chosen, gains) if g != 0.0]
 
 
 def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation]]:
@@ -344,7 +358,10 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
         done = sorted(done + exchanged(study, done[0], parameters, log), key=lambda e: -e.score)
     if not done:
         return study, []
-    best = settled(study, plain(study, done[0], parameters, log))
+    others = [e for e in done[1:] if set(e.groups) != set(done[0].groups) and len(e.groups) <= len(done[0].groups)]
+    equal = [e for e in others if e.gain > done[0].gain - SLACK]  # and may be the plainer one
+    best, *equal = [plain(study, e, parameters, log) for e in [done[0], *equal[:1]]]
+    best = settled(study, next((e for e in equal if e.gain > best.gain - SLACK and e.price < best.price), best))
     return study, [best, *done[1:], *equals(study, best, parameters, log)]
 
 
