@@ -61,15 +61,15 @@ def road(seed: int) -> np.ndarray:
     return 0.006 * z / np.std(z) * np.minimum(np.arange(SAMPLES) * STEP, 1.0) ** 2
 
 
-def drive(z: np.ndarray, force, mass: float = M_B) -> dict[str, np.ndarray]:
-    """Sensors without noise of a quarter vehicle with an extra force(s, v) in its suspension, by SciPy."""
+def drive(z: np.ndarray, force, mass: float = M_B, load: float = 0.0) -> dict[str, np.ndarray]:
+    """Sensors without noise of a quarter vehicle with an extra force(s, v) in its suspension and a load on its body, by SciPy."""
     t = np.arange(SAMPLES) * STEP
     spline = CubicSpline(t, z)
 
     def rates(time: float, x: np.ndarray) -> list[float]:
         s, v = x[0] - x[1], x[2] - x[3]
         pull = C * s + D * v + force(s, v)
-        return [x[2], x[3], -pull / mass, (pull - C_T * (x[1] - spline(time))) / M_W]
+        return [x[2], x[3], (load - pull) / mass, (pull - C_T * (x[1] - spline(time))) / M_W]
 
     x = solve_ivp(rates, (0.0, t[-1]), np.zeros(4), method="RK45", rtol=1e-7, atol=1e-10, max_step=STEP, t_eval=t).y
     a = np.array([rates(time, state)[2:] for time, state in zip(t, x.T)])
@@ -230,6 +230,15 @@ def test_the_file_has_the_fault_of_a_sensor(tmp_path, fault, show):
     show(f"{fault}: {found.seconds:.1f} s, {[(c.kind, c.where) for c in found.causes]}, {found.gain[name]}")
     assert [(c.kind, c.where) for c in found.causes] == [(kind, name)]
     assert found.gain[name].after_rmse < 1.05 * noise[name] < 0.8 * found.gain[name].before_rmse  # see test_hidden_cause
+
+
+def test_a_load_put_on_at_the_start_is_no_start_in_motion(tmp_path, model):
+    """To accelerometers a load at rest is a start away from rest, in four numbers instead of one: also beside another cause."""
+    z = road(3)
+    sensors = drive(z, lambda s, v: 2e7 * s**3, load=-90.0)
+    path = record(tmp_path / "loaded.csv", z, sensors, 4, {k: NOISE[k] for k in ("a_body", "a_wheel")})
+    causes = {(c.kind, c.where) for c in diagnosis.diagnose(model, load([path], model)).causes}
+    assert causes == {("constant_force", "body"), ("cubic_spring", "spring")}
 
 
 def test_a_start_in_motion_is_the_start(tmp_path):

@@ -75,11 +75,11 @@ def diagnose(
     if any(b.any() for b in bursts):
         study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, bursts)], set_name)
     faults = broken_sensors(model, train, study, study.null.simulated, bursts)
+    moved = other.null.cost - study.null.cost
     tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
     if study.moving:
         equals = [e for e in explanations if e.score > explanations[0].score - search.NEW]
-        moved = other.null.cost - study.null.cost
         other, found = search.at_rest(other, study, equals, log)
     if study.moving and found:
         costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
