@@ -36,7 +36,7 @@ _RUNGE_KUTTA = {
 # Names of the templates inside functions that also hold names of the model; the model's get a _ there.
 _TAKEN = frozenset(
     "p x u y z dx fx fu yx yu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
-    "inner along drive before advance fold f x0 copy begin finish usable unit solve integrate node".split()
+    "inner along drive patrol layer_by_layer before advance fold f x0 copy begin finish usable unit solve integrate node".split()
 )
 _AFFINE = {"centre": "pen_centre", "rescale": "pen_rescale"}
 _METHOD_NAMES = {
@@ -152,6 +152,8 @@ class _Emitter:
     def context(self) -> dict[str, Any]:
         model, causal = self.model, self.causal
         rosenbrock = model.method.startswith("ros")
+        set_length = len(sets.set_values(model, "default"))
+        folded = [(name, code) for code in self.networks if code.folded for name in code.users]
         nodes, weights, divisor = _RUNGE_KUTTA.get(model.method, ((), (), 1.0))
         functions = {
             "rates": self._function(causal.rates, "dx") if model.method != "ros1" else None,
@@ -161,6 +163,8 @@ class _Emitter:
             "sensors": self._function(causal.sensors, "z"),
             "curvature": self._curvature() if rosenbrock else None,
         }
+        uses_p, uses_f = (any(f[uses] for f in functions.values() if f) for uses in ("uses_p", "uses_f"))
+        reads_set = uses_p or not uses_f  # else its pieces are all that it has
         return {
             "model": model, "name": model.name, "prefix": self.prefix, "version": VERSION, "abi": sets.ABI,
             "source": model.path.name, "digest": model.digest[:16], "method_name": _METHOD_NAMES[model.method],
@@ -174,12 +178,12 @@ class _Emitter:
             "called": {f"{c.name}{part}" for c in self.networks for part in ("", "_slope", "_or_pieces", "_or_pieces_slope") if self._mentions(functions, (f" {c.name}{part}(", f"){c.name}{part}("))},
             "slope_lines": {c.name: _by_value(c, self._slope_lines(c)) for c in self.networks},
             "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),
-            "set_length": len(sets.set_values(model, "default")), "offsets": self._offset_lines(),
+            "set_length": set_length, "patrol": max(set_length if reads_set else 0, model.pieces if uses_f else 0), "offsets": self._offset_lines(),
             "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
             "uses_net16": any(_hidden16(list(c.network.layers[i:])) for c in self.networks for i in range(len(c.network.layers))),
-            "folded": [(name, code) for code in self.networks if code.folded for name in code.users],
-            "uses_p": any(f["uses_p"] for f in functions.values() if f), "uses_f": any(f["uses_f"] for f in functions.values() if f),
+            "folded": folded,
+            "uses_p": uses_p, "uses_f": uses_f, "reads_set": reads_set,
             "sample_time": real(model.sample_time), "real": real, "si": units.si,
             "columns": len(model.states) + 2 * len(model.inputs),
         }  # fmt: skip

@@ -667,7 +667,7 @@ class _Reader:
 
     def macros(self, parameters: dict[str, m.Parameter], networks: dict[str, m.NetworkPort], model: str) -> None:
         """Constants of the generated C are in capitals: names that differ in case only would meet."""
-        seen = {n: "" for n in ("N_X", "N_U", "N_Y", "N_SENSORS", "SAMPLE_TIME", "LAYOUT", "SET_LENGTH", "H")}
+        seen = {n: "" for n in ("N_X", "N_U", "N_Y", "N_SENSORS", "SAMPLE_TIME", "LAYOUT", "SET_LENGTH", "PATROL", "PIECES", "H")}
         for n in (*parameters, *networks):
             changes = n in networks or parameters[n].tunable
             for name in (f"AT_{n}",) if changes else (n, f"{n}_INVERSE"):

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 FLAGS = (
     "input_nonfinite", "state_nonfinite", "step_nonfinite", "singular", "outside", "held", "adopted", "badarg",
+    "weight_nonfinite",
     "set_busy", "set_closed", "set_range", "set_short", "set_checksum", "set_nonfinite", "set_layout", "set_no_previous",
     "set_pieces",
 )  # fmt: skip

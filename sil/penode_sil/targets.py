@@ -25,6 +25,7 @@ import penode_gen
 
 from .errors import UserError
 from .schedule import Call
+from .status import BIT
 
 ROOT = Path(__file__).resolve().parents[2]
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
@@ -177,7 +178,7 @@ class Head(ctypes.Structure):
 class Report(ctypes.Structure):
     """pen_status_report_t"""
 
-    _fields_ = [("flags", ctypes.c_uint32), ("times", ctypes.c_uint32 * 17)]
+    _fields_ = [("flags", ctypes.c_uint32), ("times", ctypes.c_uint32 * len(BIT))]
 
 
 class Set(ctypes.Structure):

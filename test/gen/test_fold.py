@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 import penode_gen
 from penode_gen import fold
 from penode_gen.networks import Affine, Dense, Network, read_network
+from penode_sil.status import BIT
 from penode_sil.targets import Sil
 
 NETWORKS = Path(__file__).resolve().parents[2] / "gen" / "nqvm" / "networks"
@@ -252,10 +254,10 @@ def test_too_many_pieces_are_refused_and_the_running_set_stays(tmp_path):
     sil = Sil(replace(made, pieces=24))
     instance = sil.instance()
     before = instance.step([0.5])[1][0]
-    assert sil.function("tune_select")(instance._self, ctypes.byref(sil.flash_set("rough"))) == 0x10000
+    assert sil.function("tune_select")(instance._self, ctypes.byref(sil.flash_set("rough"))) == 0x20000
     _, after, status = instance.step([0.5])
     assert status == 0 and after[0] == before
-    with pytest.raises(AssertionError, match="0x10000"):
+    with pytest.raises(AssertionError, match="0x20000"):
         sil.instance("rough")  # init refuses it as well
 
 
@@ -268,6 +270,7 @@ def test_too_many_pieces_run_layer_by_layer_where_the_model_says_so(tmp_path):
         instance, rival = made.instance(first), layered.instance(first)
         for name in (first, second):
             if name == second:
+                instance.memory[-24 * PIECE.itemsize :] = 255  # whatever was in the pieces of the next set: NaN, that none looks at
                 assert made.function("tune_select")(instance._self, ctypes.byref(made.flash_set(name))) == 0
                 assert layered.function("tune_select")(rival._self, ctypes.byref(layered.flash_set(name))) == 0
             steps = [(instance.step(u)[1:], rival.step(u)[1:]) for u in x]
@@ -275,6 +278,24 @@ def test_too_many_pieces_run_layer_by_layer_where_the_model_says_so(tmp_path):
             assert same if name == "rough" else not same
             assert all(a[1] == b[1] for a, b in steps)
             assert max(abs(a[0][0] - b[0][0]) for a, b in steps) <= layers_bound(in_float(PLAIN), np.array([1.5]))[0] * 2
+
+
+@pytest.mark.parametrize("capacity, more", [(48, "refuse"), (48, "layers"), (192, "layers")])
+def test_damage_in_any_piece_or_value_is_found_within_a_round(tmp_path, capacity, more):
+    """In a table with less room than the 123 values of the set, and with more; where no step reads the values, in the table only."""
+    made = model(tmp_path, PLAIN, f'pieces = {capacity}\nmore_pieces = "{more}"')
+    instance, values = Sil(made).instance(), penode_gen.set_values(made, "default")
+    assert instance.begin(penode_gen.set_head(made, "default")) == instance.write(0, values) == instance.commit() == 0
+    instance.step([0.5])
+    bank = next(bank for bank in instance.banks if np.array_equal(bank, values))
+    table = instance.memory[-capacity * PIECE.itemsize :].view(PIECE)  # of the second slot
+    steps = capacity if more == "refuse" else max(bank.size, capacity)
+    assert [instance.step([0.5])[2] for _ in range(2 * steps)] == 2 * steps * [0]
+    for numbers in (*([bank] if more == "layers" else []), table["start"], table["offset"], table["slope"]):
+        for i, bad in zip(range(numbers.size), itertools.cycle((np.nan, np.inf, -np.inf))):
+            good, numbers[i] = numbers[i], bad
+            assert any(instance.step([0.5])[2] & BIT["weight_nonfinite"] for _ in range(steps))
+            numbers[i] = good
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "cost"
 MATH = gate.ROOT / "src" / "pen_math.c"
-HALVINGS, FLAGS = 7, 8  # of 96 and 128 pieces; of a step
+HALVINGS = 7  # of 96 and 128 pieces
 SLACK = {"pen_solve_": 18, "pen_fold_find": 5}  # instructions of the call in cost.c, of the last two comparisons
 
 # Faults of pen_math.c: see gate.faulty.
@@ -37,8 +37,8 @@ def promised() -> dict[tuple[str, str], int]:
     found["pen_solve2", "-O2"] = int(re.search(r"Cost: about (\d+) instructions", text["pen_solve"])[1])
     halving = int(re.search(r"(\d+) instructions for each halving of capacity, 7 halvings", text["pen_fold"])[1])
     found |= {(f"pen_fold_find_{n}", "-O2"): HALVINGS * halving for n in (96, 128)}
-    flag = re.search(r"Cost: (\d+) instructions a flag, at -Os (\d+)", text["pen_status"])
-    found |= {("pen_status_note_step", level): FLAGS * int(n) for level, n in zip(("-O2", "-Os"), flag.groups())}
+    note = re.search(r"Cost: (\d+) instructions, at -Os (\d+)", text["pen_status"])
+    found |= {("pen_status_note_step", level): int(n) for level, n in zip(("-O2", "-Os"), note.groups())}
     return found
 
 

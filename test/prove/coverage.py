@@ -56,13 +56,18 @@ def refused(model: str) -> str:
     return "PEN_SET_PIECES" if model == "nqvm_folded" else "PEN_OK"
 
 
+def unfelt(model: str) -> str:
+    """A number that a step of `self` does not meet: of its last piece, or the lower bound of an envelope."""
+    return "self->pieces[self->tuning.active].spring_net[NQVM_FOLDED_PIECES - 1U].slope" if model == "nqvm_folded" else "value[SPRING]"
+
+
 def model_tests(build: str) -> list[Path]:
     """coverage_model.c for each model."""
     programs = []
     for model in eva.MODELS:
         others = [MODELS / f"{model}.c", MODELS / f"{model}_params.c"]
         test = gate.HERE / "coverage_model.c"
-        programs.append(program(build, f"model_{model}", test, others, [*eva.told(model), f"-DREFUSED={refused(model)}"]))
+        programs.append(program(build, f"model_{model}", test, others, [*eva.told(model), f"-DREFUSED={refused(model)}", f"-DUNFELT={unfelt(model)}"]))
     return programs
 
 

@@ -4,7 +4,7 @@
 /*
  * The interface of any generated quarter vehicle, whatever its method and networks: what it refuses, what it holds, what
  * it keeps, and that a step and a step with derivatives are one. coverage.py builds it once for each model; REFUSED is
- * what the model says to a set with more pieces than it has room for.
+ * what the model says to a set with more pieces than it has room for, UNFELT a number in memory that no step here meets.
  */
 #include <stddef.h>
 #include <stdint.h>
@@ -208,6 +208,37 @@ void test_what_is_not_finite_changes_nothing(void)
         TEST_ASSERT_EQUAL_HEX32(PEN_STATE_NONFINITE, step_both() & ~(PEN_OUTSIDE | PEN_SINGULAR));
         expect_state(&kept);
         TEST_ASSERT_EQUAL_MEMORY(&kept_j, &j, sizeof j);
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, step_both());
+    }
+}
+
+static pen_real_t *unfelt(MODEL(t) *self)
+{
+    (void)self;
+    return &UNFELT;
+}
+
+/* A bound of an envelope is not met by a step, nor a piece far away: the patrol finds it, once a round. */
+void test_the_patrol_comes_round(void)
+{
+    uint32_t times = 0U;
+    pen_real_t good;
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_select)(&model, &set));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(tune_select)(&twin, &set));
+    TEST_ASSERT_EQUAL_HEX32(PEN_ADOPTED, step_both());
+    good = *unfelt(&model);
+    *unfelt(&model) = bad[2];
+    *unfelt(&twin) = bad[2];
+    for (uint32_t k = 0U; k < (2U * MODEL_SIZE(PATROL)); k++) {
+        const pen_status_t status = step_both();
+        TEST_ASSERT_EQUAL_HEX32(PEN_OK, status & ~PEN_WEIGHT_NONFINITE);
+        times += (status == PEN_WEIGHT_NONFINITE) ? 1U : 0U;
+    }
+    TEST_ASSERT_EQUAL_UINT32(2U, times);
+    *unfelt(&model) = good;
+    *unfelt(&twin) = good;
+    for (uint32_t k = 0U; k < MODEL_SIZE(PATROL); k++) {
         TEST_ASSERT_EQUAL_HEX32(PEN_OK, step_both());
     }
 }

@@ -87,6 +87,7 @@ SEEDS = [
     Seed("pen_set.c", "(tuning == NULL) || ", "", Run(None, "sets")),
     Seed("pen_status.c", "i < PEN_STATUS_FLAGS", "i <= PEN_STATUS_FLAGS", MODEL),
     Seed("nqvm_euler.c", "self->u[1U - (self->running & 1U)]", "self->u[1U - self->running]", MODEL),
+    Seed("nqvm_euler.c", "self->patrol % NQVM_EULER_PATROL", "self->patrol", MODEL),
     Seed("nqvm_euler.c", "(u != NULL) && (y != NULL)", "(u != NULL)", MODEL),
     Seed("nqvm_euler.c", "(self != NULL) && ", "", MODEL),
     Seed("nqvm_euler.c", "    pen_status_t status = found;", "    pen_status_t status = PEN_OK;", ORDER),

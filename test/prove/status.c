@@ -7,9 +7,13 @@
  *
  *   input          not finite: PEN_INPUT_NONFINITE, and only then
  *   state          not finite: PEN_STATE_NONFINITE, and only then; the second copy is back, if that one is good
- *   weight         NaN: some flag. Inf: some flag, or exactly the step of a weight of LARGE (a neuron that is off)
+ *   weight         not finite: some flag at once, but for two kinds. An infinite bound of a trust envelope: exactly the
+ *                  step of a bound at LARGE, which is none. A weight of a folded network, whose step reads its pieces:
+ *                  exactly the undamaged step
  *   folded piece   value or slope: some flag, or exactly the step of the undamaged piece (another one was in use). Where
  *                  it starts: not finite, another piece may go on in its place; how often that was not flagged is counted
+ *   both           what the step itself did not say, of a set or pieces that it may read: PEN_WEIGHT_NONFINITE within
+ *                  PATROL steps; never without such damage
  *   any of them    no advance: state and outputs to the bit as before; advance: all finite
  *   afterwards     once weights are as they were the next step is good. After a bad input on top of a damaged one, or
  *                  one so large that the step overflows, it is the one after that: a step takes two inputs. After damage to both copies of a state, once it is set; to both of an output: init
@@ -46,6 +50,8 @@ static unsigned long counted[PEN_STATUS_FLAGS]; /* what steps said */
 static unsigned long hits[PLACES];
 static unsigned long flagged[PLACES];
 static unsigned long misplaced;
+static unsigned long patrolled; /* runs in which the patrol had to find it */
+static unsigned long latest;    /* steps it took, at most */
 static unsigned long failures;
 static unsigned long run;
 static uint64_t seed;
@@ -113,6 +119,37 @@ static bool all_finite(const void *values, size_t bytes)
         finite = finite && isfinite(((const pen_real_t *)values)[i]);
     }
     return finite;
+}
+
+/* A bound of a trust envelope: the only numbers of a set that a step compares with and does not compute with. */
+static bool is_bound(size_t at)
+{
+    static const size_t bounds[] = { MODEL_BOUNDS };
+    bool found = false;
+
+    for (size_t i = 0U; i < (sizeof(bounds) / sizeof(bounds[0])); i++) {
+        found = found || (at == bounds[i]);
+    }
+    return found;
+}
+
+/* Steps, the one with this status among them, until the patrol has met what is damaged. */
+static void wait_for_patrol(pen_status_t status, uint32_t place, pen_real_t value)
+{
+    const pen_real_t u[N_U] = { 0 };
+    pen_status_t now = status;
+    unsigned long steps = 1U;
+    MODEL(y_t) y;
+
+    while (((now & PEN_WEIGHT_NONFINITE) == PEN_OK) && (steps < MODEL_SIZE(PATROL))) {
+        now = step(u, &y);
+        steps++;
+    }
+    if ((now & PEN_WEIGHT_NONFINITE) == PEN_OK) {
+        fail("not found by the patrol", place, value, now);
+    }
+    patrolled++;
+    latest = (steps > latest) ? steps : latest;
 }
 
 /* A set through the front door: good, or with a bad value and the checksum that fits it. */
@@ -191,11 +228,13 @@ static void one_run(void)
     const pen_real_t value = bad_number();
     const bool bad = !isfinite(value);
     pen_real_t *weight = NULL;
+    size_t index = 0U; /* of the weight */
     pen_real_t right = 0;
     pen_status_t status;
     pen_status_t must = PEN_OK;
     bool huge;
     bool starts = false;
+    bool seen; /* by the patrol */
 
     for (size_t i = 0U; i < N_X; i++) {
         ((pen_real_t *)&x)[i] = between((pen_real_t)-0.02, (pen_real_t)0.02);
@@ -224,7 +263,8 @@ static void one_run(void)
     } else if (place == INPUT_BEFORE) {
         model.u[0][draw() % N_U] = value;
     } else if (place == WEIGHT) {
-        weight = &weights()[draw() % N];
+        index = draw() % N;
+        weight = &weights()[index];
 #ifdef MODEL_FOLDED
     } else if (place == PIECE) {
         pen_real_t *const pieces = (pen_real_t *)&model.pieces[model.tuning.active];
@@ -263,6 +303,7 @@ static void one_run(void)
         right = *weight;
         *weight = value;
     }
+    seen = bad && (weight != NULL) && ((place == PIECE) || (MODEL_SIZE(READS_SET) != 0U));
     must |= all_finite(u, sizeof(u)) ? PEN_OK : PEN_INPUT_NONFINITE;
 
     huge = (u[0] > LARGE) || (u[0] < -LARGE);
@@ -282,15 +323,13 @@ static void one_run(void)
     } else {
         /* kept */
     }
-    if ((weight != NULL) && bad && (status == PEN_OK)) {
-        const bool off = (place == WEIGHT) && isinf(value);
-#ifdef MODEL_FOLDED
-        const bool unused = true; /* a step does not read weights, and one piece of each network */
-#else
-        const bool unused = false;
-#endif
-        const pen_real_t instead = (off && !unused) ? copysignf(LARGE, value) : right;
-        if (!off && !unused) {
+    if (!seen && ((status & PEN_WEIGHT_NONFINITE) != PEN_OK)) {
+        fail("the patrol found what is not there", place, value, status);
+    }
+    if ((weight != NULL) && bad && ((status & ~PEN_WEIGHT_NONFINITE) == PEN_OK)) {
+        const bool folds = (MODEL_SIZE(FOLDS) != 0U); /* its step reads one piece of each network */
+        const pen_real_t instead = folds ? right : copysignf(LARGE, value);
+        if (!folds && !(is_bound(index) && isinf(value))) {
             fail("not flagged", place, value, status);
         } else {
             const pen_status_t other = other_step(weight, instead, u, &x_other);
@@ -305,6 +344,10 @@ static void one_run(void)
         }
     }
 
+    if (seen && ((status & (PEN_STEP_NONFINITE | PEN_SINGULAR)) == PEN_OK)) {
+        wait_for_patrol(status, place, value);
+        (void)MODEL(set_state)(&model, &x); /* it may have gone anywhere */
+    }
     if (weight != NULL) {
         *weight = right;
     }
@@ -325,7 +368,7 @@ static void one_run(void)
     }
     status = step(u, &y_after);
     status = (((place == INPUT_BEFORE) || huge) && !pen_advanced(status)) ? step(u, &y_after) : status;
-    if (!pen_advanced(status)) {
+    if (!pen_advanced(status) || ((status & PEN_WEIGHT_NONFINITE) != PEN_OK)) {
         fail("does not go on", place, value, status);
     }
 }
@@ -345,6 +388,7 @@ int main(int argc, char **argv)
     for (uint32_t k = 0U; k < PLACES; k++) {
         printf("%s: %lu, flagged %lu\n", place_name[k], hits[k], flagged[k]);
     }
-    printf("misplaced %lu\nfailures %lu\n", misplaced, failures);
+    printf("misplaced %lu\npatrolled %lu, after %lu of %u steps at most\nfailures %lu\n", misplaced, patrolled, latest,
+           (unsigned int)MODEL_SIZE(PATROL), failures);
     return (failures == 0U) ? 0 : 1;
 }

@@ -194,7 +194,7 @@ void test_damaged_state_comes_back_from_its_copy(void)
     }
 }
 
-/* Every weight of the running set, one after the other: none may be NaN or Inf without a flag. */
+/* Every weight of the running set, one after the other: none may be NaN or Inf without a flag, at once or from the patrol. */
 void test_damaged_weight_holds_until_it_is_mended(void)
 {
     for (uint32_t i = 0U; i < NQVM_SET_LENGTH; i++) {
@@ -217,6 +217,11 @@ void test_damaged_weight_holds_until_it_is_mended(void)
         status = nqvm_step(&model, &u, &y);
         if (envelope) {
             /* a bound of the envelope is compared, never computed with: NaN reads as outside, -Inf below as no bound */
+            for (uint32_t k = 1U; (k < NQVM_PATROL) && ((status & PEN_WEIGHT_NONFINITE) == PEN_OK); k++) {
+                TEST_ASSERT_TRUE(pen_advanced(status));
+                status = nqvm_step(&model, &u, &y);
+            }
+            TEST_ASSERT_EQUAL_HEX32(PEN_WEIGHT_NONFINITE, status & PEN_WEIGHT_NONFINITE);
             TEST_ASSERT_TRUE(pen_advanced(status));
         } else {
             TEST_ASSERT_EQUAL_HEX32(PEN_STEP_NONFINITE, status & PEN_STEP_NONFINITE);
@@ -226,6 +231,18 @@ void test_damaged_weight_holds_until_it_is_mended(void)
         banks.value[0][i] = nqvm_set_default.value[i];
         banks.value[1][i] = nqvm_set_default.value[i];
         drive(WARM + i, 1U);
+    }
+}
+
+/* Whatever became of the place it has come to: the patrol stays within the set, and goes on. */
+void test_damaged_place_of_the_patrol(void)
+{
+    static const uint32_t places[] = { NQVM_PATROL - 1U, NQVM_PATROL, 0x80000000U, UINT32_MAX };
+
+    for (size_t i = 0U; i < (sizeof(places) / sizeof(places[0])); i++) {
+        model.patrol = places[i];
+        drive(WARM, 1U);
+        TEST_ASSERT_EQUAL_UINT32((places[i] % NQVM_PATROL) + 1U, model.patrol);
     }
 }
 

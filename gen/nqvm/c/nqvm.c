@@ -377,11 +377,24 @@ static pen_real_t advance(const nqvm_t *self)
     return (pen_real_t)running;
 }
 
+/* Look at one number of the set in force; the next step looks at the next. */
+static pen_status_t patrol(nqvm_t *self, uint32_t slot)
+{
+    /* whatever its memory has become; no branch, as a comparison may be */
+    const uint32_t at = self->patrol % NQVM_PATROL;
+    const pen_real_t value = self->tuning.slot[slot].value[at];
+    pen_real_t doubt = value - value; /* 0, or NaN once a number is not finite */
+
+    self->patrol = at + 1U;
+    return (doubt >= (pen_real_t)0) ? PEN_OK : PEN_WEIGHT_NONFINITE;
+}
+
 /* take over what is pending, and see what there is to start from */
 static pen_status_t begin(nqvm_t *self, uint32_t *slot)
 {
     pen_status_t status = pen_tuning_adopt(&self->tuning, slot);
 
+    status |= patrol(self, *slot);
     status |= check(NQVM_N_U, self->u[1], PEN_INPUT_NONFINITE);
     status |= check(N_LAST, self->row[LAST], PEN_STATE_NONFINITE);
     return status;
@@ -422,6 +435,7 @@ pen_status_t nqvm_init(nqvm_t *self, const pen_set_t *set, nqvm_banks_t *banks)
             self->u[0][i] = (pen_real_t)0;
         }
         self->running = 0U;
+        self->patrol = 0U;
         pen_status_clear(&self->log);
         self->ready = NQVM_LAYOUT;
     }

@@ -41,6 +41,7 @@
 #define NQVM_LAYOUT 0x7e4f5fb7U
 #endif
 #define NQVM_SET_LENGTH 1198U
+#define NQVM_PATROL 1198U /* steps in which each number of the running set has been looked at */
 #define NQVM_AT_SPRING_NET 0U /* network spring_net */
 #define NQVM_AT_DAMPER_NET 599U /* network damper_net */
 
@@ -85,6 +86,7 @@ typedef struct {
     pen_real_t       row[3][6]; /* state, then outputs: a second copy, the last good ones, those being made */
     pen_real_t       u[2][1];   /* input: of the last sample, of this one */
     uint32_t         ready;   /* NQVM_LAYOUT once initialised */
+    uint32_t         patrol;  /* where the next step looks for damage */
     uint32_t         running; /* 1 after the first sample that went well */
     pen_tuning_t     tuning;
     pen_status_log_t log;
@@ -106,7 +108,9 @@ pen_status_t nqvm_init(nqvm_t *self, const pen_set_t *set, nqvm_banks_t *banks);
  * @param u  input now
  * @param y  outputs now; those of the last good sample if the step did not advance (see pen_advanced)
  * @return PEN_OK, or flags of pen_status.h: PEN_INPUT_NONFINITE, PEN_STATE_NONFINITE, PEN_STEP_NONFINITE,
- *         PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_BADARG
+ *         PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_BADARG, PEN_WEIGHT_NONFINITE
+ * A weight that becomes NaN or Inf in memory is said at once if the result shows it, after NQVM_PATROL steps at the
+ * latest.
  */
 pen_status_t nqvm_step(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y);
 

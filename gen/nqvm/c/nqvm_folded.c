@@ -346,11 +346,30 @@ static pen_real_t advance(const nqvm_folded_t *self)
     return (pen_real_t)running;
 }
 
+/* Look at one piece of each network; the next step looks at the next. */
+static pen_status_t patrol(nqvm_folded_t *self, uint32_t slot)
+{
+    /* whatever its memory has become; no branch, as a comparison may be */
+    const uint32_t at = self->patrol % NQVM_FOLDED_PATROL;
+    const nqvm_folded_pieces_t *const f = &self->pieces[slot];
+    pen_real_t doubt = (pen_real_t)0; /* 0, or NaN once a number is not finite */
+
+    doubt *= f->spring_net[at].start;
+    doubt *= f->spring_net[at].offset;
+    doubt *= f->spring_net[at].slope;
+    doubt *= f->damper_net[at].start;
+    doubt *= f->damper_net[at].offset;
+    doubt *= f->damper_net[at].slope;
+    self->patrol = at + 1U;
+    return (doubt >= (pen_real_t)0) ? PEN_OK : PEN_WEIGHT_NONFINITE;
+}
+
 /* take over what is pending, and see what there is to start from */
 static pen_status_t begin(nqvm_folded_t *self, uint32_t *slot)
 {
     pen_status_t status = pen_tuning_adopt(&self->tuning, slot);
 
+    status |= patrol(self, *slot);
     status |= check(NQVM_FOLDED_N_U, self->u[1], PEN_INPUT_NONFINITE);
     status |= check(N_LAST, self->row[LAST], PEN_STATE_NONFINITE);
     return status;
@@ -417,6 +436,7 @@ pen_status_t nqvm_folded_init(nqvm_folded_t *self, const pen_set_t *set, nqvm_fo
             self->u[0][i] = (pen_real_t)0;
         }
         self->running = 0U;
+        self->patrol = 0U;
         pen_status_clear(&self->log);
         self->ready = NQVM_FOLDED_LAYOUT;
     }

@@ -43,6 +43,7 @@
 #define NQVM_FOLDED_LAYOUT 0x944d8f45U
 #endif
 #define NQVM_FOLDED_SET_LENGTH 1198U
+#define NQVM_FOLDED_PATROL 96U /* steps in which each piece of the running set has been looked at */
 #define NQVM_FOLDED_AT_SPRING_NET 0U /* network spring_net */
 #define NQVM_FOLDED_AT_DAMPER_NET 599U /* network damper_net */
 
@@ -94,6 +95,7 @@ typedef struct {
     pen_real_t       row[3][6]; /* state, then outputs: a second copy, the last good ones, those being made */
     pen_real_t       u[2][1];   /* input: of the last sample, of this one */
     uint32_t         ready;   /* NQVM_FOLDED_LAYOUT once initialised */
+    uint32_t         patrol;  /* where the next step looks for damage */
     uint32_t         running; /* 1 after the first sample that went well */
     pen_tuning_t     tuning;
     pen_status_log_t log;
@@ -116,7 +118,9 @@ pen_status_t nqvm_folded_init(nqvm_folded_t *self, const pen_set_t *set, nqvm_fo
  * @param u  input now
  * @param y  outputs now; those of the last good sample if the step did not advance (see pen_advanced)
  * @return PEN_OK, or flags of pen_status.h: PEN_INPUT_NONFINITE, PEN_STATE_NONFINITE, PEN_STEP_NONFINITE,
- *         PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_BADARG
+ *         PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_BADARG, PEN_WEIGHT_NONFINITE
+ * A piece that becomes NaN or Inf in memory is said at once if the result shows it, after NQVM_FOLDED_PATROL steps at
+ * the latest.
  */
 pen_status_t nqvm_folded_step(nqvm_folded_t *self, const nqvm_folded_u_t *u, nqvm_folded_y_t *y);
 
