@@ -218,9 +218,17 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
     return found
 
 
+def _usual(e: Experiment, r: Array) -> Array:
+    """How far each sensor usually is from the model. At rest a coarse one shows its model's zero: in motion it is a quarter of a
+    quantum off, in the median."""
+    gaps = [np.diff(np.unique(y)) for y in e.y.T]
+    quanta = np.array([np.median(g) if g.size else 0.0 for g in gaps])
+    return 1.4826 * np.maximum(np.median(np.abs(r), axis=0), 0.25 * quanta) + 1e-300
+
+
 def _frozen(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
     """Samples that repeat a value while the model moves by more than any coarse sensor would let pass."""
-    usual = 1.4826 * np.median(np.abs(r), axis=0) + 1e-300
+    usual = _usual(e, r)
     found = np.zeros(r.shape, dtype=bool)
     for j in range(r.shape[1]):
         same = np.concatenate([[0], (np.diff(e.y[:, j]) == 0.0).astype(np.int8), [0]])
@@ -235,7 +243,7 @@ def _frozen(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
 
 def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
     """Samples of short stretches in which a sensor sinks towards zero while the model goes on."""
-    usual = 1.4826 * np.median(np.abs(r), axis=0) + 1e-300
+    usual = _usual(e, r)
     longest = int(0.5 / e.step)
     found = np.zeros(r.shape, dtype=bool)
     for j in range(r.shape[1]):
