@@ -34,7 +34,6 @@ ALIKE = 7.0  # standard deviations by which sensors may share a residual that is
 PATCHED = 0.985  # share that several causes must take away if sensors still share a residual
 WHOLE = 0.97  # share that is a whole explanation
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
-CLEAR = 0.02  # of what a start in motion explains: a load that leaves less than that of it is the simpler cause
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
@@ -75,7 +74,6 @@ def diagnose(
     if any(b.any() for b in bursts):
         study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, bursts)], set_name)
     faults = broken_sensors(model, train, study, study.null.simulated, bursts)
-    moved = other.null.cost - study.null.cost
     tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
     if study.moving:
@@ -85,9 +83,7 @@ def diagnose(
         costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
         told = set(found[0].groups) in (set(e.groups) for e in equals)
-        starts = len(model.states) * len(experiments)
-        price = search.NEW + (search.FORM * starts + search.LEAST) * found[0].gain  # a start in motion is a cause like others
-        spare = IDLE * starts if told else MOVING * starts + min(price, CLEAR * moved)
+        spare = (IDLE if told else MOVING) * len(model.states) * len(experiments)
         if costs[1] < costs[0] + spare:
             study, explanations = other, found
     best = explanations[0] if explanations else None
