@@ -221,7 +221,7 @@ def test_campaign_runs_a_command_and_survives_it(tmp_path, answer, outcome):
         f"out.mkdir()\n{ANSWERS[answer]}\n"
     )
     (row,) = campaign.run(
-        1, 1, {"mine": f"{sys.executable} {script}"}, "", 5.0 if answer != "slow" else 0.5, tmp_path / "out", keep=True
+        1, 1, {"mine": f"{sys.executable} {script}"}, "", 5.0 if answer != "slow" else 0.5, tmp_path / "out", keep=True, calls=1
     )
     assert row["stratum"] == "null" and (row["why"] or row["outcome"]).startswith(outcome)
     assert json.loads((tmp_path / "out" / "truth" / "1-1.json").read_text())["effects"] == []

@@ -16,7 +16,8 @@ from scipy.signal import lfilter
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import extension, hypotheses, noise, plant, study
+from penode_sil.diagnosis import extension, hypotheses, noise, plant, search, study
+from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.engine import experiment
 from penode_sil.diagnosis.fit import Problem
 from penode_sil.measured import load
@@ -114,6 +115,49 @@ def test_whitened_noise_is_white(model):
     r = np.stack([np.fft.irfft(through[:, k, 0] * common, n) for k in range(2)], axis=1) + sigma * rng.standard_normal((n, 2))
     white = noise.metric(e, np.tile(sigma**2, (e.band, 1)), through)(r)
     assert abs(np.mean(white**2) - 1.0) < 4.0 * np.sqrt(2.0 / white.size)
+
+
+def test_what_acts_from_the_start_is_not_in_the_first_sample():
+    """A load put on at once is not in an acceleration measured just before; and short bursts are of samples that count."""
+    n = 1000
+    good = np.ones((n, 1), bool)
+    good[500:510] = False
+    y = np.random.default_rng(1).standard_normal((n, 1))
+    y[495:515] += 100.0
+    e = noise.prepare("", STEP * np.arange(n), np.zeros((n, 1)), y, good, np.zeros(1), [None])
+    assert not e.good[0, 0] and e.good[1:400].all() and good[0, 0]
+    burst = noise.bursts([e], [np.zeros((n, 1))])[0]
+    assert burst[[496, 513], 0].all() and not burst[500:510].any()
+
+
+def test_a_way_that_cannot_be_simulated_is_not_gone(model, sound, monkeypatch):
+    """Where a little more of a value makes the simulation leave all bounds, that is a large residual, and a fit goes on."""
+    one = study.null_study(model, [experiment(m, model) for m in sound])
+    problem = Problem(model, one.experiments, one.metrics)
+    free, simulate = one.null.free, problem.simulate
+    wild = next(i for i, f in enumerate(free) if f.target == "d")
+
+    def bounded(e, free, shifts, *more):
+        z, x = simulate(e, free, shifts, *more)
+        return np.where((shifts[:, wild] != 0.0)[:, None, None], 1e300, z), x
+
+    monkeypatch.setattr(problem, "simulate", bounded)
+    residual, jacobian, _ = problem.linear(free)
+    assert np.isfinite(residual).all() and np.isfinite(jacobian).all()
+    assert problem.solve(free, 2).cost <= one.null.cost + 1.0
+
+
+def test_what_ends_without_force_is_no_cause(tmp_path, model):
+    """Friction and a spring that gets softer hide; a fit that begins with friction and a stop ends with the friction alone."""
+    z = road(5)
+    path = record(tmp_path / "rubs.csv", z, drive(z, lambda s, v: 60.0 * np.tanh(v / 4e-3) - 2e7 * s**3), 15)
+    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
+    r = study.regression(one, one.null, [])
+    first = {c.kind: c for c in r.candidates[::-1]}
+    terms = [Term(first["coulomb_friction"], 40.0), Term(first["bump_stop"], 1000.0)]
+    found = search.explain(one, terms)
+    assert [t.candidate.what.place for t in found.terms] == [terms[0].candidate.what.place] and found.groups[0][0] != "bump_stop"
+    assert len(found.built.names) == 1 and not any("gap" in name for name in found.fit.model.parameters)
 
 
 def test_transfer_of_a_place_is_that_of_the_equations(model):

@@ -116,13 +116,13 @@ def test_a_resonance_needs_little_damping_and_one_mass(values, monkeypatch):
     "kind, small, large",
     [
         ("sensor_scale", {"scale": 1.004}, {"scale": 0.994}),
-        ("sensor_delay", {"delay": 1.9 * engine.SKEW * 1e-3}, {"delay": 2.1 * engine.SKEW * 1e-3}),
+        ("sensor_delay", {"delay": 7.6e-6}, {"delay": 8.4e-6}),
         ("wrong_parameter", {"c": 100.9}, {"c": 98.9}),
         ("hidden_resonance", {"mass": 0.7, "frequency": 8.0, "damping_ratio": 0.1}, {"mass": 0.9, "frequency": 8.0, "damping_ratio": 0.1}),
     ],
 )
 def test_what_is_significant_may_be_too_small(values, kind, small, large):
-    """Half a per cent of a scale, two skews of a sample, the tolerance, two thousandths of the body."""
+    """Half a per cent of a scale, eight thousandths of a sample, the tolerance, two thousandths of the body."""
     for size, answer in ((small, ([], "no_discrepancy")), (large, ([kind], "explained"))):
         values[kind] = {k: (v, 0.99 * v, 1.01 * v) for k, v in size.items()}
         assert judged(found((kind, "body"))) == answer
@@ -141,3 +141,27 @@ def test_alternatives_are_near_and_take_one_place(values):
     (cause,), _, _, _ = engine.judge(STUDY, [best, near, far, both], [], 0.0, 0.0, False)
     assert [o.kind for o in cause.alternatives] == ["cubic_spring"]
     assert 0.5 < cause.confidence < 0.99
+
+
+@pytest.mark.parametrize(
+    "high, model, kinds",
+    [
+        (2.5, 3.0, ["sensor_clipping"]),  # 15 samples at the greatest value there is, and the model goes on beyond
+        (2.5, 1.0, ["sensor_dropout"]),  # the model is below: the sensor was held
+        (9.0, 10.0, ["sensor_dropout"]),  # the value was exceeded elsewhere
+    ],
+)
+def test_a_rail_may_be_met_once(high, model, kinds):
+    """Flat samples that no statistics of the record shows, for they are too few, are a rail if the sensor never shows more."""
+    y, at = np.zeros(ROWS), slice(5000, 5015)
+    y[100], y[at] = min(high, 2.4) if high < 9.0 else high, 2.5
+    quality = SimpleNamespace(low=None, high=None, quantum=0.0, held=0, missing=0, spikes=0)
+    measured = SimpleNamespace(z={"a": y}, mask={"a": np.ones(ROWS, bool)}, quality=SimpleNamespace(channels={"a": quality}))
+    study = SimpleNamespace(experiments=[SimpleNamespace(time=np.arange(ROWS))], levels=[np.full((1, 1), 1e-4)])
+    sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
+    simulated, burst = y.copy(), np.zeros((ROWS, 1), bool)
+    simulated[at], burst[at] = model, True
+    found = engine.broken_sensors(sensors, [measured], study, [simulated[:, None]], [burst])
+    assert [c.kind for c in found] == kinds
+    if kinds == ["sensor_clipping"]:
+        assert found[0].parameters["high"].value == found[0].parameters["limit"].value == 2.5

@@ -9,8 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from penode_sil.diagnosis.build import Term
+from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.score import Candidate, Regression
-from penode_sil.diagnosis.search import PART, pursue, terms_of
+from penode_sil.diagnosis.search import PART, Explanation, acting, distinct, pursue, sprung, terms_of
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
 
@@ -39,3 +41,52 @@ def test_a_law_stays_beside_its_companions(residual, gains):
 def test_companions_alone_are_no_cause():
     assert terms_of(regression([1.0, 0.0], [1.0, 1.0], [-10.0, -5.0]), [0, 1]) == []
     assert terms_of(regression([1.0, 0.0], [1.0, 1.0], [30.0, 10.0]), [1]) == []
+
+
+def explanation(*kinds: str, gain: float = 0.0, formulas: float = 0.0) -> Explanation:
+    terms = tuple(Term(Candidate(kind, "body", 0, False, "c"), 1.0) for kind in kinds)
+    return Explanation(terms, None, None, None, gain, formulas)
+
+
+def test_the_best_of_each_choice_comes_first():
+    """An explanation that was found twice stands where its better form belongs, not where it was first seen."""
+    found = [explanation("cubic_spring", gain=g) for g in (100.0, 900.0)] + [explanation("bump_stop", gain=500.0)]
+    assert [e.gain for e in distinct(found)] == [900.0, 500.0]
+
+
+def test_form_is_a_part_of_what_formulas_leave():
+    """A load takes 150 000 and has no form to mend; a second cause that gains 1 000 beside it is worth nearly that."""
+    alone, both = explanation("constant_force", gain=150_000.0), explanation("constant_force", "tyre_liftoff", gain=151_000.0, formulas=150_000.0)
+    assert 900.0 < both.score - alone.score < 950.0  # 50 for the kind, 10 for its number, and thousandths of 1 000
+    assert explanation("constant_force", "tyre_liftoff", gain=151_000.0).score < alone.score + 800.0
+
+
+@pytest.mark.parametrize("value, masses", [(460.0, 3), (380.0, 0)])
+def test_a_mass_that_is_too_small_may_have_one_on_a_spring(value, masses):
+    """Tried below, in and above the range of most of them, each with what the body has too little; a body that is lighter has none."""
+    tried = [("absorber", 0, f, zeta) for f in (1.0, 8.0, 16.0, 30.0, 40.0) for zeta in (0.03, 0.1, 0.3)]
+    r = SimpleNamespace(candidates=[Candidate("hidden_resonance", "body", 1, False, what) for what in tried])
+    model = SimpleNamespace(bodies=[SimpleNamespace(name="body", mass="m_b")], parameters={"m_b": SimpleNamespace(value=400.0)})
+    fitted = SimpleNamespace(fit=SimpleNamespace(value={"m_b": value}.__getitem__))
+    ways = sprung(SimpleNamespace(model=model), fitted, r, ("wrong_parameter", "m_b"))
+    assert [(t.candidate.what[2:], t.gain) for way in ways for t in way] == [((f, 0.1), 60.0) for f in (8.0, 16.0, 30.0)][:masses]
+    assert sprung(SimpleNamespace(model=model), fitted, r, ("sensor_scale", "a_body")) == []
+
+
+def law(kind: str, gain: float, companion: bool = False) -> Term:
+    return Term(Candidate(kind, "spring", 1, companion, Basis(kind, 0, "", ("k", ""), {}, 1, (), companion)), gain)
+
+
+@pytest.mark.parametrize(
+    "gains, left",
+    [
+        ((1.0, 1.0, 0.0), (0, 1)),  # a law of another kind that ended without force is no cause
+        ((1.0, 0.0, 2.0), (0, 2)),
+        ((0.0, 1.0, 0.0), (0, 1)),  # a companion is none without the law that it goes with
+        ((0.0, 0.0, 2.0), (2,)),
+    ],
+)
+def test_what_has_no_force_goes(gains, left):
+    terms = [law("backlash", gains[0]), law("backlash", gains[1], companion=True), law("bump_stop", gains[2])]
+    wrong = Term(Candidate("wrong_parameter", "c", 0, False, "c"), 0.0)
+    assert acting([*terms, wrong]) == [*(terms[k] for k in left), wrong]

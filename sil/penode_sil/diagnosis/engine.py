@@ -24,7 +24,7 @@ from . import absorb, extension, nameless, naming, noise, plausible, residual, s
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
 from .search import Explanation
-from .study import MOVING, SKEW, Study, begin, look
+from .study import MOVING, Study, begin, look
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it
@@ -32,12 +32,11 @@ WILD = 2.0  # standard deviations of the noise that bursts have together: one sa
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
 ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
 PATCHED = 0.985  # share that several causes must take away if sensors still share a residual
-WHOLE = 0.97  # share that is a whole explanation
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
-FILTER = 0.93  # of what several hidden masses gain: where one gains less, they are a filter that stands for other dynamics
+LATE = 0.008  # of a sample: less delay than that is no fault of a sensor
 OUTSIDE = "outside_taxonomy"
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
 SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "maxwell_bushing": "stiffness", "hidden_resonance": "frequency"}
@@ -89,7 +88,9 @@ def diagnose(
     best = explanations[0] if explanations else None
     if best is not None:  # bursts and spikes that a cause explains were none
         kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
-        faults = broken_sensors(model, train, study, best.fit.simulated, kept)
+        rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
+        again = broken_sensors(model, train, study, best.fit.simulated, kept)  # a cause may clip as well: then a rail looks like a drop-out
+        faults = [f for f in again if f.kind != "sensor_dropout" or f.where not in rails]
     tell(SEARCH[1], "weighing them against numerics")
     study = replace(study, seen=look(study, best.fit if best else study.null))
     numbers, step = extension.numerics(study)
@@ -206,11 +207,13 @@ def broken_sensors(
             sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
             flagged = ~m.mask[sensor.name][:n]
             off = np.abs(m.z[sensor.name][:n] - simulated[k][:, j]) > 4.0 * sigma
+            railing = np.zeros(n, bool)
             for side, name, rail in ((-1.0, "low", channel.low), (1.0, "high", channel.high)):
                 if rail is None:
                     continue
                 at = flagged & (np.abs(m.z[sensor.name][:n] - rail) < 1e-6 * abs(rail))
                 beyond = side * (simulated[k][at, j] - rail) > -4.0 * sigma
+                railing |= at
                 if np.mean(beyond) > 0.5:
                     clipped += np.count_nonzero(at)
                     rails[name] = rail
@@ -218,9 +221,16 @@ def broken_sensors(
                     railed += np.count_nonzero(at)
             lost = channel.held + channel.missing + channel.spikes
             still = channel.held > max(FEW, STILL * n) and channel.quantum < 0.3 * sigma  # noise does not repeat itself
-            if lost and (channel.missing or still or np.count_nonzero(flagged & off) > 0.2 * lost):
+            if lost and (channel.missing or still or np.count_nonzero(flagged & off & ~railing) > 0.2 * lost):
                 dropped += lost
-            dropped += int(np.count_nonzero(bursts[k][:n, j])) if len(bursts) > k else 0
+            burst = bursts[k][:n, j] if len(bursts) > k else np.zeros(n, bool)
+            dropped += int(np.count_nonzero(burst))
+            y = m.z[sensor.name][:n]
+            for side, name, rail in ((-1.0, "low", np.min(y)), (1.0, "high", np.max(y))):  # a rail that was met once or twice
+                at = burst & (y == rail) & (side * (simulated[k][:, j] - rail) > 0.0)
+                if np.count_nonzero(at) >= FEW:
+                    clipped, dropped = clipped + np.count_nonzero(at), dropped - np.count_nonzero(at)
+                    rails[name] = float(rail)
         dropped += 0 if clipped >= FEW else railed
         if clipped >= FEW:
             sizes = {"limit": max(map(abs, rails.values())), **rails}
@@ -238,7 +248,7 @@ def judge(
 ) -> tuple[tuple[Cause, ...], str, float, float]:
     """Causes, verdict, share explained, and the evidence that there is anything at all; `alike`, `shared`: see
     noise.kinship; `pure`: a tone is left."""
-    rows = len(study.null.residual) * float(np.mean([np.mean(e.good) for e in study.experiments]))
+    rows = search.rows(study)
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)
     if not explanations:
@@ -255,7 +265,7 @@ def judge(
     if len(best.groups) > 1 and share < PATCHED and alike > ALIKE:  # several causes, and still no whole: a patchwork
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
-    if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < FILTER * best.gain:
+    if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < search.FILTER * best.gain:
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     causes = [cause(study, explanations, group) for group in best.groups]
     causes = [c for c in causes if worth(study, c)]
@@ -267,7 +277,7 @@ def judge(
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     faulty = {(c.kind, c.where) for c in causes}
     causes += [f for f in faults if (f.kind, f.where) not in faulty]
-    whole = (share > WHOLE or left < 0.15 * rows) and not pure
+    whole = (share > search.WHOLE or left < 0.15 * rows) and not pure
     return tuple(causes), ("explained" if whole else "partly_explained") if causes else "no_discrepancy", share, evidence
 
 
@@ -277,8 +287,11 @@ def worth(study: Study, c: Cause) -> bool:
     match c.kind:
         case "sensor_scale":
             return abs(p["scale"] - 1.0) > 0.005
+        case "constant_force":
+            low, high = c.parameters["force"].ci95
+            return low * high > 0.0
         case "sensor_delay":
-            return p["delay"] > 2.0 * SKEW * study.model.sample_time
+            return p["delay"] > LATE * study.model.sample_time
         case "wrong_parameter":
             return all(abs(v / study.model.parameters[k].value - 1.0) > study.model.parameters[k].tolerance for k, v in p.items())
         case "hidden_resonance":

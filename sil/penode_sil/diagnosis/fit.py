@@ -26,6 +26,7 @@ from .noise import Experiment, Metric
 from .plant import anonymous
 
 Array = NDArray[np.float64]
+FAR = 1e20  # residual of a run that cannot be simulated
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of trial steps, relative to the curvature
 
@@ -132,11 +133,14 @@ class Problem:
     def residuals(self, e: int, z: Array) -> Array:
         """Whitened residuals [runs, rows]."""
         y, good = self.experiments[e].y.T, self.experiments[e].good.T
-        rows = np.empty((len(z), *y.shape))  # as the transforms like them
-        np.subtract(y, np.moveaxis(z, 1, 2), out=rows)
-        if not good.all():
-            rows *= good
-        return self.metrics[e](np.moveaxis(rows, 1, 2))
+        rows = np.empty((len(z), *y.shape), np.float32)  # as the transforms like them, and fine enough for what is left
+        with np.errstate(over="ignore", invalid="ignore"):  # some runs leave all bounds
+            np.subtract(y, np.moveaxis(z, 1, 2), out=rows, casting="same_kind")
+            if not good.all():
+                rows *= good
+            white = self.metrics[e](np.moveaxis(rows, 1, 2))
+            white[~np.isfinite(np.sum(white, axis=1))] = FAR
+        return white
 
     def solve(self, free: Sequence[Free], iterations: int = 12, close: float = 0.05, known: Mapping[int, Array] = {}) -> Fit:
         """The best free values from those given on, by damped Gauss-Newton; stops when a step gains less than `close`.

@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.polynomial import Legendre
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.linalg import solve_banded
 
 import penode_gen
 from penode_gen.model import GROUND
@@ -141,7 +141,7 @@ def losses(s: Array, step: float, gaps: Sequence[float], taus: Sequence[float]) 
 def lag(x: Array, tau: float, step: float) -> Array:
     """First-order lag of x."""
     a = np.exp(-step / tau)
-    return lfilter([1.0 - a], [1.0, -a], x)
+    return solve_banded((1, 0), np.stack([np.ones_like(x), np.full_like(x, -a)]), (1.0 - a) * x, check_finite=False)
 
 
 def warm(v: Array, t: Array, work: float, cooling: float) -> Array:

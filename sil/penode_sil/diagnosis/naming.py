@@ -36,10 +36,11 @@ SPRINGS = ("asymmetric_spring", "cubic_spring", "bump_stop", "network_extrapolat
 TYRES = ("tyre_nonlinear", "tyre_liftoff")
 QUIET = 0.25  # of the largest force that an element is wrong by: less where its network was trained, and it is not the element
 UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that makes it asymmetric
-EDGE = 0.03  # of the reach: a stop that acts from nearer than that to the middle is a spring of two stiffnesses
+EDGE = 0.15  # of the reach: a stop that acts from nearer than that to the middle is a spring that hardens, or has two stiffnesses
 STRAIGHT = 0.02  # of the straight part of a curve: less than that beside it, and it is a straight line
 FLAT = 0.015  # of what a tyre lacks when stretched: bent by less than that when pressed in, it only loses contact
-PEAK = 1.08  # friction at low rates over that at high ones that makes it Stribeck's
+PEAK = 1.2  # friction at low rates over that at high ones that makes it Stribeck's
+STEP = 0.5  # of its greatest force, that friction without memory has at a twentieth of the rates: with less, it is a damper
 Array = NDArray[np.float64]
 Values = Mapping[object, float]
 
@@ -73,6 +74,8 @@ def _friction(terms: Sequence[Term], names: Sequence[str], values: Values, reach
     f = Curve(terms, names)(np.zeros_like(v), v, values)
     if travel > ELASTIC * reach * force:
         return "bouc_wen"
+    if not travel and np.interp(0.05 * speed, v, f) < STEP * np.max(f):
+        return "degressive_damper"
     return "stribeck_friction" if np.max(f) > PEAK * f[-1] else "coulomb_friction"
 
 
@@ -91,7 +94,7 @@ def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: 
     found = {t.candidate.kind for t in terms}
     gaps = [abs(values.get(f"{n}_gap", reach)) for t, n in zip(terms, names) if t.candidate.kind == "bump_stop"]
     if gaps and max(gaps) < EDGE * reach:
-        return "asymmetric_spring"
+        return "asymmetric_spring" if _size(even) > UNEVEN * _size(odd) else "cubic_spring"
     if found & {"bump_stop", "network_extrapolation"}:
         return terms[0].candidate.kind
     if found == {"asymmetric_spring"} and _size(even) < UNEVEN * _size(odd):
@@ -374,7 +377,7 @@ def functions(
                 """Of the linear damper that takes as much work from the motion that was met."""
                 work = 0.0
                 for m in met:
-                    late = sum(p[f"{n}_stiffness"] * (m.s - m.s[0] - lag(m.s - m.s[0], p[f"{n}_relaxation"], m.t[1] - m.t[0])) for n in lagging)
+                    late = sum(p[f"{n}_stiffness"] * p[f"{n}_relaxation"] * lag(m.v, p[f"{n}_relaxation"], m.t[1] - m.t[0]) for n in lagging)
                     work += float(m.v @ (at_once(np.zeros_like(m.v), m.v, p) + late))
                 return work / sum(float(m.v @ m.v) for m in met)
 

@@ -70,10 +70,11 @@ def prepare(
     """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors.
 
     Where the noise exceeds the input's own spectrum, the measured input is damped to what is likely (Wiener), and the rest
-    is unsure. The number of samples becomes one that Fourier transforms like.
+    is unsure. The number of samples becomes one that Fourier transforms like. The first does not count: what acts from the start
+    on is not in it yet.
     """
     n = fft.prev_fast_len(len(time), real=True)
-    time, u, y, good = time[:n], u[:n], y[:n], good[:n]
+    time, u, y, good = time[:n], u[:n], y[:n], good[:n] & (np.arange(n) > 0)[:, None]
     step = float(time[1] - time[0])
     f = fft.rfftfreq(2 * n, step)
     line = np.linspace(0.0, 1.0, n)[:, None]
@@ -214,7 +215,7 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
         few = np.mean(wild & alone, axis=0) < 0.01
         many = np.sum(wild & alone, axis=0) >= np.where(np.max(rough, axis=0) > 30.0 * usual, 2, 5)
         often = np.mean(e.good, axis=0) > 0.5  # a sensor slower than the raster has no neighbours to be far beyond
-        found.append(((alone & few & many) | _sunken(e, z, r) | _frozen(e, z, r)) & often)
+        found.append(((alone & few & many) | _sunken(e, z, r) | _frozen(e, z, r)) & often & e.good)
     return found
 
 

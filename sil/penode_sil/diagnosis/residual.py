@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal, stats
+from scipy import special
 from scipy.fft import irfft, rfft, rfftfreq
 
 from penode_gen import units
@@ -130,12 +130,13 @@ def segment(n: int, step: float, few: int) -> int:
 def density(r: Array, step: float, length: int, good: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
     """Frequencies [Hz] and one-sided power density of r [n] (Welch, Hann, overlap by half); r is 0 where it is not
     good."""
-    f, power = signal.welch(r, 1.0 / step, "hann", length, detrend=False)
-    if good is None or good.all():
-        return f, power
-    window = signal.get_window("hann", length) ** 2
-    counted = [window @ good[k : k + length] for k in range(0, len(r) - length + 1, max(length - length // 2, 1))]
-    return f, power * (window.sum() / max(float(np.mean(counted)), 1e-300))
+    window = np.hanning(length + 1)[:length]
+    starts = range(0, len(r) - length + 1, max(length - length // 2, 1))
+    power = np.mean([np.abs(rfft(window * r[k : k + length])) ** 2 for k in starts], axis=0)
+    power[1 : (length + 1) // 2] *= 2.0  # a mean and the highest frequency have no other side
+    good = np.ones(len(r), bool) if good is None else good
+    counted = [window**2 @ good[k : k + length] for k in starts]
+    return rfftfreq(length, step), power * step / max(float(np.mean(counted)), 1e-300)
 
 
 def coherence(r: Array, u: Array, step: float, length: int) -> tuple[Array, float, float]:
@@ -151,7 +152,7 @@ def coherence(r: Array, u: Array, step: float, length: int) -> tuple[Array, floa
     cross = np.einsum("kfi,kf->fi", x, np.conj(y))
     linear = np.real(np.einsum("fi,fi->f", np.conj(cross), np.linalg.solve(power, cross[:, :, None])[:, :, 0]))
     number = len(starts) / OVERLAP
-    limit = float(stats.beta.ppf(1.0 - CHANCE, u.shape[1], max(number - u.shape[1], 0.5)))
+    limit = float(special.betaincinv(u.shape[1], max(number - u.shape[1], 0.5), 1.0 - CHANCE))
     found = np.clip(linear / np.maximum(np.sum(np.abs(y) ** 2, axis=0), 1e-300), 0.0, 1.0)
     return found, limit, min(u.shape[1] / number, 1.0)
 
@@ -163,9 +164,9 @@ def whiteness(ratio: Array) -> tuple[Whiteness, Array]:
     inner = np.sort(running[:-1])
     line = np.arange(m) / max(m - 1, 1)
     distance = float(max(np.max(line[1:] - inner), np.max(inner - line[:-1]))) if m > 1 else 0.0
-    limit = float(stats.kstwobign.ppf(1.0 - CHANCE)) / np.sqrt(max(m - 1, 1))
+    limit = float(special.kolmogi(CHANCE)) / np.sqrt(max(m - 1, 1))
     return Whiteness(
-        distance, limit, float(stats.kstwobign.sf(distance * np.sqrt(max(m - 1, 1)))), float(np.mean(ratio))
+        distance, limit, float(special.kolmogorov(distance * np.sqrt(max(m - 1, 1)))), float(np.mean(ratio))
     ), running
 
 

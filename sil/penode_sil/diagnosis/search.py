@@ -18,7 +18,7 @@ from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
 from .hypotheses import BENDS, KNEE, STRIBECK, Basis, Fault
 from .naming import christened, straight
-from .score import Candidate, Regression
+from .score import DAMPINGS, Candidate, Regression
 from .study import Study, loss, regression, requieted
 
 TERMS = 3  # elementary laws of one kind
@@ -34,10 +34,14 @@ CURVES = {  # kinds of one family at one place are one curve with one name
     "network_extrapolation": "spring",
     "tyre_nonlinear": "tyre", "tyre_liftoff": "tyre",
 }  # fmt: skip
+FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
 SMALL = 0.03  # of all that was gained: a cause worth less than that may be a remainder of another
 PART = 0.1  # of the size a law has alone: left to it where its companions do the rest
+WHOLE = 0.97  # share that is a whole explanation
 NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
+CLOSE = 0.02  # of the gain: an exchanged cause that is nearly as good gets more laws
+SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
     "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
@@ -88,8 +92,13 @@ class Explanation:
         plain = len(self.terms) == len(self.groups) and all(kind in (*EXACT, *FORMULAS) for kind, _ in self.groups)
         slow = all(kind == "sensor_bias" or kind in EXACT for kind, _ in self.groups)  # a bias is no form, however it wanders
         if not plain and not slow:
-            form = FORM * self.freedom / COST * (self.gain - self.formulas) + LEAST * (len(self.groups) - 1) * self.gain
+            form = (FORM * self.freedom / COST + LEAST * (len(self.groups) - 1)) * (self.gain - self.formulas)
         return self.gain - self.price - max(form, 0.0)
+
+
+def rows(study: Study) -> float:
+    """Chi2 that noise leaves."""
+    return len(study.null.residual) * float(np.mean([np.mean(e.good) for e in study.experiments]))
 
 
 def exact(groups: Sequence[Group]) -> bool:
@@ -156,7 +165,7 @@ def pair(r: Regression) -> tuple[float, list[int]]:
 def explain(
     study: Study, terms: Sequence[Term], iterations: int = 10, start: Fit | None = None, formulas: float = 0.0
 ) -> Explanation:
-    """Fit some terms by simulation, with everything else from where a fit has left it."""
+    """Fit some terms by simulation, with everything else from where a fit has left it. What ends without force is left out."""
     recordings = len(study.experiments)
     built = extended(study.model, study.places, terms, recordings if study.moving else 0, recordings)
     problem = Problem(built.model, study.experiments, study.metrics, study.set_name, study.linear.fastest, built.faults)
@@ -168,7 +177,18 @@ def explain(
     near = {i: study.null.jacobian[:, i] for i, f in enumerate(study.null.free) if f.target not in built.loosened}
     fit = problem.solve(problem.eased(free), iterations, 0.5, near)
     gain = study.nothing - loss(study, fit) if np.isfinite(fit.cost) else -np.inf
-    return Explanation(christened(fitted(terms, built, fit), built.names, fit, study), built, problem, fit, gain, formulas)
+    found = fitted(terms, built, fit)
+    if len(acting(found)) < len(found):
+        return explain(study, acting(found), 2, fit, formulas)
+    return Explanation(christened(found, built.names, fit, study), built, problem, fit, gain, formulas)
+
+
+def acting(terms: Sequence[Term]) -> list[Term]:
+    """The terms that have a force, and those that companions with one need to be a cause."""
+    forceful = [t for t in terms if t.gain != 0.0 or not isinstance(t.candidate.what, Basis)]
+    led = {t.group for t in forceful if not t.candidate.companion}
+    bare = {t.group for t in forceful} - led
+    return [t for t in terms if t in forceful or t.group in bare and not t.candidate.companion]
 
 
 def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
@@ -190,7 +210,7 @@ def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
     if worth > 0.7 * best:
         choices.append(both)
     found = [explain(study, terms) for terms in (terms_of(r, chosen) for chosen in choices) if terms]
-    return sorted(found, key=lambda e: -e.score)
+    return sorted((e for e in found if e.groups), key=lambda e: -e.score)
 
 
 def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str]) -> tuple[Explanation, Regression]:
@@ -198,7 +218,7 @@ def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str
     for _ in range(2):
         best = None
         for group in e.groups:
-            if sum(t.group == group for t in e.terms) < room(group[0]) + 1:
+            if group[0] != "hidden_resonance" and sum(t.group == group for t in e.terms) < room(group[0]) + 1:
                 own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
                 pool = [k for k in pools(r).get(group, []) if _fault(r.candidates[k]) not in own]
                 gain, chosen = pursue(r, pool, terms=1, alone=group[0] != "sensor_bias")
@@ -212,6 +232,16 @@ def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str
         e = wider.whole()
         r = regression(study, e.fit, parameters)
     return e, r
+
+
+def filtered(study: Study, e: Explanation, r: Regression) -> Explanation | None:
+    """The explanation with a second hidden mass, if it has one and that gains by another: any filter will do, and has no name."""
+    for group in e.groups:
+        if group[0] == "hidden_resonance" and sum(t.group == group for t in e.terms) == 1:
+            gain, chosen = pursue(r, pools(r).get(group, []), terms=1)
+            if chosen and gain > (1.0 / FILTER - 1.0) * e.gain:
+                return explain(study, [*e.terms, *terms_of(r, chosen)], start=e.fit, formulas=e.formulas)
+    return None
 
 
 def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
@@ -252,16 +282,23 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     loads = {r.candidates[k].where: terms_of(r, [k]) for k in sorted(gains, key=gains.__getitem__)}.values()  # the best of each place
     unloaded = [t for e in told[:1] for t in e.terms if t.candidate.kind != "constant_force"]
     others = [t for t in unloaded if t.candidate.kind != "sensor_bias"]  # in motion, a load looks like one
-    ways = [[*load, *more] for load in loads for more in ([[], others] if others else [[]])]
-    biased = [list(e.terms) for e in told if {"constant_force", "sensor_bias"} & {g[0] for g in e.groups} == {"sensor_bias"}]
-    beam = sorted((explain(rest, terms) for terms in [*ways, *biased[:1]]), key=lambda e: -e.score)
-    idle = explain(rest, unloaded).score if unloaded and unloaded not in biased else 0.0
+    ways = [(load, others) for load in loads]
+    for e in [e for e in told if {"constant_force", "sensor_bias"} & {g[0] for g in e.groups} == {"sensor_bias"}][:1]:
+        bias = [t for t in e.terms if t.candidate.kind == "sensor_bias"]
+        ways.append((bias, [t for t in e.terms if t not in bias]))
+    beam = []
+    for first, more in ways:
+        beam.append(explain(rest, first))
+        beam += [explain(rest, [*first, *more], formulas=max(beam[-1].gain, 0.0))] if more else []
+    beam.sort(key=lambda e: -e.score)
+    tried = [set(first + more) for first, more in ways]
+    idle = explain(rest, unloaded).score if unloaded and set(unloaded) not in tried else 0.0
     moving = rest.nothing - free.nothing + (told[0].score if told else 0.0)
     log(f"at rest {idle:.0f}, with {beam[0].groups} {beam[0].score:.0f}, moving {moving:.0f}")
     if beam[0].score < max(idle + NEW, (1.0 - NEAR) * moving - NEW):
         return rest, []
     quiet = requieted(rest, beam[0].fit)
-    return grow(quiet, [explain(quiet, e.terms, 4, e.fit) for e in beam[:3]], log)
+    return grow(quiet, [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]], log)
 
 
 def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:
@@ -320,8 +357,15 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
     if quiet is bare:
         return grow(quiet, first, log)
     again = [*singles(quiet, regression(quiet, quiet.null, parameters)), explain(quiet, first[0].terms, start=first[0].fit)]
-    best = {e.groups: e for e in sorted(again, key=lambda e: e.score)}
-    return grow(quiet, list(best.values())[::-1], log)
+    return grow(quiet, distinct(again), log)
+
+
+def distinct(found: Sequence[Explanation]) -> list[Explanation]:
+    """The best explanation by each choice of causes, from best to worst."""
+    best: dict[frozenset[Group], Explanation] = {}
+    for e in sorted(found, key=lambda e: -e.score):
+        best.setdefault(frozenset(e.groups), e)
+    return list(best.values())
 
 
 def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Explanation]]:
@@ -332,7 +376,10 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
     done = list(beam)
     for _ in (2, 3):
         grown: list[Explanation] = []
-        for e in [b for b in beam[:2] if b.gain > 0.7 * beam[0].gain]:
+        enough = 0.7 * beam[0].gain
+        for e in beam[:2]:
+            if e.gain < enough:
+                break
             here = requieted(study, e.fit)
             if here is not study:
                 e = explain(here, e.terms, 4, e.fit, e.formulas)
@@ -340,9 +387,13 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
             e, r = refine(here, e, regression(here, e.fit, parameters), parameters)
             done.append(e)
             log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f} {[_law(t) for t in e.terms]}")
-            for new in [terms_of(r, chosen) for chosen in further(here, e, r)[:2]]:
-                if not new:
-                    continue
+            if second := filtered(here, e, r):
+                done.append(second)
+                log(f"  two masses: {second.gain:.0f}")
+            ways = [*filter(None, (terms_of(r, chosen) for chosen in further(here, e, r)[:2]))]
+            if not ways and e.fit.chi2 - rows(here) < (1.0 - WHOLE) * e.gain:
+                enough = (1.0 - NEAR) * e.gain  # it is whole: only what is about as good may take its place
+            for new in ways:
                 more = explain(here, [*e.terms, *new], start=e.fit, formulas=e.gain if exact(e.groups) else e.formulas)
                 log(f"  + {more.groups[-1]} -> {more.gain:.0f}")
                 if more.score > e.score:
@@ -355,14 +406,19 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
     if done:
         study = requieted(study, done[0].fit)
     if done and len(done[0].groups) > 1:
-        done = sorted(done + exchanged(study, done[0], parameters, log), key=lambda e: -e.score)
+        found = exchanged(study, done[0], parameters, log)
+        if found and max(e.score for e in found) > done[0].score:
+            found += lightened(study, max(found, key=lambda e: e.score), log)
+        done = sorted(done + found, key=lambda e: -e.score)
     if not done:
         return study, []
     others = [e for e in done[1:] if set(e.groups) != set(done[0].groups) and len(e.groups) <= len(done[0].groups)]
     equal = [e for e in others if e.gain > done[0].gain - SLACK]  # and may be the plainer one
-    best, *equal = [plain(study, e, parameters, log) for e in [done[0], *equal[:1]]]
-    best = settled(study, next((e for e in equal if e.gain > best.gain - SLACK and e.price < best.price), best))
-    return study, [best, *done[1:], *equals(study, best, parameters, log)]
+    plainer = [(e, plain(study, e, parameters, log)) for e in [done[0], *equal[:1]]]
+    best = settled(study, max(plainer, key=lambda both: max(e.score for e in both))[1])
+    alike = equals(study, best, parameters, log)
+    swapped = max([best, *alike], key=lambda e: e.score)
+    return study, [swapped if swapped is best else settled(study, swapped), *([] if swapped is best else [best]), *done[1:], *alike]
 
 
 def settled(study: Study, e: Explanation) -> Explanation:
@@ -375,7 +431,7 @@ def settled(study: Study, e: Explanation) -> Explanation:
 def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Explanation:
     """The explanation with the textbook law of a kind in place of several laws, where it does about as well: its parameters
     are known better."""
-    e = unbent(study, e, log)
+    e = leaner(study, unbent(study, e, log), log)
     laws = {g: [_law(t) for t in e.terms if t.group == g] for g in e.groups if g[0] in TEXTBOOK}
     laws = {g: own for g, own in laws.items() if own != ["loose_damper"]}  # one as well
     bent = [g for g, own in laws.items() if len(own) > len(TEXTBOOK[g[0]]) or not set(own) <= set(TEXTBOOK[g[0]])]
@@ -395,6 +451,17 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
             log(f"  plain {group}: {simple.gain:.0f} for {e.gain:.0f}")
             if set(simple.groups) == set(e.groups) and (simple.gain > e.gain - SLACK or simple.score > e.score - SLACK):
                 e = simple
+    return e
+
+
+def leaner(study: Study, e: Explanation, log) -> Explanation:
+    """The explanation with the first law of a kind that has no textbook law in place of several, where that is worth as much."""
+    for group in e.groups:
+        own = [t for t in e.terms if t.group == group]
+        if len(own) > 1 and group[0] not in (*TEXTBOOK, "sensor_bias"):
+            simple = explain(study, [t for t in e.terms if t not in own[1:]], start=e.fit, formulas=e.formulas)
+            log(f"  lean {group}: {simple.gain:.0f} for {e.gain:.0f}")
+            e = simple if set(simple.groups) == set(e.groups) and simple.score > e.score else e
     return e
 
 
@@ -438,11 +505,35 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
                 gain, chosen = pursue(without, pool)
                 if chosen and gain > RIVAL * worth:
                     ranked.append((gain - sum(cost(r.candidates[c]) for c in chosen), chosen))
-        for new in [terms_of(without, chosen) for _, chosen in sorted(ranked, key=lambda x: -x[0])[:2]]:
-            if not new:
-                continue
+        ways = [terms_of(without, chosen) for _, chosen in sorted(ranked, key=lambda x: -x[0])[:2]]
+        for new in [*filter(None, ways), *sprung(study, e, r, group)]:
             found.append(explain(study, [*kept, *new], start=e.fit, formulas=e.formulas))
             log(f"  {group} for {found[-1].groups[-1]}: {found[-1].gain:.0f}")
+    close = [x for x in found if set(x.groups) != set(e.groups) and x.gain > (1.0 - CLOSE) * e.gain]
+    for other in [x.whole() for x in distinct(close)[:2]]:
+        found.append(refine(study, other, regression(study, other.fit, parameters), parameters)[0])
+        log(f"  refined {found[-1].groups} x{len(found[-1].terms)}: {found[-1].gain:.0f}")
+    return found
+
+
+def sprung(study: Study, e: Explanation, r: Regression, group: Group) -> list[list[Term]]:
+    """What a mass that is too small may be instead: the rest of it on a spring, which moves along at frequencies below its own."""
+    model = study.model
+    body = next((b.name for b in model.bodies if group == ("wrong_parameter", b.mass)), "")
+    more = e.fit.value(group[1]) - model.parameters[group[1]].value if body else 0.0
+    masses = [c for c in r.candidates if c.kind == "hidden_resonance" and c.where == body]
+    if more <= 0.0 or not masses:
+        return []
+    nearest = [min(masses, key=lambda c: abs(np.log(c.what[2] / f)) + abs(np.log(c.what[3] / DAMPINGS[1]))) for f in SPRUNG]
+    return [[Term(c, more)] for c in nearest]
+
+
+def lightened(study: Study, e: Explanation, log) -> list[Explanation]:
+    """Explanations with one of three causes or more left out: one that stood in for a cause found later is not needed."""
+    fewer = [[t for t in e.terms if t.group != group] for group in e.groups] if len(e.groups) > 2 else []
+    found = [explain(study, terms, start=e.fit, formulas=e.formulas) for terms in fewer]
+    for less in found:
+        log(f"  only {less.groups}: {less.gain:.0f} for {e.gain:.0f}")
     return found
 
 

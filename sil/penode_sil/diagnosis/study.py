@@ -19,7 +19,7 @@ from .plant import Linear, Place
 from .score import Regression, Seen, collect, smooth
 
 Array = NDArray[np.float64]
-SKEW = 0.004  # of a sample: channels are never sampled at quite the same time
+SKEW = 0.001  # of a sample: channels are never sampled at quite the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
 SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What a fitted curve is called, and the sizes read from it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from penode_sil.diagnosis import naming
+from penode_sil.diagnosis.build import Term
+from penode_sil.diagnosis.hypotheses import STRIBECK, Basis, Motion
+from penode_sil.diagnosis.score import Candidate
+
+REACH, SPEED = 0.02, 0.5  # m, m/s
+HUMP = "2.3316439815971242*k*exp(-(v/width)^2)*v/width"
+
+
+def term(kind: str, law: str, gain: str, shapes: dict[str, float] = {}) -> Term:
+    basis = Basis(kind, 0, law, (gain, ""), {k: (x, "") for k, x in shapes.items()}, 1, ())
+    return Term(Candidate(kind, "spring", 1, False, basis), 1.0)
+
+
+def named(rule, *laws: tuple[str, str, str, dict[str, float]]) -> str:
+    """What a rule calls the sum of laws: kind, law, gain, and its shapes with the gain."""
+    terms = [term(kind, law, gain, {k: x for k, x in shapes.items() if k != gain}) for kind, law, gain, shapes in laws]
+    names = [f"x{i}" for i in range(len(laws))]
+    values = {f"x{i}_{k}": x for i, (_, _, _, shapes) in enumerate(laws) for k, x in shapes.items()}
+    return rule(terms, names, values, REACH, SPEED)
+
+
+@pytest.mark.parametrize(
+    "rise, width, kind",
+    [
+        (0.5, 0.05, "stribeck_friction"),
+        (0.05, 0.05, "coulomb_friction"),  # a twentieth more at rest is what a form of hysteresis leaves
+    ],
+)
+def test_friction_that_falls_is_stribecks(rise, width, kind):
+    law = ("stribeck_friction", STRIBECK, "force", {"force": 20.0, "knee": 1e-3, "width": width, "rise": rise})
+    assert named(naming._friction, law) == kind
+
+
+@pytest.mark.parametrize("width, kind", [(0.02, "stribeck_friction"), (0.25, "degressive_damper")])
+def test_friction_is_there_at_once(width, kind):
+    """A force that comes with the rate, as that of a damper, and goes again is no friction: at a twentieth of the rates a width of
+    half of them has a quarter of its greatest force."""
+    assert named(naming._friction, ("stribeck_friction", HUMP, "k", {"k": 5.0, "width": width})) == kind
+
+
+@pytest.mark.parametrize(
+    "gaps, kind",
+    [
+        ((0.4, 0.5), "bump_stop"),
+        ((0.1, 0.1), "cubic_spring"),  # on both sides, and nearly from the middle: it hardens
+        ((0.1,), "asymmetric_spring"),
+    ],
+)
+def test_a_stop_leaves_room(gaps, kind):
+    sides = ("bump_stop", "rebound_stop")
+    laws = [("bump_stop", law, "stiffness", {"stiffness": 1e4, "gap": g * REACH}) for law, g in zip(sides, gaps)]
+    assert named(naming._spring, *laws) == kind
+
+
+@pytest.mark.parametrize("relaxation", [1e-6, 1e-4, 1e-3, 1e-2])
+def test_damping_of_a_tyre_that_lags(relaxation):
+    """
+    Spring and damper in series take from a sine the work of a damper of k tau / (1 + (omega tau)^2), whatever the samples.
+
+    Of 40 samples a period the filter's lag is off by (omega h)^2 / 12 = 0.2 % and half a step; a start costs a period of 50.
+    """
+    step, omega, stiffness = 1e-3, 2.0 * np.pi * 25.0, 1e5
+    t = step * np.arange(2000)
+    motion = Motion(1e-3 * np.sin(omega * t), 1e-3 * omega * np.cos(omega * t), t)
+    lagging = term("tyre_damping", "maxwell_bushing", "stiffness", {"relaxation": relaxation})
+    study = SimpleNamespace(model=None, places=[None], seen=[SimpleNamespace(motions=[motion])])
+    e = SimpleNamespace(terms=[lagging], built=SimpleNamespace(names=["x0"]))
+    unit, damping = naming.functions(study, e, lagging.group, REACH, SPEED)["damping"]
+    want = stiffness * relaxation / (1.0 + (omega * relaxation) ** 2)
+    half = omega * step / 2.0 * omega * relaxation  # half a step of delay, as a part of what is in phase
+    found = damping({"x0_stiffness": stiffness, "x0_relaxation": relaxation})
+    assert unit == "N*s/m" and abs(found / want - 1.0) < half + 0.03
