@@ -70,11 +70,10 @@ def prepare(
     """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors.
 
     Where the noise exceeds the input's own spectrum, the measured input is damped to what is likely (Wiener), and the rest
-    is unsure. The number of samples becomes one that Fourier transforms like. The first does not count: what acts from the start
-    on is not in it yet.
+    is unsure. The number of samples becomes one that Fourier transforms like.
     """
     n = fft.prev_fast_len(len(time), real=True)
-    time, u, y, good = time[:n], u[:n], y[:n], good[:n] & (np.arange(n) > 0)[:, None]
+    time, u, y, good = time[:n], u[:n], y[:n], good[:n]
     step = float(time[1] - time[0])
     f = fft.rfftfreq(2 * n, step)
     line = np.linspace(0.0, 1.0, n)[:, None]
