@@ -181,7 +181,7 @@ accuracy-source: | $(READY)
 
 python: $(patsubst test/%,python-%,$(wildcard test/gen test/sil test/tools test/diagnosis)) ## The Python tests
 python-%: | $(READY)
-	@HYPOTHESIS_STORAGE_DIRECTORY=build/hypothesis $(PYTHON) -m pytest -q test/$*
+	@HYPOTHESIS_STORAGE_DIRECTORY=build/hypothesis OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q test/$* # one thread each: parts run side by side
 
 # -- hidden effects: a draw that never changes, and one that nobody has seen --------------------------------------------
 

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_diagnosis import MODEL, drive, record, road
 
 import penode_gen
-from penode_gen import sets
+from penode_gen import fold, sets
 from penode_gen.networks import Affine, Dense, Network
 from penode_gen.read_json import read_json
 from penode_sil import diagnosis
@@ -53,6 +54,16 @@ def test_what_is_written_is_what_was_learnt(tmp_path):
     assert again.architecture == NETWORK.architecture
     assert again.evaluate(x) == pytest.approx(learnt.evaluate(x), rel=1e-12)  # ranges are stored, not factors
     assert (again.input_min, again.input_max) == (NETWORK.input_min, NETWORK.input_max)
+
+
+def test_the_running_code_has_room_for_the_pieces_of_what_was_learnt():
+    """pen_fold refuses a set with more of them, so such a one is not offered."""
+    learnt = Network((Dense(np.array([[1.0]] * 3), np.arange(3.0), "relu"), Dense(np.ones((1, 3)), np.zeros(1), "identity")), None, None, "x")
+    assert fold.pieces(learnt) == 5  # three kinks, four lines, and the one at the centre
+    rooms = {(0, "refuse"): True, (4, "refuse"): False, (4, "layers"): True, (5, "refuse"): True}
+    for (pieces, more), fits in rooms.items():
+        assert absorb.roomy(SimpleNamespace(pieces=pieces, more_pieces=more, outside="extrapolate"), learnt) == fits
+    assert absorb.roomy(SimpleNamespace(pieces=4, more_pieces="refuse", outside="extrapolate"), NETWORK)  # tanh has no pieces
 
 
 def diagnosed(tmp_path, model_text: str, force):

@@ -12,7 +12,7 @@ import pytest
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.score import Candidate, Regression
-from penode_sil.diagnosis.search import PART, Explanation, acting, distinct, pursue, sprung, terms_of
+from penode_sil.diagnosis.search import PART, Explanation, acting, distinct, hopeful, pursue, sprung, terms_of
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
 
@@ -59,6 +59,13 @@ def test_form_is_a_part_of_what_formulas_leave():
     alone, both = explanation("constant_force", gain=150_000.0), explanation("constant_force", "tyre_liftoff", gain=151_000.0, formulas=150_000.0)
     assert 900.0 < both.score - alone.score < 950.0  # 50 for the kind, 10 for its number, and thousandths of 1 000
     assert explanation("constant_force", "tyre_liftoff", gain=151_000.0).score < alone.score + 800.0
+
+
+@pytest.mark.parametrize("null, left, so", [(31_000, 14_000, True), (31_000, 24_000, False), (14_000, 11_000, False), (10_000, 9_900, False)])
+def test_a_cause_that_takes_most_is_not_given_up(null, left, so):
+    """In 10 000 samples: most of what is more than noise; less than most; and what may be noise of a colour."""
+    study = SimpleNamespace(null=SimpleNamespace(cost=null, residual=np.zeros(10_000)), experiments=[SimpleNamespace(good=np.ones(10_000, bool))])
+    assert hopeful(study, SimpleNamespace(fit=SimpleNamespace(cost=left))) == so
 
 
 @pytest.mark.parametrize("value, masses", [(460.0, 3), (380.0, 0)])

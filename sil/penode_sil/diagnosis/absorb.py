@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen import units
+from penode_gen import fold, units
 from penode_gen.laws import LAWS
-from penode_gen.model import Element
+from penode_gen.model import Element, Model
 from penode_gen.networks import Affine, Dense, Network, layer_slope, layer_value
 
 from .hypotheses import Basis, size
@@ -46,7 +46,8 @@ class Taught:
 
 
 def taught(study: Study, e: Explanation) -> list[Taught]:
-    """All networks of one input that can take up a cause beside them; none if a cause has memory or no network sees it."""
+    """All networks of one input that can take up a cause beside them; none if a cause has memory, if no network sees it, or
+    if the code that runs would refuse what was learnt."""
     chosen = study.model.sets[study.set_name].networks if study.model.sets else {}
     values = {f.target: f.value for f in e.fit.free}
     found = []
@@ -62,7 +63,7 @@ def taught(study: Study, e: Explanation) -> list[Taught]:
             if network.input_min is not None:
                 learnt = replace(learnt, input_min=np.array([np.min(x)]), input_max=np.array([np.max(x)]))
             missing = left / float(np.sqrt(np.mean(law**2)))
-            if missing < LEARNT:
+            if missing < LEARNT and roomy(study.model, learnt):
                 found.append(Taught(element.network, element.name, learnt, missing))
     return found
 
@@ -102,6 +103,13 @@ def _movable(network: Network) -> bool:
     )
     inner = network.layers[1:-1]
     return network.n_outputs == 1 and bool(ends) and all(isinstance(x, Dense) and x.activation != "step" for x in inner)
+
+
+def roomy(model: Model, network: Network) -> bool:
+    """Has code that folds its networks room for the pieces of this one?"""
+    if model.pieces == 0 or model.more_pieces == "layers" or not fold.foldable(network):
+        return True
+    return fold.pieces(network, model.outside == "clamp") <= model.pieces
 
 
 def learn(network: Network, x: Array, wanted: Array) -> tuple[Network, float]:

@@ -109,7 +109,7 @@ def diagnose(
     gain: dict[str, Gain] = {}
     named = None  # what has no name does not go into a model
     if not any(c.kind == OUTSIDE for c in causes):
-        named = best if best is not None and causes else search.explain(study, [])
+        named = search.mended(study, best, log) if best is not None and causes else search.explain(study, [])
     unnamed = nameless.fitted(study, best) if verdict == "unexplained" and not doubt else None
     if unnamed is not None and unused:
         tell(0.83, "fitting what has no name")
@@ -137,7 +137,7 @@ def diagnose(
         absorbed, more = absorbing(study, named, learnt, unused, output)
         notes += more
     tell(0.9, "showing what is wrong")
-    whole = named is not None and named in (best, unnamed)
+    whole = named is not None and (named is unnamed or best is not None and bool(causes))
     shown = residual.show(study, named.fit if whole else None, extended if whole else None, held)
     data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
     causes = tuple(replace(c, separate=separating(c)) for c in causes)

@@ -26,6 +26,8 @@ from .noise import Experiment, Metric
 from .plant import anonymous
 
 Array = NDArray[np.float64]
+STIFF = 2.5e-4  # [s] longest step of a law that follows a short way or a short time
+BLOCK = 256  # samples that are turned about at a time: they stay in the cache
 FAR = 1e20  # residual of a run that cannot be simulated
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of trial steps, relative to the curvature
@@ -93,7 +95,7 @@ class Problem:
         self.fine = 4 if moving(model) else 2  # see _drive
         step = model.sample_time / self.fine
         stiff = any(e.law == "loose_damper" or "presliding" in e.arguments for e in model.elements)
-        substeps = max(1, int(np.ceil(step * fastest / 0.1)), 4 * stiff, -(-model.substeps // self.fine))
+        substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / STIFF - 1e-6)) * stiff, -(-model.substeps // self.fine))
         exact = replace(_folded(model), method="rk4", interpolation="linear", input_rate="chord", substeps=substeps, sample_time=step)
         self.batch = _compiled(anonymous(exact))
         self.inputs = [_drive(e, self.fine) for e in experiments]
@@ -112,7 +114,10 @@ class Problem:
             else:
                 faults.append((f.target[0], f.target[1], values))
         run = self.batch.run(self.inputs[e], x0=start, parameters=parameters, set_name=self.set_name, states=states, every=self.fine)
-        z = np.ascontiguousarray(np.moveaxis(run.z, 1, 2))  # [runs, n_z, n], as what follows likes it
+        turned = run.z.transpose(0, 2, 1)
+        z = np.empty(turned.shape)  # [runs, n_z, n], in the order that what follows likes
+        for i in range(0, z.shape[2], BLOCK):
+            z[:, :, i : i + BLOCK] = turned[:, :, i : i + BLOCK]
         if self.fine == 4 and z.shape[2] > 2:
             z[:, :, 0] = 2.0 * z[:, :, 1] - z[:, :, 2]  # the step knows no rate of an input at its first sample
         z[run.first_bad >= 0] = 1e30
@@ -227,11 +232,12 @@ class Problem:
 
 
 def _folded(model: Model) -> Model:
-    """The model with its networks as straight pieces where all of them are: the same forces, far sooner."""
+    """The model with its networks as straight pieces where all of them are: the same forces, far sooner.
+    Layer by layer where the float weights have more of them: neurons may switch between two neighbouring numbers."""
     networks = [n for s in model.sets.values() for n in s.networks.values()]
     if not networks or model.pieces or model.outside == "fade" or not all(map(fold.foldable, networks)):
         return model
-    return replace(model, pieces=fold.room(max(fold.pieces(n, model.outside == "clamp") for n in networks)), more_pieces="refuse")
+    return replace(model, pieces=fold.room(max(fold.pieces(n, model.outside == "clamp") for n in networks)), more_pieces="layers")
 
 
 _BATCHES: dict[tuple[object, ...], Batch] = {}
@@ -240,7 +246,8 @@ _MOVING: dict[tuple[object, ...], bool] = {}
 
 def _structure(model: Model) -> tuple[object, ...]:
     """What models share that differ in values of parameters only."""
-    return repr(replace(model, parameters={}, sets={}, networks={})), tuple(model.parameters), id(model.networks)
+    shapes = {name: n.architecture for s in list(model.sets.values())[:1] for name, n in s.networks.items()}
+    return repr(replace(model, parameters={}, sets={})), tuple(model.parameters), repr(shapes)
 
 
 def moving(model: Model) -> bool:

@@ -19,7 +19,7 @@ from .fit import Fit, Problem
 from .hypotheses import BENDS, KNEE, STRIBECK, Basis, Fault
 from .naming import christened, straight
 from .score import DAMPINGS, Candidate, Regression
-from .study import Study, loss, regression, requieted
+from .study import Study, heard, loss, regression, requieted
 
 TERMS = 3  # elementary laws of one kind
 WANDERING = 5  # and of a bias, which may go any slow way
@@ -41,6 +41,9 @@ PART = 0.1  # of the size a law has alone: left to it where its companions do th
 WHOLE = 0.97  # share that is a whole explanation
 NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
 CLOSE = 0.02  # of the gain: an exchanged cause that is nearly as good gets more laws
+MOST = 0.5  # of what is more than noise
+DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a colour
+MENDS = 4  # laws, at most, that only mend the form of what is named
 SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
@@ -351,13 +354,20 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
         first = sorted([*first, *singles(slow, regression(slow, slow.null, parameters), 2)], key=lambda e: -e.score)
     for e in first:
         log(f"first {e.groups} {e.gain:.0f}")
-    if not first or first[0].score <= 0.0:
+    if not first or first[0].score <= 0.0 and not hopeful(bare, first[0]):
         return study, []
     quiet = requieted(bare, first[0].fit)
     if quiet is bare:
         return grow(quiet, first, log)
     again = [*singles(quiet, regression(quiet, quiet.null, parameters)), explain(quiet, first[0].terms, start=first[0].fit)]
     return grow(quiet, distinct(again), log)
+
+
+def hopeful(study: Study, e: Explanation) -> bool:
+    """Does a cause take most of what is more than noise, though noise of another colour would do as well? Then another cause is left
+    that was hidden in that noise, such as a bias, and both together may do better."""
+    more = study.null.cost - rows(study)
+    return more > DOUBLE * rows(study) and study.null.cost - e.fit.cost > MOST * more
 
 
 def distinct(found: Sequence[Explanation]) -> list[Explanation]:
@@ -376,7 +386,7 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
     done = list(beam)
     for _ in (2, 3):
         grown: list[Explanation] = []
-        enough = 0.7 * beam[0].gain
+        enough = beam[0].gain - 0.3 * abs(beam[0].gain)
         for e in beam[:2]:
             if e.gain < enough:
                 break
@@ -484,6 +494,35 @@ def _fault(c: Candidate) -> tuple[str, float] | None:
 
 def _law(t: Term) -> str:
     return getattr(t.candidate.what, "law", "")
+
+
+def mended(study: Study, e: Explanation, log) -> Explanation:
+    """The explanation with as many more laws of its causes as are worth their numbers, under the same names. A name is what a curve
+    does in the large; what the extended model foretells depends on all of the curve."""
+    parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
+    spare = [g for g in e.groups if g[0] not in (*EXACT, "sensor_delay")]
+    for _ in range(MENDS):
+        e = e.whole()
+        r = regression(study, e.fit, parameters)
+        found = []
+        for group in spare:
+            own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
+            pool = [k for k in family(study, r, [group]) if _fault(r.candidates[k]) not in own]
+            gain, chosen = pursue(r, pool, terms=1, alone=False)
+            if chosen and gain > 2.0 * cost(r.candidates[chosen[0]]):
+                found.append((gain, group, Term(r.candidates[chosen[0]], float(r.gain(chosen)[1][0]))))
+        if not found:
+            break
+        _, group, new = max(found, key=lambda x: x[0])
+        wider = explain(study, [*e.terms, new], start=e.fit, formulas=e.formulas)
+        log(f"  mended {group}: {wider.gain:.0f} for {e.gain:.0f}")
+        if set(wider.groups) == set(e.groups) and wider.gain > e.gain + 2.0 * cost(new.candidate):
+            levels, metrics = heard(study, wider.fit)  # what is mended had been taken for noise
+            study = replace(study, levels=levels, metrics=metrics)
+            e = settled(study, wider)
+        else:
+            spare.remove(group)
+    return e
 
 
 def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> list[Explanation]:
