@@ -44,7 +44,20 @@ def test_a_signal_that_fades_is_found_though_the_motion_turns():
     y[first : first + 50, 0] = y[first - 1, 0] * np.exp(-np.arange(50) / 10.0)
     (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
     far = np.abs(y[:, 0] - MOVE) > 0.06
-    assert found[far, 0].all() and not found[:, 1].any() and np.count_nonzero(found) < 60
+    assert found[far, 0].all() and not found[:, 1].any() and np.count_nonzero(found) <= 50 + 4 + 4 + 8  # margins, and what comes back
+
+
+@pytest.mark.parametrize("discharges", [True, False])
+def test_what_discharges_is_found_however_often(discharges):
+    """In 3 % of all samples, of both signs against the motion; what only sinks would as often be another motion."""
+    y = noisy(5)
+    for first in range(600, 9600, 1100):
+        y[first : first + 40, 0] = (
+            y[first - 1, 0] * np.exp(-np.arange(40) / 12.0) if discharges else y[first : first + 40, 0] * (1.0 - 0.97 * np.hanning(40))
+        )
+    (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
+    far = np.abs(y[:, 0] - MOVE) > 0.1
+    assert found[far, 0].mean() > 0.9 if discharges else not found.any()
 
 
 @pytest.mark.parametrize("quantum", [0.0, 0.03, 0.1])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from penode_sil.diagnosis import engine
+from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.result import Cause, Value
 
 ROWS = 10_000
@@ -28,9 +29,9 @@ SIGMA = np.sqrt(2.0 * ROWS)  # of chi2
 
 def found(*groups: tuple[str, str], left: float = 0.0, score: float = 1000.0, gain: float = 1000.0):
     """An explanation by groups that leaves `left` of chi2 beyond the noise."""
-    fit = SimpleNamespace(chi2=ROWS + left, cost=ROWS + left)
-    terms = [SimpleNamespace(group=g, candidate=SimpleNamespace(kind=g[0])) for g in groups]
-    return SimpleNamespace(groups=groups, terms=terms, fit=fit, score=score, gain=gain)
+    fit = SimpleNamespace(chi2=ROWS + left, cost=ROWS + left, free=(), covariance=lambda: np.zeros((0, 0)))
+    terms = [SimpleNamespace(group=g, candidate=SimpleNamespace(kind=g[0], what="")) for g in groups]
+    return SimpleNamespace(groups=groups, terms=terms, built=SimpleNamespace(names=["x1"] * len(terms)), fit=fit, score=score, gain=gain)
 
 
 @pytest.fixture
@@ -89,6 +90,21 @@ def test_a_size_that_may_be_zero_stands_for_something_else(values, kind, size):
     assert judged(found((kind, "body"))) == ([kind], "explained")
     values[kind] = others | {size: (1.0, -0.1, 2.1)}
     assert judged(found((kind, "body"))) == OUT
+
+
+@pytest.mark.parametrize("gains, together, out", [((300.0,), 0.0, False), ((200.0,), 0.0, True), ((200.0, 200.0), -0.9, False), ((200.0, 200.0), 0.9, True), ((200.0, -200.0), 0.9, False)])
+def test_laws_that_are_sure_make_up_for_a_size_that_is_not(values, gains, together, out):
+    """A stiffness over a time that is hardly known; gains are known to 100 N s/m each, and two as far as they go `together`."""
+    values["maxwell_bushing"] = {"stiffness": (1e6, -1e5, 2e6)}
+    e = found(*[("maxwell_bushing", "spring")] * len(gains))
+    e.groups, e.built.names = (("maxwell_bushing", "spring"),), ["x1", "x2"]
+    for t in e.terms:
+        t.candidate = SimpleNamespace(kind="maxwell_bushing", what=Basis("maxwell_bushing", 0, "loose_damper", ("damping", "N*s/m"), {}, 1, ()))
+    spring = [SimpleNamespace(group=t.group, candidate=SimpleNamespace(kind=t.group[0], what=Basis("maxwell_bushing", 0, "maxwell_bushing", ("stiffness", "N/m"), {}, 1, ()))) for t in e.terms]
+    assert judged(SimpleNamespace(**vars(e) | {"terms": spring})) == OUT  # of a spring behind a damper, a size that may be nothing is none
+    e.fit.free = [SimpleNamespace(target=f"x{i}_damping", value=g, unit=50.0) for i, g in enumerate(gains, 1)]
+    e.fit.covariance = lambda: 4.0 * np.array([[1.0, together], [together, 1.0]])[: len(gains), : len(gains)]
+    assert (judged(e) == OUT) == out
 
 
 def test_several_wrong_parameters_are_another_vehicle_and_delays_another_clock(values):

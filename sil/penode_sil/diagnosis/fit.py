@@ -75,12 +75,16 @@ class Fit:
     def value(self, target: object) -> float:
         return next(f.value for f in self.free if f.target == target)
 
-    def deviation(self) -> Array:
-        """Standard deviations of all free values in their units (log: relative)."""
+    def covariance(self) -> Array:
+        """Of all free values, in their units (log: relative)."""
         priors = np.array([(f.unit / f.sigma) ** 2 for f in self.free])
         curvature = self.jacobian.T @ self.jacobian + np.diag(priors)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
-        return scale * np.sqrt(np.maximum(np.diag(np.linalg.pinv(curvature * np.outer(scale, scale), rcond=1e-12)), 0.0))
+        return np.linalg.pinv(curvature * np.outer(scale, scale), rcond=1e-10) * np.outer(scale, scale)
+
+    def deviation(self) -> Array:
+        """Standard deviations of all free values in their units (log: relative)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance()), 0.0))
 
 
 class Problem:

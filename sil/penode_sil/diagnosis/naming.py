@@ -414,11 +414,7 @@ def values(study: Study, e: Explanation, group: Group) -> dict[str, Value]:
     what = terms[0].candidate.what
     reach, speed = size([s.motions[what.place] for s in study.seen]) if isinstance(what, Basis) else (1.0, 1.0)
     found = functions(study, e, group, reach, speed)
-    priors = np.array([(f.unit / f.sigma) ** 2 for f in free])
-    curvature = e.fit.jacobian.T @ e.fit.jacobian + np.diag(priors)
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
-    covariance = np.linalg.pinv(curvature * np.outer(scale, scale), rcond=1e-10) * np.outer(scale, scale)
-    covariance *= max(1.0, e.fit.chi2 / len(e.fit.residual))
+    covariance = e.fit.covariance() * max(1.0, e.fit.chi2 / len(e.fit.residual))
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     result = {}
     for name, (unit, function) in found.items():

@@ -250,16 +250,28 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
         far = np.abs(r[:, j]) > 6.0 * usual[j]
         wide = np.convolve(far, np.ones(9), "same") > 0
         edges = np.flatnonzero(np.diff(np.concatenate([[0], wide.astype(np.int8), [0]])))
+        empty = []
         for a, b in zip(edges[::2], edges[1::2]):
             inside = far[a:b]
             y, model = e.y[a:b, j][inside], z[a:b, j][inside]
             sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2) | (np.abs(y) < 0.05 * np.max(np.abs(model)))
+            fades = _discharges(y)  # from where it was, which may be of the other sign
             deep = np.min(np.abs(y)) < 0.25 * np.max(np.abs(model))
-            if a > int(0.1 / e.step) and b - a < longest and np.mean(sinks) > 0.95 and deep and np.count_nonzero(inside) > 4:
-                found[a:b, j] = True
-        if np.mean(found[:, j]) > 0.02:
+            if a > int(0.1 / e.step) and b - a < longest and (fades or np.mean(sinks) > 0.95) and deep and np.count_nonzero(inside) > 4:
+                found[a : b + 8, j] = True  # where it comes back, the samples between may have seen both
+                empty.append(fades)
+        if np.mean(found[:, j]) > (0.06 if np.mean(empty or [False]) > 0.5 else 0.02):  # that often, only what discharges
             found[:, j] = False
     return found
+
+
+def _discharges(y: Array) -> bool:
+    """Does a signal fall by the same share in each sample, as no motion does: what is left of a sensor without supply?"""
+    if len(y) < 12 or np.any(y == 0.0):
+        return False
+    falls = -np.diff(np.log(np.abs(y)))
+    usual = float(np.median(falls))
+    return usual > 0.0 and float(np.median(np.abs(falls - usual))) < 0.05 * usual
 
 
 @dataclass(frozen=True)

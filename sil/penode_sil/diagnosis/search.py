@@ -501,9 +501,11 @@ def mended(study: Study, e: Explanation, log) -> Explanation:
     does in the large; what the extended model foretells depends on all of the curve."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
     spare = [g for g in e.groups if g[0] not in (*EXACT, "sensor_delay")]
-    for _ in range(MENDS):
-        e = e.whole()
-        r = regression(study, e.fit, parameters)
+    most, r = len(e.terms) + MENDS, None
+    while spare and len(e.terms) < most:
+        if r is None:
+            e = e.whole()
+            r = regression(study, e.fit, parameters)
         found = []
         for group in spare:
             own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
@@ -519,7 +521,7 @@ def mended(study: Study, e: Explanation, log) -> Explanation:
         if set(wider.groups) == set(e.groups) and wider.gain > e.gain + 2.0 * cost(new.candidate):
             levels, metrics = heard(study, wider.fit)  # what is mended had been taken for noise
             study = replace(study, levels=levels, metrics=metrics)
-            e = settled(study, wider)
+            e, r = settled(study, wider), None
         else:
             spare.remove(group)
     return e
