@@ -44,7 +44,7 @@ def test_a_signal_that_fades_is_found_though_the_motion_turns():
     y[first : first + 50, 0] = y[first - 1, 0] * np.exp(-np.arange(50) / 10.0)
     (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
     far = np.abs(y[:, 0] - MOVE) > 0.06
-    assert found[far, 0].all() and not found[:, 1].any() and np.count_nonzero(found) <= 50 + 4 + 4 + 8  # margins, and what comes back
+    assert found[far, 0].all() and not found[:, 1].any() and np.count_nonzero(found) < 60
 
 
 @pytest.mark.parametrize("discharges", [True, False])

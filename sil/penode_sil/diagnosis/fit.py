@@ -82,10 +82,6 @@ class Fit:
         scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
         return np.linalg.pinv(curvature * np.outer(scale, scale), rcond=1e-10) * np.outer(scale, scale)
 
-    def deviation(self) -> Array:
-        """Standard deviations of all free values in their units (log: relative)."""
-        return np.sqrt(np.maximum(np.diag(self.covariance()), 0.0))
-
 
 class Problem:
     """A model against recordings in their metrics."""
