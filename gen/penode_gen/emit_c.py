@@ -36,7 +36,7 @@ _RUNGE_KUTTA = {
 # Names of the templates inside functions that also hold names of the model; the model's get a _ there.
 _TAKEN = frozenset(
     "p x u y z dx fx fu yx yu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
-    "inner along drive patrol layer_by_layer before advance fold f x0 copy begin finish usable unit solve integrate node".split()
+    "inner along drive bent patrol layer_by_layer before advance fold f x0 copy begin finish usable unit solve integrate node".split()
 )
 _AFFINE = {"centre": "pen_centre", "rescale": "pen_rescale"}
 _METHOD_NAMES = {
@@ -141,7 +141,7 @@ class _Emitter:
         self.at = sets.offsets(model)
         everything = [*self.causal.rates, *self.causal.outputs, *self.causal.sensors]
         self.uses_input_rate = self.causal.uses(everything, self.causal.input_rates)
-        self.parabola = self.uses_input_rate and model.input_rate == "parabola"
+        self.parabola = model.interpolation == "parabola" and bool(model.states or self.uses_input_rate)
         self.drive = self.causal.inputs + (self.causal.input_rates if self.uses_input_rate else ())
         self.networks = self._network_code()
         self.code_of = {user: code for code in self.networks for user in code.users}
@@ -185,7 +185,7 @@ class _Emitter:
             "folded": folded,
             "uses_p": uses_p, "uses_f": uses_f, "reads_set": reads_set,
             "sample_time": real(model.sample_time), "real": real, "si": units.si,
-            "columns": len(model.states) + 2 * len(model.inputs),
+            "columns": len(model.states) + (3 if self.parabola else 2) * len(model.inputs),
         }  # fmt: skip
 
     @staticmethod

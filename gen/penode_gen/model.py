@@ -8,8 +8,7 @@ from pathlib import Path
 from .networks import Network
 
 METHODS = ("euler", "heun", "rk4", "ros1", "ros2")
-INTERPOLATIONS = ("held", "linear")
-INPUT_RATES = ("chord", "parabola")
+INTERPOLATIONS = ("held", "linear", "parabola")
 OUTSIDE = ("extrapolate", "clamp", "fade")
 MORE_PIECES = ("refuse", "layers")
 GROUND = "ground"
@@ -142,7 +141,6 @@ class Model:
     method: str
     substeps: int
     interpolation: str
-    input_rate: str  # at a sample
     outside: str
     fade_width: float
     pieces: int  # room for the straight pieces of a folded network; 0: evaluate layer by layer

@@ -28,7 +28,7 @@ _C_WORDS = set(
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
     "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false "
     "self NULL linux unix size_t ptrdiff_t wchar_t "
-    "H GH SUBSTEPS N_X N_U N_Y N_Q N_W N_DRIVE N_COLUMNS N_SENSORS".split()
+    "H GH SUBSTEPS N_X N_U N_Y N_Q N_W N_DRIVE N_KEPT N_COLUMNS AT_CHANGE AT_BEND N_SENSORS".split()
 )
 _C_PATTERN = re.compile(r"u?int\w*_t|U?INT\w*_(MAX|MIN|C)|(SIZE|PTRDIFF|WCHAR|SIG_ATOMIC|WINT)_(MAX|MIN)")
 _RESERVED = {*ex.FUNCTIONS, "der", "where", m.GROUND}
@@ -63,7 +63,7 @@ _REQUIRED = {
 }
 ROOM = 4096  # pieces of a folded network, at most
 _MODEL = {
-    "extends": str, "name": str, "description": str, "sample_time": str, "method": str, "substeps": int, "input": str, "input_rate": str, "outside": str,
+    "extends": str, "name": str, "description": str, "sample_time": str, "method": str, "substeps": int, "input": str, "outside": str,
     "fade_width": (int, float), "pieces": int, "more_pieces": str,
 }  # fmt: skip
 
@@ -292,7 +292,7 @@ class _Reader:
         if sample_time < 1e-9 or sample_time > 86400.0:
             self.problem(("model", "sample_time"), f"{head['sample_time']} is out of range", "give a time from 1 ns to 1 day, such as '1 ms'")
         for key, default, choices in (
-            ("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS), ("input_rate", "chord", m.INPUT_RATES),
+            ("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS),
             ("outside", "extrapolate", m.OUTSIDE), ("more_pieces", "refuse", m.MORE_PIECES),
         ):  # fmt: skip
             if head.setdefault(key, default) not in choices:
@@ -328,7 +328,7 @@ class _Reader:
             raise m.ModelError(self.problems)
         return m.Model(
             name=head["name"], description=head.get("description", ""), sample_time=sample_time, method=head["method"],
-            substeps=head["substeps"], interpolation=head["input"], input_rate=head["input_rate"], outside=head["outside"], fade_width=float(head["fade_width"]),
+            substeps=head["substeps"], interpolation=head["input"], outside=head["outside"], fade_width=float(head["fade_width"]),
             pieces=room(head["pieces"]), more_pieces=head["more_pieces"], parameters=parameters, inputs=inputs, bodies=bodies, elements=elements, extra_states=states, variables=variables,
             equations=equations, networks=networks, outputs=outputs, sensors=sensors, sets=sets, path=self.path,
             digest=self.digest.hexdigest(),

@@ -18,7 +18,6 @@ sample_time = "{h} s"
 method = "{method}"
 substeps = {substeps}
 input = "{input}"
-input_rate = "{rate}"
 outside = "{outside}"
 fade_width = 0.5
 
@@ -110,12 +109,12 @@ def network_file(path: Path, sizes: list[int], activations: list[str], seed: int
 
 
 def rich(folder: Path, method: str = "rk4", h: float = 1e-3, input: str = "linear", outside: str = "extrapolate",
-         substeps: int = 1, activation: str = "tanh", low: float = -1.0, high: float = 1.0, rate: str = "chord") -> Path:
+         substeps: int = 1, activation: str = "tanh", low: float = -1.0, high: float = 1.0) -> Path:
     """Write the rich model and its network; the damper to the foot needs the input's rate, so a held input has none."""
-    damper = 'foot_d = { between = ["mass", "z"], law = "linear_damper", damping = "3 N*s/m" }' if input == "linear" else ""
+    damper = 'foot_d = { between = ["mass", "z"], law = "linear_damper", damping = "3 N*s/m" }' if input != "held" else ""
     network_file(folder / "n2.json", [2, 5, 7, 1], [activation, "softplus", "identity"], 5, low, high)
-    path = folder / f"rich_{method}_{input}_{outside}_{substeps}_{activation}_{h:g}_{low:g}_{rate}.toml"
-    path.write_text(RICH.format(method=method, h=h, input=input, rate=rate, outside=outside, substeps=substeps, foot_damper=damper))
+    path = folder / f"rich_{method}_{input}_{outside}_{substeps}_{activation}_{h:g}_{low:g}.toml"
+    path.write_text(RICH.format(method=method, h=h, input=input, outside=outside, substeps=substeps, foot_damper=damper))
     return path
 
 

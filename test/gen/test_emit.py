@@ -123,7 +123,8 @@ def test_no_warnings(tmp_path, method):
     """All policies, inputs and substeps, in float and double, by every compiler that is installed."""
     assert COMPILERS
     folders = []
-    for input, outside, substeps in itertools.product(INPUTS, OUTSIDE, SUBSTEPS):
+    curved = [("parabola", "clamp", 1), ("parabola", "fade", 3)]
+    for input, outside, substeps in [*itertools.product(INPUTS, OUTSIDE, SUBSTEPS), *curved]:
         model = penode_gen.load(models.rich(tmp_path, method, input=input, outside=outside, substeps=substeps))
         folders.append(tmp_path / f"{input}_{outside}_{substeps}")
         penode_gen.generate(model, folders[-1])
@@ -146,7 +147,9 @@ def test_no_warnings_where_little_is_used(tmp_path, method):
     """Models that need only some of state, input, parameters and networks leave nothing unused; any name is fine."""
     models.network_file(tmp_path / "n.json", [1, 4, 1], ["tanh", "identity"], 2)
     folders = []
-    for (name, (equation, output)), input in itertools.product(SPARSE.items(), INPUTS):
+    curved = itertools.product(("constant rate", "input only", "state only"), ["parabola"])
+    for name, input in [*itertools.product(SPARSE, INPUTS), *curved]:
+        equation, output = SPARSE[name]
         own = "".join(f'{n} = {{ unit = "1" }}\n' for n in ("x", "y", "p", "fx", "node", "rates", "status", "h", "t1")) if name == "names" else ""
         equations = "".join(f'e{i} = "{n} = {i}*T"\n' for i, n in enumerate(re.findall(r"^\w+", own, re.MULTILINE)))
         path = tmp_path / "sparse.toml"

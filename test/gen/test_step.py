@@ -19,23 +19,28 @@ ORDERS = {"euler": 1, "heun": 2, "rk4": 4, "ros1": 1, "ros2": 2}
 EXTRA = 0x10  # PEN_OUTSIDE
 
 
-@pytest.mark.parametrize("input", ["linear", "held"])
+@pytest.mark.parametrize("input", ["parabola", "linear", "held"])
 @pytest.mark.parametrize("method", ORDERS)
 def test_order_of_convergence(tmp_path, method, input, show):
-    """Halving the sample time divides the error by 2^order. The inputs are straight lines (constant if held), so that
-    sampling them loses nothing; the reference is the model's equations by hand, integrated by SciPy to 1e-12."""
-    slope = 1.0 if input == "linear" else 0.0
-    force, foot, foot_rate = (lambda t: 1.0 + 2.0 * slope * t), (lambda t: 0.02 + 0.1 * slope * t), (lambda t: 0.1 * slope)
+    """Halving the sample time divides the error by 2^order. The inputs are parabolas, straight lines or constant, so that
+    sampling them loses nothing; the reference is the model's equations by hand, integrated by SciPy to 1e-12. The steps
+    begin at the third sample."""
+    slope, bend = float(input != "held"), float(input == "parabola")
+    force = lambda t: 1.0 + slope * 2.0 * t - bend * 40.0 * t**2  # noqa: E731
+    foot, foot_rate = (lambda t: 0.02 + slope * 0.1 * t + bend * 0.5 * t**2), (lambda t: slope * 0.1 + bend * t)
     duration, errors = 0.32, []
     for h in (4e-3, 2e-3, 1e-3):
         path = models.rich(tmp_path, method, h, input)
         n = round(duration / h)
-        t = np.arange(n + 1) * h
+        t = np.arange(-2, n + 1) * h
         u = np.stack([np.vectorize(force)(t), np.vectorize(foot)(t)], axis=1)
-        run = Sil(penode_gen.load(path), np.float64).run(u)
+        instance = Sil(penode_gen.load(path), np.float64).instance()
+        instance.run(u[:3])
+        instance.set_state(np.array([0.01, 0.0, 0.5]))
+        run = instance.run(u[3:])
         assert not np.any(run.status & ~np.uint32(EXTRA))
         data = json.loads((tmp_path / "n2.json").read_text())
-        damping = 3.0 if input == "linear" else 0.0
+        damping = 3.0 if input != "held" else 0.0
         exact = solve_ivp(
             lambda t, x: models.rich_by_hand(data, t, x, force, foot, foot_rate, damping),
             (0.0, duration), [0.01, 0.0, 0.5], method="DOP853", rtol=1e-12, atol=1e-14,
@@ -51,7 +56,7 @@ LAW = """
 [model]
 name = "law"
 sample_time = "{h} s"
-input_rate = "{rate}"
+input = "{input}"
 [inputs]
 z = {{ unit = "m" }}
 [elements]
@@ -61,14 +66,14 @@ F = {{ value = "F_damper", unit = "N" }}
 """
 
 
-@pytest.mark.parametrize("rate, order, share", [("chord", 1, 1 / 2), ("parabola", 2, 1 / 3)])
-def test_rate_of_an_input_at_a_sample(tmp_path, rate, order, share):
-    """Of a sine at 5 Hz the chord errs by h/2 of the second derivative, the parabola by h^2/3 of the third (Taylor at the
-    sample); what that leaves out is a share of 2 pi f h = 0.06 at most. Two samples make a chord; a bad one is passed over."""
+@pytest.mark.parametrize("input, order, share", [("linear", 1, 1 / 2), ("parabola", 2, 1 / 3)])
+def test_rate_of_an_input_at_a_sample(tmp_path, input, order, share):
+    """Of a sine at 5 Hz a line errs by h/2 of the second derivative, the parabola by h^2/3 of the third (Taylor at the
+    sample); what that leaves out is a share of 2 pi f h = 0.06 at most. Two samples make a line; a bad one is passed over."""
     omega = 2 * math.pi * 5
     for h in (2e-3, 1e-3):
-        path = tmp_path / f"{rate}_{h}.toml"
-        path.write_text(LAW.format(h=h, rate=rate))
+        path = tmp_path / f"{input}_{h}.toml"
+        path.write_text(LAW.format(h=h, input=input))
         sil, t = Sil(penode_gen.load(path), np.float64), np.arange(500) * h
         z = np.sin(omega * t)
         y = sil.run(z[:, None]).y[:, 0]
@@ -83,7 +88,9 @@ def test_rate_of_an_input_at_a_sample(tmp_path, rate, order, share):
 
 def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: int) -> dict[str, np.ndarray]:
     """The parts of the jacobian struct by name; `moving`: how many inputs before this one the outputs depend on themselves."""
-    shapes = {"x_x": (n_x, n_x), "x_u_before": (n_x, n_u), "x_u": (n_x, n_u), "y_x": (n_y, n_x), "y_u": (n_y, n_u)}
+    shapes = {"x_x": (n_x, n_x), "x_u_before": (n_x, n_u), "x_u": (n_x, n_u)}
+    shapes |= {"x_u_earlier": (n_x, n_u)} if moving == 2 else {}
+    shapes |= {"y_x": (n_y, n_x), "y_u": (n_y, n_u)}
     shapes |= {name: (n_y, n_u) for name in ("y_u_before", "y_u_earlier")[:moving]}
     parts, at = {}, 0
     for name, (rows, columns) in shapes.items():
@@ -93,19 +100,20 @@ def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: int) -> 
 
 
 @pytest.mark.parametrize("outside", ["extrapolate", "clamp", "fade"])
-@pytest.mark.parametrize("input, rate, moving", [("linear", "chord", 1), ("held", "chord", 0), ("linear", "parabola", 2)])
+@pytest.mark.parametrize("input, moving", [("held", 0), ("linear", 1), ("parabola", 2)])
 @pytest.mark.parametrize("method", ORDERS)
-def test_step_jacobian_against_differences(tmp_path, method, input, rate, moving, outside):
-    """Central differences of the discrete step in double, at random states inside, on and outside of the envelope."""
-    model = penode_gen.load(models.rich(tmp_path, method, 5e-3, input, outside, substeps=2, low=-0.3, high=0.3, rate=rate))
+def test_step_jacobian_against_differences(tmp_path, method, input, moving, outside):
+    """Central differences of the discrete step in double, at random states inside, on and outside of the envelope, behind one
+    or two samples."""
+    model = penode_gen.load(models.rich(tmp_path, method, 5e-3, input, outside, substeps=2, low=-0.3, high=0.3))
     sil, draw = Sil(model, np.float64), np.random.default_rng(11)
     n_x, n_u, n_y = 3, 2, 2
-    size = n_x * n_x + 2 * n_x * n_u + n_y * n_x + n_y * n_u * (1 + moving)
+    size = n_x * n_x + (3 if moving == 2 else 2) * n_x * n_u + n_y * n_x + n_y * n_u * (1 + moving)
 
     def started(x, earlier, before):
         instance = sil.instance()
-        instance.step(earlier)
-        instance.step(before)
+        for u in (earlier, before)[-behind:]:
+            instance.step(u)
         instance.set_state(x)
         return instance
 
@@ -120,7 +128,7 @@ def test_step_jacobian_against_differences(tmp_path, method, input, rate, moving
         d[i] = 1e-5
         return (function(at + d) - function(at - d)) / 2e-5
 
-    for _ in range(6):
+    for behind in (1, 2, 2, 2, 2, 2):
         x, (earlier, before, now) = draw.uniform(-0.5, 0.5, n_x), draw.uniform(-1, 1, (3, n_u)) * [1, 0.1]
         instance = started(x, earlier, before)
         y, found, status = instance.step_jacobian(now, size)
@@ -143,7 +151,9 @@ def test_step_jacobian_against_differences(tmp_path, method, input, rate, moving
             np.testing.assert_allclose(j["x_u"][:, i], column[:n_x], **tolerance)
             np.testing.assert_allclose((j["y_x"] @ j["x_u"])[:, i] + j["y_u"][:, i], column[n_x:], rtol=1e-6, atol=1e-5)
             column = difference(lambda v: step(x, v, before, now), earlier, i)
-            np.testing.assert_allclose(j["y_u_earlier"][:, i] if moving == 2 else 0.0, column[n_x:], rtol=1e-6, atol=1e-5)
+            along, direct = (j["x_u_earlier"][:, i], j["y_u_earlier"][:, i]) if moving == 2 else (np.zeros(n_x), 0.0)
+            np.testing.assert_allclose(along, column[:n_x], **tolerance)
+            np.testing.assert_allclose(j["y_x"] @ along + direct, column[n_x:], rtol=1e-6, atol=1e-5)
 
 
 @pytest.mark.parametrize("method", ["rk4", "ros1", "ros2"])

@@ -23,7 +23,7 @@ MODELS = {
     "nqvm_euler": [],
     "nqvm_folded": [],
     "clamped": ['method = "heun"', 'outside = "clamp"', 'input = "held"', "substeps = 2"],
-    "implicit": ['method = "ros1"', 'outside = "clamp"', 'input_rate = "parabola"', "[elements]", WET],
+    "implicit": ['method = "ros1"', 'outside = "clamp"', 'input = "parabola"', "[elements]", WET],
     "fading": ['method = "ros2"', 'outside = "fade"', "fade_width = 0.5"],
     "folded_or_not": ['method = "euler"', 'outside = "clamp"', "pieces = 96", 'more_pieces = "layers"'],
 }

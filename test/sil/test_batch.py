@@ -111,7 +111,7 @@ def network(path: Path, sizes: list[int], activations: list[str]) -> None:
 def rich(folder: Path, method: str = "rk4", input: str = "linear", outside: str = "extrapolate", substeps: int = 1, activation: str = "tanh", folding: str = "") -> penode_gen.Model:
     network(folder / "two.json", [2, 5, 7, 1], [activation, "softplus", "identity"])
     network(folder / "one.json", [1, 21, 16, 3, 1], ["relu", "relu", "relu", "identity"])
-    damper = 'foot_d = { between = ["mass", "z"], law = "linear_damper", damping = "3 N*s/m" }' if input == "linear" else ""
+    damper = 'foot_d = { between = ["mass", "z"], law = "linear_damper", damping = "3 N*s/m" }' if input != "held" else ""
     path = folder / "rich.toml"
     path.write_text(RICH.format(method=method, input=input, outside=outside, substeps=substeps, foot_damper=damper, folding=folding))
     return penode_gen.load(path)
@@ -151,7 +151,10 @@ def everything(model) -> dict[str, tuple[str, ...]]:
         ("ros1", "held", "extrapolate", 2, "relu", "pieces = 96"),
         ("ros2", "linear", "clamp", 1, "sigmoid", 'pieces = 8\nmore_pieces = "layers"'),
         ("ros2", "held", "fade", 3, "step"),
-        ("rk4", "linear", "extrapolate", 1, "tanh", 'input_rate = "parabola"'),
+        ("rk4", "parabola", "extrapolate", 1, "tanh"),
+        ("euler", "parabola", "extrapolate", 2, "tanh"),
+        ("ros1", "parabola", "clamp", 1, "sigmoid"),
+        ("ros2", "parabola", "extrapolate", 2, "tanh"),
     ],
 )
 def test_each_lane_has_the_bits_of_the_step(tmp_path, choices, dtype):

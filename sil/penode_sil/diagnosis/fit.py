@@ -96,7 +96,7 @@ class Problem:
         step = model.sample_time / self.fine
         stiff = any(e.law == "loose_damper" or "presliding" in e.arguments for e in model.elements)
         substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / STIFF - 1e-6)) * stiff, -(-model.substeps // self.fine))
-        exact = replace(_folded(model), method="rk4", interpolation="linear", input_rate="chord", substeps=substeps, sample_time=step)
+        exact = replace(_folded(model), method="rk4", interpolation="linear", substeps=substeps, sample_time=step)
         self.batch = _compiled(anonymous(exact))
         self.inputs = [_drive(e, self.fine) for e in experiments]
 

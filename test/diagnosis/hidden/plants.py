@@ -143,7 +143,7 @@ def model_file(plant: Plant, sample_rate: float, sensors: Mapping[str, float], i
     a, b = (name.get(end, end) for end in ends)
     driver, unit = INPUT[plant.kind]
     lines = ["[model]", f'name = "{plant.kind}"', f'sample_time = "{1e3 / sample_rate:g} ms"']
-    lines += ['input_rate = "parabola"'] if plant.kind == "law" else []  # all that its force needs, and the chord's is late
+    lines += ['input = "parabola"'] if plant.kind == "law" else []  # its force needs the rate, and a line's is late
     lines += ["", "[parameters]"]
     lines += [
         f'{p} = {{ value = {x!r}, unit = "{UNITS[p]}", tolerance = {plant.tolerance[p]!r} }}' for p, x in plant.nominal.items()
