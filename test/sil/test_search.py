@@ -12,7 +12,7 @@ import pytest
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.score import Candidate, Regression
-from penode_sil.diagnosis.search import PART, Explanation, acting, distinct, hopeful, pursue, sprung, terms_of
+from penode_sil.diagnosis.search import PART, Explanation, acting, distinct, hopeful, pursue, renamed, sprung, terms_of
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
 
@@ -59,6 +59,11 @@ def test_form_is_a_part_of_what_formulas_leave():
     alone, both = explanation("constant_force", gain=150_000.0), explanation("constant_force", "tyre_liftoff", gain=151_000.0, formulas=150_000.0)
     assert 900.0 < both.score - alone.score < 950.0  # 50 for the kind, 10 for its number, and thousandths of 1 000
     assert explanation("constant_force", "tyre_liftoff", gain=151_000.0).score < alone.score + 800.0
+
+
+def test_a_law_that_mends_a_form_leaves_the_name():
+    e = renamed(explanation("tyre_liftoff", "tyre_liftoff", "sensor_bias"), [("tyre_nonlinear", "tyre")] * 2 + [("sensor_bias", "body")])
+    assert e.groups == (("tyre_nonlinear", "tyre"), ("sensor_bias", "body")) and [t.gain for t in e.terms] == [1.0] * 3
 
 
 @pytest.mark.parametrize("null, left, so", [(31_000, 14_000, True), (31_000, 24_000, False), (14_000, 11_000, False), (10_000, 9_900, False)])

@@ -500,7 +500,7 @@ def mended(study: Study, e: Explanation, log) -> Explanation:
     """The explanation with as many more laws of its causes as are worth their numbers, under the same names. A name is what a curve
     does in the large; what the extended model foretells depends on all of the curve."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
-    spare = [g for g in e.groups if g[0] not in (*EXACT, "sensor_delay")]
+    spare = [g for g in e.groups if g[0] not in ("wrong_parameter", "constant_force", "sensor_delay")]
     most, r = len(e.terms) + MENDS, None
     while spare and len(e.terms) < most:
         if r is None:
@@ -518,6 +518,8 @@ def mended(study: Study, e: Explanation, log) -> Explanation:
         _, group, new = max(found, key=lambda x: x[0])
         wider = explain(study, [*e.terms, new], start=e.fit, formulas=e.formulas)
         log(f"  mended {group}: {wider.gain:.0f} for {e.gain:.0f}")
+        if len(wider.terms) == len(e.terms) + 1 and len(wider.groups) == len(e.groups):  # whatever its curve is called now
+            wider = renamed(wider, [*(t.group for t in e.terms), group])
         if set(wider.groups) == set(e.groups) and wider.gain > e.gain + 2.0 * cost(new.candidate):
             levels, metrics = heard(study, wider.fit)  # what is mended had been taken for noise
             study = replace(study, levels=levels, metrics=metrics)
@@ -525,6 +527,12 @@ def mended(study: Study, e: Explanation, log) -> Explanation:
         else:
             spare.remove(group)
     return e
+
+
+def renamed(e: Explanation, groups: Sequence[Group]) -> Explanation:
+    """The explanation with other names for its terms."""
+    candidates = [replace(t.candidate, kind=kind, where=where) for t, (kind, where) in zip(e.terms, groups)]
+    return replace(e, terms=tuple(replace(t, candidate=c) for t, c in zip(e.terms, candidates)))
 
 
 def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> list[Explanation]:
