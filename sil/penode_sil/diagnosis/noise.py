@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,9 +118,10 @@ class Metric:
         rows = np.ascontiguousarray(np.moveaxis(r, -1, -2))
         return np.moveaxis(fft.rfft(rows, axis=-1)[..., : len(self.root)], -1, -2)
 
-    def white(self, spectra: NDArray[np.complex128]) -> Array:
+    def white(self, spectra: NDArray[np.complex128], out: Array | None = None) -> Array:
         """Real numbers [..., rows] of unit variance if spectra [..., f, sensors] are those of noise."""
-        w = np.empty((*spectra.shape[:-2], *spectra.shape[:-3:-1]), dtype=complex)  # [..., sensors, f]
+        shape = *spectra.shape[:-2], *spectra.shape[:-3:-1]  # [..., sensors, f]
+        w = np.empty(shape, dtype=complex) if out is None else out.view(complex).reshape(shape, copy=False)
         for i in range(w.shape[-2]):  # a triangle
             w[..., i, :] = self.root[:, i, 0] * spectra[..., 0]
             for j in range(1, i + 1):
@@ -155,9 +157,9 @@ def sensor_levels(
     else:
         power = np.abs(fft.rfft(residual, axis=0)) ** 2 / n
     high = slice(band, max(int(0.9 * len(f)), band + 1))
-    omega = 2.0 * np.pi * f * e.step
     wide = max(int(1.0 / f[1]), 2)  # bins of a band of 1 Hz
     edges = np.arange(1, band, wide)
+    shapes, means = _slow(n, band, wide)
     found = np.empty((band, residual.shape[1]))
     for j, sigma in enumerate(declared):
         road = np.sum(np.abs(through[:, j, :] * e.unsure) ** 2, axis=1)
@@ -170,8 +172,6 @@ def sensor_levels(
         p, b, r = (np.add.reduceat(x[:band], edges) / bins for x in (power[:, j], base, road))
         whole = float(np.mean(base))
         room = max((1.25 * sigma) ** 2 if sigma > 0.0 else 4.0 * whole, 1.1 * whole) - whole
-        shapes = [(1.0 - pole**2) / np.abs(1.0 - pole * np.exp(-1j * omega)) ** 2 for pole in POLES]
-        means = [np.add.reduceat(shape[:band], edges) / bins for shape in shapes]
 
         def loss(k: int, share: float) -> float:
             s = b + r + share * room * means[k]
@@ -184,8 +184,17 @@ def sensor_levels(
                     best = new, k, share
         for finer in FINER if best[2] else ():
             best = min(best, *((loss(best[1], x), best[1], x) for x in (best[2] / finer, min(best[2] * finer, 1.0))))
-        found[:, j] = (base + best[2] * room * shapes[best[1]])[:band]
+        found[:, j] = base[:band] + best[2] * room * shapes[best[1]]
     return found
+
+
+@cache
+def _slow(n: int, band: int, wide: int) -> tuple[Array, Array]:
+    """Spectra [POLES, f] of slow noise of unit variance in the band, and their means over `wide` bins."""
+    turn = np.exp(-2j * np.pi / n * np.arange(band))
+    shapes = np.array([(1.0 - pole**2) / np.abs(1.0 - pole * turn) ** 2 for pole in POLES])
+    edges = np.arange(1, band, wide)
+    return shapes, np.add.reduceat(shapes, edges, axis=1) / np.diff(np.append(edges, band))
 
 
 def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Metric:
