@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.interpolate import CubicSpline
@@ -30,6 +31,9 @@ HALF = 8  # bins to either side that say how loud it is around a tone
 PURE = 40.0  # see Tone: noise has 16 at most
 PARTS = (0.1, 2.0, 6.0, 20.0)  # [Hz] from which to which coherence is added up
 TOP = 100.0  # [Hz] what vehicles do above it is not looked at, but for the noise
+STOP = 120.0  # [dB] by which thinning damps what it would mirror into the band
+TOGETHER = 8  # thinned samples that are made by one matrix product
+CHUNK = 32  # of such products at a time: their signals stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +140,50 @@ class Metric:
     def volume(self) -> float:
         """What belongs to chi2 for a log likelihood where metrics differ: 2 log det S summed over the band."""
         return -4.0 * float(np.sum(np.log(np.abs(np.diagonal(self.root, axis1=1, axis2=2)))))
+
+
+@dataclass(frozen=True, eq=False)
+class Thinning:
+    """Spectra in a narrow band of signals that go round in a circle of n samples: from one in `every` samples of what a low-pass leaves
+    of them. `taps` turn the samples around TOGETHER of those into them, `gain` [f] is what the low-pass leaves of the band."""
+
+    n: int
+    every: int
+    taps: Array
+    gain: Array
+
+    def __call__(self, signals: Array, good: NDArray[np.bool_]) -> NDArray[np.complex128]:
+        """Spectra [sensors, runs, f] of signals [n, sensors, runs] where they are good [n, sensors]."""
+        signals = np.ascontiguousarray(signals)
+        step, width = TOGETHER * self.every, self.taps.shape[1]
+        before = (width - step + self.every) // 2
+        columns = signals.shape[1] * signals.shape[2]
+        blocks, whole = -(-self.n // step), good.all()
+        thin = np.empty((blocks, TOGETHER, columns))
+        for k in range(0, blocks, CHUNK):
+            some = thin[k : k + CHUNK]
+            first = k * step - before
+            last = first + (len(some) - 1) * step + width
+            at = slice(first, last) if first >= 0 and last <= self.n else np.arange(first, last) % self.n
+            part = signals[at] if whole else signals[at] * good[at, :, None]
+            stride = part.strides[0]
+            windows = as_strided(part, (len(some), width, columns), (step * stride, stride, part.itemsize))
+            np.matmul(self.taps, windows, out=some)
+        rows = thin.reshape(-1, columns)[: self.n // self.every].T
+        spectra = fft.rfft(rows, axis=1)[:, : len(self.gain)] / self.gain
+        return spectra.reshape(*signals.shape[1:], -1)
+
+
+@cache
+def thinning(n: int, band: int) -> Thinning:
+    """The thinning of n samples to `band` frequencies, by a low-pass with Kaiser's window."""
+    every = max(q for q in range(1, max(int(0.3 * n / band), 1) + 1) if n % q == 0)
+    half = int(np.ceil((STOP - 7.95) / (28.72 * (1.0 / every - 2.0 * band / n)))) if every > 1 else 0
+    k = np.arange(-half, half + 1)
+    tap = np.sinc(k / every) / every * np.kaiser(2 * half + 1, 0.1102 * (STOP - 8.7))
+    taps = np.stack([np.pad(tap, (j * every, (TOGETHER - 1 - j) * every)) for j in range(TOGETHER)])
+    gain = np.cos(2.0 * np.pi / n * np.outer(np.arange(band), k)) @ tap / every
+    return Thinning(n, every, taps, gain)
 
 
 def sensor_levels(
