@@ -113,7 +113,8 @@ class Problem:
         self.batch = _compiled(anonymous(exact))
         self.inputs = [_drive(e, self.fine) for e in experiments]
         self.thin = [thinning(len(e.time), e.band) for e in experiments]
-        self.measured = [thin(e.y[:, :, None], e.good) for thin, e in zip(self.thin, experiments)]
+        self.good = [None if e.good.all() else e.good for e in experiments]
+        self.measured = [thin(e.y[:, :, None], good) for thin, e, good in zip(self.thin, experiments, self.good)]
 
     def simulate(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array]:
         """Sensors [runs, n, n_z] and named states of recording e for shifts [runs, free]."""
@@ -155,7 +156,7 @@ class Problem:
     def residuals(self, e: int, z: Array) -> Array:
         """Whitened residuals [runs, rows]."""
         with np.errstate(over="ignore", invalid="ignore"):  # some runs leave all bounds
-            spectra = self.measured[e] - self.thin[e](z.transpose(1, 2, 0), self.experiments[e].good)  # [n_z, runs, f]
+            spectra = self.measured[e] - self.thin[e](z.transpose(1, 2, 0), self.good[e])  # [n_z, runs, f]
             white = self.metrics[e].white(spectra.transpose(1, 2, 0))
             white[~(np.sum(np.abs(white), axis=1) < FAR)] = FAR
         return white

@@ -152,20 +152,19 @@ class Thinning:
     taps: Array
     gain: Array
 
-    def __call__(self, signals: Array, good: NDArray[np.bool_]) -> NDArray[np.complex128]:
-        """Spectra [sensors, runs, f] of signals [n, sensors, runs] where they are good [n, sensors]."""
+    def __call__(self, signals: Array, good: NDArray[np.bool_] | None) -> NDArray[np.complex128]:
+        """Spectra [sensors, runs, f] of signals [n, sensors, runs] where they are good [n, sensors]; None: everywhere."""
         signals = np.ascontiguousarray(signals)
         step, width = TOGETHER * self.every, self.taps.shape[1]
         before = (width - step + self.every) // 2
         columns = signals.shape[1] * signals.shape[2]
-        blocks, whole = -(-self.n // step), good.all()
-        thin = np.empty((blocks, TOGETHER, columns))
-        for k in range(0, blocks, CHUNK):
+        thin = np.empty((-(-self.n // step), TOGETHER, columns))
+        for k in range(0, len(thin), CHUNK):
             some = thin[k : k + CHUNK]
             first = k * step - before
             last = first + (len(some) - 1) * step + width
             at = slice(first, last) if first >= 0 and last <= self.n else np.arange(first, last) % self.n
-            part = signals[at] if whole else signals[at] * good[at, :, None]
+            part = signals[at] if good is None else signals[at] * good[at, :, None]
             stride = part.strides[0]
             windows = as_strided(part, (len(some), width, columns), (step * stride, stride, part.itemsize))
             np.matmul(self.taps, windows, out=some)

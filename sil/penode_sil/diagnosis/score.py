@@ -130,8 +130,9 @@ class Candidate:
 class Regression:
     """Whitened effects [candidates, rows] of all candidates against the whitened residual of a fit, its free values projected out."""
 
-    def __init__(self, fit: Fit, candidates: Sequence[Candidate], effects: Array):
+    def __init__(self, fit: Fit, candidates: Sequence[Candidate], effects: Array, whole: Array | None = None):
         self.candidates, self.effects = tuple(candidates), effects
+        self.whole = effects @ effects.T if whole is None else whole
         movable = [i for i, f in enumerate(fit.free) if f.low < f.value < f.high]  # the others stand at their bounds
         free = [fit.free[i] for i in movable]
         priors = np.array([f.unit / f.sigma for f in free])
@@ -141,11 +142,10 @@ class Regression:
         r, offsets = fit.residual, np.array([f.offset for f in free])
         top, low = q[: len(r)], q[len(r) :]
         xt, tr = effects @ top, top.T @ r - low.T @ offsets  # effects have no part in the rows of the priors
-        whole = effects @ effects.T
-        self.gram = whole - xt @ xt.T
+        self.gram = self.whole - xt @ xt.T
         self.slope = effects @ r - xt @ tr
         self.scale = np.sqrt(np.maximum(np.diag(self.gram), 1e-300))
-        self.alive = np.diag(self.gram) > 1e-9 * np.diag(whole)  # what nuisances do not imitate altogether
+        self.alive = np.diag(self.gram) > 1e-9 * np.diag(self.whole)  # what nuisances do not imitate altogether
         self.gram /= np.outer(self.scale, self.scale)
         self.slope /= self.scale
         self.chi2 = float(r @ r + offsets @ offsets - tr @ tr)
@@ -173,7 +173,7 @@ class Regression:
 
     def without(self, fit: Fit) -> Regression:
         """The same effects against another residual and other free values."""
-        return Regression(fit, self.candidates, self.effects)
+        return Regression(fit, self.candidates, self.effects, self.whole)
 
     def beside(self, taken: Sequence[int]) -> Regression:
         """The regression with these columns free in size and sign, so that only what none of them can do is left."""
