@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -116,6 +117,28 @@ def test_whitened_noise_is_white(model):
     r = np.stack([np.fft.irfft(through[:, k, 0] * common, n) for k in range(2)], axis=1) + sigma * rng.standard_normal((n, 2))
     white = noise.metric(e, np.tile(sigma**2, (e.band, 1)), through)(r)
     assert abs(np.mean(white**2) - 1.0) < 4.0 * np.sqrt(2.0 / white.size)
+
+
+@pytest.mark.parametrize("n, band", [(48000, 2400), (13824, 1383), (5000, 1000), (60, 2)])
+def test_thinned_signals_have_the_same_spectra(n, band):
+    """In the band, beside what is ten times as loud above it: 120 dB below that, and steps at both ends go round."""
+    rng = np.random.default_rng(4)
+    signals = np.cumsum(rng.standard_normal((n, 2, 3)), axis=0) + 10.0 * rng.standard_normal((n, 2, 3))
+    good = np.ones((n, 2), bool)
+    good[n // 3 : n // 2, 1] = False
+    want = np.moveaxis(np.fft.rfft(signals * good[:, :, None], axis=0), 0, 2)
+    assert np.max(np.abs(noise.thinning(n, band)(signals, good) - want[:, :, :band])) < 1e-6 * np.max(np.abs(want[:, :, -n // 4 :]))
+
+
+def test_a_fit_ends_at_its_bounds(model, sound):
+    """A damping that may not be as low as it would like: the others end where they do with that damping held."""
+    one = study.null_study(model, [experiment(m, model) for m in sound])
+    problem = Problem(model, one.experiments, one.metrics, fastest=one.linear.fastest)
+    low = 1.004 * one.null.value("d")
+    bound, held = ([replace(f, **change) if f.target == "d" else f for f in one.nuisances] for change in ({"low": low}, {"low": low, "high": low}))
+    bound, held = (problem.solve([replace(f, value=float(np.clip(f.value, f.low, f.high))) for f in free], 20, 1e-4) for free in (bound, held))
+    assert bound.value("d") == low
+    assert abs(bound.cost - held.cost) < 1e-2
 
 
 def test_bursts_are_of_samples_that_count():

@@ -22,14 +22,15 @@ from penode_gen.model import Model
 
 from ..batch import Batch
 from .hypotheses import Fault
-from .noise import Experiment, Metric
+from .noise import Experiment, Metric, thinning
 from .plant import anonymous
 
 Array = NDArray[np.float64]
 STIFF = 2.5e-4  # [s] longest step of a law that follows a short way or a short time
-BLOCK = 256  # samples that are turned about at a time: they stay in the cache
+BLOCK = 256  # samples that are worked on at a time: they stay in the cache
 FAR = 1e20  # residual of a run that cannot be simulated
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
+PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, others need not be tried
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of trial steps, relative to the curvature
 
 
@@ -82,6 +83,18 @@ class Fit:
         scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
         return np.linalg.pinv(curvature * np.outer(scale, scale), rcond=1e-10) * np.outer(scale, scale)
 
+    def steps(self) -> tuple[Array, float]:
+        """Steps [DAMPING, free] towards the least chi2 with priors, and how much of it the full one promises to take."""
+        precision = np.array([f.unit / f.sigma for f in self.free])
+        curvature = self.jacobian.T @ self.jacobian + np.diag(precision**2)
+        slope = self.jacobian.T @ self.residual - precision * np.array([f.offset for f in self.free])
+        stuck = [f.value <= f.low and s <= 0.0 or f.value >= f.high and s >= 0.0 for f, s in zip(self.free, slope)]
+        slope[stuck] = curvature[stuck] = curvature[:, stuck] = 0.0  # it would go beyond its bound
+        scale = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
+        normed = curvature / np.outer(scale, scale)
+        found = np.array([np.linalg.solve(normed + (1e-10 + d) * np.eye(len(scale)), slope / scale) / scale for d in DAMPING])
+        return np.where([f.log for f in self.free], np.clip(found, -1.0, 1.0), found), float(found[0] @ slope)
+
 
 class Problem:
     """A model against recordings in their metrics."""
@@ -99,6 +112,9 @@ class Problem:
         exact = replace(_folded(model), method="rk4", interpolation="linear", substeps=substeps, sample_time=step)
         self.batch = _compiled(anonymous(exact))
         self.inputs = [_drive(e, self.fine) for e in experiments]
+        self.thin = [thinning(len(e.time), e.band) for e in experiments]
+        self.good = [None if e.good.all() else e.good for e in experiments]
+        self.measured = [thin(e.y[:, :, None], good) for thin, e, good in zip(self.thin, experiments, self.good)]
 
     def simulate(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array]:
         """Sensors [runs, n, n_z] and named states of recording e for shifts [runs, free]."""
@@ -114,77 +130,79 @@ class Problem:
             else:
                 faults.append((f.target[0], f.target[1], values))
         run = self.batch.run(self.inputs[e], x0=start, parameters=parameters, set_name=self.set_name, states=states, every=self.fine)
-        turned = run.z.transpose(0, 2, 1)
-        z = np.empty(turned.shape)  # [runs, n_z, n], in the order that what follows likes
-        for i in range(0, z.shape[2], BLOCK):
-            z[:, :, i : i + BLOCK] = turned[:, :, i : i + BLOCK]
-        if self.fine == 4 and z.shape[2] > 2:
-            z[:, :, 0] = 2.0 * z[:, :, 1] - z[:, :, 2]  # the step knows no rate of an input at its first sample
-        z[run.first_bad >= 0] = 1e30
+        z = run.z.transpose(1, 2, 0)  # [n, n_z, runs], as they lie in memory
+        if self.fine == 4 and len(z) > 2:
+            z[0] = 2.0 * z[1] - z[2]  # the step knows no rate of an input at its first sample
+        z[:, :, run.first_bad >= 0] = 1e30
+        skews = np.zeros(z.shape[1:])
         for what, j, values in faults:
             if what == "fault":
                 fault = self.faults[j]
-                z[:, fault.sensor] += values[:, None] * fault.of(z[:, fault.sensor], e)
+                z[:, fault.sensor] += (values[:, None] * fault.of(z[:, fault.sensor].T, e)).T
             elif what == "scale":
-                z[:, j] *= 1.0 + values[:, None]
+                z[:, j] *= 1.0 + values
             elif what == "bias":
-                z[:, j] += values[:, None]
-            elif what == "skew":  # of all runs about the same
-                z[:, j] -= values[:, None] * np.gradient(z[0, j], self.experiments[e].step)
+                z[:, j] += values
+            elif what == "skew":
+                skews[j] = values
             elif what == "delay":
-                z[:, j] = delayed(z[:, j].T, values, self.experiments[e].step).T
-        return np.moveaxis(z, 1, 2), run.x
+                z[:, j] = delayed(z[:, j], values, self.experiments[e].step)
+        if skews.any():
+            rates = np.gradient(z[:, :, 0], self.experiments[e].step, axis=0)  # of all runs about the same
+            for i in range(0, len(z), BLOCK):
+                z[i : i + BLOCK] -= rates[i : i + BLOCK, :, None] * skews
+        return z.transpose(2, 0, 1), run.x
 
     def residuals(self, e: int, z: Array) -> Array:
         """Whitened residuals [runs, rows]."""
-        y, good = self.experiments[e].y.T, self.experiments[e].good.T
-        rows = np.empty((len(z), *y.shape), np.float32)  # as the transforms like them, and fine enough for what is left
         with np.errstate(over="ignore", invalid="ignore"):  # some runs leave all bounds
-            np.subtract(y, np.moveaxis(z, 1, 2), out=rows, casting="same_kind")
-            if not good.all():
-                rows *= good
-            white = self.metrics[e](np.moveaxis(rows, 1, 2))
-            white[~np.isfinite(np.sum(white, axis=1))] = FAR
+            spectra = self.measured[e] - self.thin[e](z.transpose(1, 2, 0), self.good[e])  # [n_z, runs, f]
+            white = self.metrics[e].white(spectra.transpose(1, 2, 0))
+            white[~(np.sum(np.abs(white), axis=1) < FAR)] = FAR
         return white
 
     def solve(self, free: Sequence[Free], iterations: int = 12, close: float = 0.05, known: Mapping[int, Array] = {}) -> Fit:
-        """The best free values from those given on, by damped Gauss-Newton; stops when a step gains less than `close`.
-        `known` derivatives (by number) are near enough and are not simulated: see `complete`."""
-        free, known = tuple(free), dict(known)
-        precision = np.array([f.unit / f.sigma for f in free])
-        cost = np.inf
-        for _ in range(iterations + 1):
-            fresh = bool(known) and _ == REFRESHED
-            residual, jacobian, simulated = self.linear(free, {} if fresh else known)
-            if fresh:
-                known = {i: jacobian[:, i] for i in known}
-            offset = np.array([f.offset for f in free])
-            chi2 = float(residual @ residual)
-            cost_here = chi2 + float(offset @ offset)
-            fit = Fit(self.model, free, chi2, cost_here, residual, jacobian, simulated, tuple(self.faults))
-            if not np.isfinite(cost_here) or cost - cost_here < close or not free:
+        """The best free values from those given on, by damped Gauss-Newton; stops where a step gains less than `close`, or promises to.
+        `known` derivatives (by number) are near enough and are not simulated: see `complete`.
+
+        Steps of all dampings are tried at once until the full one is the best. From then on it is gone where it keeps its promise.
+        """
+        known, bold = dict(known), False
+        fit = self.at(tuple(free), known)
+        for k in range(1, iterations + 1):
+            trials, promised = fit.steps()
+            if not np.isfinite(fit.cost) or promised < close:
                 break
-            cost = cost_here
-            if _ == iterations:
+            moved = np.stack([f.at(t) for f, t in zip(fit.free, trials.T)])
+            further = None
+            if bold and k != REFRESHED:
+                further = self.at(_put(fit.free, moved[:, 0]), known)
+                bold = fit.cost - further.cost > PROMISE * promised
+            if further is None or not bold:
+                costs = np.zeros(len(trials))
+                for e in range(len(self.experiments)):
+                    r = self.residuals(e, self.simulate(e, fit.free, trials)[0])
+                    costs += np.einsum("ij,ij->i", r, r)
+                away = (moved - np.array([[f.origin] for f in fit.free])) / np.array([[f.sigma] for f in fit.free])
+                costs = np.where(np.isfinite(costs), costs + np.sum(away**2, axis=0), np.inf)
+                best = int(np.argmin(costs))
+                if not costs[best] < fit.cost - close:
+                    break
+                bold = best == 0
+                further = self.at(_put(fit.free, moved[:, best]), {} if k == REFRESHED else known)
+                if k == REFRESHED:
+                    known = {i: further.jacobian[:, i] for i in known}
+            gained, fit = fit.cost - further.cost, further
+            if gained < close:
                 break
-            curvature = jacobian.T @ jacobian + np.diag(precision**2)
-            slope = jacobian.T @ residual - precision * offset
-            scale = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
-            normed = curvature / np.outer(scale, scale)
-            trials = np.array([np.linalg.solve(normed + (1e-10 + d) * np.eye(len(free)), slope / scale) / scale for d in DAMPING])
-            trials = np.where([f.log for f in free], np.clip(trials, -1.0, 1.0), trials)
-            costs = np.zeros(len(trials))
-            for e in range(len(self.experiments)):
-                r = self.residuals(e, self.simulate(e, free, trials)[0])
-                costs += np.einsum("ij,ij->i", r, r)
-            moved = np.stack([f.at(t) for f, t in zip(free, trials.T)])
-            away = (moved - np.array([[f.origin] for f in free])) / np.array([[f.sigma] for f in free])
-            costs = np.where(np.isfinite(costs), costs + np.sum(away**2, axis=0), np.inf)
-            best = int(np.argmin(costs))
-            if not costs[best] < cost - close:
-                break
-            free = tuple(replace(f, value=float(v)) for f, v in zip(free, moved[:, best]))
         return fit
+
+    def at(self, free: tuple[Free, ...], known: Mapping[int, Array] = {}) -> Fit:
+        """The fit that ends at these free values."""
+        residual, jacobian, simulated = self.linear(free, known)
+        chi2 = float(residual @ residual)
+        cost = chi2 + float(sum(f.offset**2 for f in free))
+        return Fit(self.model, free, chi2, cost, residual, jacobian, simulated, tuple(self.faults))
 
     def eased(self, free: Sequence[Free]) -> tuple[Free, ...]:
         """The free values with all gains of laws scaled down as far as the simulation starts best: a regression that
@@ -199,7 +217,7 @@ class Problem:
             r = self.residuals(e, self.simulate(e, free, shifts)[0])
             costs += np.einsum("ij,ij->i", r, r)
         best = int(np.argmin(np.where(np.isfinite(costs[:-1]), costs[:-1], np.inf)))
-        return tuple(replace(f, value=float(f.at(shifts[best, i]))) for i, f in enumerate(free))
+        return _put(free, np.array([f.at(shift) for f, shift in zip(free, shifts[best])]))
 
     def complete(self, fit: Fit) -> Fit:
         """The fit with all of its derivatives as they are where it ended."""
@@ -214,21 +232,26 @@ class Problem:
                 if i not in known and not (isinstance(f.target, tuple) and f.target[0] == "start" and f.target[1] != e)
             ]  # fmt: skip
             step = 1e-3
-            shifts = np.zeros((len(own) + 1, len(free)))
+            lanes = self.batch.lanes
+            shifts = np.zeros((-(-(len(own) + 1) // lanes) * lanes, len(free)))  # whole vectors lie closely in memory
             for k, i in enumerate(own):
                 shifts[k + 1, i] = step if free[i].at(step) != free[i].value else -step
             z, _ = self.simulate(e, free, shifts)
             r = self.residuals(e, z)
-            block = np.zeros((r.shape[1], len(free)))
+            block = np.zeros((len(free), r.shape[1]))
             for k, i in enumerate(own):
-                block[:, i] = (r[0] - r[k + 1]) / shifts[k + 1, i]
+                block[i] = (r[0] - r[k + 1]) / shifts[k + 1, i]
             blocks.append(block)
             rows.append(r[0])
             simulated.append(np.array(z[0]))
-        jacobian = np.concatenate(blocks)
+        jacobian = np.concatenate(blocks, axis=1).T
         for i, column in known.items():
             jacobian[:, i] = column
         return np.concatenate(rows), jacobian, tuple(simulated)
+
+
+def _put(free: Sequence[Free], values: Array) -> tuple[Free, ...]:
+    return tuple(replace(f, value=float(v)) for f, v in zip(free, values))
 
 
 def _folded(model: Model) -> Model:

@@ -12,8 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.interpolate import CubicSpline
@@ -29,6 +31,9 @@ HALF = 8  # bins to either side that say how loud it is around a tone
 PURE = 40.0  # see Tone: noise has 16 at most
 PARTS = (0.1, 2.0, 6.0, 20.0)  # [Hz] from which to which coherence is added up
 TOP = 100.0  # [Hz] what vehicles do above it is not looked at, but for the noise
+STOP = 120.0  # [dB] by which thinning damps what it would mirror into the band
+TOGETHER = 8  # thinned samples that are made by one matrix product
+CHUNK = 32  # of such products at a time: their signals stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +122,10 @@ class Metric:
         rows = np.ascontiguousarray(np.moveaxis(r, -1, -2))
         return np.moveaxis(fft.rfft(rows, axis=-1)[..., : len(self.root)], -1, -2)
 
-    def white(self, spectra: NDArray[np.complex128]) -> Array:
+    def white(self, spectra: NDArray[np.complex128], out: Array | None = None) -> Array:
         """Real numbers [..., rows] of unit variance if spectra [..., f, sensors] are those of noise."""
-        w = np.empty((*spectra.shape[:-2], *spectra.shape[:-3:-1]), dtype=complex)  # [..., sensors, f]
+        shape = *spectra.shape[:-2], *spectra.shape[:-3:-1]  # [..., sensors, f]
+        w = np.empty(shape, dtype=complex) if out is None else out.view(complex).reshape(shape, copy=False)
         for i in range(w.shape[-2]):  # a triangle
             w[..., i, :] = self.root[:, i, 0] * spectra[..., 0]
             for j in range(1, i + 1):
@@ -134,6 +140,49 @@ class Metric:
     def volume(self) -> float:
         """What belongs to chi2 for a log likelihood where metrics differ: 2 log det S summed over the band."""
         return -4.0 * float(np.sum(np.log(np.abs(np.diagonal(self.root, axis1=1, axis2=2)))))
+
+
+@dataclass(frozen=True, eq=False)
+class Thinning:
+    """Spectra in a narrow band of signals that go round in a circle of n samples: from one in `every` samples of what a low-pass leaves
+    of them. `taps` turn the samples around TOGETHER of those into them, `gain` [f] is what the low-pass leaves of the band."""
+
+    n: int
+    every: int
+    taps: Array
+    gain: Array
+
+    def __call__(self, signals: Array, good: NDArray[np.bool_] | None) -> NDArray[np.complex128]:
+        """Spectra [sensors, runs, f] of signals [n, sensors, runs] where they are good [n, sensors]; None: everywhere."""
+        signals = np.ascontiguousarray(signals)
+        step, width = TOGETHER * self.every, self.taps.shape[1]
+        before = (width - step + self.every) // 2
+        columns = signals.shape[1] * signals.shape[2]
+        thin = np.empty((-(-self.n // step), TOGETHER, columns))
+        for k in range(0, len(thin), CHUNK):
+            some = thin[k : k + CHUNK]
+            first = k * step - before
+            last = first + (len(some) - 1) * step + width
+            at = slice(first, last) if first >= 0 and last <= self.n else np.arange(first, last) % self.n
+            part = signals[at] if good is None else signals[at] * good[at, :, None]
+            stride = part.strides[0]
+            windows = as_strided(part, (len(some), width, columns), (step * stride, stride, part.itemsize))
+            np.matmul(self.taps, windows, out=some)
+        rows = thin.reshape(-1, columns)[: self.n // self.every].T
+        spectra = fft.rfft(rows, axis=1)[:, : len(self.gain)] / self.gain
+        return spectra.reshape(*signals.shape[1:], -1)
+
+
+@cache
+def thinning(n: int, band: int) -> Thinning:
+    """The thinning of n samples to `band` frequencies, by a low-pass with Kaiser's window."""
+    every = max(q for q in range(1, max(int(0.3 * n / band), 1) + 1) if n % q == 0)
+    half = int(np.ceil((STOP - 7.95) / (28.72 * (1.0 / every - 2.0 * band / n)))) if every > 1 else 0
+    k = np.arange(-half, half + 1)
+    tap = np.sinc(k / every) / every * np.kaiser(2 * half + 1, 0.1102 * (STOP - 8.7))
+    taps = np.stack([np.pad(tap, (j * every, (TOGETHER - 1 - j) * every)) for j in range(TOGETHER)])
+    gain = np.cos(2.0 * np.pi / n * np.outer(np.arange(band), k)) @ tap / every
+    return Thinning(n, every, taps, gain)
 
 
 def sensor_levels(
@@ -155,9 +204,9 @@ def sensor_levels(
     else:
         power = np.abs(fft.rfft(residual, axis=0)) ** 2 / n
     high = slice(band, max(int(0.9 * len(f)), band + 1))
-    omega = 2.0 * np.pi * f * e.step
     wide = max(int(1.0 / f[1]), 2)  # bins of a band of 1 Hz
     edges = np.arange(1, band, wide)
+    shapes, means = _slow(n, band, wide)
     found = np.empty((band, residual.shape[1]))
     for j, sigma in enumerate(declared):
         road = np.sum(np.abs(through[:, j, :] * e.unsure) ** 2, axis=1)
@@ -170,8 +219,6 @@ def sensor_levels(
         p, b, r = (np.add.reduceat(x[:band], edges) / bins for x in (power[:, j], base, road))
         whole = float(np.mean(base))
         room = max((1.25 * sigma) ** 2 if sigma > 0.0 else 4.0 * whole, 1.1 * whole) - whole
-        shapes = [(1.0 - pole**2) / np.abs(1.0 - pole * np.exp(-1j * omega)) ** 2 for pole in POLES]
-        means = [np.add.reduceat(shape[:band], edges) / bins for shape in shapes]
 
         def loss(k: int, share: float) -> float:
             s = b + r + share * room * means[k]
@@ -184,8 +231,17 @@ def sensor_levels(
                     best = new, k, share
         for finer in FINER if best[2] else ():
             best = min(best, *((loss(best[1], x), best[1], x) for x in (best[2] / finer, min(best[2] * finer, 1.0))))
-        found[:, j] = (base + best[2] * room * shapes[best[1]])[:band]
+        found[:, j] = base[:band] + best[2] * room * shapes[best[1]]
     return found
+
+
+@cache
+def _slow(n: int, band: int, wide: int) -> tuple[Array, Array]:
+    """Spectra [POLES, f] of slow noise of unit variance in the band, and their means over `wide` bins."""
+    turn = np.exp(-2j * np.pi / n * np.arange(band))
+    shapes = np.array([(1.0 - pole**2) / np.abs(1.0 - pole * turn) ** 2 for pole in POLES])
+    edges = np.arange(1, band, wide)
+    return shapes, np.add.reduceat(shapes, edges, axis=1) / np.diff(np.append(edges, band))
 
 
 def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Metric:

@@ -10,9 +10,10 @@ frequency. So all of them are columns of one linear regression, in the metric of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ Complex = NDArray[np.complex128]
 RESONANCES = np.geomspace(0.5, 40.0, 36)  # [Hz] of hidden masses that are tried
 DAMPINGS = (0.03, 0.1, 0.3)  # and their damping ratios
 COARSE = 0.002  # [s] step at which forces along a motion are looked at, if their recordings have a finer one
+TOGETHER = 8  # candidates whose effects are computed together: they stay in the cache
 FEW = 200  # samples of a sensor that are taken out one by one, sooner than by a transform
 
 
@@ -47,15 +49,17 @@ class Seen:
     free: Complex | None  # None if start states are free anyway
 
     def answer(self, force: Complex, place: int, settled: Sequence[bool] = ()) -> Complex:
-        """Spectra [k, f, sensors] of what forces [k, f] at a place do to the sensors, from rest unless settled."""
-        spectra = force[:, :, None] * self.response[None, :, :, place]
+        """Spectra [k, f, sensors] of what forces [k, f] at a place do to the sensors, from rest unless settled; in memory
+        [k, sensors, f]."""
+        spectra = force[:, None, :] * np.ascontiguousarray(self.response[:, :, place].T)
         if self.states is not None and self.free is not None:
             # what is periodic is not at rest at the start: take that start away
             start = force @ self.states[:, :, place] * 2.0 - force[:, :1] * self.states[0, :, place]
             if settled:
                 start[np.array(settled)] = 0.0
-            spectra -= np.tensordot(start.real / self.n, self.free, axes=(1, 2))
-        return spectra
+            free = np.ascontiguousarray(np.moveaxis(self.free, 2, 0).swapaxes(1, 2))  # [x, sensors, f]
+            spectra -= (start.real / self.n @ free.reshape(len(free), -1).view(float)).view(complex).reshape(spectra.shape)
+        return spectra.swapaxes(1, 2)
 
     @property
     def n(self) -> int:
@@ -126,8 +130,9 @@ class Candidate:
 class Regression:
     """Whitened effects [candidates, rows] of all candidates against the whitened residual of a fit, its free values projected out."""
 
-    def __init__(self, fit: Fit, candidates: Sequence[Candidate], effects: Array):
+    def __init__(self, fit: Fit, candidates: Sequence[Candidate], effects: Array, whole: Array | None = None):
         self.candidates, self.effects = tuple(candidates), effects
+        self.whole = effects @ effects.T if whole is None else whole
         movable = [i for i, f in enumerate(fit.free) if f.low < f.value < f.high]  # the others stand at their bounds
         free = [fit.free[i] for i in movable]
         priors = np.array([f.unit / f.sigma for f in free])
@@ -137,11 +142,10 @@ class Regression:
         r, offsets = fit.residual, np.array([f.offset for f in free])
         top, low = q[: len(r)], q[len(r) :]
         xt, tr = effects @ top, top.T @ r - low.T @ offsets  # effects have no part in the rows of the priors
-        whole = effects @ effects.T
-        self.gram = whole - xt @ xt.T
+        self.gram = self.whole - xt @ xt.T
         self.slope = effects @ r - xt @ tr
         self.scale = np.sqrt(np.maximum(np.diag(self.gram), 1e-300))
-        self.alive = np.diag(self.gram) > 1e-9 * np.diag(whole)  # what nuisances do not imitate altogether
+        self.alive = np.diag(self.gram) > 1e-9 * np.diag(self.whole)  # what nuisances do not imitate altogether
         self.gram /= np.outer(self.scale, self.scale)
         self.slope /= self.scale
         self.chi2 = float(r @ r + offsets @ offsets - tr @ tr)
@@ -169,7 +173,7 @@ class Regression:
 
     def without(self, fit: Fit) -> Regression:
         """The same effects against another residual and other free values."""
-        return Regression(fit, self.candidates, self.effects)
+        return Regression(fit, self.candidates, self.effects, self.whole)
 
     def beside(self, taken: Sequence[int]) -> Regression:
         """The regression with these columns free in size and sign, so that only what none of them can do is left."""
@@ -228,57 +232,71 @@ def collect(
     sensor_names: Sequence[str], fit: Fit, parameters: Sequence[str],
 ) -> tuple[list[Candidate], Array]:  # fmt: skip
     """All candidates and their whitened effects [candidates, rows]."""
-    candidates: list[Candidate] = []
-    parts: list[list[Array]] = [[] for _ in experiments]
+    groups: list[tuple[list[Candidate], Callable[[int], Complex]]] = []  # and the spectra of their effects in each recording
     most = max(int(COARSE / experiments[0].step + 1e-6), 1)
     every = max(q for q in range(1, most + 1) if all(len(x.time) % q == 0 for x in experiments))
     step = every * experiments[0].step
 
-    def masked(e: int, spectra: Complex) -> Array:
-        """Whitened effects from their spectra [k, f, sensors]; samples that do not count are taken out."""
+    @cache
+    def turns(e: int, j: int) -> Complex:
+        """By how much the samples of a sensor that do not count are turned at each frequency."""
+        good = experiments[e].good[:, j]
+        return np.exp(-2j * np.pi / len(good) * (np.outer(np.arange(experiments[e].band), np.flatnonzero(~good)) % len(good)))
+
+    def masked(e: int, spectra: Complex) -> Complex:
+        """Spectra [k, f, sensors] of effects without the samples that do not count."""
         good, band = experiments[e].good, experiments[e].band
         for j in np.flatnonzero(~good.all(axis=0)):
-            bad = np.flatnonzero(~good[:, j])
-            if len(bad) <= FEW:
-                turn = np.exp(-2j * np.pi / len(good) * (np.outer(np.arange(band), bad) % len(good)))
+            if np.count_nonzero(~good[:, j]) <= FEW:
+                turn = turns(e, j)
                 twice = np.where(np.arange(band) > 0, 2.0, 1.0)[:, None] / len(good)
                 spectra[:, :, j] -= (spectra[:, :, j] @ (np.conj(turn) * twice)).real @ turn.T
             else:
                 signals = fft.irfft(spectra[:, :, j].astype(np.complex64), len(good), axis=1)  # quicker, and fine enough for a column
                 signals *= good[:, j]
                 spectra[:, :, j] = fft.rfft(signals, axis=1)[:, :band]
-        return metrics[e].white(spectra)
+        return spectra
+
+    def acted(place: int, laws: Sequence[Basis], e: int) -> Complex:
+        rows = np.stack([b.series[e] for b in laws])
+        phi = every * fft.rfft(rows, axis=1)[:, : experiments[e].band]
+        return masked(e, seen[e].answer(phi, place, [b.settled for b in laws]))
+
+    def pulled(place: int, body: Sequence[Array], tried: Array, e: int) -> Complex:
+        x = experiments[e].frequencies[: experiments[e].band] / tried[:, :1]
+        damped = 2j * tried[:, 1:] * x
+        return masked(e, seen[e].answer((1.0 + damped) / (1.0 - x**2 + damped) * body[e], place))
+
+    def faulty(sensor: int, faults: Sequence[Fault], e: int) -> Complex:
+        x = experiments[e]
+        spectra = np.zeros((len(faults), len(sensor_names), x.band), dtype=complex)
+        spectra[:, sensor] = fft.rfft(np.stack([f.series[e] for f in faults]) * x.good[:, sensor], axis=1)[:, : x.band]
+        return spectra.swapaxes(1, 2)
 
     for k, place in enumerate(found):
         motions = [Motion(m.s[::every], m.v[::every], m.t[::every]) for m in (s.motions[k] for s in seen)]
         laws = list(hy.force_laws(k, place, motions, step, not {b.name for b in model.bodies} & set(place.ends)))
         body = next((b.name for b in model.bodies if set(place.ends) == {b.name, GROUND}), None)
-        if laws:
-            candidates += [Candidate(b.kind, where(b.kind, place, model), b.sign, b.companion, b) for b in laws]
-            for e, s in enumerate(seen):
-                rows = np.stack([b.series[e] for b in laws])
-                phi = every * fft.rfft(rows, axis=1)[:, : experiments[e].band]
-                parts[e].append(masked(e, s.answer(phi, k, [b.settled for b in laws])))
+        for i in range(0, len(laws), TOGETHER):
+            own = laws[i : i + TOGETHER]
+            groups.append(([Candidate(b.kind, where(b.kind, place, model), b.sign, b.companion, b) for b in own], partial(acted, k, own)))
         if body is not None:
-            tried = [(float(f0), zeta) for f0 in RESONANCES for zeta in DAMPINGS]
-            candidates += [Candidate("hidden_resonance", body, 1, False, ("absorber", k, *both)) for both in tried]
-            for e, (s, m) in enumerate(zip(seen, motions)):
-                x = experiments[e].frequencies[: experiments[e].band] / np.array(tried)[:, :1]
-                damped = 2j * np.array(tried)[:, 1:] * x
-                pull = (1.0 + damped) / (1.0 - x**2 + damped) * every * fft.rfft(np.gradient(m.v, step))[: x.shape[1]]
-                parts[e].append(masked(e, s.answer(pull, k)))
+            pull = [every * fft.rfft(np.gradient(m.v, step))[: x.band] for x, m in zip(experiments, motions)]
+            for f0 in RESONANCES:
+                own = [Candidate("hidden_resonance", body, 1, False, ("absorber", k, float(f0), zeta)) for zeta in DAMPINGS]
+                groups.append((own, partial(pulled, k, pull, np.array([(f0, zeta) for zeta in DAMPINGS]))))
     for j, name in enumerate(sensor_names):
         times = [s.motions[0].t if s.motions else e.time for e, s in zip(experiments, seen)]
         faults = list(hy.sensor_faults(j, [s.sensors[:, j] for s in seen], times, step))
-        candidates += [Candidate(f.kind, name, f.sign, f.companion, f) for f in faults]
-        for e, x in enumerate(experiments):
-            spectra = np.zeros((len(faults), x.band, len(sensor_names)), dtype=complex)
-            spectra[:, :, j] = fft.rfft(np.stack([f.series[e] for f in faults]) * x.good[:, j], axis=1)[:, : x.band]
-            parts[e].append(metrics[e].white(spectra))
+        groups.append(([Candidate(f.kind, name, f.sign, f.companion, f) for f in faults], partial(faulty, j, faults)))
     index = {f.target: i for i, f in enumerate(fit.free)}
     chosen = [p for p in parameters if p in index]
-    candidates += [Candidate("wrong_parameter", p, 0, False, p) for p in chosen]
-    ends = np.cumsum([p[0].shape[1] for p in parts])[:-1]
-    for own, rows in zip(parts, np.split(fit.jacobian[:, [index[p] for p in chosen]].T, ends, axis=1)):
-        own.append(rows)
-    return candidates, np.concatenate([np.concatenate(p) for p in parts], axis=1) if len(parts) > 1 else np.concatenate(parts[0])
+    candidates = [c for own, _ in groups for c in own]
+    effects = np.empty((len(candidates) + len(chosen), len(fit.residual)))
+    effects[len(candidates) :] = fit.jacobian[:, [index[p] for p in chosen]].T
+    column = 0
+    for e, x in enumerate(experiments):
+        row, columns = 0, slice(column, column := column + 2 * x.band * len(sensor_names))
+        for own, spectra in groups:
+            metrics[e].white(spectra(e), effects[row : (row := row + len(own)), columns])
+    return [*candidates, *(Candidate("wrong_parameter", p, 0, False, p) for p in chosen)], effects
