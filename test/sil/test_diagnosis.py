@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,7 +17,7 @@ from scipy.signal import lfilter
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import extension, hypotheses, noise, plant, search, study
+from penode_sil.diagnosis import extension, hypotheses, naming, noise, plant, search, study
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.engine import experiment
 from penode_sil.diagnosis.fit import Problem
@@ -200,6 +201,37 @@ def test_simulation_of_the_fit_is_exact(model):
         y = y[: len(got)]
         # (omega h)^4/720 of the highest frequency of the road, 20 Hz, is 6e-6
         assert np.std(got[:, j] - y) < 1e-4 * np.std(y), name
+
+
+
+def test_laws_that_do_the_same_are_one(tmp_path, model):
+    """Two stops fitted to the recording of one share it in any way; the one that is left knows its gap."""
+    z = road(5)
+    path = record(tmp_path / "stop.csv", z, drive(z, lambda s, v: 10e3 * max(s - 0.006, 0.0)), 15)
+    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
+    one = replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+    r = study.regression(one, one.null, [])
+    stops = [c for c in r.candidates if c.kind == "bump_stop" and c.what.law == "bump_stop"]
+    stops.sort(key=lambda c: abs(c.what.shapes["gap"][0] - 0.006))
+    both = search.explain(one, [Term(c, 5e3) for c in stops[:2]])
+    alone = search.leaner(one, both, lambda text: None)
+    assert len(both.terms) == 2 and len(alone.terms) == 1 and alone.score > both.score
+    gap = naming.values(one, alone, alone.groups[0])["gap"]
+    assert gap.value == pytest.approx(0.006, rel=0.02) and gap.ci95[0] < 0.006 < gap.ci95[1] < 0.0062
+
+
+def test_a_narrow_play_takes_all_of_the_spring(tmp_path, model):
+    """Of 0.2 mm in 30 mm of travel: play and stiffness are seen as a product only, but what is lost is the spring's own
+    stiffness."""
+    z = road(5)
+    path = record(tmp_path / "loose.csv", z, drive(z, lambda s, v: -C * np.clip(s, -1e-4, 1e-4)), 15)
+    found = diagnosis.diagnose(model, load([path], model), (), tmp_path / "out")
+    (cause,) = found.causes
+    gap = cause.parameters["gap"]
+    assert cause.kind == "backlash" and gap.value == pytest.approx(2e-4, rel=0.05)
+    assert gap.ci95[1] - gap.ci95[0] < 0.2 * gap.value
+    (play,) = [e for e in penode_gen.load(tmp_path / "out" / "model_extended.toml").elements if e.law == "backlash"]
+    assert play.arguments["stiffness"] == "c"
 
 
 def test_hysteresis_under_prescribed_motion():

@@ -45,6 +45,7 @@ MOST = 0.5  # of what is more than noise
 DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a colour
 MENDS = 4  # laws, at most, that only mend the form of what is named
 SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
+WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
     "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
@@ -53,6 +54,7 @@ TEXTBOOK = {
     "stribeck_friction": (STRIBECK,), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
     "degressive_damper": (KNEE,), "damper_fading": ("heating_damper",),
 }  # fmt: skip
+TAKING = ("backlash", "liftoff")  # laws that undo a spring
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance")  # a formula after all
 FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
@@ -82,7 +84,7 @@ class Explanation:
     @property
     def freedom(self) -> float:
         """What its numbers are worth in chi2."""
-        return sum(cost(t.candidate) for t in self.terms)
+        return sum(cost(t.candidate) - COST * bool(t.own) for t in self.terms)
 
     @property
     def price(self) -> float:
@@ -247,28 +249,36 @@ def filtered(study: Study, e: Explanation, r: Regression) -> Explanation | None:
     return None
 
 
-def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
-    """The terms with gains and shapes where the fit left them."""
-    values = {f.target: f.value for f in fit.free}
-    found, fault = [], 0
-    for term, name in zip(terms, built.names):
+def gains(terms: Sequence[Term], names: Sequence[str]) -> list[str | tuple[str, int]]:
+    """What is free as the gain of each term."""
+    found: list[str | tuple[str, int]] = []
+    faults = 0
+    for term, name in zip(terms, names):
         what = term.candidate.what
         if isinstance(what, Basis):
-            shapes = {k: (values[f"{name}_{k}"], u) for k, (_, u) in what.shapes.items()}
-            found.append(Term(replace(term.candidate, what=replace(what, shapes=shapes)), values[f"{name}_{what.gain[0]}"]))
+            found.append(term.own or f"{name}_{what.gain[0]}")
         elif isinstance(what, Fault):
-            if what.what in ("bias", "scale", "delay"):
-                found.append(Term(term.candidate, values[(what.what, what.sensor)]))
-            else:
-                found.append(Term(term.candidate, values[("fault", fault)]))
-                fault += 1
-        elif isinstance(what, tuple):
-            m, k, d = (values[f"{name}_{key}"] for key in ("mass", "stiffness", "damping"))
-            w = np.sqrt(k / m)
-            what = (what[0], what[1], w / (2 * np.pi), d / (2 * w * m))
-            found.append(Term(replace(term.candidate, what=what), m, values[f"{name}_cubic"]))
+            series = what.what not in ("bias", "scale", "delay")
+            found.append(("fault", faults) if series else (what.what, what.sensor))
+            faults += series
         else:
-            found.append(term)
+            found.append(what if isinstance(what, str) else f"{name}_mass")
+    return found
+
+
+def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
+    """The terms with gains and shapes where the fit left them."""
+    values = {name: p.value for name, p in built.model.parameters.items()} | {f.target: f.value for f in fit.free}
+    found = []
+    for term, name, target in zip(terms, built.names, gains(terms, built.names)):
+        what, gain, bend = term.candidate.what, values[target], 0.0
+        if isinstance(what, Basis):
+            what = replace(what, shapes={k: (values[f"{name}_{k}"], u) for k, (_, u) in what.shapes.items()})
+        elif isinstance(what, tuple):
+            k, d = (values[f"{name}_{key}"] for key in ("stiffness", "damping"))
+            w = np.sqrt(k / gain)
+            what, bend = (what[0], what[1], w / (2 * np.pi), d / (2 * w * gain)), values[f"{name}_cubic"]
+        found.append(replace(term, candidate=replace(term.candidate, what=what), gain=gain, bend=bend))
     return found
 
 
@@ -425,7 +435,7 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
     others = [e for e in done[1:] if set(e.groups) != set(done[0].groups) and len(e.groups) <= len(done[0].groups)]
     equal = [e for e in others if e.gain > done[0].gain - SLACK]  # and may be the plainer one
     plainer = [(e, plain(study, e, parameters, log)) for e in [done[0], *equal[:1]]]
-    best = settled(study, max(plainer, key=lambda both: max(e.score for e in both))[1])
+    best = settled(study, owned(study, max(plainer, key=lambda both: max(e.score for e in both))[1], log))
     alike = equals(study, best, parameters, log)
     swapped = max([best, *alike], key=lambda e: e.score)
     return study, [swapped if swapped is best else settled(study, swapped), *([] if swapped is best else [best]), *done[1:], *alike]
@@ -465,14 +475,29 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
 
 
 def leaner(study: Study, e: Explanation, log) -> Explanation:
-    """The explanation with the first law of a kind that has no textbook law in place of several, where that is worth as much."""
-    for group in e.groups:
-        own = [t for t in e.terms if t.group == group]
-        if len(own) > 1 and group[0] not in (*TEXTBOOK, "sensor_bias"):
-            simple = explain(study, [t for t in e.terms if t not in own[1:]], start=e.fit, formulas=e.formulas)
-            log(f"  lean {group}: {simple.gain:.0f} for {e.gain:.0f}")
-            e = simple if set(simple.groups) == set(e.groups) and simple.score > e.score else e
+    """The explanation without laws that the others of their kind do as well without: they only blur its parameters."""
+    kept: list[Term] = []
+    while spare := [t for t in weak(e) if t not in kept]:
+        simple = explain(study, [t for t in e.terms if t is not spare[0]], start=e.fit, formulas=e.formulas)
+        log(f"  lean {spare[0].group}: {simple.gain:.0f} for {e.gain:.0f}")
+        if set(simple.groups) == set(e.groups) and simple.score > e.score:
+            e, kept = simple, []
+        else:
+            kept.append(spare[0])
     return e
+
+
+def weak(e: Explanation) -> list[Term]:
+    """Laws beside others of their kind that may be worth less than they cost, the least one first."""
+    places = {f.target: i for i, f in enumerate(e.fit.free)}
+    variance = np.diag(e.fit.covariance())
+    found = []
+    for term, target in zip(e.terms, gains(e.terms, e.built.names)):
+        if term.group[0] != "sensor_bias" and sum(t.group == term.group for t in e.terms) > 1:
+            f, i = e.fit.free[places[target]], places[target]
+            found.append(((f.value / f.unit) ** 2 / max(variance[i], 1e-300), term))
+    bound = WEAK * (COST + FORM * e.gain)
+    return [term for worth, term in sorted(found, key=lambda x: x[0]) if worth < bound * cost(term.candidate) / COST]
 
 
 def unbent(study: Study, e: Explanation, log) -> Explanation:
@@ -486,6 +511,29 @@ def unbent(study: Study, e: Explanation, log) -> Explanation:
             if simple.score > e.score - SLACK:
                 e = simple
     return e
+
+
+def owned(study: Study, e: Explanation, log) -> Explanation:
+    """The explanation with laws that take away all of a spring, where they do as well as with a share of it: how wide a play
+    is would else be known no better than how much it takes."""
+    springs = {x.name: x.arguments["stiffness"] for x in study.model.elements if x.law == "linear_spring"}
+
+    def whole(t: Term) -> Term:
+        what = t.candidate.what
+        near = study.places[what.place].elements if _law(t) in TAKING else ()
+        own = [springs[name] for name, _ in near if name in springs]
+        if len(own) != 1:
+            return t
+        share = t.gain / e.fit.model.parameters[own[0]].value  # of a narrow play, only gap times stiffness is seen
+        shapes = {k: (x * share if k == "gap" else x, unit) for k, (x, unit) in what.shapes.items()}
+        return replace(t, candidate=replace(t.candidate, what=replace(what, shapes=shapes)), own=own[0])
+
+    terms = [whole(t) for t in e.terms]
+    if not any(t.own for t in terms):
+        return e
+    tied = explain(study, terms, start=e.fit, formulas=e.formulas)
+    log(f"  all of a spring: {tied.gain:.0f} for {e.gain:.0f}")
+    return tied if tied.groups == e.groups and tied.score > e.score else e
 
 
 def _fault(c: Candidate) -> tuple[str, float] | None:
