@@ -184,3 +184,11 @@ def test_a_rail_may_be_met_once(high, model, kinds):
     assert [c.kind for c in found] == kinds
     if kinds == ["sensor_clipping"]:
         assert found[0].parameters["high"].value == found[0].parameters["limit"].value == 2.5
+
+
+def test_parameters_are_those_of_the_wider_explanation(values):
+    """Of a cause that is in it; another keeps its own."""
+    values["bump_stop"] = {"gap": (0.02, 0.019, 0.021)}
+    known = Cause("bump_stop", "spring", {"gap": Value(0.03, "m", (0.01, 0.05))}, 0.9)
+    assert engine.resized(STUDY, found(("bump_stop", "spring")), known).parameters["gap"].value == 0.02
+    assert engine.resized(STUDY, found(("backlash", "spring")), known) == known

@@ -118,6 +118,7 @@ def diagnose(
     named = None  # what has no name does not go into a model
     if not any(c.kind == OUTSIDE for c in causes):
         named = search.mended(study, best, log) if best is not None and causes else search.explain(study, [])
+        causes = tuple(resized(study, named, c) for c in causes)
     unnamed = nameless.fitted(study, best) if verdict == "unexplained" and not doubt else None
     if unnamed is not None and unused:
         tell(0.83, "fitting what has no name")
@@ -287,6 +288,13 @@ def judge(
     causes += [f for f in faults if (f.kind, f.where) not in faulty]
     whole = (share > search.WHOLE or left < 0.15 * rows) and not pure
     return tuple(causes), ("explained" if whole else "partly_explained") if causes else "no_discrepancy", share, evidence
+
+
+def resized(study: Study, e: Explanation, c: Cause) -> Cause:
+    """A cause with its parameters in another explanation, if it is in there: where more of the rest is explained, it need not
+    make up for that."""
+    group = (c.kind, c.where)
+    return replace(c, parameters=naming.values(study, e, group)) if group in e.groups else c
 
 
 def unsized(e: Explanation, c: Cause) -> bool:
