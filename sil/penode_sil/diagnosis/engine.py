@@ -29,6 +29,7 @@ from .study import MOVING, Study, begin, look
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it
+ENDS = 2.0  # samples by which the ends of a hole may be wrong
 WILD = 2.0  # standard deviations of the noise that bursts have together: one sample in nine that is far out
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
 ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
@@ -203,7 +204,8 @@ def broken_sensors(
     found = []
     for j, sensor in enumerate(model.sensors):
         unit = units.si(sensor.unit)
-        clipped, dropped, railed, total = 0, 0, 0, 0
+        clipped, dropped, railed, lost, more, holes, total = 0, 0, 0, 0.0, 0, 0, 0
+        proven = False
         rails: dict[str, float] = {}
         quantum = 0.0
         for k, m in enumerate(train):
@@ -211,7 +213,7 @@ def broken_sensors(
             if channel is None:
                 continue
             n = len(study.experiments[k].time)
-            total += n
+            total += len(m.mask[sensor.name])
             quantum = max(quantum, channel.quantum)
             sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
             flagged = ~m.mask[sensor.name][:n]
@@ -228,13 +230,16 @@ def broken_sensors(
                     rails[name] = rail
                 else:  # a rail that the signal was not near
                     railed += np.count_nonzero(at)
-            lost = channel.held + channel.missing + channel.spikes
+            bad, wrong = channel.held + channel.missing + channel.spikes, flagged & off & ~railing
             still = channel.held > max(FEW, STILL * n) and channel.quantum < 0.3 * sigma  # noise does not repeat itself
-            if lost and (channel.missing or still or np.count_nonzero(flagged & off & ~railing) > 0.2 * lost):
-                dropped += lost
+            proven |= bad > 0 and bool(channel.missing or still or np.count_nonzero(wrong) > 0.2 * bad)
+            lost += bad * len(m.mask[sensor.name]) / channel.rows  # of a file that may be parted, or slower
             burst = bursts[k][:n, j] if len(bursts) > k else np.zeros(n, bool)
             dropped += int(np.count_nonzero(burst))
             y = m.z[sensor.name][:n]
+            again = noise.repeats(y, simulated[k][:, j], ~flagged, channel.quantum, sigma) & ~burst
+            more += int(np.count_nonzero(again))
+            holes += int(np.count_nonzero(np.diff((wrong | burst | again).astype(np.int8), prepend=0) > 0))
             for side, name, rail in ((-1.0, "low", np.min(y)), (1.0, "high", np.max(y))):  # a rail that was met once or twice
                 at = burst & (y == rail) & (side * (simulated[k][:, j] - rail) > 0.0)
                 if np.count_nonzero(at) >= FEW:
@@ -246,9 +251,11 @@ def broken_sensors(
             sure = {k: 0.002 * abs(x) + 0.5 * quantum for k, x in sizes.items()}
             exact = {k: Value(x, unit, (x - sure[k], x + sure[k])) for k, x in sizes.items()}
             found.append(Cause("sensor_clipping", sensor.name, exact, 0.99))
+        dropped += round(lost) if proven else 0
         if dropped >= FEW:
-            share = dropped / total
-            found.append(Cause("sensor_dropout", sensor.name, {"share": Value(share, "1", (0.9 * share, 1.1 * share))}, 0.99))
+            share, blur = (dropped + more) / total, ENDS * holes / total
+            size = Value(share, "1", (max(share - blur, 0.0), share + blur))
+            found.append(Cause("sensor_dropout", sensor.name, {"share": size}, 0.99))
     return found
 
 
