@@ -332,6 +332,16 @@ def test_a_load_put_on_at_the_start_is_no_start_in_motion(tmp_path, model):
     assert causes == {("constant_force", "body"), ("cubic_spring", "spring")}
 
 
+def test_clocks_that_drift_apart_are_on_no_list(tmp_path, model):
+    """Sensors run ahead of the road by 100 ppm, 1 ms after 10 s."""
+    z, t = road(5), np.arange(SAMPLES) * STEP
+    early = {k: CubicSpline(t, y)(np.minimum(t * (1.0 + 1e-4), t[-1])) for k, y in drive(z, lambda s, v: 0.0).items()}
+    found = diagnosis.diagnose(model, load([record(tmp_path / "drift.csv", z, early, 15)], model))
+    assert [c.kind for c in found.causes] == ["outside_taxonomy"] and found.verdict == "unexplained"
+    (said,) = [n for n in found.notes if "clocks" in n]
+    assert float(said.split(" by ")[1].split(" ppm")[0]) == pytest.approx(100.0, rel=0.03)
+
+
 def test_a_start_in_motion_is_the_start(tmp_path):
     """Free oscillation of a mass: at sample k the C is at cos(omega k h). A sample late it would be off by omega h = 0.06; float
     rounds 1000 sums to 1000 2^-24 = 6e-5 at most, RK4 leaves (omega h)^4/120 omega t = 7e-6."""

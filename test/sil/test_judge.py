@@ -186,6 +186,17 @@ def test_a_rail_may_be_met_once(high, model, kinds):
         assert found[0].parameters["high"].value == found[0].parameters["limit"].value == 2.5
 
 
+def test_a_drift_of_clocks_has_no_name(values, monkeypatch):
+    """Alone, or where others do less than half without it; beside one that does most, a note tells it."""
+    drift, stop = (engine.CLOCK, ""), ("bump_stop", "spring")
+    assert judged(found(drift)) == OUT
+    for share, answer in ((0.4, OUT), (0.6, (["bump_stop"], "explained"))):
+        monkeypatch.setattr(engine.search, "explain", lambda study, terms: found(stop, gain=share * 1000.0))
+        assert judged(found(stop, drift)) == answer
+    (cause,), _, _, _ = engine.judge(STUDY, [found(stop), found(drift, score=999.0)], [], 0.0, 0.0, False)
+    assert cause.alternatives == () and cause.confidence < 0.7
+
+
 def test_a_sensor_that_drops_out_does_so_near_its_value_too():
     """Zeros in two recordings, some of them while the model goes through zero: all count, and their ends say how sure that is."""
     t = np.arange(ROWS) * 1e-3

@@ -15,7 +15,7 @@ from penode_gen.laws import LAWS
 from penode_gen.model import GROUND, Element, Model
 
 from .fit import Free
-from .hypotheses import Basis, Fault
+from .hypotheses import VALUED, Basis, Fault
 from .plant import Place, extend
 from .score import Candidate
 
@@ -101,7 +101,7 @@ def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recor
             loosened.add(what)
         elif isinstance(what, Fault):
             size = max(abs(term.gain), 1e-12)
-            if what.what in ("bias", "scale", "delay"):
+            if what.what in VALUED:
                 free.append(Free((what.what, what.sensor), term.gain, size, low=0.0 if what.what == "delay" else -np.inf))
             else:
                 free.append(Free(("fault", len(faults)), term.gain, size))

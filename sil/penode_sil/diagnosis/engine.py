@@ -21,7 +21,7 @@ from penode_gen.model import Model
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
 from . import absorb, extension, nameless, naming, noise, plausible, residual, search
-from .hypotheses import Basis
+from .hypotheses import CLOCK, Basis
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
 from .search import Explanation
@@ -38,6 +38,7 @@ ENOUGH = 0.85  # share of the avoidable residual that named causes must take awa
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
+MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks only stand in for it
 LATE = 0.008  # of a sample: less delay than that is no fault of a sensor
 OUTSIDE = "outside_taxonomy"
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
@@ -115,12 +116,15 @@ def diagnose(
     notes: list[str] = []
     if tone.purity > noise.PURE:
         notes.append(f"{model.sensors[tone.sensor].name} has a tone of its own at {tone.frequency:.0f} Hz: an engine, a wheel, the mains?")
+    drift = sum(t.gain for t in best.terms if t.candidate.kind == CLOCK) if best else 0.0
+    if drift:
+        notes.append(f"clocks of sensors and inputs drift apart by {1e6 * abs(drift):.3g} ppm: put both on one clock")
     gain: dict[str, Gain] = {}
     named = None  # what has no name does not go into a model
     if not any(c.kind == OUTSIDE for c in causes):
         named = search.mended(study, best, log) if best is not None and causes else search.explain(study, [])
         causes = tuple(resized(study, named, c) for c in causes)
-    unnamed = nameless.fitted(study, best) if verdict == "unexplained" and not doubt else None
+    unnamed = nameless.fitted(study, best) if verdict == "unexplained" and not doubt and not drift else None
     if unnamed is not None and unused:
         tell(0.83, "fitting what has no name")
         worse = extension.measure(study, extension.extend_file(study, unnamed, causes)[1], unused)[0].values()
@@ -283,7 +287,10 @@ def judge(
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
     if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < search.FILTER * best.gain:
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
-    causes = [cause(study, explanations, group) for group in best.groups]
+    others = [t for t in best.terms if t.candidate.kind != CLOCK]
+    if not others or len(others) < len(best.terms) and search.explain(study, others).gain < MAIN * best.gain:
+        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
+    causes = [cause(study, explanations, group) for group in best.groups if group[0] != CLOCK]
     causes = [c for c in causes if worth(study, c)]
     if any(unsized(best, c) for c in causes):
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
@@ -345,7 +352,7 @@ def cause(study: Study, explanations: Sequence[Explanation], group: tuple[str, s
     for e in explanations[1:]:
         if group in e.groups:
             continue
-        swapped = [g for g in e.groups if g not in best.groups]
+        swapped = [g for g in e.groups if g not in best.groups and g[0] != CLOCK]
         behind = best.score - e.score
         margin = min(margin, behind)
         if len(swapped) == 1 and behind < max(50.0, 0.01 * best.gain) and swapped[0] not in others:

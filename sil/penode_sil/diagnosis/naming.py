@@ -403,6 +403,8 @@ def _fault(model: Model, kind: str, what: Fault) -> dict[str, tuple[str, Callabl
             return {"scale": ("1", lambda p: 1.0 + p.get(("scale", j), 0.0))}
         case "sensor_delay":
             return {"delay": ("s", lambda p: p[("delay", j)])}
+        case "clock_drift":
+            return {"drift": ("1", lambda p: p[("clock", 0)])}
     return {}
 
 

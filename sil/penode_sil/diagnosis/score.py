@@ -275,6 +275,10 @@ def collect(
             spectra = np.zeros((len(faults), x.band, len(sensor_names)), dtype=complex)
             spectra[:, :, j] = fft.rfft(np.stack([f.series[e] for f in faults]) * x.good[:, j], axis=1)[:, : x.band]
             parts[e].append(metrics[e].white(spectra))
+    drift = hy.clock([s.sensors for s in seen], [e.time - e.time[0] for e in experiments], experiments[0].step)
+    candidates.append(Candidate(drift.kind, "", drift.sign, drift.companion, drift))
+    for own, x, m, rows in zip(parts, experiments, metrics, drift.series):
+        own.append(m(rows * x.good)[None])
     index = {f.target: i for i, f in enumerate(fit.free)}
     chosen = [p for p in parameters if p in index]
     candidates += [Candidate("wrong_parameter", p, 0, False, p) for p in chosen]

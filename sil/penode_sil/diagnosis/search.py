@@ -16,7 +16,7 @@ import numpy as np
 
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
-from .hypotheses import BENDS, KNEE, STRIBECK, Basis, Fault
+from .hypotheses import BENDS, CLOCK, KNEE, STRIBECK, VALUED, Basis, Fault
 from .naming import christened, straight
 from .score import DAMPINGS, Candidate, Regression
 from .study import Study, heard, loss, regression, requieted
@@ -56,7 +56,7 @@ TEXTBOOK = {
 }  # fmt: skip
 TAKING = ("backlash", "liftoff")  # laws that undo a spring
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
-EXACT = ("wrong_parameter", "constant_force", "hidden_resonance")  # a formula after all
+EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK)  # a formula after all
 FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
 Group = tuple[str, str]
 
@@ -258,7 +258,7 @@ def gains(terms: Sequence[Term], names: Sequence[str]) -> list[str | tuple[str, 
         if isinstance(what, Basis):
             found.append(term.own or f"{name}_{what.gain[0]}")
         elif isinstance(what, Fault):
-            series = what.what not in ("bias", "scale", "delay")
+            series = what.what not in VALUED
             found.append(("fault", faults) if series else (what.what, what.sensor))
             faults += series
         else:
@@ -653,7 +653,7 @@ def missing(e: Explanation, group: Group) -> Fit:
     for i, f in enumerate(e.fit.free):
         if isinstance(f.target, str):
             own += [i] if f.target == group_parameter(e, group) or any(f.target.startswith(n) for n in names) else []
-        elif f.target[0] in ("bias", "scale", "delay"):
+        elif f.target[0] in VALUED:
             own += [i] if any(f.target == (x.what, x.sensor) for x in faults) else []
         elif f.target[0] == "fault":
             own += [i] if e.built.faults[f.target[1]] in faults else []
