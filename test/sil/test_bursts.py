@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from penode_sil.diagnosis.engine import WILD, still_wild
-from penode_sil.diagnosis.noise import Experiment, bursts
+from penode_sil.diagnosis.noise import Experiment, bursts, repeats
 
 STEP, N = 2e-3, 10_000
 T = np.arange(N) * STEP
@@ -104,3 +104,21 @@ def test_what_is_no_more_than_noise_is_not_wild():
         study.null = Simple(simulated=[np.full((N, 2), before)])
         (found,) = still_wild(study, Simple(fit=Simple(simulated=[np.full((N, 2), after)])), [wild])
         assert found.tolist() == [[said, False]]
+
+
+@pytest.mark.parametrize("quantum, length, so", [(0.0, 4, True), (0.0, 2, False), (0.02, 30, True), (0.02, 5, False)])
+def test_rows_too_long_for_noise_repeat(quantum, length, so):
+    """Two equal samples of a fine sensor are chance, four are not; of one whose quantum is twice its noise, five are, thirty
+    are not."""
+    y = noisy(6)[:, 0]
+    y = np.round(y / quantum) * quantum if quantum else y
+    at = slice(4001, 4000 + length)
+    y[4000 : 4000 + length] = y[3999] + 1.0  # where no sample near it has this value
+    y[4000 : 4000 + length] = y[4000]
+    found = repeats(y, MOVE, np.ones(N, bool), quantum, 0.01)
+    assert found[at].all() == so and not found[:4000].any() and not found[4001 + length :].any()
+
+
+def test_a_model_at_rest_lets_a_sensor_rest():
+    y = np.where(T < 2.0, 0.0, noisy(7)[:, 0])
+    assert not repeats(y, np.where(T < 2.0, 0.0, MOVE), np.ones(N, bool), 0.0, 0.01).any()

@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import extension, hypotheses, noise, plant, search, study
+from penode_sil.diagnosis import extension, hypotheses, naming, noise, plant, search, study
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.engine import experiment
 from penode_sil.diagnosis.fit import Problem
@@ -225,6 +225,87 @@ def test_simulation_of_the_fit_is_exact(model):
         assert np.std(got[:, j] - y) < 1e-4 * np.std(y), name
 
 
+
+def test_laws_that_do_the_same_are_one(tmp_path, model):
+    """Two stops fitted to the recording of one share it in any way; the one that is left knows its gap."""
+    z = road(5)
+    path = record(tmp_path / "stop.csv", z, drive(z, lambda s, v: 10e3 * max(s - 0.006, 0.0)), 15)
+    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
+    one = replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+    r = study.regression(one, one.null, [])
+    stops = [c for c in r.candidates if c.kind == "bump_stop" and c.what.law == "bump_stop"]
+    stops.sort(key=lambda c: abs(c.what.shapes["gap"][0] - 0.006))
+    both = search.explain(one, [Term(c, 5e3) for c in stops[:2]])
+    alone = search.leaner(one, both, lambda text: None)
+    assert len(both.terms) == 2 and len(alone.terms) == 1 and alone.score > both.score
+    gap = naming.values(one, alone, alone.groups[0])["gap"]
+    assert gap.value == pytest.approx(0.006, rel=0.02) and gap.ci95[0] < 0.006 < gap.ci95[1] < 0.0062
+
+
+def test_a_narrow_play_takes_all_of_the_spring(tmp_path, model):
+    """Of 0.2 mm in 30 mm of travel: play and stiffness are seen as a product only, but what is lost is the spring's own
+    stiffness."""
+    z = road(5)
+    path = record(tmp_path / "loose.csv", z, drive(z, lambda s, v: -C * np.clip(s, -1e-4, 1e-4)), 15)
+    found = diagnosis.diagnose(model, load([path], model), (), tmp_path / "out")
+    (cause,) = found.causes
+    gap = cause.parameters["gap"]
+    assert cause.kind == "backlash" and gap.value == pytest.approx(2e-4, rel=0.05)
+    assert gap.ci95[1] - gap.ci95[0] < 0.2 * gap.value
+    (play,) = [e for e in penode_gen.load(tmp_path / "out" / "model_extended.toml").elements if e.law == "backlash"]
+    assert play.arguments["stiffness"] == "c"
+
+
+SLEDGE = """
+[model]
+name = "sledge"
+sample_time = "2 ms"
+[parameters]
+m = { value = 20.6, unit = "kg", tolerance = 0.02 }
+c = { value = 1200.0, unit = "N/m", tolerance = 0.02 }
+d = { value = 47.5, unit = "N*s/m", tolerance = 0.02 }
+[inputs]
+pull = { unit = "N" }
+[bodies]
+mass = { mass = "m", position = "z_m", velocity = "v_m" }
+[elements]
+spring = { between = ["mass", "ground"], law = "linear_spring", stiffness = "c" }
+damper = { between = ["mass", "ground"], law = "linear_damper", damping = "d" }
+shaker = { between = ["mass", "ground"], law = "expression", force = "-pull" }
+[outputs]
+z = { value = "z_m", unit = "m" }
+[sensors]
+a = { value = "der(v_m)", unit = "m/s^2", noise = 0.02 }
+z = { value = "z_m", unit = "m", noise = 1e-4 }
+"""
+
+
+def test_a_mount_in_series_takes_all_of_the_damper(tmp_path):
+    """A mount of 4.4 kN/m under a sweep, where sensors that are late or another mass do nearly the same: with a damping
+    of its own, the fit of the mount ends there."""
+    (tmp_path / "sledge.toml").write_text(SLEDGE)
+    model = penode_gen.load(tmp_path / "sledge.toml")
+    m, c, d, tau = 20.87, 1200.0, 48.1, 0.011
+    t = np.arange(SAMPLES) * STEP
+    pull = CubicSpline(t, 30.0 * np.minimum(t, 1.0) ** 2 * np.sin(2.0 * np.pi * (0.3 + 0.25 * t) * t))
+
+    def rates(time: float, x: np.ndarray) -> list[float]:
+        mount = d / tau * (x[0] - x[2])
+        return [x[1], (pull(time) - c * x[0] - mount) / m, mount / d]
+
+    x = solve_ivp(rates, (0.0, t[-1]), np.zeros(3), rtol=1e-8, atol=1e-11, max_step=STEP, t_eval=t).y
+    a = np.array([rates(time, state)[1] for time, state in zip(t, x.T)])
+    rng = np.random.default_rng(4)
+    columns = [t, pull(t), a + 0.02 * rng.standard_normal(SAMPLES), x[0] + 1e-4 * rng.standard_normal(SAMPLES)]
+    header = "time [s],pull [N],a [m/s^2],z [m]"
+    path = tmp_path / "sledge.csv"
+    np.savetxt(path, np.stack(columns, axis=1), delimiter=",", header=header, comments="", fmt="%.9g")
+    found = diagnosis.diagnose(model, load([path], model))
+    assert [c.kind for c in found.causes] == ["maxwell_bushing"]
+    stiffness = found.causes[0].parameters["stiffness"]
+    assert stiffness.value == pytest.approx(d / tau, rel=0.1) and stiffness.ci95[0] < d / tau < stiffness.ci95[1]
+
+
 def test_hysteresis_under_prescribed_motion():
     """slips() against the law integrated by SciPy; four RK4 steps a sample of 1/50 presliding leave (1/200)^4."""
     t = np.linspace(0.0, 1.0, 2001)
@@ -345,6 +426,16 @@ def test_a_load_put_on_at_the_start_is_no_start_in_motion(tmp_path, model):
     path = record(tmp_path / "loaded.csv", z, sensors, 4, {k: NOISE[k] for k in ("a_body", "a_wheel")})
     causes = {(c.kind, c.where) for c in diagnosis.diagnose(model, load([path], model)).causes}
     assert causes == {("constant_force", "body"), ("cubic_spring", "spring")}
+
+
+def test_clocks_that_drift_apart_are_on_no_list(tmp_path, model):
+    """Sensors run ahead of the road by 100 ppm, 1 ms after 10 s."""
+    z, t = road(5), np.arange(SAMPLES) * STEP
+    early = {k: CubicSpline(t, y)(np.minimum(t * (1.0 + 1e-4), t[-1])) for k, y in drive(z, lambda s, v: 0.0).items()}
+    found = diagnosis.diagnose(model, load([record(tmp_path / "drift.csv", z, early, 15)], model))
+    assert [c.kind for c in found.causes] == ["outside_taxonomy"] and found.verdict == "unexplained"
+    (said,) = [n for n in found.notes if "clocks" in n]
+    assert float(said.split(" by ")[1].split(" ppm")[0]) == pytest.approx(100.0, rel=0.03)
 
 
 def test_a_start_in_motion_is_the_start(tmp_path):

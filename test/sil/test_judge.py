@@ -174,7 +174,7 @@ def test_a_rail_may_be_met_once(high, model, kinds):
     """Flat samples that no statistics of the record shows, for they are too few, are a rail if the sensor never shows more."""
     y, at = np.zeros(ROWS), slice(5000, 5015)
     y[100], y[at] = min(high, 2.4) if high < 9.0 else high, 2.5
-    quality = SimpleNamespace(low=None, high=None, quantum=0.0, held=0, missing=0, spikes=0)
+    quality = SimpleNamespace(rows=ROWS, low=None, high=None, quantum=0.0, held=0, missing=0, spikes=0)
     measured = SimpleNamespace(z={"a": y}, mask={"a": np.ones(ROWS, bool)}, quality=SimpleNamespace(channels={"a": quality}))
     study = SimpleNamespace(experiments=[SimpleNamespace(time=np.arange(ROWS))], levels=[np.full((1, 1), 1e-4)])
     sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
@@ -184,3 +184,44 @@ def test_a_rail_may_be_met_once(high, model, kinds):
     assert [c.kind for c in found] == kinds
     if kinds == ["sensor_clipping"]:
         assert found[0].parameters["high"].value == found[0].parameters["limit"].value == 2.5
+
+
+def test_a_drift_of_clocks_has_no_name(values, monkeypatch):
+    """Alone, or where others do less than half without it; beside one that does most, a note tells it."""
+    drift, stop = (engine.CLOCK, ""), ("bump_stop", "spring")
+    assert judged(found(drift)) == OUT
+    for share, answer in ((0.4, OUT), (0.6, (["bump_stop"], "explained"))):
+        monkeypatch.setattr(engine.search, "explain", lambda study, terms: found(stop, gain=share * 1000.0))
+        assert judged(found(stop, drift)) == answer
+    (cause,), _, _, _ = engine.judge(STUDY, [found(stop), found(drift, score=999.0)], [], 0.0, 0.0, False)
+    assert cause.alternatives == () and cause.confidence < 0.7
+
+
+def test_a_sensor_that_drops_out_does_so_near_its_value_too():
+    """Zeros in two recordings, some of them while the model goes through zero: all count, and their ends say how sure that is."""
+    t = np.arange(ROWS) * 1e-3
+    model = np.sin(np.pi * t)
+    recordings, simulated = [], []
+    for holes in ((5490, 30, True), (7990, 20, False)), ((2490, 4, True),):
+        y, mask = model + 0.01 * np.random.default_rng(len(holes)).normal(size=ROWS), np.ones(ROWS, bool)
+        for first, n, seen in holes:
+            y[first : first + n], mask[first : first + n] = 0.0, not seen
+        held = int(np.count_nonzero(~mask))
+        quality = SimpleNamespace(rows=ROWS, low=None, high=None, quantum=0.0, held=held, missing=0, spikes=0)
+        channels = SimpleNamespace(channels={"a": quality})
+        recordings.append(SimpleNamespace(z={"a": y}, mask={"a": mask}, quality=channels))
+        simulated.append(model[:, None])
+    study = SimpleNamespace(experiments=[SimpleNamespace(time=t)] * 2, levels=[np.full((1, 1), 1e-4)] * 2)
+    sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
+    (cause,) = engine.broken_sensors(sensors, recordings, study, simulated, [np.zeros((ROWS, 1), bool)] * 2)
+    share = cause.parameters["share"]
+    assert share.value == pytest.approx((30 + 20 + 4) / (2 * ROWS))
+    assert share.ci95[0] < share.value < share.ci95[1] < 1.15 * share.value
+
+
+def test_parameters_are_those_of_the_wider_explanation(values):
+    """Of a cause that is in it; another keeps its own."""
+    values["bump_stop"] = {"gap": (0.02, 0.019, 0.021)}
+    known = Cause("bump_stop", "spring", {"gap": Value(0.03, "m", (0.01, 0.05))}, 0.9)
+    assert engine.resized(STUDY, found(("bump_stop", "spring")), known).parameters["gap"].value == 0.02
+    assert engine.resized(STUDY, found(("backlash", "spring")), known) == known

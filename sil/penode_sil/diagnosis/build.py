@@ -15,7 +15,7 @@ from penode_gen.laws import LAWS
 from penode_gen.model import GROUND, Element, Model
 
 from .fit import Free
-from .hypotheses import Basis, Fault
+from .hypotheses import VALUED, Basis, Fault
 from .plant import Place, extend
 from .score import Candidate
 
@@ -34,6 +34,7 @@ class Term:
     candidate: Candidate
     gain: float
     bend: float = 0.0  # N/m^3, of a hidden mass's spring
+    own: str = ""  # parameter of the model that its gain is, for a law that takes away all of an element
 
     @property
     def group(self) -> tuple[str, str]:
@@ -68,19 +69,21 @@ def element(term: Term, place: Place, name: str, model: Model) -> tuple[Element,
         arguments = {key: f"{name}_{key}" for key in values}
         return Element(name, (body.name, GROUND), "absorber", arguments), {arguments[k]: v for k, v in values.items()}, free
     gain, unit = what.gain
+    size = max(abs(term.gain), 1e-12)
+    low, high = (0.0, np.inf) if what.sign > 0 else (-np.inf, 0.0) if what.sign < 0 else (-np.inf, np.inf)
+    parameters = {} if term.own else {f"{name}_{gain}": (term.gain, unit)}
+    free = [Free(key, x, size, low=low, high=high) for key, (x, _) in parameters.items()]
     shapes = {f"{name}_{key}": value for key, value in what.shapes.items()}
     least = {f"{name}_{key}": value for key, value in what.least.items()}
     known = {f"{name}_{key}": value for key, value in what.fixed.items()}
-    parameters = {f"{name}_{gain}": (term.gain, unit)} | shapes | known
-    size = max(abs(term.gain), 1e-12)
-    low, high = (0.0, np.inf) if what.sign > 0 else (-np.inf, 0.0) if what.sign < 0 else (-np.inf, np.inf)
-    free = [Free(f"{name}_{gain}", term.gain, size, low=low, high=high)]
+    parameters |= shapes | known
     for key, (value, _) in shapes.items():
         below, above = RANGES.get(key.removeprefix(f"{name}_"), (30.0, 30.0))
         most = SLOWEST if key == f"{name}_relaxation" else np.inf
         free.append(Free(key, value, 1.0, log=True, low=max(value / below, least.get(key, 0.0)), high=min(value * above, most)))
     if what.law in LAWS:
-        return Element(name, place.ends, what.law, {key: f"{name}_{key}" for key in LAWS[what.law].arguments}), parameters, free
+        arguments = {key: f"{name}_{key}" for key in LAWS[what.law].arguments} | ({gain: term.own} if term.own else {})
+        return Element(name, place.ends, what.law, arguments), parameters, free
     text = re.sub(rf"\b({'|'.join((gain, *what.shapes, *what.fixed))})\b", lambda m: f"{name}_{m[1]}", what.law)
     return Element(name, place.ends, "expression", expression=text), parameters, free
 
@@ -98,7 +101,7 @@ def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recor
             loosened.add(what)
         elif isinstance(what, Fault):
             size = max(abs(term.gain), 1e-12)
-            if what.what in ("bias", "scale", "delay"):
+            if what.what in VALUED:
                 free.append(Free((what.what, what.sensor), term.gain, size, low=0.0 if what.what == "delay" else -np.inf))
             else:
                 free.append(Free(("fault", len(faults)), term.gain, size))

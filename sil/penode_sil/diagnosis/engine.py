@@ -21,7 +21,7 @@ from penode_gen.model import Model
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
 from . import absorb, extension, nameless, naming, noise, plausible, residual, search
-from .hypotheses import Basis
+from .hypotheses import CLOCK, Basis
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
 from .search import Explanation
@@ -29,6 +29,7 @@ from .study import MOVING, Study, begin, look
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it
+ENDS = 2.0  # samples by which the ends of a hole may be wrong
 WILD = 2.0  # standard deviations of the noise that bursts have together: one sample in nine that is far out
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
 ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
@@ -37,6 +38,7 @@ ENOUGH = 0.85  # share of the avoidable residual that named causes must take awa
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
+MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks only stand in for it
 LATE = 0.008  # of a sample: less delay than that is no fault of a sensor
 OUTSIDE = "outside_taxonomy"
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
@@ -114,11 +116,15 @@ def diagnose(
     notes: list[str] = []
     if tone.purity > noise.PURE:
         notes.append(f"{model.sensors[tone.sensor].name} has a tone of its own at {tone.frequency:.0f} Hz: an engine, a wheel, the mains?")
+    drift = sum(t.gain for t in best.terms if t.candidate.kind == CLOCK) if best else 0.0
+    if drift:
+        notes.append(f"clocks of sensors and inputs drift apart by {1e6 * abs(drift):.3g} ppm: put both on one clock")
     gain: dict[str, Gain] = {}
     named = None  # what has no name does not go into a model
     if not any(c.kind == OUTSIDE for c in causes):
         named = search.mended(study, best, log) if best is not None and causes else search.explain(study, [])
-    unnamed = nameless.fitted(study, best) if verdict == "unexplained" and not doubt else None
+        causes = tuple(resized(study, named, c) for c in causes)
+    unnamed = nameless.fitted(study, best) if verdict == "unexplained" and not doubt and not drift else None
     if unnamed is not None and unused:
         tell(0.83, "fitting what has no name")
         worse = extension.measure(study, extension.extend_file(study, unnamed, causes)[1], unused)[0].values()
@@ -202,7 +208,8 @@ def broken_sensors(
     found = []
     for j, sensor in enumerate(model.sensors):
         unit = units.si(sensor.unit)
-        clipped, dropped, railed, total = 0, 0, 0, 0
+        clipped, dropped, railed, lost, more, holes, total = 0, 0, 0, 0.0, 0, 0, 0
+        proven = False
         rails: dict[str, float] = {}
         quantum = 0.0
         for k, m in enumerate(train):
@@ -210,7 +217,7 @@ def broken_sensors(
             if channel is None:
                 continue
             n = len(study.experiments[k].time)
-            total += n
+            total += len(m.mask[sensor.name])
             quantum = max(quantum, channel.quantum)
             sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
             flagged = ~m.mask[sensor.name][:n]
@@ -227,13 +234,16 @@ def broken_sensors(
                     rails[name] = rail
                 else:  # a rail that the signal was not near
                     railed += np.count_nonzero(at)
-            lost = channel.held + channel.missing + channel.spikes
+            bad, wrong = channel.held + channel.missing + channel.spikes, flagged & off & ~railing
             still = channel.held > max(FEW, STILL * n) and channel.quantum < 0.3 * sigma  # noise does not repeat itself
-            if lost and (channel.missing or still or np.count_nonzero(flagged & off & ~railing) > 0.2 * lost):
-                dropped += lost
+            proven |= bad > 0 and bool(channel.missing or still or np.count_nonzero(wrong) > 0.2 * bad)
+            lost += bad * len(m.mask[sensor.name]) / channel.rows  # of a file that may be parted, or slower
             burst = bursts[k][:n, j] if len(bursts) > k else np.zeros(n, bool)
             dropped += int(np.count_nonzero(burst))
             y = m.z[sensor.name][:n]
+            again = noise.repeats(y, simulated[k][:, j], ~flagged, channel.quantum, sigma) & ~burst
+            more += int(np.count_nonzero(again))
+            holes += int(np.count_nonzero(np.diff((wrong | burst | again).astype(np.int8), prepend=0) > 0))
             for side, name, rail in ((-1.0, "low", np.min(y)), (1.0, "high", np.max(y))):  # a rail that was met once or twice
                 at = burst & (y == rail) & (side * (simulated[k][:, j] - rail) > 0.0)
                 if np.count_nonzero(at) >= FEW:
@@ -245,9 +255,11 @@ def broken_sensors(
             sure = {k: 0.002 * abs(x) + 0.5 * quantum for k, x in sizes.items()}
             exact = {k: Value(x, unit, (x - sure[k], x + sure[k])) for k, x in sizes.items()}
             found.append(Cause("sensor_clipping", sensor.name, exact, 0.99))
+        dropped += round(lost) if proven else 0
         if dropped >= FEW:
-            share = dropped / total
-            found.append(Cause("sensor_dropout", sensor.name, {"share": Value(share, "1", (0.9 * share, 1.1 * share))}, 0.99))
+            share, blur = (dropped + more) / total, ENDS * holes / total
+            size = Value(share, "1", (max(share - blur, 0.0), share + blur))
+            found.append(Cause("sensor_dropout", sensor.name, {"share": size}, 0.99))
     return found
 
 
@@ -275,7 +287,10 @@ def judge(
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
     if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < search.FILTER * best.gain:
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
-    causes = [cause(study, explanations, group) for group in best.groups]
+    others = [t for t in best.terms if t.candidate.kind != CLOCK]
+    if not others or len(others) < len(best.terms) and search.explain(study, others).gain < MAIN * best.gain:
+        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
+    causes = [cause(study, explanations, group) for group in best.groups if group[0] != CLOCK]
     causes = [c for c in causes if worth(study, c)]
     if any(unsized(best, c) for c in causes):
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
@@ -287,6 +302,13 @@ def judge(
     causes += [f for f in faults if (f.kind, f.where) not in faulty]
     whole = (share > search.WHOLE or left < 0.15 * rows) and not pure
     return tuple(causes), ("explained" if whole else "partly_explained") if causes else "no_discrepancy", share, evidence
+
+
+def resized(study: Study, e: Explanation, c: Cause) -> Cause:
+    """A cause with its parameters in another explanation, if it is in there: where more of the rest is explained, it need not
+    make up for that."""
+    group = (c.kind, c.where)
+    return replace(c, parameters=naming.values(study, e, group)) if group in e.groups else c
 
 
 def unsized(e: Explanation, c: Cause) -> bool:
@@ -330,7 +352,7 @@ def cause(study: Study, explanations: Sequence[Explanation], group: tuple[str, s
     for e in explanations[1:]:
         if group in e.groups:
             continue
-        swapped = [g for g in e.groups if g not in best.groups]
+        swapped = [g for g in e.groups if g not in best.groups and g[0] != CLOCK]
         behind = best.score - e.score
         margin = min(margin, behind)
         if len(swapped) == 1 and behind < max(50.0, 0.01 * best.gain) and swapped[0] not in others:

@@ -24,7 +24,7 @@ from ..batch import Batch
 from ..targets import Sil
 from .build import SPREAD, Term
 from .fit import Free, Problem, moving
-from .hypotheses import Basis, Fault, size
+from .hypotheses import VALUED, Basis, Fault, size
 from .noise import Experiment, bursts, metric
 from .plant import anonymous
 from .residual import Channel, channels, noise_floor, noise_rms, rms
@@ -200,7 +200,7 @@ def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
 def _series(e: Explanation, values: dict[object, float], sensor: int) -> list[tuple[Fault, float]]:
     """What faults of a sensor there are beside bias, scale and delay, each with its gain."""
     faults = [t.candidate.what for t in e.terms if isinstance(t.candidate.what, Fault)]
-    series = [f for f in faults if f.what not in ("bias", "scale", "delay")]
+    series = [f for f in faults if f.what not in VALUED]
     return [(f, values[("fault", i)]) for i, f in enumerate(series) if f.sensor == sensor]
 
 

@@ -145,6 +145,8 @@ class Problem:
                 z[:, j] += values
             elif what == "skew":
                 skews[j] = values
+            elif what == "clock":
+                z = drifted(z, values)
             elif what == "delay":
                 z[:, j] = delayed(z[:, j], values, self.experiments[e].step)
         if skews.any():
@@ -311,6 +313,16 @@ def _drive(e: Experiment, fine: int) -> Array:
         parts[:, 3] = u[1:] - 0.25 * h * e.rate[1:]
         parts[:, 2] = 4.0 * whole - 0.5 * (u[:-1] + u[1:]) - parts[:, 1] - parts[:, 3]
     return np.concatenate([parts.reshape(-1, u.shape[1]), u[-1:]])
+
+
+def drifted(signals: Array, drift: Array) -> Array:
+    """Signals [n, n_z, runs] by clocks that run fast by drifts [runs]: parabolas through the nearest three samples."""
+    n = len(signals)
+    at = np.arange(n)[:, None] * (1.0 + drift)
+    near = np.clip(np.rint(at).astype(int), 1, n - 2)
+    before, here, after = (np.take_along_axis(signals, (near + k)[:, None], axis=0) for k in (-1, 0, 1))
+    part = (at - near)[:, None]
+    return here + 0.5 * part * (after - before + part * (after - 2.0 * here + before))
 
 
 def delayed(signals: Array, delay: Array, step: float) -> Array:

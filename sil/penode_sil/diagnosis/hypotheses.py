@@ -48,6 +48,10 @@ class Basis:
     least: dict[str, float] = field(default_factory=dict)  # what shapes may be at least: less cannot be told
 
 
+VALUED = ("bias", "scale", "delay", "clock")  # faults of a value alone; the others add a series
+CLOCK = "clock_drift"  # kind of what is not on the list, but would pass for something that is
+
+
 @dataclass(frozen=True, eq=False)
 class Fault:
     """One elementary fault of a sensor: `series` is what it adds to that sensor for gain 1, per recording."""
@@ -395,3 +399,9 @@ def sensor_faults(sensor: int, signals: Sequence[Array], times: Sequence[Array],
     yield fault("sensor_scale", "scale_drift", 0, lambda y, t: y * (t / last - 0.5), 0.0, True)
     yield fault("sensor_scale", "scale_side", 0, lambda y, t: np.abs(y), 0.0, True)
     yield fault("sensor_scale", "scale_bend", 0, lambda y, t: y**3 / max(top, 1e-300) ** 2, top, True)
+
+
+def clock(signals: Sequence[Array], times: Sequence[Array], step: float) -> Fault:
+    """A clock of all sensors [n, n_z] that runs faster than that of the inputs, from the start of each recording on."""
+    series = tuple(t[:, None] * np.gradient(y, step, axis=0) for y, t in zip(signals, times))
+    return Fault(CLOCK, 0, "clock", 0, series)

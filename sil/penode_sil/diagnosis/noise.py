@@ -252,6 +252,7 @@ def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Met
     return Metric(len(e.time), root)
 
 
+CHANCE = 1e-3  # that a whole recording has one row of repeated samples as long
 LAST = 8  # samples: so far the end of a spline is felt
 
 
@@ -295,6 +296,19 @@ def _frozen(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
         if np.mean(found[:, j]) > 0.2:  # that is no sensor at all, or slower than the raster
             found[:, j] = False
     return found
+
+
+def repeats(y: Array, z: Array, good: NDArray[np.bool_], quantum: float, sigma: float) -> NDArray[np.bool_]:
+    """Good samples [n] of a sensor that repeat the one before in rows too long for its noise and quantum, while the model z
+    moves. Of zeros, which is what lost samples are mostly set to, the first one counts as well."""
+    same = np.diff(y) == 0.0
+    edges = np.flatnonzero(np.diff(same.astype(np.int8), prepend=0, append=0))
+    usual = max(quantum / (2.0 * np.sqrt(np.pi) * sigma), float(np.mean(same & good[1:])))  # chance of the same twice
+    found = np.zeros(len(y), dtype=bool)
+    for a, b in zip(edges[::2], edges[1::2] + 1):
+        if len(y) * usual ** (b - a - 1) < CHANCE and np.ptp(z[a:b]) > quantum:
+            found[a + (y[a] != 0.0) : b] = True
+    return found & good
 
 
 def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:

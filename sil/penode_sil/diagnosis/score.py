@@ -289,6 +289,9 @@ def collect(
         times = [s.motions[0].t if s.motions else e.time for e, s in zip(experiments, seen)]
         faults = list(hy.sensor_faults(j, [s.sensors[:, j] for s in seen], times, step))
         groups.append(([Candidate(f.kind, name, f.sign, f.companion, f) for f in faults], partial(faulty, j, faults)))
+    drift = hy.clock([s.sensors for s in seen], [e.time - e.time[0] for e in experiments], experiments[0].step)
+    apart = Candidate(drift.kind, "", drift.sign, drift.companion, drift)
+    groups.append(([apart], lambda e: metrics[e].spectrum(drift.series[e] * experiments[e].good)[None]))
     index = {f.target: i for i, f in enumerate(fit.free)}
     chosen = [p for p in parameters if p in index]
     candidates = [c for own, _ in groups for c in own]

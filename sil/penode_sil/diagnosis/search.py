@@ -16,7 +16,7 @@ import numpy as np
 
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
-from .hypotheses import BENDS, KNEE, STRIBECK, Basis, Fault
+from .hypotheses import BENDS, CLOCK, KNEE, STRIBECK, VALUED, Basis, Fault
 from .naming import christened, straight
 from .score import DAMPINGS, Candidate, Regression
 from .study import Study, heard, loss, regression, requieted
@@ -45,6 +45,7 @@ MOST = 0.5  # of what is more than noise
 DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a colour
 MENDS = 4  # laws, at most, that only mend the form of what is named
 SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
+WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
     "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
@@ -53,8 +54,13 @@ TEXTBOOK = {
     "stribeck_friction": (STRIBECK,), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
     "degressive_damper": (KNEE,), "damper_fading": ("heating_damper",),
 }  # fmt: skip
+TAKING = {  # laws that take an element away: its law and argument
+    "backlash": ("linear_spring", "stiffness"),
+    "liftoff": ("linear_spring", "stiffness"),
+    "loose_damper": ("linear_damper", "damping"),
+}
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
-EXACT = ("wrong_parameter", "constant_force", "hidden_resonance")  # a formula after all
+EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK)  # a formula after all
 FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
 Group = tuple[str, str]
 
@@ -82,7 +88,7 @@ class Explanation:
     @property
     def freedom(self) -> float:
         """What its numbers are worth in chi2."""
-        return sum(cost(t.candidate) for t in self.terms)
+        return sum(cost(t.candidate) - COST * bool(t.own) for t in self.terms)
 
     @property
     def price(self) -> float:
@@ -212,8 +218,18 @@ def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
     worth, both = pair(r)
     if worth > 0.7 * best:
         choices.append(both)
-    found = [explain(study, terms) for terms in (terms_of(r, chosen) for chosen in choices) if terms]
-    return sorted((e for e in found if e.groups), key=lambda e: -e.score)
+    ways = [terms_of(r, chosen) for chosen in choices]
+    ways += [in_series(study, r, group) for _, group, _ in taken]
+    return distinct([e for e in (explain(study, terms) for terms in ways if terms) if e.groups])
+
+
+def in_series(study: Study, r: Regression, group: Group) -> list[Term]:
+    """A spring or a play in series with all of a damper; none if that is not of the group. With a damping of its own,
+    many values of the rest do about as well, and a fit may end in the wrong ones."""
+    pool = [k for k in pools(r)[group] if _law(Term(r.candidates[k], 0.0)) == "loose_damper"]
+    _, best = r.best_single([], pool, dict.fromkeys(pool, 0.0))
+    terms = terms_of(r, [best]) if best >= 0 else []
+    return [tied for tied in (whole(study, t) for t in terms) if tied]
 
 
 def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str]) -> tuple[Explanation, Regression]:
@@ -247,28 +263,36 @@ def filtered(study: Study, e: Explanation, r: Regression) -> Explanation | None:
     return None
 
 
-def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
-    """The terms with gains and shapes where the fit left them."""
-    values = {f.target: f.value for f in fit.free}
-    found, fault = [], 0
-    for term, name in zip(terms, built.names):
+def gains(terms: Sequence[Term], names: Sequence[str]) -> list[str | tuple[str, int]]:
+    """What is free as the gain of each term."""
+    found: list[str | tuple[str, int]] = []
+    faults = 0
+    for term, name in zip(terms, names):
         what = term.candidate.what
         if isinstance(what, Basis):
-            shapes = {k: (values[f"{name}_{k}"], u) for k, (_, u) in what.shapes.items()}
-            found.append(Term(replace(term.candidate, what=replace(what, shapes=shapes)), values[f"{name}_{what.gain[0]}"]))
+            found.append(term.own or f"{name}_{what.gain[0]}")
         elif isinstance(what, Fault):
-            if what.what in ("bias", "scale", "delay"):
-                found.append(Term(term.candidate, values[(what.what, what.sensor)]))
-            else:
-                found.append(Term(term.candidate, values[("fault", fault)]))
-                fault += 1
-        elif isinstance(what, tuple):
-            m, k, d = (values[f"{name}_{key}"] for key in ("mass", "stiffness", "damping"))
-            w = np.sqrt(k / m)
-            what = (what[0], what[1], w / (2 * np.pi), d / (2 * w * m))
-            found.append(Term(replace(term.candidate, what=what), m, values[f"{name}_cubic"]))
+            series = what.what not in VALUED
+            found.append(("fault", faults) if series else (what.what, what.sensor))
+            faults += series
         else:
-            found.append(term)
+            found.append(what if isinstance(what, str) else f"{name}_mass")
+    return found
+
+
+def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
+    """The terms with gains and shapes where the fit left them."""
+    values = {name: p.value for name, p in built.model.parameters.items()} | {f.target: f.value for f in fit.free}
+    found = []
+    for term, name, target in zip(terms, built.names, gains(terms, built.names)):
+        what, gain, bend = term.candidate.what, values[target], 0.0
+        if isinstance(what, Basis):
+            what = replace(what, shapes={k: (values[f"{name}_{k}"], u) for k, (_, u) in what.shapes.items()})
+        elif isinstance(what, tuple):
+            k, d = (values[f"{name}_{key}"] for key in ("stiffness", "damping"))
+            w = np.sqrt(k / gain)
+            what, bend = (what[0], what[1], w / (2 * np.pi), d / (2 * w * gain)), values[f"{name}_cubic"]
+        found.append(replace(term, candidate=replace(term.candidate, what=what), gain=gain, bend=bend))
     return found
 
 
@@ -425,7 +449,7 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
     others = [e for e in done[1:] if set(e.groups) != set(done[0].groups) and len(e.groups) <= len(done[0].groups)]
     equal = [e for e in others if e.gain > done[0].gain - SLACK]  # and may be the plainer one
     plainer = [(e, plain(study, e, parameters, log)) for e in [done[0], *equal[:1]]]
-    best = settled(study, max(plainer, key=lambda both: max(e.score for e in both))[1])
+    best = settled(study, owned(study, max(plainer, key=lambda both: max(e.score for e in both))[1], log))
     alike = equals(study, best, parameters, log)
     swapped = max([best, *alike], key=lambda e: e.score)
     return study, [swapped if swapped is best else settled(study, swapped), *([] if swapped is best else [best]), *done[1:], *alike]
@@ -465,14 +489,31 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
 
 
 def leaner(study: Study, e: Explanation, log) -> Explanation:
-    """The explanation with the first law of a kind that has no textbook law in place of several, where that is worth as much."""
-    for group in e.groups:
-        own = [t for t in e.terms if t.group == group]
-        if len(own) > 1 and group[0] not in (*TEXTBOOK, "sensor_bias"):
-            simple = explain(study, [t for t in e.terms if t not in own[1:]], start=e.fit, formulas=e.formulas)
-            log(f"  lean {group}: {simple.gain:.0f} for {e.gain:.0f}")
-            e = simple if set(simple.groups) == set(e.groups) and simple.score > e.score else e
+    """The explanation without laws that the others of their kind do as well without: they only blur its parameters."""
+    kept: list[Term] = []
+    while spare := [t for t in weak(e) if t not in kept]:
+        simple = explain(study, [t for t in e.terms if t is not spare[0]], start=e.fit, formulas=e.formulas)
+        log(f"  lean {spare[0].group}: {simple.gain:.0f} for {e.gain:.0f}")
+        if set(simple.groups) == set(e.groups) and simple.score > e.score:
+            e, kept = simple, []
+        else:
+            kept.append(spare[0])
     return e
+
+
+def weak(e: Explanation) -> list[Term]:
+    """Laws beside others of their kind that may be worth less than they cost, the least one first."""
+    places = {f.target: i for i, f in enumerate(e.fit.free)}
+    variance = np.diag(e.fit.covariance())
+    found = []
+    for term, target in zip(e.terms, gains(e.terms, e.built.names)):
+        several = sum(t.group == term.group for t in e.terms) > 1 and term.group[0] != "sensor_bias"
+        if several and not term.own:
+            i = places[target]
+            f = e.fit.free[i]
+            found.append(((f.value / f.unit) ** 2 / max(variance[i], 1e-300), term))
+    bound = WEAK * (COST + FORM * e.gain)
+    return [term for worth, term in sorted(found, key=lambda x: x[0]) if worth < bound * cost(term.candidate) / COST]
 
 
 def unbent(study: Study, e: Explanation, log) -> Explanation:
@@ -488,6 +529,30 @@ def unbent(study: Study, e: Explanation, log) -> Explanation:
     return e
 
 
+def owned(study: Study, e: Explanation, log) -> Explanation:
+    """The explanation with laws that take away all of an element, where they do as well as with a share of it: else how
+    wide a play is would be known no better than how much it takes."""
+    terms = [whole(study, t) or t for t in e.terms]
+    if terms == list(e.terms):
+        return e
+    tied = explain(study, terms, start=e.fit, formulas=e.formulas)
+    log(f"  all of an element: {tied.gain:.0f} for {e.gain:.0f}")
+    return tied if tied.groups == e.groups and tied.score > e.score else e
+
+
+def whole(study: Study, t: Term) -> Term | None:
+    """A law that takes away all of the element at its place; None if it is no such law, or already does."""
+    law, argument = TAKING.get(_law(t), ("", ""))
+    near = {name for name, _ in study.places[t.candidate.what.place].elements} if law and not t.own else set()
+    own = [x.arguments[argument] for x in study.model.elements if x.law == law and x.name in near]
+    if len(own) != 1:
+        return None
+    what, all_of_it = t.candidate.what, study.model.parameters[own[0]].value
+    share = t.gain / all_of_it  # of a narrow play, only its gap times what it takes is seen
+    shapes = {k: (x * share if k == "gap" else x, unit) for k, (x, unit) in what.shapes.items()}
+    return replace(t, candidate=replace(t.candidate, what=replace(what, shapes=shapes)), gain=all_of_it, own=own[0])
+
+
 def _fault(c: Candidate) -> tuple[str, float] | None:
     return (c.what.what, c.what.shape) if isinstance(c.what, Fault) else None
 
@@ -500,7 +565,7 @@ def mended(study: Study, e: Explanation, log) -> Explanation:
     """The explanation with as many more laws of its causes as are worth their numbers, under the same names. A name is what a curve
     does in the large; what the extended model foretells depends on all of the curve."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
-    spare = [g for g in e.groups if g[0] not in ("wrong_parameter", "constant_force", "sensor_delay")]
+    spare = [g for g in e.groups if g[0] not in ("wrong_parameter", "constant_force", "sensor_delay", CLOCK)]
     most, r = len(e.terms) + MENDS, None
     while spare and len(e.terms) < most:
         if r is None:
@@ -608,12 +673,14 @@ def equals(study: Study, e: Explanation, parameters: Sequence[str], log) -> list
 def missing(e: Explanation, group: Group) -> Fit:
     """The fit as it would be without a cause, to first order."""
     names = {f"{n}_" for t, n in zip(e.terms, e.built.names) if t.group == group}
+    shrinking = [("gap", "relaxation") if t.own else ("mass",) for t in e.terms]  # what goes to nothing with a cause
+    sizes = {f"{n}_{key}" for n, keys in zip(e.built.names, shrinking) for key in keys}
     faults = [t.candidate.what for t in e.terms if t.group == group and isinstance(t.candidate.what, Fault)]
     own = []
     for i, f in enumerate(e.fit.free):
         if isinstance(f.target, str):
             own += [i] if f.target == group_parameter(e, group) or any(f.target.startswith(n) for n in names) else []
-        elif f.target[0] in ("bias", "scale", "delay"):
+        elif f.target[0] in VALUED:
             own += [i] if any(f.target == (x.what, x.sensor) for x in faults) else []
         elif f.target[0] == "fault":
             own += [i] if e.built.faults[f.target[1]] in faults else []
@@ -621,7 +688,7 @@ def missing(e: Explanation, group: Group) -> Fit:
     for i in own:
         f = e.fit.free[i]
         if f.log:
-            effect += e.fit.jacobian[:, i] if str(f.target).endswith("_mass") else 0.0
+            effect += e.fit.jacobian[:, i] if f.target in sizes else 0.0
         else:
             effect += e.fit.jacobian[:, i] * (f.value - f.origin) / f.unit
     rest = [i for i in range(len(e.fit.free)) if i not in own]
