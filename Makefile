@@ -27,7 +27,7 @@ run: setup ## The main job: recalibration while it runs, on the host and a Corte
 	    -o build/run/diagnosis
 
 test: setup ## All checks; the last line adds them up
-	$(Q)$(PYTHON) test/tally.py $(SUITES)
+	$(Q)$(PYTHON) test/tally.py -j $$(nproc) $(SUITES)
 
 prove: setup build/setup/proof ## The proofs: all values, all orders, all statements; each also has to find seeded faults
 	$(Q)$(PYTHON) test/tally.py $(PROVE_STATIC) $(PROVE_DYNAMIC)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Run suites (targets of the Makefile) one after the other and add up what they report, in one last line.
+"""Run suites (targets of the Makefile), some at the same time, and add up what they report, in one last line.
 
 Counted are Unity's summary lines, pytest's last line, and lines of gates that begin with "ok", "FAIL" or "skip". A
 suite that ends badly without having reported a failure, or reports nothing at all, counts as one failure. Exit code 1
@@ -9,10 +9,12 @@ if anything failed.
 
 from __future__ import annotations
 
+import argparse
 import re
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import NamedTuple
 
 UNITY = re.compile(r"\b(\d+) Tests (\d+) Failures (\d+) Ignored")
@@ -58,30 +60,37 @@ def verdict(total: Count, code: int) -> Count:
     return total.plus(Count(failed=1)) if silent else total
 
 
-def run(suite: str) -> Count:
-    """Run one suite, showing its output."""
-    print(f"== {suite}", flush=True)
-    start, total = time.monotonic(), Count()
-    command = ["make", "--no-print-directory", "-j2", "-k", "-Otarget", suite]
-    with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
-    ) as process:
-        for line in process.stdout or ():
-            print(line, end="", flush=True)
-            total = total.plus(count_line(line))
-    total = verdict(total, process.returncode)
-    print(f"-- {suite}: {total} ({time.monotonic() - start:.0f} s)\n", flush=True)
-    return total
-
-
-def main(suites: list[str]) -> int:
-    """Run all suites, whatever becomes of each."""
+def run(suite: str) -> tuple[Count, str]:
+    """Run one suite; its count, and all that it said between its name and its count."""
+    start = time.monotonic()
+    done = subprocess.run(
+        ["make", "--no-print-directory", "-k", suite],
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+    )  # fmt: skip
     total = Count()
-    for suite in suites:
-        total = total.plus(run(suite))
+    for line in done.stdout.splitlines():
+        total = total.plus(count_line(line))
+    total = verdict(total, done.returncode)
+    return total, f"== {suite}\n{done.stdout}-- {suite}: {total} ({time.monotonic() - start:.0f} s)\n"
+
+
+def main() -> int:
+    """Run all suites, whatever becomes of each."""
+    parse = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parse.add_argument("-j", "--jobs", type=int, default=1, help="suites at the same time (1)")
+    parse.add_argument("suites", nargs="+")
+    asked = parse.parse_args()
+    total, pool = Count(), ThreadPoolExecutor(asked.jobs)
+    try:
+        for done in as_completed([pool.submit(run, suite) for suite in asked.suites]):
+            count, text = done.result()
+            print(text, flush=True)
+            total = total.plus(count)
+    finally:  # Ctrl-C: begin no other
+        pool.shutdown(cancel_futures=True)
     print(total)
     return int(total.failed > 0)
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

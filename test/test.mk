@@ -3,7 +3,10 @@
 #
 # The suites of `make test`, each also a target of its own. What a suite prints is what test/tally.py counts.
 
-SUITES   := warnings symbols misra gen-check unit board cmock accuracy python hidden figures-check
+# Each takes one core there; the longest begins.
+SUITES   := python-sil warnings symbols misra gen-check unit board cmock accuracy python-gen python-tools \
+            python-diagnosis hidden-fixed hidden-fresh figures-check
+PYTHONS  := $(filter python-%,$(SUITES))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
 RUNTIME  := $(wildcard src/*.c)
 MODEL    := $(wildcard gen/nqvm/c/*.c)
@@ -12,7 +15,7 @@ LIBRARY  := $(RUNTIME) $(MODEL)
 INCLUDE  := -Igen/nqvm/c
 
 .SECONDARY:
-.PHONY: $(SUITES)
+.PHONY: $(SUITES) python hidden
 # A suite can also be called on its own; python is the last part of the set-up that one needs, unity aside.
 READY := build/setup/python
 
@@ -179,17 +182,15 @@ accuracy-source: | $(READY)
 
 # -- Python: generator, simulation, and this tally --------------------------------------------------------------------
 
-python: $(patsubst test/%,python-%,$(wildcard test/gen test/sil test/tools test/diagnosis)) ## The Python tests
-python-%: | $(READY)
+python: $(PYTHONS) ## The Python tests
+$(PYTHONS): python-%: | $(READY)
 	@HYPOTHESIS_STORAGE_DIRECTORY=build/hypothesis OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q test/$* # one thread each: parts run side by side
 
 # -- hidden effects: a draw that never changes, and one that nobody has seen --------------------------------------------
 
-HIDDEN := $(PYTHON) test/diagnosis/campaign.py --cases 12 --jobs $$(nproc) --brief --gate --command "$(PENODE) diagnose"
-.PHONY: hidden-fixed hidden-fresh
+HIDDEN := $(PYTHON) test/diagnosis/campaign.py --cases 12 --brief --gate --command "$(PENODE) diagnose"
 
-hidden: ## The diagnosis has to find what recordings hide; a right program fails less than once in 1000 runs
-	@$(MAKE) -k -j1 hidden-fixed hidden-fresh # each takes all cores
+hidden: hidden-fixed hidden-fresh ## The diagnosis has to find what recordings hide; a right program fails less than once in 1000 runs
 hidden-fixed: | $(READY)
 	@$(HIDDEN) --seed 1 --out build/campaign/fixed
 hidden-fresh: | $(READY)

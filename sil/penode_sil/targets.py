@@ -135,35 +135,37 @@ def compile_program(command: Sequence[str], output: Path) -> None:
         _move(part, output)
 
 
+def _kept(name: str, suffix: str, command: Sequence[str], read: Iterable[str | bytes | Path]) -> Path:
+    """What a compiler makes, in the build directory; made once for a command and the contents of all that it reads."""
+    output = build_directory() / f"{name}-{_digest([*command, *read])}{suffix}"
+    if not output.exists():
+        output.parent.mkdir(parents=True, exist_ok=True)
+        compile_program(command, output)
+    return output
+
+
 def build_library(
     model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None
 ) -> Path:
     """The shared library of a model; `source` is a folder with its C if it is not to be generated."""
     source = source or generated(model)
-    runtime, code = _files(("src", "*.c")), [source / f"{model.name}.c", source / f"{model.name}_params.c"]
+    code, runtime = [source / f"{model.name}.c", source / f"{model.name}_params.c"], _files(("src", "*.c"))
     shim = ROOT / "sil" / "firmware" / "sil.c"
-    command = [
+    options = [
         *compiler,
         *FLAGS,
-        "-shared",
         "-fPIC",
         *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []),
-        *model_options(model),
         f"-I{ROOT}/inc",
         f"-I{ROOT}/port/gnu",
-        f"-I{source}",
-        *map(str, [shim, *code, *runtime]),
     ]
-    headers = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))
     version = (
         subprocess.run([compiler[0], "--version"], capture_output=True).stdout if shutil.which(compiler[0]) else b""
     )
-    key = _digest([*command, version, shim, *code, source / f"{model.name}.h", *runtime, *headers])
-    library = build_directory() / f"{model.name}-{key}.so"
-    if not library.exists():
-        library.parent.mkdir(parents=True, exist_ok=True)
-        compile_program(command, library)
-    return library
+    read = [version, *_files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
+    same = _kept("runtime", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
+    own = ["-shared", *model_options(model), f"-I{source}", *map(str, [shim, *code, same])]
+    return _kept(model.name, ".so", [*options, *own], [*read, shim, *code, source / f"{model.name}.h", same])
 
 
 # -- SiL --------------------------------------------------------------------------------------------------------------
@@ -421,12 +423,8 @@ def build_firmware(model: Any, machine: str, source: Path | None = None, optimis
     if shutil.which(compiler) is None:
         raise UserError(f"{compiler}: this compiler is not installed; install it (make test does)")
     parts = _files(("inc", "*.h"), ("port", "*"), ("sil/firmware", "*.h"))
-    key = _digest([*command, program, *code, source / f"{model.name}.h", *runtime, *(p for p in parts if p.is_file())])
-    elf = build_directory() / f"{model.name}-{machine}-{key}.elf"
-    if not elf.exists():
-        elf.parent.mkdir(parents=True, exist_ok=True)
-        compile_program(command, elf)
-    return elf
+    read = [program, *code, source / f"{model.name}.h", *runtime, *(p for p in parts if p.is_file())]
+    return _kept(f"{model.name}-{machine}", ".elf", command, read)
 
 
 class Pil:

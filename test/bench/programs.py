@@ -126,9 +126,10 @@ def run(program: Program, arguments: Sequence[str], folder: Path, limit: int = 6
 def sizes(program: Program, weights_inside: int = 0) -> dict[str, int]:
     """Bytes of text, rodata and RAM of the step with all it calls, without weights: linked alone."""
     elf = program.elf.with_name("size.elf")
-    _run(
+    _make(
         ["arm-none-eabi-gcc", *core(program.machine), "-nostdlib", "-Wl,--gc-sections", f"-Wl,-e,{program.step}",
-         "-Wl,--defsym=peer_weights=0x10000000", "-o", elf, *program.objects, "-lm", "-lc", "-lgcc"]
+         "-Wl,--defsym=peer_weights=0x10000000", *program.objects, "-lm", "-lc", "-lgcc"],
+        elf,
     )  # fmt: skip
     text = _run(["arm-none-eabi-size", "-A", elf])
     found = {m[1]: int(m[2]) for m in re.finditer(r"^\.(\w+)\S*\s+(\d+)", text, re.M)}

@@ -47,8 +47,11 @@ def test_a_suite_cannot_fail_or_check_nothing_unnoticed(total, code, failed):
 
 
 def test_a_failing_suite_does_not_keep_the_next_from_running(tmp_path):
-    (tmp_path / "Makefile").write_text('bad:\n\t@echo "FAIL  this"; exit 1\ngood:\n\t@echo "ok    that"\n')
+    """Nor do suites that run at the same time mix what they say."""
+    good = 'good:\n\t@echo "ok    this"; sleep 0.2; echo "ok    that"\n'
+    (tmp_path / "Makefile").write_text('bad:\n\t@sleep 0.1; echo "FAIL  this"; exit 1\n' + good)
     tally = Path(__file__).resolve().parents[1] / "tally.py"
-    done = subprocess.run([sys.executable, tally, "bad", "good"], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, tally, "-j2", "bad", "good"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1
-    assert done.stdout.splitlines()[-1] == "1 passed, 1 failed, 0 skipped"
+    assert "== good\nok    this\nok    that\n-- good: 2 passed, 0 failed, 0 skipped (0 s)\n" in done.stdout
+    assert done.stdout.splitlines()[-1] == "2 passed, 1 failed, 0 skipped"
