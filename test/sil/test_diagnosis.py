@@ -234,6 +234,56 @@ def test_a_narrow_play_takes_all_of_the_spring(tmp_path, model):
     assert play.arguments["stiffness"] == "c"
 
 
+SLEDGE = """
+[model]
+name = "sledge"
+sample_time = "2 ms"
+[parameters]
+m = { value = 20.6, unit = "kg", tolerance = 0.02 }
+c = { value = 1200.0, unit = "N/m", tolerance = 0.02 }
+d = { value = 47.5, unit = "N*s/m", tolerance = 0.02 }
+[inputs]
+pull = { unit = "N" }
+[bodies]
+mass = { mass = "m", position = "z_m", velocity = "v_m" }
+[elements]
+spring = { between = ["mass", "ground"], law = "linear_spring", stiffness = "c" }
+damper = { between = ["mass", "ground"], law = "linear_damper", damping = "d" }
+shaker = { between = ["mass", "ground"], law = "expression", force = "-pull" }
+[outputs]
+z = { value = "z_m", unit = "m" }
+[sensors]
+a = { value = "der(v_m)", unit = "m/s^2", noise = 0.02 }
+z = { value = "z_m", unit = "m", noise = 1e-4 }
+"""
+
+
+def test_a_mount_in_series_takes_all_of_the_damper(tmp_path):
+    """A mount of 4.4 kN/m under a sweep, where sensors that are late or another mass do nearly the same: with a damping
+    of its own, the fit of the mount ends there."""
+    (tmp_path / "sledge.toml").write_text(SLEDGE)
+    model = penode_gen.load(tmp_path / "sledge.toml")
+    m, c, d, tau = 20.87, 1200.0, 48.1, 0.011
+    t = np.arange(SAMPLES) * STEP
+    pull = CubicSpline(t, 30.0 * np.minimum(t, 1.0) ** 2 * np.sin(2.0 * np.pi * (0.3 + 0.25 * t) * t))
+
+    def rates(time: float, x: np.ndarray) -> list[float]:
+        mount = d / tau * (x[0] - x[2])
+        return [x[1], (pull(time) - c * x[0] - mount) / m, mount / d]
+
+    x = solve_ivp(rates, (0.0, t[-1]), np.zeros(3), rtol=1e-8, atol=1e-11, max_step=STEP, t_eval=t).y
+    a = np.array([rates(time, state)[1] for time, state in zip(t, x.T)])
+    rng = np.random.default_rng(4)
+    columns = [t, pull(t), a + 0.02 * rng.standard_normal(SAMPLES), x[0] + 1e-4 * rng.standard_normal(SAMPLES)]
+    header = "time [s],pull [N],a [m/s^2],z [m]"
+    path = tmp_path / "sledge.csv"
+    np.savetxt(path, np.stack(columns, axis=1), delimiter=",", header=header, comments="", fmt="%.9g")
+    found = diagnosis.diagnose(model, load([path], model))
+    assert [c.kind for c in found.causes] == ["maxwell_bushing"]
+    stiffness = found.causes[0].parameters["stiffness"]
+    assert stiffness.value == pytest.approx(d / tau, rel=0.1) and stiffness.ci95[0] < d / tau < stiffness.ci95[1]
+
+
 def test_hysteresis_under_prescribed_motion():
     """slips() against the law integrated by SciPy; four RK4 steps a sample of 1/50 presliding leave (1/200)^4."""
     t = np.linspace(0.0, 1.0, 2001)

@@ -346,12 +346,14 @@ def functions(
             return {"force": ("N", force), "yield_deflection": ("m", lambda p: force(p) / max(stiff(p), 1e-300))}
         case "maxwell_bushing":
             springs = [n for n, t in zip(names, terms) if t.candidate.what.law == "maxwell_bushing"]
-            series = [n for n, t in zip(names, terms) if t.candidate.what.law == "loose_damper"]
+            loose = [(n, t) for n, t in zip(names, terms) if t.candidate.what.law == "loose_damper"]
+            series = [(t.own or f"{n}_damping", f"{n}_relaxation") for n, t in loose]
 
             def bushing(p: Values) -> tuple[float, float]:
                 """Stiffnesses in series with a damper, and their dampings, summed."""
-                k = sum(p[f"{n}_stiffness"] for n in springs) + sum(p[f"{n}_damping"] / p[f"{n}_relaxation"] for n in series)
-                return k, sum(p[f"{n}_stiffness"] * p[f"{n}_relaxation"] for n in springs) + sum(p[f"{n}_damping"] for n in series)
+                parallel = [(p[f"{n}_stiffness"], p[f"{n}_relaxation"]) for n in springs]
+                parallel += [(p[d] / p[tau], p[tau]) for d, tau in series]
+                return sum(k for k, _ in parallel), sum(k * tau for k, tau in parallel)
 
             return {
                 "stiffness": ("N/m", lambda p: bushing(p)[0]),

@@ -54,7 +54,11 @@ TEXTBOOK = {
     "stribeck_friction": (STRIBECK,), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
     "degressive_damper": (KNEE,), "damper_fading": ("heating_damper",),
 }  # fmt: skip
-TAKING = ("backlash", "liftoff")  # laws that undo a spring
+TAKING = {  # laws that take an element away: its law and argument
+    "backlash": ("linear_spring", "stiffness"),
+    "liftoff": ("linear_spring", "stiffness"),
+    "loose_damper": ("linear_damper", "damping"),
+}
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK)  # a formula after all
 FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
@@ -214,8 +218,18 @@ def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
     worth, both = pair(r)
     if worth > 0.7 * best:
         choices.append(both)
-    found = [explain(study, terms) for terms in (terms_of(r, chosen) for chosen in choices) if terms]
-    return sorted((e for e in found if e.groups), key=lambda e: -e.score)
+    ways = [terms_of(r, chosen) for chosen in choices]
+    ways += [in_series(study, r, group) for _, group, _ in taken]
+    return distinct([e for e in (explain(study, terms) for terms in ways if terms) if e.groups])
+
+
+def in_series(study: Study, r: Regression, group: Group) -> list[Term]:
+    """A spring or a play in series with all of a damper; none if that is not of the group. With a damping of its own,
+    many values of the rest do about as well, and a fit may end in the wrong ones."""
+    pool = [k for k in pools(r)[group] if _law(Term(r.candidates[k], 0.0)) == "loose_damper"]
+    _, best = r.best_single([], pool, dict.fromkeys(pool, 0.0))
+    terms = terms_of(r, [best]) if best >= 0 else []
+    return [tied for tied in (whole(study, t) for t in terms) if tied]
 
 
 def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str]) -> tuple[Explanation, Regression]:
@@ -493,8 +507,10 @@ def weak(e: Explanation) -> list[Term]:
     variance = np.diag(e.fit.covariance())
     found = []
     for term, target in zip(e.terms, gains(e.terms, e.built.names)):
-        if term.group[0] != "sensor_bias" and sum(t.group == term.group for t in e.terms) > 1:
-            f, i = e.fit.free[places[target]], places[target]
+        several = sum(t.group == term.group for t in e.terms) > 1 and term.group[0] != "sensor_bias"
+        if several and not term.own:
+            i = places[target]
+            f = e.fit.free[i]
             found.append(((f.value / f.unit) ** 2 / max(variance[i], 1e-300), term))
     bound = WEAK * (COST + FORM * e.gain)
     return [term for worth, term in sorted(found, key=lambda x: x[0]) if worth < bound * cost(term.candidate) / COST]
@@ -514,26 +530,27 @@ def unbent(study: Study, e: Explanation, log) -> Explanation:
 
 
 def owned(study: Study, e: Explanation, log) -> Explanation:
-    """The explanation with laws that take away all of a spring, where they do as well as with a share of it: how wide a play
-    is would else be known no better than how much it takes."""
-    springs = {x.name: x.arguments["stiffness"] for x in study.model.elements if x.law == "linear_spring"}
-
-    def whole(t: Term) -> Term:
-        what = t.candidate.what
-        near = study.places[what.place].elements if _law(t) in TAKING else ()
-        own = [springs[name] for name, _ in near if name in springs]
-        if len(own) != 1:
-            return t
-        share = t.gain / e.fit.model.parameters[own[0]].value  # of a narrow play, only gap times stiffness is seen
-        shapes = {k: (x * share if k == "gap" else x, unit) for k, (x, unit) in what.shapes.items()}
-        return replace(t, candidate=replace(t.candidate, what=replace(what, shapes=shapes)), own=own[0])
-
-    terms = [whole(t) for t in e.terms]
-    if not any(t.own for t in terms):
+    """The explanation with laws that take away all of an element, where they do as well as with a share of it: else how
+    wide a play is would be known no better than how much it takes."""
+    terms = [whole(study, t) or t for t in e.terms]
+    if terms == list(e.terms):
         return e
     tied = explain(study, terms, start=e.fit, formulas=e.formulas)
-    log(f"  all of a spring: {tied.gain:.0f} for {e.gain:.0f}")
+    log(f"  all of an element: {tied.gain:.0f} for {e.gain:.0f}")
     return tied if tied.groups == e.groups and tied.score > e.score else e
+
+
+def whole(study: Study, t: Term) -> Term | None:
+    """A law that takes away all of the element at its place; None if it is no such law, or already does."""
+    law, argument = TAKING.get(_law(t), ("", ""))
+    near = {name for name, _ in study.places[t.candidate.what.place].elements} if law and not t.own else set()
+    own = [x.arguments[argument] for x in study.model.elements if x.law == law and x.name in near]
+    if len(own) != 1:
+        return None
+    what, all_of_it = t.candidate.what, study.model.parameters[own[0]].value
+    share = t.gain / all_of_it  # of a narrow play, only its gap times what it takes is seen
+    shapes = {k: (x * share if k == "gap" else x, unit) for k, (x, unit) in what.shapes.items()}
+    return replace(t, candidate=replace(t.candidate, what=replace(what, shapes=shapes)), gain=all_of_it, own=own[0])
 
 
 def _fault(c: Candidate) -> tuple[str, float] | None:
@@ -648,6 +665,8 @@ def equals(study: Study, e: Explanation, parameters: Sequence[str], log) -> list
 def missing(e: Explanation, group: Group) -> Fit:
     """The fit as it would be without a cause, to first order."""
     names = {f"{n}_" for t, n in zip(e.terms, e.built.names) if t.group == group}
+    shrinking = [("gap", "relaxation") if t.own else ("mass",) for t in e.terms]  # what goes to nothing with a cause
+    sizes = {f"{n}_{key}" for n, keys in zip(e.built.names, shrinking) for key in keys}
     faults = [t.candidate.what for t in e.terms if t.group == group and isinstance(t.candidate.what, Fault)]
     own = []
     for i, f in enumerate(e.fit.free):
@@ -661,7 +680,7 @@ def missing(e: Explanation, group: Group) -> Fit:
     for i in own:
         f = e.fit.free[i]
         if f.log:
-            effect += e.fit.jacobian[:, i] if str(f.target).endswith("_mass") else 0.0
+            effect += e.fit.jacobian[:, i] if f.target in sizes else 0.0
         else:
             effect += e.fit.jacobian[:, i] * (f.value - f.origin) / f.unit
     rest = [i for i in range(len(e.fit.free)) if i not in own]
