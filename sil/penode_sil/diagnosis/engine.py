@@ -308,7 +308,10 @@ def resized(study: Study, e: Explanation, c: Cause) -> Cause:
     """A cause with its parameters in another explanation, if it is in there: where more of the rest is explained, it need not
     make up for that."""
     group = (c.kind, c.where)
-    return replace(c, parameters=naming.values(study, e, group)) if group in e.groups else c
+    own = [t for t in e.terms if t.group == group]
+    if not own or c.kind == "hidden_resonance" and len(own) > 1:  # which share what one was
+        return c
+    return replace(c, parameters=naming.values(study, e, group))
 
 
 def unsized(e: Explanation, c: Cause) -> bool:
