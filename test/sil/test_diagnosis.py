@@ -40,7 +40,7 @@ c_t = {{ value = {C_T}, unit = "N/m", tolerance = 0.01 }}
 [inputs]
 z_road = {{ unit = "m" }}
 [bodies]
-body = {{ mass = "m_b", position = "z_b", velocity = "v_b" }}
+body = {{ mass = "m_b", position = "z_b", velocity = "v" }}
 wheel = {{ mass = "m_w", position = "z_w", velocity = "v_w" }}
 [elements]
 spring = {{ between = ["body", "wheel"], law = "linear_spring", stiffness = "c" }}
@@ -49,10 +49,10 @@ tyre = {{ between = ["wheel", "z_road"], law = "linear_spring", stiffness = "c_t
 [outputs]
 z_b = {{ value = "z_b", unit = "m" }}
 [sensors]
-a_body = {{ value = "der(v_b)", unit = "m/s^2", noise = {NOISE["a_body"]} }}
+a_body = {{ value = "der(v)", unit = "m/s^2", noise = {NOISE["a_body"]} }}
 a_wheel = {{ value = "der(v_w)", unit = "m/s^2", noise = {NOISE["a_wheel"]} }}
 deflection = {{ value = "z_b - z_w", unit = "m", noise = {NOISE["deflection"]} }}
-"""
+"""  # v: a name that laws have for a rate as well
 
 
 def road(seed: int) -> np.ndarray:
@@ -357,7 +357,7 @@ def test_what_is_foretold_is_as_good_as_the_true_law(tmp_path, model):
     train, held = load(paths[:1], model), load(paths[1:], model)
     found = diagnosis.diagnose(model, train, held, tmp_path / "out")
     assert [(c.kind, c.where) for c in found.causes] == [("quadratic_damper", "damper")]
-    law = 'more = { between = ["body", "wheel"], law = "expression", force = "strong*v*abs(v)/(fast + abs(v))" }'
+    law = 'more = { between = ["body", "wheel"], law = "expression", force = "strong*v_more*abs(v_more)/(fast + abs(v_more))" }'
     sizes = 'strong = { value = 4000, unit = "N*s/m" }\nfast = { value = 0.1, unit = "m/s" }'
     (tmp_path / "true.toml").write_text(
         MODEL.replace("[inputs]", f"{sizes}\n[inputs]").replace("[outputs]", f"{law}\n[outputs]").replace("[parameters]", 'input = "parabola"\n[parameters]')

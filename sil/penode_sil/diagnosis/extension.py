@@ -88,7 +88,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         rename[name] = _unlike(stem, {*taken, *rename.values()})
 
     def named(text: str) -> str:
-        return re.sub(r"\b((?:F_)?)(x\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
+        return re.sub(r"\b((?:[Fsv]_)?)(x\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
 
     parameters = []
     for p in e.built.model.parameters.values():

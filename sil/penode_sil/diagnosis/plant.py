@@ -84,6 +84,7 @@ def extend(
     model: Model, elements: Sequence[Element], parameters: Mapping[str, tuple[float, str]], where: Sequence[Place] = ()
 ) -> Model:
     """The model with more elements. What measures the force at a place then measures theirs as well."""
+    elements = [_told_apart(model, e) for e in elements]
     sensors, outputs = model.sensors, model.outputs
     for e, place in zip(elements, where):
         sensors, outputs = (tuple(_share(s, e.name, place) for s in signals) for signals in (sensors, outputs))
@@ -97,6 +98,12 @@ def extend(
         model, elements=(*model.elements, *elements), parameters={**model.parameters, **values}, sensors=sensors,
         outputs=outputs, extra_states=(*model.extra_states, *states),
     )  # fmt: skip
+
+
+def _told_apart(model: Model, e: Element) -> Element:
+    """An element whose expression has s_NAME and v_NAME for s and v where the model has others of that name."""
+    taken = {*model.states, *model.parameters, *(x.name for x in (*model.inputs, *model.variables))} & {"s", "v"}
+    return replace(e, expression=re.sub(r"\b[sv]\b", lambda m: f"{m[0]}_{e.name}" if m[0] in taken else m[0], e.expression))
 
 
 def _share(signal: Signal, new: str, place: Place) -> Signal:
