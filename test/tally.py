@@ -62,6 +62,7 @@ def verdict(total: Count, code: int) -> Count:
 
 def run(suite: str) -> tuple[Count, str]:
     """Run one suite; its count, and all that it said between its name and its count."""
+    print(f".. {suite}", flush=True)  # so that one sees what takes long
     start = time.monotonic()
     done = subprocess.run(
         ["make", "--no-print-directory", "-k", suite],
