@@ -346,7 +346,7 @@ def test_one_version_and_one_abi_everywhere():
 def test_names_that_look_like_those_of_the_generated_code(tmp_path):
     """Elements called net, net_1, net_in, net_slope: a network of two inputs among them."""
     text = (
-        models.RICH.format(method="rk4", h=1e-3, input="held", outside="extrapolate", rate="chord", substeps=1, foot_damper="")
+        models.RICH.format(method="rk4", h=1e-3, input="held", outside="extrapolate", substeps=1, foot_damper="")
         .replace('net = { between', 'net_1 = { between = ["mass", "ground"], law = "network", network = "n1" }\nnet_in = { between = ["mass", "ground"], law = "linear_spring", stiffness = "k" }\nnet_slope = { between = ["mass", "ground"], law = "linear_damper", damping = "3 N*s/m" }\nnet = { between')
         .replace('output = "N" }\n', 'output = "N" }\nn1 = { inputs = ["m"], output = "N" }\n', 1)
         .replace('n2 = "n2.json"', 'n2 = "n2.json"\nn1 = "n1.json"')

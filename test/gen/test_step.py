@@ -26,14 +26,22 @@ def test_order_of_convergence(tmp_path, method, input, show):
     sampling them loses nothing; the reference is the model's equations by hand, integrated by SciPy to 1e-12. The steps
     begin at the third sample."""
     slope, bend = float(input != "held"), float(input == "parabola")
-    force = lambda t: 1.0 + slope * 2.0 * t - bend * 40.0 * t**2  # noqa: E731
-    foot, foot_rate = (lambda t: 0.02 + slope * 0.1 * t + bend * 0.5 * t**2), (lambda t: slope * 0.1 + bend * t)
+
+    def force(t):
+        return 1.0 + slope * 2.0 * t - bend * 40.0 * t**2
+
+    def foot(t):
+        return 0.02 + slope * 0.1 * t + bend * 0.5 * t**2
+
+    def foot_rate(t):
+        return slope * 0.1 + bend * t
+
     duration, errors = 0.32, []
     for h in (4e-3, 2e-3, 1e-3):
         path = models.rich(tmp_path, method, h, input)
         n = round(duration / h)
         t = np.arange(-2, n + 1) * h
-        u = np.stack([np.vectorize(force)(t), np.vectorize(foot)(t)], axis=1)
+        u = np.stack([force(t), foot(t)], axis=1)
         instance = Sil(penode_gen.load(path), np.float64).instance()
         instance.run(u[:3])
         instance.set_state(np.array([0.01, 0.0, 0.5]))
