@@ -2,7 +2,7 @@
 # Copyright (c) 2026 the penode authors
 """Many runs of a model at once on the host: the generated step in the lanes of vector registers, one run a lane.
 
-Without variations each run has the bits of NAME_step. For identification, sweeps and large SiL campaigns.
+Without variations each run has the bits of NAME_step, if that is asked for. For identification, sweeps and large SiL campaigns.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from .targets import FLAGS, ROOT, _digest, _files, build_directory, compile_prog
 
 Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
+QUICK = ("-ffp-contract=fast", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math")  # not -ffast-math: NaN stays NaN
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +58,12 @@ class _Job(ctypes.Structure):
 
 
 class Batch:
-    """A model's batch library, compiled for this processor; `lanes` runs go at once."""
+    """A model's batch library, compiled for this processor; `lanes` runs go at once. Without `exact` sums and products
+    may be fused and put in another order: in about half of the time, but other bits than NAME_step has, and other
+    ones from machine to machine. For fits."""
 
-    def __init__(self, model: penode_gen.Model, dtype: type = np.float64):
-        self.model, self.dtype = model, dtype
+    def __init__(self, model: penode_gen.Model, dtype: type = np.float64, exact: bool = True):
+        self.model, self.dtype, self.exact = model, dtype, exact
         self._code = render_batch(model)
         self._libraries: dict[bool, ctypes.CDLL] = {}
         self.lanes = ctypes.c_size_t.in_dll(self._library(False), "batch_lanes").value
@@ -182,7 +185,7 @@ class Batch:
 
     def _library(self, per_run: bool) -> ctypes.CDLL:
         if per_run not in self._libraries:
-            library = ctypes.CDLL(str(_build(self.model.name, self._code, self.dtype, per_run)))
+            library = ctypes.CDLL(str(_build(self.model.name, self._code, self.dtype, per_run, self.exact)))
             library.batch_run.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t)
             library.batch_run.restype = ctypes.c_bool
             self._libraries[per_run] = library
@@ -198,12 +201,13 @@ def _processor() -> bytes:
         raise UserError("gcc: this compiler is not installed; install it (make test does)") from exc
 
 
-def _build(name: str, code: BatchCode, dtype: type, per_run: bool) -> Path:
+def _build(name: str, code: BatchCode, dtype: type, per_run: bool, exact: bool) -> Path:
     """The shared library of a batch code, compiled once; keyed by sources, compiler and processor."""
     command = [
         "gcc",
         *OPTIMISE,
         *FLAGS,
+        *(() if exact else QUICK),
         "-shared",
         "-fPIC",
         *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []),

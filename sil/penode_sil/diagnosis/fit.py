@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,12 @@ from penode_gen.model import Model
 
 from ..batch import Batch
 from .hypotheses import Fault
-from .noise import Experiment, Metric, thinning
+from .noise import Experiment, Metric, Thinning, thinning
 from .plant import anonymous
 
 Array = NDArray[np.float64]
 STIFF = 2.5e-4  # [s] longest step of a law that follows a short way or a short time
-BLOCK = 256  # samples that are worked on at a time: they stay in the cache
+KEPT = 32  # experiments of which spectra and inputs are kept
 FAR = 1e20  # residual of a run that cannot be simulated
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
 PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, others need not be tried
@@ -112,12 +113,20 @@ class Problem:
         exact = replace(_folded(model), method="rk4", interpolation="linear", substeps=substeps, sample_time=step)
         self.batch = _compiled(anonymous(exact))
         self.inputs = [_drive(e, self.fine) for e in experiments]
-        self.thin = [thinning(len(e.time), e.band) for e in experiments]
-        self.good = [None if e.good.all() else e.good for e in experiments]
-        self.measured = [thin(e.y[:, :, None], good) for thin, e, good in zip(self.thin, experiments, self.good)]
 
     def simulate(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array]:
         """Sensors [runs, n, n_z] and named states of recording e for shifts [runs, free]."""
+        z, skews, x = self.sensors(e, free, shifts, states)
+        if skews.any():
+            z -= self.rates(e, z) * skews
+        return z.transpose(2, 0, 1), x
+
+    def rates(self, e: int, z: Array) -> Array:
+        """Rates [n, n_z, 1] of the sensors of the first run; those of all runs are about the same."""
+        return np.gradient(np.ascontiguousarray(z[:, :, :1]), self.experiments[e].step, axis=0)
+
+    def sensors(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array, Array]:
+        """The same as they lie in memory, [n, n_z, runs], but for skews [n_z, runs] whose rates are still to be taken away."""
         start = np.tile(np.array(self.model.start, dtype=float), (len(shifts), 1))
         parameters, faults = {}, []
         for f, shift in zip(free, shifts.T):
@@ -149,16 +158,17 @@ class Problem:
                 z = drifted(z, values)
             elif what == "delay":
                 z[:, j] = delayed(z[:, j], values, self.experiments[e].step)
-        if skews.any():
-            rates = np.gradient(z[:, :, 0], self.experiments[e].step, axis=0)  # of all runs about the same
-            for i in range(0, len(z), BLOCK):
-                z[i : i + BLOCK] -= rates[i : i + BLOCK, :, None] * skews
-        return z.transpose(2, 0, 1), run.x
+        return z, skews, run.x
 
-    def residuals(self, e: int, z: Array) -> Array:
-        """Whitened residuals [runs, rows]."""
+    def residuals(self, e: int, z: Array, skews: Array) -> Array:
+        """Whitened residuals [runs, rows] of what `sensors` gives."""
+        thin, good, measured = _thinned(self.experiments[e])
         with np.errstate(over="ignore", invalid="ignore"):  # some runs leave all bounds
-            spectra = self.measured[e] - self.thin[e](z.transpose(1, 2, 0), self.good[e])  # [n_z, runs, f]
+            spectra = thin(z, good)  # [n_z, runs, f]
+            if skews.any():
+                rates = thin(self.rates(e, z), good) if good is not None else thin.rates(z[:, :, 0], spectra[:, 0], self.experiments[e].step)
+                spectra -= rates.reshape(len(spectra), 1, -1) * skews[:, :, None]
+            spectra = measured - spectra
             white = self.metrics[e].white(spectra.transpose(1, 2, 0))
             white[~(np.sum(np.abs(white), axis=1) < FAR)] = FAR
         return white
@@ -183,7 +193,7 @@ class Problem:
             if further is None or not bold:
                 costs = np.zeros(len(trials))
                 for e in range(len(self.experiments)):
-                    r = self.residuals(e, self.simulate(e, fit.free, trials)[0])
+                    r = self.residuals(e, *self.sensors(e, fit.free, trials)[:2])
                     costs += np.einsum("ij,ij->i", r, r)
                 away = (moved - np.array([[f.origin] for f in fit.free])) / np.array([[f.sigma] for f in fit.free])
                 costs = np.where(np.isfinite(costs), costs + np.sum(away**2, axis=0), np.inf)
@@ -216,7 +226,7 @@ class Problem:
         shifts = np.outer(shares - 1.0, np.where(gains, [f.value / f.unit for f in free], 0.0))
         costs = np.zeros(len(shares))
         for e in range(len(self.experiments)):
-            r = self.residuals(e, self.simulate(e, free, shifts)[0])
+            r = self.residuals(e, *self.sensors(e, free, shifts)[:2])
             costs += np.einsum("ij,ij->i", r, r)
         best = int(np.argmin(np.where(np.isfinite(costs[:-1]), costs[:-1], np.inf)))
         return _put(free, np.array([f.at(shift) for f, shift in zip(free, shifts[best])]))
@@ -238,14 +248,14 @@ class Problem:
             shifts = np.zeros((-(-(len(own) + 1) // lanes) * lanes, len(free)))  # whole vectors lie closely in memory
             for k, i in enumerate(own):
                 shifts[k + 1, i] = step if free[i].at(step) != free[i].value else -step
-            z, _ = self.simulate(e, free, shifts)
-            r = self.residuals(e, z)
+            z, skews, _ = self.sensors(e, free, shifts)
+            r = self.residuals(e, z, skews)
             block = np.zeros((len(free), r.shape[1]))
             for k, i in enumerate(own):
                 block[i] = (r[0] - r[k + 1]) / shifts[k + 1, i]
             blocks.append(block)
             rows.append(r[0])
-            simulated.append(np.array(z[0]))
+            simulated.append(z[:, :, 0] - self.rates(e, z)[:, :, 0] * skews[:, 0])
         jacobian = np.concatenate(blocks, axis=1).T
         for i, column in known.items():
             jacobian[:, i] = column
@@ -288,12 +298,20 @@ def _compiled(model: Model) -> Batch:
     """The batch library of a model."""
     key = _structure(model)
     if key not in _BATCHES:
-        _BATCHES[key] = Batch(model)
+        _BATCHES[key] = Batch(model, exact=False)
     found = copy(_BATCHES[key])
     found.model = model
     return found
 
 
+@lru_cache(maxsize=KEPT)
+def _thinned(e: Experiment) -> tuple[Thinning, NDArray[np.bool_] | None, NDArray[np.complex128]]:
+    """How signals of an experiment are thinned, where they are good (None: everywhere), and spectra [n_z, 1, f] of its own."""
+    thin, good = thinning(len(e.time), e.band), None if e.good.all() else e.good
+    return thin, good, thin(e.y[:, :, None], good)
+
+
+@lru_cache(maxsize=KEPT)
 def _drive(e: Experiment, fine: int) -> Array:
     """Inputs with `fine` - 1 samples between each two, for a step that joins them by straight lines.
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
@@ -32,7 +32,7 @@ PURE = 40.0  # see Tone: noise has 16 at most
 PARTS = (0.1, 2.0, 6.0, 20.0)  # [Hz] from which to which coherence is added up
 TOP = 100.0  # [Hz] what vehicles do above it is not looked at, but for the noise
 STOP = 120.0  # [dB] by which thinning damps what it would mirror into the band
-TOGETHER = 8  # thinned samples that are made by one matrix product
+TOGETHER = 8  # thinned samples that are made by one matrix product, and signals that are transformed at a time
 CHUNK = 32  # of such products at a time: their signals stay in the cache
 
 
@@ -126,12 +126,19 @@ class Metric:
         """Real numbers [..., rows] of unit variance if spectra [..., f, sensors] are those of noise."""
         shape = *spectra.shape[:-2], *spectra.shape[:-3:-1]  # [..., sensors, f]
         w = np.empty(shape, dtype=complex) if out is None else out.view(complex).reshape(shape, copy=False)
-        for i in range(w.shape[-2]):  # a triangle
-            w[..., i, :] = self.root[:, i, 0] * spectra[..., 0]
-            for j in range(1, i + 1):
-                w[..., i, :] += self.root[:, i, j] * spectra[..., j]
-        w[..., 0] /= np.sqrt(2.0)  # the mean has one real part only
+        for i, row in enumerate(self.triangle):
+            np.multiply(row[i], spectra[..., i], out=w[..., i, :])
+            for j in range(i):
+                if row[j].any():  # inputs without noise have nothing in common
+                    w[..., i, :] += row[j] * spectra[..., j]
         return w.reshape(*w.shape[:-2], -1).view(float)
+
+    @cached_property
+    def triangle(self) -> NDArray[np.complex128]:
+        """The root as it lies closely in memory, [sensors, sensors, f]; of the mean, which has no imaginary part, half the power."""
+        found = np.moveaxis(self.root, 0, -1).copy()
+        found[..., 0] /= np.sqrt(2.0)
+        return found
 
     def __call__(self, r: Array) -> Array:
         return self.white(self.spectrum(r))
@@ -157,20 +164,34 @@ class Thinning:
         signals = np.ascontiguousarray(signals)
         step, width = TOGETHER * self.every, self.taps.shape[1]
         before = (width - step + self.every) // 2
-        columns = signals.shape[1] * signals.shape[2]
-        thin = np.empty((-(-self.n // step), TOGETHER, columns))
-        for k in range(0, len(thin), CHUNK):
-            some = thin[k : k + CHUNK]
+        columns, products = signals.shape[1] * signals.shape[2], -(-self.n // step)
+        thin = np.empty((CHUNK, TOGETHER, columns))
+        rows = np.empty((columns, self.n // self.every))
+        for k in range(0, products, CHUNK):
+            some = thin[: products - k]
             first = k * step - before
             last = first + (len(some) - 1) * step + width
             at = slice(first, last) if first >= 0 and last <= self.n else np.arange(first, last) % self.n
             part = signals[at] if good is None else signals[at] * good[at, :, None]
-            stride = part.strides[0]
-            windows = as_strided(part, (len(some), width, columns), (step * stride, stride, part.itemsize))
-            np.matmul(self.taps, windows, out=some)
-        rows = thin.reshape(-1, columns)[: self.n // self.every].T
-        spectra = fft.rfft(rows, axis=1)[:, : len(self.gain)] / self.gain
+            if self.every > 1:
+                stride = part.strides[0]
+                windows = as_strided(part, (len(some), width, columns), (step * stride, stride, part.itemsize))
+                part = np.matmul(self.taps, windows, out=some)
+            here = rows[:, k * TOGETHER : (k + CHUNK) * TOGETHER]
+            here[:] = part.reshape(-1, columns)[: here.shape[1]].T
+        spectra = np.empty((columns, len(self.gain)), dtype=complex)
+        for k in range(0, columns, TOGETHER):
+            some = slice(k, k + TOGETHER)
+            np.divide(fft.rfft(rows[some], axis=1)[:, : len(self.gain)], self.gain, out=spectra[some])
         return spectra.reshape(*signals.shape[1:], -1)
+
+
+    def rates(self, signals: Array, spectra: NDArray[np.complex128], step: float) -> NDArray[np.complex128]:
+        """Spectra [sensors, f] of the rates (central differences, at the ends to one side) of signals [n, sensors] that have `spectra`."""
+        turn = 2.0 * np.pi / self.n * np.arange(len(self.gain))
+        first, second, before, last = signals[0], signals[1], signals[-2], signals[-1]
+        ends = (0.5 * (second + last) - first)[:, None] + (last - 0.5 * (first + before))[:, None] * np.exp(1j * turn)
+        return (1j * np.sin(turn) * spectra + ends) / step
 
 
 @cache

@@ -10,10 +10,10 @@ frequency. So all of them are columns of one linear regression, in the metric of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
-from functools import cache, partial
+from dataclasses import dataclass, replace
+from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,18 +48,34 @@ class Seen:
     states: Complex | None  # of the states [f, x, places], and of the sensors to a start state [f, sensors, x]:
     free: Complex | None  # None if start states are free anyway
 
-    def answer(self, force: Complex, place: int, settled: Sequence[bool] = ()) -> Complex:
-        """Spectra [k, f, sensors] of what forces [k, f] at a place do to the sensors, from rest unless settled; in memory
-        [k, sensors, f]."""
-        spectra = force[:, None, :] * np.ascontiguousarray(self.response[:, :, place].T)
+    def answer(self, force: Complex, place: int, settled: Sequence[bool] = (), out: Array | None = None) -> Complex:
+        """Spectra [k, f, sensors] of what forces [k, f] at a place do to the sensors, from rest unless settled; in memory, which
+        may be the rows `out`, [k, sensors, f]."""
+        shape = len(force), self.response.shape[1], force.shape[1]
+        spectra = np.empty(shape, dtype=complex) if out is None else out.view(complex).reshape(shape, copy=False)
+        np.multiply(force[:, None, :], self._responses[place], out=spectra)
         if self.states is not None and self.free is not None:
             # what is periodic is not at rest at the start: take that start away
             start = force @ self.states[:, :, place] * 2.0 - force[:, :1] * self.states[0, :, place]
             if settled:
                 start[np.array(settled)] = 0.0
-            free = np.ascontiguousarray(np.moveaxis(self.free, 2, 0).swapaxes(1, 2))  # [x, sensors, f]
-            spectra -= (start.real / self.n @ free.reshape(len(free), -1).view(float)).view(complex).reshape(spectra.shape)
+            spectra -= (start.real / self.n @ self._frees).view(complex).reshape(shape)
         return spectra.swapaxes(1, 2)
+
+    def white(self, m: Metric) -> Seen:
+        """The same with sensors whose noise is white: what answers then are rows of a regression."""
+        rows = m.triangle.transpose(2, 0, 1)
+        return replace(self, response=rows @ self.response, free=None if self.free is None else rows @ self.free)
+
+    @cached_property
+    def _responses(self) -> Complex:
+        """Of one place after the other, [places, sensors, f]."""
+        return np.ascontiguousarray(self.response.T)
+
+    @cached_property
+    def _frees(self) -> Array:
+        """Of one state after the other, [x, numbers]."""
+        return np.ascontiguousarray(self.free.T).reshape(self.free.shape[2], -1).view(float)
 
     @property
     def n(self) -> int:
@@ -229,13 +245,16 @@ def where(kind: str, place: Place, model: Model) -> str:
 
 def collect(
     model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], seen: Sequence[Seen], found: Sequence[Place],
-    sensor_names: Sequence[str], fit: Fit, parameters: Sequence[str],
+    sensor_names: Sequence[str], fit: Fit, parameters: Sequence[str], kinds: Collection[str] = (),
 ) -> tuple[list[Candidate], Array]:  # fmt: skip
-    """All candidates and their whitened effects [candidates, rows]."""
-    groups: list[tuple[list[Candidate], Callable[[int], Complex]]] = []  # and the spectra of their effects in each recording
+    """All candidates, or those of some kinds, and their whitened effects [candidates, rows]."""
+    groups: list[tuple[list[Candidate], Callable[[int, Array], object]]] = []  # and what writes their effects in a recording
     most = max(int(COARSE / experiments[0].step + 1e-6), 1)
     every = max(q for q in range(1, most + 1) if all(len(x.time) % q == 0 for x in experiments))
     step = every * experiments[0].step
+
+    holes = [np.flatnonzero(~x.good.all(axis=0)) for x in experiments]  # sensors that have any
+    white = [s.white(m) for s, m in zip(seen, metrics)]
 
     @cache
     def turns(e: int, j: int) -> Complex:
@@ -246,7 +265,7 @@ def collect(
     def masked(e: int, spectra: Complex) -> Complex:
         """Spectra [k, f, sensors] of effects without the samples that do not count."""
         good, band = experiments[e].good, experiments[e].band
-        for j in np.flatnonzero(~good.all(axis=0)):
+        for j in holes[e]:
             if np.count_nonzero(~good[:, j]) <= FEW:
                 turn = turns(e, j)
                 twice = np.where(np.arange(band) > 0, 2.0, 1.0)[:, None] / len(good)
@@ -257,41 +276,49 @@ def collect(
                 spectra[:, :, j] = fft.rfft(signals, axis=1)[:, :band]
         return spectra
 
-    def acted(place: int, laws: Sequence[Basis], e: int) -> Complex:
+    def answered(force: Complex, place: int, e: int, out: Array, settled: Sequence[bool] = ()) -> None:
+        if len(holes[e]):
+            metrics[e].white(masked(e, seen[e].answer(force, place, settled)), out)
+        else:
+            white[e].answer(force, place, settled, out)
+
+    def acted(place: int, laws: Sequence[Basis], e: int, out: Array) -> None:
         rows = np.stack([b.series[e] for b in laws])
         phi = every * fft.rfft(rows, axis=1)[:, : experiments[e].band]
-        return masked(e, seen[e].answer(phi, place, [b.settled for b in laws]))
+        answered(phi, place, e, out, [b.settled for b in laws])
 
-    def pulled(place: int, body: Sequence[Array], tried: Array, e: int) -> Complex:
+    def pulled(place: int, body: Sequence[Array], tried: Array, e: int, out: Array) -> None:
         x = experiments[e].frequencies[: experiments[e].band] / tried[:, :1]
         damped = 2j * tried[:, 1:] * x
-        return masked(e, seen[e].answer((1.0 + damped) / (1.0 - x**2 + damped) * body[e], place))
+        answered((1.0 + damped) / (1.0 - x**2 + damped) * body[e], place, e, out)
 
-    def faulty(sensor: int, faults: Sequence[Fault], e: int) -> Complex:
+    def faulty(sensor: int, faults: Sequence[Fault], e: int, out: Array) -> None:
         x = experiments[e]
-        spectra = np.zeros((len(faults), len(sensor_names), x.band), dtype=complex)
-        spectra[:, sensor] = fft.rfft(np.stack([f.series[e] for f in faults]) * x.good[:, sensor], axis=1)[:, : x.band]
-        return spectra.swapaxes(1, 2)
+        spectra = fft.rfft(np.stack([f.series[e] for f in faults]) * x.good[:, sensor], axis=1)[:, : x.band]
+        out = out.view(complex).reshape(len(faults), len(sensor_names), x.band, copy=False)
+        np.multiply(spectra[:, None], metrics[e].triangle[:, sensor], out=out)
 
     for k, place in enumerate(found):
         motions = [Motion(m.s[::every], m.v[::every], m.t[::every]) for m in (s.motions[k] for s in seen)]
-        laws = list(hy.force_laws(k, place, motions, step, not {b.name for b in model.bodies} & set(place.ends)))
+        laws = list(hy.force_laws(k, place, motions, step, not {b.name for b in model.bodies} & set(place.ends), kinds))
         body = next((b.name for b in model.bodies if set(place.ends) == {b.name, GROUND}), None)
         for i in range(0, len(laws), TOGETHER):
             own = laws[i : i + TOGETHER]
             groups.append(([Candidate(b.kind, where(b.kind, place, model), b.sign, b.companion, b) for b in own], partial(acted, k, own)))
-        if body is not None:
+        if body is not None and (not kinds or "hidden_resonance" in kinds):
             pull = [every * fft.rfft(np.gradient(m.v, step))[: x.band] for x, m in zip(experiments, motions)]
             for f0 in RESONANCES:
                 own = [Candidate("hidden_resonance", body, 1, False, ("absorber", k, float(f0), zeta)) for zeta in DAMPINGS]
                 groups.append((own, partial(pulled, k, pull, np.array([(f0, zeta) for zeta in DAMPINGS]))))
     for j, name in enumerate(sensor_names):
         times = [s.motions[0].t if s.motions else e.time for e, s in zip(experiments, seen)]
-        faults = list(hy.sensor_faults(j, [s.sensors[:, j] for s in seen], times, step))
-        groups.append(([Candidate(f.kind, name, f.sign, f.companion, f) for f in faults], partial(faulty, j, faults)))
-    drift = hy.clock([s.sensors for s in seen], [e.time - e.time[0] for e in experiments], experiments[0].step)
-    apart = Candidate(drift.kind, "", drift.sign, drift.companion, drift)
-    groups.append(([apart], lambda e: metrics[e].spectrum(drift.series[e] * experiments[e].good)[None]))
+        faults = list(hy.sensor_faults(j, [s.sensors[:, j] for s in seen], times, step, kinds))
+        if faults:
+            groups.append(([Candidate(f.kind, name, f.sign, f.companion, f) for f in faults], partial(faulty, j, faults)))
+    if not kinds or hy.CLOCK in kinds:
+        drift = hy.clock([s.sensors for s in seen], [e.time - e.time[0] for e in experiments], experiments[0].step)
+        apart = Candidate(drift.kind, "", drift.sign, drift.companion, drift)
+        groups.append(([apart], lambda e, out: metrics[e].white(metrics[e].spectrum(drift.series[e] * experiments[e].good)[None], out)))
     index = {f.target: i for i, f in enumerate(fit.free)}
     chosen = [p for p in parameters if p in index]
     candidates = [c for own, _ in groups for c in own]
@@ -300,6 +327,6 @@ def collect(
     column = 0
     for e, x in enumerate(experiments):
         row, columns = 0, slice(column, column := column + 2 * x.band * len(sensor_names))
-        for own, spectra in groups:
-            metrics[e].white(spectra(e), effects[row : (row := row + len(own)), columns])
+        for own, write in groups:
+            write(e, effects[row : (row := row + len(own)), columns])
     return [*candidates, *(Candidate("wrong_parameter", p, 0, False, p) for p in chosen)], effects

@@ -62,6 +62,7 @@ TAKING = {  # laws that take an element away: its law and argument
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK)  # a formula after all
 FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
+LOADS = {"constant_force", "sensor_bias"}  # one looks like the other
 Group = tuple[str, str]
 
 
@@ -300,8 +301,8 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     """Explanations of a start in motion by a load that was put on at the start, alone or beside the causes that were found, or by
     the bias of a sensor that looks like one, and the study with the noise they leave; none where such a load is out of the
     question. `told`: what is about as good in motion, from best to worst."""
-    r = regression(rest, rest.null, [])
-    gains = {k: r.gain([k])[0] for k, c in enumerate(r.candidates) if c.kind == "constant_force"}
+    r = regression(rest, rest.null, [], {"constant_force"})
+    gains = {k: r.gain([k])[0] for k in range(len(r.candidates))}
     gains = {k: g for k, g in gains.items() if g > 0.8 * (rest.null.cost - free.null.cost)}
     if not gains:
         return rest, []
@@ -310,7 +311,7 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     unloaded = [t for e in told[:1] for t in e.terms if t.candidate.kind != "constant_force"]
     others = [t for t in unloaded if t.candidate.kind != "sensor_bias"]  # in motion, a load looks like one
     ways = [(load, others) for load in loads]
-    for e in [e for e in told if {"constant_force", "sensor_bias"} & {g[0] for g in e.groups} == {"sensor_bias"}][:1]:
+    for e in [e for e in told if LOADS & {g[0] for g in e.groups} == {"sensor_bias"}][:1]:
         bias = [t for t in e.terms if t.candidate.kind == "sensor_bias"]
         ways.append((bias, [t for t in e.terms if t not in bias]))
     beam = []
@@ -326,6 +327,12 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
         return rest, []
     quiet = requieted(rest, beam[0].fit)
     return grow(quiet, [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]], log)
+
+
+def related(groups: Sequence[Group]) -> set[str]:
+    """All kinds that are of one curve with some groups, wherever."""
+    curves = {CURVES.get(kind, kind) for kind, _ in groups}
+    return curves | {kind for kind, curve in CURVES.items() if curve in curves}
 
 
 def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:
@@ -472,7 +479,7 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
     if not bent:
         return e
     whole = e.whole()
-    r = regression(study, whole.fit, parameters)
+    r = regression(study, whole.fit, parameters, {kind for kind, _ in bent})
     for group in bent:
         pool = [k for k in pools(r).get(group, []) if _law(Term(r.candidates[k], 0.0)) in TEXTBOOK[group[0]]]
         without = r.without(missing(whole, group))
@@ -570,7 +577,7 @@ def mended(study: Study, e: Explanation, log) -> Explanation:
     while spare and len(e.terms) < most:
         if r is None:
             e = e.whole()
-            r = regression(study, e.fit, parameters)
+            r = regression(study, e.fit, parameters, related(spare))
         found = []
         for group in spare:
             own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
@@ -653,15 +660,15 @@ def lightened(study: Study, e: Explanation, log) -> list[Explanation]:
 
 def equals(study: Study, e: Explanation, parameters: Sequence[str], log) -> list[Explanation]:
     """The explanation with a load or a bias, beside other causes, exchanged for the one of its like that does about as well."""
-    loads = [g for g in e.groups if g[0] in ("constant_force", "sensor_bias")]
+    loads = [g for g in e.groups if g[0] in LOADS]
     if not loads or len(e.groups) == 1:
         return []
     e = e.whole()
-    r = regression(study, e.fit, parameters)
+    r = regression(study, e.fit, parameters, LOADS)
     found = []
     for group in loads:
         without = r.without(missing(e, group))
-        alike = [k for k, c in enumerate(r.candidates) if c.kind in ("constant_force", "sensor_bias") and (c.kind, c.where) not in e.groups]
+        alike = [k for k, c in enumerate(r.candidates) if c.kind in LOADS and (c.kind, c.where) not in e.groups]
         gain, chosen = pursue(without, alike, terms=1)
         if chosen and gain > RIVAL * (without.chi2 - r.chi2):
             kept = [t for t in e.terms if t.group != group]

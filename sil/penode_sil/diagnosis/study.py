@@ -4,15 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from penode_gen.model import Model, Signal
 
 from . import plant
-from .fit import Fit, Free, Problem
+from .fit import KEPT, Fit, Free, Problem
 from .hypotheses import size
 from .noise import Experiment, Metric, metric, sensor_levels
 from .plant import Linear, Place
@@ -152,11 +153,11 @@ def requieted(study: Study, fit: Fit, coloured: bool = True) -> Study:
     return replace(quiet, null=refit(quiet, study.nuisances))
 
 
-def regression(study: Study, fit: Fit, parameters: Sequence[str]) -> Regression:
-    """All hypotheses beside a fit."""
+def regression(study: Study, fit: Fit, parameters: Sequence[str], kinds: Collection[str] = ()) -> Regression:
+    """All hypotheses beside a fit, or those of some kinds and all wrong parameters."""
     seen = look(study, fit)
     names = [s.name for s in study.model.sensors]
-    return Regression(fit, *collect(study.model, study.experiments, study.metrics, seen, study.places, names, fit, parameters))
+    return Regression(fit, *collect(study.model, study.experiments, study.metrics, seen, study.places, names, fit, parameters, kinds))
 
 
 def watch(study: Study, fit: Fit) -> list[Array]:
@@ -175,6 +176,7 @@ def look(study: Study, fit: Fit) -> tuple[Seen, ...]:
     return tuple(smooth(e, m, l, study.linear, study.places, z[:, :n_z], z[:, n_z:], study.moving) for e, m, l, z in parts)
 
 
+@lru_cache(maxsize=KEPT)
 def widened(e: Experiment, more: int) -> Experiment:
     """The experiment for a model with more sensors than were measured."""
     n = len(e.time)
