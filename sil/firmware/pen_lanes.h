@@ -88,12 +88,13 @@ LANES_INLINE lanes_t lanes_abs(lanes_t x)
 /** pen_finite on lanes */
 LANES_INLINE mask_t lanes_finite(size_t n, const lanes_t value[])
 {
-    lanes_t sum = {0};
+    const mask_t exponent = (mask_t)lanes_wide((pen_real_t)INFINITY);
+    mask_t bad = {0};
 
     for (size_t i = 0U; i < n; i++) {
-        sum += ZERO * value[i];
+        bad |= ((mask_t)value[i] & exponent) == exponent;
     }
-    return sum >= ZERO;
+    return ~bad;
 }
 
 /* ---- pen_math ---- */

@@ -127,7 +127,11 @@ def test_thinned_signals_have_the_same_spectra(n, band):
     good = np.ones((n, 2), bool)
     good[n // 3 : n // 2, 1] = False
     want = np.moveaxis(np.fft.rfft(signals * good[:, :, None], axis=0), 0, 2)
-    assert np.max(np.abs(noise.thinning(n, band)(signals, good) - want[:, :, :band])) < 1e-6 * np.max(np.abs(want[:, :, -n // 4 :]))
+    thin = noise.thinning(n, band)
+    assert np.max(np.abs(thin(signals, good) - want[:, :, :band])) < 1e-6 * np.max(np.abs(want[:, :, -n // 4 :]))
+    plain = np.fft.rfft(signals[:, :, 0], axis=0)
+    rates = np.fft.rfft(np.gradient(signals[:, :, 0], STEP, axis=0), axis=0).T[:, :band]  # central differences are sines by the spectra
+    assert np.max(np.abs(thin.rates(signals[:, :, 0], thin(signals, None)[:, 0], STEP) - rates)) < 1e-6 / STEP * np.max(np.abs(plain[-n // 4 :]))
 
 
 def test_a_fit_ends_at_its_bounds(model, sound):
@@ -210,6 +214,28 @@ def test_column_of_a_law_is_what_simulation_gives(model, sound):
     white = base.metrics[0](want)
     # parameters within tolerance move the motion by about 1 %, and so the force beyond the gap
     assert np.linalg.norm(got - white) < 0.05 * np.linalg.norm(white)
+
+
+def test_some_kinds_have_the_rows_that_they_have_among_all(tmp_path, model):
+    """Of whole recordings and of such with holes, few and many, which are whitened in other ways."""
+    z = road(1)
+    measured = load([record(tmp_path / "sound.csv", z, drive(z, lambda s, v: 0.0), 2)], model)
+    whole = experiment(measured[0], model)
+    for holes in (0, 20, 900):
+        good = np.ones_like(whole.good)
+        good[100 : 100 + holes, 2] = False
+        base, _ = study.begin(model, [replace(whole, good=good)])
+        every, some = (study.regression(base, base.null, ["c"], kinds) for kinds in ((), {"bump_stop", "sensor_scale"}))
+        own = [i for i, c in enumerate(every.candidates) if c.kind in ("bump_stop", "sensor_scale", "wrong_parameter")]
+        assert [(c.kind, c.where) for c in some.candidates] == [(every.candidates[i].kind, every.candidates[i].where) for i in own]
+        assert np.array_equal(some.effects, every.effects[own]) or np.allclose(some.effects, every.effects[own], rtol=1e-9)
+        stop = next(c for c in some.candidates if c.kind == "bump_stop")
+        seen = study.look(base, base.null)
+        force = np.fft.rfft(stop.what.series[0])[None, : base.experiments[0].band]
+        effect = np.fft.irfft(seen[0].answer(force, stop.what.place)[0], SAMPLES, axis=0) * good
+        row = some.effects[some.candidates.index(stop)]
+        # the transform of many holes is one of single precision, and what is above the band is not in it
+        assert np.linalg.norm(row - base.metrics[0](effect)) < (1e-9 if holes < 200 else 1e-5) * np.linalg.norm(row)
 
 
 def test_simulation_of_the_fit_is_exact(model):
@@ -470,6 +496,19 @@ def test_sound_vehicle_has_no_cause(model, sound):
     found = diagnosis.diagnose(model, sound)
     assert found.verdict == "no_discrepancy" and found.causes == ()
     json.dumps(found.as_json())
+
+
+def test_what_only_the_holdout_shows_has_no_name(tmp_path, model, sound):
+    """A stop that the training never met: nothing is wrong there, and the model is not right all the same."""
+    far = road(3)
+    reach = float(np.max(drive(road(1), lambda s, v: 0.0)["deflection"]))
+    met = drive(far, lambda s, v: 90e3 * max(s - 0.7 * reach, 0.0))
+    unused = load([record(tmp_path / "far.csv", far, met, 4)], model)
+    found = diagnosis.diagnose(model, sound, unused)
+    assert [c.kind for c in found.causes] == ["outside_taxonomy"] and found.verdict == "unexplained"
+    assert any("hold-out shows" in note for note in found.notes)
+    sane = load([record(tmp_path / "sane.csv", far, drive(far, lambda s, v: 0.0), 4)], model)
+    assert diagnosis.diagnose(model, sound, sane).verdict == "no_discrepancy"
 
 
 def test_a_small_mass_gets_steps_that_it_is_stable_in(model):

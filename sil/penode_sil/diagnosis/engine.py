@@ -40,6 +40,7 @@ DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
 MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks only stand in for it
 LATE = 0.008  # of a sample: less delay than that is no fault of a sensor
+UNSEEN = 1.5  # times the noise: a hold-out that is that far off, where training showed nothing, is of another vehicle
 OUTSIDE = "outside_taxonomy"
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
 SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "maxwell_bushing": "stiffness", "hidden_resonance": "frequency"}
@@ -146,6 +147,10 @@ def diagnose(
         lost = {c.where for c in causes if c.kind == "sensor_dropout"}
         gain, more, held = extension.measure(study, extended, unused, lost)
         notes += more + [f"{s} gets worse by the extended model: do not use it" for s, g in gain.items() if g.after_rmse > 1.05 * g.before_rmse]
+        unseen = [s for s, g in gain.items() if g.after_rmse > UNSEEN * g.noise_floor] if not causes else []
+        if unseen:
+            causes, verdict, explained = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0
+            notes.append(f"{', '.join(unseen)}: the hold-out shows what the training does not: train with recordings like it")
     absorbed: dict[str, object] = {}
     if learnt := absorb.taught(study, named) if named is not None and named.terms else []:
         absorbed, more = absorbing(study, named, learnt, unused, output)

@@ -60,6 +60,7 @@ class Seen:
             if settled:
                 start[np.array(settled)] = 0.0
             spectra -= (start.real / self.n @ self._frees).view(complex).reshape(shape)
+        spectra[:, :, 0].imag = 0.0  # of a mean
         return spectra.swapaxes(1, 2)
 
     def white(self, m: Metric) -> Seen:
