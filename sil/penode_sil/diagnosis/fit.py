@@ -121,9 +121,9 @@ class Problem:
             z -= self.rates(e, z) * skews
         return z.transpose(2, 0, 1), x
 
-    def rates(self, e: int, z: Array) -> Array:
-        """Rates [n, n_z, 1] of the sensors of the first run; those of all runs are about the same."""
-        return np.gradient(np.ascontiguousarray(z[:, :, :1]), self.experiments[e].step, axis=0)
+    def rates(self, e: int, z: Array, run: int = 0) -> Array:
+        """Rates [n, n_z, 1] of the sensors of one run; those of all runs are about the same."""
+        return np.gradient(z[:, :, run, None], self.experiments[e].step, axis=0)
 
     def sensors(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array, Array]:
         """The same as they lie in memory, [n, n_z, runs], but for skews [n_z, runs] whose rates are still to be taken away."""
@@ -160,13 +160,14 @@ class Problem:
                 z[:, j] = delayed(z[:, j], values, self.experiments[e].step)
         return z, skews, run.x
 
-    def residuals(self, e: int, z: Array, skews: Array) -> Array:
-        """Whitened residuals [runs, rows] of what `sensors` gives."""
+    def residuals(self, e: int, z: Array, skews: Array, sane: int = 0) -> Array:
+        """Whitened residuals [runs, rows] of what `sensors` gives; `sane`: the run that is least likely to have left all bounds."""
         thin, good, measured = _thinned(self.experiments[e])
         with np.errstate(over="ignore", invalid="ignore"):  # some runs leave all bounds
             spectra = thin(z, good)  # [n_z, runs, f]
             if skews.any():
-                rates = thin(self.rates(e, z), good) if good is not None else thin.rates(z[:, :, 0], spectra[:, 0], self.experiments[e].step)
+                step = self.experiments[e].step
+                rates = thin.rates(z[:, :, sane], spectra[:, sane], step) if good is None else thin(self.rates(e, z, sane), good)
                 spectra -= rates.reshape(len(spectra), 1, -1) * skews[:, :, None]
             spectra = measured - spectra
             white = self.metrics[e].white(spectra.transpose(1, 2, 0))
@@ -193,7 +194,7 @@ class Problem:
             if further is None or not bold:
                 costs = np.zeros(len(trials))
                 for e in range(len(self.experiments)):
-                    r = self.residuals(e, *self.sensors(e, fit.free, trials)[:2])
+                    r = self.residuals(e, *self.sensors(e, fit.free, trials)[:2], sane=-1)
                     costs += np.einsum("ij,ij->i", r, r)
                 away = (moved - np.array([[f.origin] for f in fit.free])) / np.array([[f.sigma] for f in fit.free])
                 costs = np.where(np.isfinite(costs), costs + np.sum(away**2, axis=0), np.inf)
@@ -226,7 +227,7 @@ class Problem:
         shifts = np.outer(shares - 1.0, np.where(gains, [f.value / f.unit for f in free], 0.0))
         costs = np.zeros(len(shares))
         for e in range(len(self.experiments)):
-            r = self.residuals(e, *self.sensors(e, free, shifts)[:2])
+            r = self.residuals(e, *self.sensors(e, free, shifts)[:2], sane=-1)
             costs += np.einsum("ij,ij->i", r, r)
         best = int(np.argmin(np.where(np.isfinite(costs[:-1]), costs[:-1], np.inf)))
         return _put(free, np.array([f.at(shift) for f, shift in zip(free, shifts[best])]))
