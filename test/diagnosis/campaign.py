@@ -5,7 +5,6 @@
     campaign.py --cases 300 --jobs 2 --out DIR           a fresh draw; its seed is printed
     campaign.py --only 123456:17 --out DIR               one case again; leaves its files and truth
     campaign.py --command "penode diagnose" --command "neural=python neural.py"     several on the same cases
-    campaign.py --cases 48 --again               seconds of a second call, which finds compiled what the first one compiled
     campaign.py --cases 20 --generate --out DIR          only the files: DIR/cases/... and, apart from them, DIR/truth/...
 """
 
@@ -37,15 +36,13 @@ def worked() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def diagnose(command: str, folder: Path, recordings: list[Path], timeout: float, calls: int = 1) -> tuple[dict | None, float, str]:
-    """Runs the command as a user would. Returns the diagnosis or None, seconds of one core that the last of its calls took, and
-    why there is none."""
+def diagnose(command: str, folder: Path, recordings: list[Path], timeout: float) -> tuple[dict | None, float, str]:
+    """Runs the command as a user would. Returns the diagnosis or None, seconds of one core that it took, and why there is none."""
     answer = folder / "diagnosis"
     call = [*shlex.split(command), folder / "model.toml", "--data", *recordings[:-1], "--holdout", recordings[-1], "-o", answer]
     try:
-        for _ in range(calls):
-            begin = worked()
-            done = subprocess.run(list(map(str, call)), capture_output=True, text=True, timeout=timeout, env={**os.environ, **ONE_CORE})
+        begin = worked()
+        done = subprocess.run(list(map(str, call)), capture_output=True, text=True, timeout=timeout, env={**os.environ, **ONE_CORE})
     except subprocess.TimeoutExpired:
         return None, timeout, "timeout"
     seconds = worked() - begin
@@ -70,14 +67,14 @@ def simulated(command: str, model: Path, recording: Path) -> dict[str, float]:
     return {name.split("_[")[0]: float(np.sqrt(np.mean((seen[name][:n] - said[name][:n]) ** 2))) for name in both}
 
 
-def run(seed: int, index: int, commands: dict[str, str], simulate: str, timeout: float, out: Path, keep: bool, calls: int) -> list[dict]:
+def run(seed: int, index: int, commands: dict[str, str], simulate: str, timeout: float, out: Path, keep: bool) -> list[dict]:
     """One case from draw to scores, one for each command. The truth is written only after the commands are through."""
     case = cases.make(seed, index)
     folder = out / "cases" / f"{seed}-{index}"
     shutil.rmtree(folder, ignore_errors=True)
     recordings, answers = case.write(folder), []
     for name, command in commands.items():
-        found, seconds, why = diagnose(command, folder, recordings, timeout, calls)
+        found, seconds, why = diagnose(command, folder, recordings, timeout)
         error: dict[str, float] = {}
         if simulate and found and not case.bench.moving:  # else it needs a start state that only the diagnosis knows
             error = simulated(simulate, folder / "diagnosis" / "model_extended.toml", recordings[-1])
@@ -133,7 +130,6 @@ def arguments() -> argparse.ArgumentParser:
     add("--simulate", default="", metavar="COMMAND",
         help="measure the gain by COMMAND model_extended.toml --input REC -o OUT.csv, not by what the diagnosis says")
     add("--timeout", type=float, default=240, help="seconds for one case, by the clock (240)")
-    add("--again", action="store_true", help="call each command twice; seconds are those of the second call")
     add("--jobs", type=int, default=1, help="cases at the same time (1)")
     add("--out", type=Path, default=Path("build/campaign"), help="folder (build/campaign)")
     add("--page", type=Path, help="write the tables there too")
@@ -165,7 +161,7 @@ def main() -> int:
             for job in [pool.submit(generate, *one, asked.out) for one in chosen]:
                 print(job.result(), flush=True)
             return 0
-        more = (commands, asked.simulate, asked.timeout, asked.out, asked.keep or bool(asked.only), 1 + asked.again)
+        more = (commands, asked.simulate, asked.timeout, asked.out, asked.keep or bool(asked.only))
         for done, job in enumerate([pool.submit(run, *one, *more) for one in chosen], 1):
             for row in job.result():
                 rows[row["command"]].append(row)

@@ -80,6 +80,7 @@ def score(
         "case": f"{truth['seed']}:{truth['index']}",
         "stratum": truth["stratum"],
         "seconds": round(seconds, 2),
+        "compiling": round((diagnosis or {}).get("compile_seconds", 0.0), 2),
         "kinds": [e["kind"] for e in truth["effects"]],
         "forms": [e["form"] for e in truth["effects"]],
         "energies": [e["energy"] for e in truth["effects"]],
@@ -178,7 +179,7 @@ def summary(rows: Sequence[Mapping]) -> dict:
         for r in rows
         if r["stratum"] == "outside" and r["answer"] and any(g[1] > 1.05 * g[0] for g in r["gain"].values())
     ]
-    seconds = [r["seconds"] for r in rows]
+    seconds = [round(r["seconds"] - r.get("compiling", 0.0), 2) for r in rows]
     out["outcomes"] = dict(Counter(r["outcome"] for r in rows))
     out["no_answer"] = sum(r["verdict"] is None for r in rows)
     out["parameters"] = {
@@ -206,6 +207,7 @@ def summary(rows: Sequence[Mapping]) -> dict:
         },
     }
     out["time"] = {"median": quantile(seconds, 0.5), "q90": quantile(seconds, 0.9), "longest": max(seconds, default=None)}
+    out["time"]["compiling"] = quantile((r.get("compiling", 0.0) for r in rows), 0.5)
     return out
 
 
@@ -252,7 +254,8 @@ def text(out: Mapping) -> str:
         f"parameters ({p['n']}): median error {_percent(p['median_error'], 2)} (asked 1 %), 95 % within {_percent(p['error_95'], 2)} (asked 6 %)",
         f"95 % intervals ({c['n']}): cover {_percent(c['share'])} of the truths (asked 90 .. 98 %), {_percent(c['wilson95'][0])} .. {_percent(c['wilson95'][1])}",
         f"hold-out inside the trained range ({g['n']}): {_percent(g['within_5_percent_of_floor'])} within 5 % of the noise floor (asked 95 %)",
-        f"time a case: median {t['median']} s, 90 % within {t['q90']} s (asked 10 s), longest {t['longest']} s (asked 40 s)",
+        f"time a case: median {t['median']} s, 90 % within {t['q90']} s (asked 10 s), longest {t['longest']} s (asked 40 s); "
+        f"compilers, in a first call, beside that: median {t['compiling']} s",
     ]
     return "\n".join(lines)
 

@@ -202,6 +202,8 @@ def test_tables_add_up():
         ["4", "no_discrepancy"],
     ]
     assert (out["time"]["longest"], out["time"]["q90"]) == (19.0, 16.0)
+    first = [{**row, "compiling": 0.25} for row in rows("null", 10, 10)]  # what compilers took is told apart
+    assert score.summary(first)["time"] == {"median": 3.75, "q90": 7.75, "longest": 8.75, "compiling": 0.25}
     assert "18 of 20" in score.text(out) and "2x backlash at damper" in score.text(out)
 
 
@@ -221,7 +223,7 @@ def test_campaign_runs_a_command_and_survives_it(tmp_path, answer, outcome):
         f"out.mkdir()\n{ANSWERS[answer]}\n"
     )
     (row,) = campaign.run(
-        1, 1, {"mine": f"{sys.executable} {script}"}, "", 5.0 if answer != "slow" else 0.5, tmp_path / "out", keep=True, calls=1
+        1, 1, {"mine": f"{sys.executable} {script}"}, "", 5.0 if answer != "slow" else 0.5, tmp_path / "out", keep=True
     )
     assert row["stratum"] == "null" and (row["why"] or row["outcome"]).startswith(outcome)
     assert json.loads((tmp_path / "out" / "truth" / "1-1.json").read_text())["effects"] == []

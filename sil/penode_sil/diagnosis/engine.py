@@ -66,7 +66,7 @@ def diagnose(
 ) -> Diagnosis:  # fmt: skip
     """Name what the model gets wrong in `train`, and measure on `holdout` what knowing it gains; with `output`, write
     model_extended.toml there. `log` hears what is tried, `tell` which share of the work is done and what comes next."""
-    started = time.perf_counter()
+    started, compiled = time.perf_counter(), compilers()
     log = advancing(log, tell)
     tell(0.0, "fitting the model as it is")
     both = told_of_rails([*train, *holdout])
@@ -162,8 +162,14 @@ def diagnose(
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(
         verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), data,
-        shown.numbers(), absorbed, time.perf_counter() - started, shown,
+        shown.numbers(), absorbed, time.perf_counter() - started, compilers() - compiled, shown,
     )  # fmt: skip
+
+
+def compilers() -> float:
+    """Processor time [s] of all programs that this one has run so far: compilers."""
+    used = os.times()
+    return used.children_user + used.children_system
 
 
 def absorbing(

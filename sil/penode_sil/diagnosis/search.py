@@ -337,7 +337,7 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     if beam[0].score < max(idle + NEW, (1.0 - NEAR) * moving - NEW):
         return rest, []
     quiet = requieted(rest, beam[0].fit)
-    return grow(quiet, [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]], log)
+    return grow(quiet, [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]], log, 1)  # the rest was found in motion
 
 
 def related(groups: Sequence[Group]) -> set[str]:
@@ -420,8 +420,14 @@ def distinct(found: Sequence[Explanation]) -> list[Explanation]:
     return list(best.values())
 
 
-def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Explanation]]:
-    """Explanations by one kind, by two and by three, from best to worst."""
+def curves(e: Explanation) -> set[tuple[str, object]]:
+    """What its causes are about: curves at places, faults of sensors, parameters."""
+    what = ((t.group, t.candidate.what) for t in e.terms)
+    return {(CURVES.get(kind, kind), x.place if isinstance(x, Basis) else where) for (kind, where), x in what}
+
+
+def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tuple[Study, list[Explanation]]:
+    """Explanations by one kind, by two and by three, from best to worst; `width`: how many of each are given a further one."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
     for e in beam:
         log(f"{e.groups} {e.gain:.0f}")
@@ -429,9 +435,9 @@ def grow(study: Study, beam: Sequence[Explanation], log) -> tuple[Study, list[Ex
     for _ in (2, 3):
         grown: list[Explanation] = []
         enough = beam[0].gain - 0.3 * abs(beam[0].gain)
-        for e in beam[:2]:
-            if e.gain < enough:
-                break
+        for e in beam[:width]:
+            if e.gain < (max(enough, (1.0 - NEAR) * beam[0].gain) if curves(e) == curves(beam[0]) else enough):
+                break  # of one curve, the worse form of it will not become the better one
             here = requieted(study, e.fit)
             if here is not study:
                 e = explain(here, e.terms, 4, e.fit, e.formulas)
