@@ -29,6 +29,7 @@ from .plant import anonymous
 Array = NDArray[np.float64]
 STIFF = 2.5e-4  # [s] longest step of a law that follows a short way or a short time
 KEPT = 32  # experiments of which spectra and inputs are kept
+SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
 FAR = 1e20  # residual of a run that cannot be simulated
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
 PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, others need not be tried
@@ -160,13 +161,14 @@ class Problem:
                 z[:, j] = delayed(z[:, j], values, self.experiments[e].step)
         return z, skews, run.x
 
-    def residuals(self, e: int, z: Array, skews: Array, sane: int = 0) -> Array:
-        """Whitened residuals [runs, rows] of what `sensors` gives; `sane`: the run that is least likely to have left all bounds."""
+    def residuals(self, e: int, z: Array, skews: Array) -> Array:
+        """Whitened residuals [runs, rows] of what `sensors` gives."""
         thin, good, measured = _thinned(self.experiments[e])
         with np.errstate(over="ignore", invalid="ignore"):  # some runs leave all bounds
             spectra = thin(z, good)  # [n_z, runs, f]
             if skews.any():
                 step = self.experiments[e].step
+                sane = int(np.argmin(np.max(np.abs(z[::SPARSE]), axis=(0, 1))))  # a run that has not left all bounds
                 rates = thin.rates(z[:, :, sane], spectra[:, sane], step) if good is None else thin(self.rates(e, z, sane), good)
                 spectra -= rates.reshape(len(spectra), 1, -1) * skews[:, :, None]
             spectra = measured - spectra
@@ -194,7 +196,7 @@ class Problem:
             if further is None or not bold:
                 costs = np.zeros(len(trials))
                 for e in range(len(self.experiments)):
-                    r = self.residuals(e, *self.sensors(e, fit.free, trials)[:2], sane=-1)
+                    r = self.residuals(e, *self.sensors(e, fit.free, trials)[:2])
                     costs += np.einsum("ij,ij->i", r, r)
                 away = (moved - np.array([[f.origin] for f in fit.free])) / np.array([[f.sigma] for f in fit.free])
                 costs = np.where(np.isfinite(costs), costs + np.sum(away**2, axis=0), np.inf)
@@ -220,14 +222,14 @@ class Problem:
     def eased(self, free: Sequence[Free]) -> tuple[Free, ...]:
         """The free values with all gains of laws scaled down as far as the simulation starts best: a regression that
         looked at small motions may ask for too much."""
-        gains = np.array([isinstance(f.target, str) and not f.log and f.sigma == np.inf for f in free])
+        gains = np.array([isinstance(f.target, str) and not f.log and f.sigma == np.inf and f.origin == 0.0 for f in free])
         if not gains.any():
             return tuple(free)
         shares = np.array([1.0, 0.7, 0.5, 0.3, 0.15, 0.07, 0.03, 0.0])
         shifts = np.outer(shares - 1.0, np.where(gains, [f.value / f.unit for f in free], 0.0))
         costs = np.zeros(len(shares))
         for e in range(len(self.experiments)):
-            r = self.residuals(e, *self.sensors(e, free, shifts)[:2], sane=-1)
+            r = self.residuals(e, *self.sensors(e, free, shifts)[:2])
             costs += np.einsum("ij,ij->i", r, r)
         best = int(np.argmin(np.where(np.isfinite(costs[:-1]), costs[:-1], np.inf)))
         return _put(free, np.array([f.at(shift) for f, shift in zip(free, shifts[best])]))

@@ -37,7 +37,6 @@ CURVES = {  # kinds of one family at one place are one curve with one name
 FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
 SMALL = 0.03  # of all that was gained: a cause worth less than that may be a remainder of another
-LESS = 0.1  # of further terms, to begin with where all of them led astray
 PART = 0.1  # of the size a law has alone: left to it where its companions do the rest
 WHOLE = 0.97  # share that is a whole explanation
 NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
@@ -194,16 +193,6 @@ def explain(
     return Explanation(christened(found, built.names, fit, study), built, problem, fit, gain, formulas)
 
 
-def more(study: Study, e: Explanation, new: Sequence[Term], formulas: float | None = None) -> Explanation:
-    """The explanation with further terms. A fit that ends worse than without them went astray: then from less of them."""
-    formulas = e.formulas if formulas is None else formulas
-    wider = explain(study, [*e.terms, *new], start=e.fit, formulas=formulas)
-    if wider.gain >= e.gain:
-        return wider
-    again = explain(study, [*e.terms, *(replace(t, gain=LESS * t.gain) for t in new)], start=e.fit, formulas=formulas)
-    return max(wider, again, key=lambda x: x.gain)
-
-
 def acting(terms: Sequence[Term]) -> list[Term]:
     """The terms that have a force, and those that companions with one need to be a cause."""
     forceful = [t for t in terms if t.gain != 0.0 or not isinstance(t.candidate.what, Basis)]
@@ -257,7 +246,7 @@ def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str
                     best = gain, chosen[0], r.gain(chosen)[1][0]
         if best is None:
             break
-        wider = more(study, e, [Term(r.candidates[best[1]], float(best[2]))])
+        wider = explain(study, [*e.terms, Term(r.candidates[best[1]], float(best[2]))], start=e.fit, formulas=e.formulas)
         if wider.score < e.score + 2e-3 * e.gain:
             break
         e = wider.whole()
@@ -271,7 +260,7 @@ def filtered(study: Study, e: Explanation, r: Regression) -> Explanation | None:
         if group[0] == "hidden_resonance" and sum(t.group == group for t in e.terms) == 1:
             gain, chosen = pursue(r, pools(r).get(group, []), terms=1)
             if chosen and gain > (1.0 / FILTER - 1.0) * e.gain:
-                return more(study, e, terms_of(r, chosen))
+                return explain(study, [*e.terms, *terms_of(r, chosen)], start=e.fit, formulas=e.formulas)
     return None
 
 
@@ -452,7 +441,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
             if not ways and e.fit.chi2 - rows(here) < (1.0 - WHOLE) * e.gain:
                 enough = (1.0 - NEAR) * e.gain  # it is whole: only what is about as good may take its place
             for new in ways:
-                wider = more(here, e, new, e.gain if exact(e.groups) else e.formulas)
+                wider = explain(here, [*e.terms, *new], start=e.fit, formulas=e.gain if exact(e.groups) else e.formulas)
                 log(f"  + {wider.groups[-1]} -> {wider.gain:.0f}")
                 if wider.score > e.score:
                     grown.append(wider)
@@ -614,7 +603,7 @@ def mended(study: Study, e: Explanation, log) -> Explanation:
         if not found:
             break
         _, group, new = max(found, key=lambda x: x[0])
-        wider = more(study, e, [new])
+        wider = explain(study, [*e.terms, new], start=e.fit, formulas=e.formulas)
         log(f"  mended {group}: {wider.gain:.0f} for {e.gain:.0f}")
         if len(wider.terms) == len(e.terms) + 1 and len(wider.groups) == len(e.groups):  # whatever its curve is called now
             wider = renamed(wider, [*(t.group for t in e.terms), group])
