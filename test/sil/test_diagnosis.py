@@ -415,6 +415,23 @@ def test_a_mass_on_rubber_is_foretold(tmp_path, model):
     assert all(gain.after_rmse < 1.07 * NOISE[name] for name, gain in found.gain.items())
 
 
+def test_two_bends_of_a_sensor_are_one_cube_in_the_file(model, sound):
+    """Rails that are soft bend a sensor, and so does a gain that bends: both write y^3, with sizes of their own."""
+    base, _ = study.begin(model, [experiment(m, model) for m in sound])
+    base = replace(base, nothing=study.loss(base, base.null), seen=study.look(base, base.null))
+    bends = [c for c in study.regression(base, base.null, []).candidates if getattr(c.what, "what", "") == "scale_bend"]
+    rails, gain = (next(c for c in bends if (c.kind, c.where) == (kind, "deflection")) for kind in ("sensor_clipping", "sensor_scale"))
+    gain = replace(gain, what=replace(gain.what, shape=2.0 * gain.what.shape))
+    e = search.explain(base, [Term(rails, -1e-3), Term(gain, -1e-3)], iterations=0)
+    text, extended = extension.extend_file(base, e, ())
+    assert text.count("curve_deflection = ") == 1
+    y = 0.02
+    want = sum(f.value * y**3 / b.what.shape**2 for f, b in zip((f for f in e.fit.free if f.target[0] == "fault"), (rails, gain)))
+    sensor = next(s for s in extended.sensors if s.name == "deflection").expression.replace("^", "**")
+    curve = extended.parameters["curve_deflection"].value
+    assert eval(sensor, {"z_b": y, "z_w": 0.0, "curve_deflection": curve}) - y == pytest.approx(want, rel=1e-5)
+
+
 SHARE = np.linspace(0.0, 1.0, SAMPLES)
 LATE = 12e-3  # s
 FAULTS = {  # sensor, what it shows, and its kind

@@ -209,12 +209,14 @@ def _bent(
 ) -> str:
     """What a scale of two sides, a bent or a drifting one adds to a signal; `share` of the recording is over."""
     parts = []
+    bends = [(f.shape, k) for f, k in _series(e, values, sensor) if f.what == "scale_bend"]
+    if bends:  # one cube, however many causes share it
+        curve = bends[0][0]
+        parts.append(f"{sum(k * (curve / shape) ** 2 for shape, k in bends):.7g}*{signal}^3/curve_{name}^2")
+        parameters.append(f"curve_{name} = {_table({'value': curve, 'unit': unit})}")
     for f, k in _series(e, values, sensor):
         if f.what == "scale_side":
             parts.append(f"{k:.7g}*abs{signal}")
-        if f.what == "scale_bend":
-            parts.append(f"{k:.7g}*{signal}^3/curve_{name}^2")
-            parameters.append(f"curve_{name} = {_table({'value': f.shape, 'unit': unit})}")
         if f.what == "scale_drift":
             parts.append(f"{k:.7g}*{signal}*({share} - 0.5)")
     return " + ".join(parts)

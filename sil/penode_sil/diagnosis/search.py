@@ -576,7 +576,8 @@ def whole(study: Study, t: Term) -> Term | None:
 
 
 def _fault(c: Candidate) -> tuple[str, float] | None:
-    return (c.what.what, c.what.shape) if isinstance(c.what, Fault) else None
+    """What a fault is, so that none comes twice; the size of a bend is the unit of its gain only."""
+    return (c.what.what, 0.0 if c.what.what == "scale_bend" else c.what.shape) if isinstance(c.what, Fault) else None
 
 
 def _law(t: Term) -> str:
