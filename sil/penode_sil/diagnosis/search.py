@@ -331,18 +331,20 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
 
 def related(groups: Sequence[Group]) -> set[str]:
     """All kinds that are of one curve with some groups, wherever."""
-    curves = {CURVES.get(kind, kind) for kind, _ in groups}
-    return curves | {kind for kind, curve in CURVES.items() if curve in curves}
+    own = {CURVES.get(kind, kind) for kind, _ in groups}
+    return own | {kind for kind, its in CURVES.items() if its in own}
+
+
+def curve(c: Candidate) -> tuple[str, object]:
+    """The curve at a place, the fault of a sensor or the parameter that a candidate is about."""
+    return CURVES.get(c.kind, c.kind), c.what.place if isinstance(c.what, Basis) else c.where
 
 
 def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:
     """All candidates that are of one curve, or one fault of a sensor, with some groups."""
     places = {(c.kind, c.where): c.what.place for c in r.candidates if isinstance(c.what, Basis)}
-    curves = {(CURVES.get(g[0], g[0]), places.get(g, g[1])) for g in groups}
-    return [
-        k for k, c in enumerate(r.candidates)
-        if (CURVES.get(c.kind, c.kind), c.what.place if isinstance(c.what, Basis) else c.where) in curves
-    ]  # fmt: skip
+    own = {(CURVES.get(g[0], g[0]), places.get(g, g[1])) for g in groups}
+    return [k for k, c in enumerate(r.candidates) if curve(c) in own]
 
 
 def further(study: Study, e: Explanation, r: Regression) -> list[list[int]]:
@@ -409,12 +411,6 @@ def distinct(found: Sequence[Explanation]) -> list[Explanation]:
     return list(best.values())
 
 
-def curves(e: Explanation) -> set[tuple[str, object]]:
-    """What its causes are about: curves at places, faults of sensors, parameters."""
-    what = ((t.group, t.candidate.what) for t in e.terms)
-    return {(CURVES.get(kind, kind), x.place if isinstance(x, Basis) else where) for (kind, where), x in what}
-
-
 def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tuple[Study, list[Explanation]]:
     """Explanations by one kind, by two and by three, from best to worst; `width`: how many of each are given a further one."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
@@ -425,7 +421,8 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
         grown: list[Explanation] = []
         enough = beam[0].gain - 0.3 * abs(beam[0].gain)
         for e in beam[:width]:
-            if e.gain < (max(enough, (1.0 - NEAR) * beam[0].gain) if curves(e) == curves(beam[0]) else enough):
+            alike = {curve(t.candidate) for t in e.terms} == {curve(t.candidate) for t in beam[0].terms}
+            if e.gain < (max(enough, (1.0 - NEAR) * beam[0].gain) if alike else enough):
                 break  # of one curve, the worse form of it will not become the better one
             here = requieted(study, e.fit)
             if here is not study:
