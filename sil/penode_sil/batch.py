@@ -30,7 +30,7 @@ Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
 # Not -ffast-math, which takes nothing for NaN. But gcc drops 0*x, by which lanes_max and its like pass NaN on: states, inputs and outputs
 # that are not finite are told by their bits all the same.
-QUICK = ("-ffp-contract=fast", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math")
+QUICK = ("-ffp-contract=fast", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math", "-DLANES_FLUSH")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +61,8 @@ class _Job(ctypes.Structure):
 
 class Batch:
     """A model's batch library, compiled for this processor; `lanes` runs go at once. Without `exact` sums and products
-    may be fused and put in another order: in about half of the time, but other bits than NAME_step has, and other
-    ones from machine to machine. For fits."""
+    may be fused and put in another order, and subnormal numbers are 0: in about half of the time, but other bits than
+    NAME_step has, and other ones from machine to machine. For fits."""
 
     def __init__(self, model: penode_gen.Model, dtype: type = np.float64, exact: bool = True):
         self.model, self.dtype, self.exact = model, dtype, exact
@@ -161,8 +161,10 @@ class Batch:
 
     def _spread(self, values: Array, padded: int) -> Array:
         """[..., 1 or runs] repeated to [..., padded], the last run in the lanes that are left over."""
-        width = [(0, 0)] * (values.ndim - 1) + [(0, padded - values.shape[-1])]
-        return np.ascontiguousarray(np.pad(values, width, mode="edge"), dtype=self.dtype)
+        wide = np.empty((*values.shape[:-1], padded), dtype=self.dtype)
+        wide[..., : values.shape[-1]] = values
+        wide[..., values.shape[-1] :] = values[..., -1:]
+        return wide
 
     def _parameters(self, given: Mapping[str, Array], values: Array, padded: int) -> Array:
         """[n_p, padded]: value or reciprocal of each parameter the code takes; reciprocals of doubles, as in the C."""
