@@ -21,7 +21,7 @@ def regression(main: list[float], companion: list[float], residual: list[float])
     """A law of positive size and a companion of any, as columns; nothing else is free."""
     candidates = [Candidate("tyre_damping", "tyre", 1, False, LAW), Candidate("tyre_damping", "tyre", 0, True, LAW)]
     fit = SimpleNamespace(free=(), residual=np.array(residual), jacobian=np.zeros((len(residual), 0)))
-    return Regression(fit, candidates, np.array([main, companion]))
+    return Regression(fit, candidates, np.array([main, companion], dtype=np.float32), [])
 
 
 @pytest.mark.parametrize(

@@ -125,13 +125,13 @@ class Metric:
     def white(self, spectra: NDArray[np.complex128], out: Array | None = None) -> Array:
         """Real numbers [..., rows] of unit variance if spectra [..., f, sensors] are those of noise."""
         shape = *spectra.shape[:-2], *spectra.shape[:-3:-1]  # [..., sensors, f]
-        w = np.empty(shape, dtype=complex) if out is None else out.view(complex).reshape(shape, copy=False)
+        w = np.empty(shape, dtype=complex) if out is None else out.view(self.root.dtype).reshape(shape, copy=False)
         for i, row in enumerate(self.triangle):
             np.multiply(row[i], spectra[..., i], out=w[..., i, :])
             for j in range(i):
                 if row[j].any():  # inputs without noise have nothing in common
                     w[..., i, :] += row[j] * spectra[..., j]
-        return w.reshape(*w.shape[:-2], -1).view(float)
+        return w.reshape(*w.shape[:-2], -1).view(w.real.dtype)
 
     @cached_property
     def triangle(self) -> NDArray[np.complex128]:

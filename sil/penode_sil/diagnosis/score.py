@@ -28,11 +28,14 @@ from penode_gen.model import GROUND, Model
 from .plant import Linear, Place
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+Single = NDArray[np.float32]
+Complex = NDArray[np.complex128] | NDArray[np.complex64]
 RESONANCES = np.geomspace(0.5, 40.0, 36)  # [Hz] of hidden masses that are tried
 DAMPINGS = (0.03, 0.1, 0.3)  # and their damping ratios
 COARSE = 0.002  # [s] step at which forces along a motion are looked at, if their recordings have a finer one
 TOGETHER = 8  # candidates whose effects are computed together: they stay in the cache
+BLOCK = 1024  # rows of which products are added up in single
+ROUND = 3e-6  # of the square of a column: less is rounding, or not as linear
 FEW = 200  # samples of a sensor that are taken out one by one, sooner than by a transform
 
 
@@ -51,17 +54,22 @@ class Seen:
     def answer(self, force: Complex, place: int, settled: Sequence[bool] = (), out: Array | None = None) -> Complex:
         """Spectra [k, f, sensors] of what forces [k, f] at a place do to the sensors, from rest unless settled; in memory, which
         may be the rows `out`, [k, sensors, f]."""
-        shape = len(force), self.response.shape[1], force.shape[1]
-        spectra = np.empty(shape, dtype=complex) if out is None else out.view(complex).reshape(shape, copy=False)
+        shape, dtype = (len(force), self.response.shape[1], force.shape[1]), self.response.dtype
+        spectra = np.empty(shape, dtype=dtype) if out is None else out.view(dtype).reshape(shape, copy=False)
         np.multiply(force[:, None, :], self._responses[place], out=spectra)
         if self.states is not None and self.free is not None:
             # what is periodic is not at rest at the start: take that start away
             start = force @ self.states[:, :, place] * 2.0 - force[:, :1] * self.states[0, :, place]
             if settled:
                 start[np.array(settled)] = 0.0
-            spectra -= (start.real / self.n @ self._frees).view(complex).reshape(shape)
+            spectra -= (start.real / self.n @ self._frees).view(dtype).reshape(shape)
         spectra[:, :, 0].imag = 0.0  # of a mean
         return spectra.swapaxes(1, 2)
+
+    def single(self) -> Seen:
+        """The same with responses in single precision: in half of the time, and fine enough for a column of a regression."""
+        states, free = (None if x is None else x.astype(np.complex64) for x in (self.states, self.free))
+        return replace(self, response=self.response.astype(np.complex64), states=states, free=free)
 
     def white(self, m: Metric) -> Seen:
         """The same with sensors whose noise is white: what answers then are rows of a regression."""
@@ -76,7 +84,7 @@ class Seen:
     @cached_property
     def _frees(self) -> Array:
         """Of one state after the other, [x, numbers]."""
-        return np.ascontiguousarray(self.free.T).reshape(self.free.shape[2], -1).view(float)
+        return np.ascontiguousarray(self.free.T).reshape(self.free.shape[2], -1).view(self.free.real.dtype)
 
     @property
     def n(self) -> int:
@@ -115,22 +123,22 @@ def likely(e: Experiment, levels: Array, g: Complex, acting: int, r: Complex) ->
     first, then errors of the inputs. These are their most likely values; the spectra of the forces are those that spectra r [f, n_z] of
     a residual suggest, smooth over half a hertz."""
     band = len(g)
-    sensor = levels[:, :, None] * np.eye(g.shape[1])
+    heard = np.conj(np.swapaxes(g, 1, 2)) / levels[:, None, :]
+    curvature, slope = heard @ g, (heard @ r[:, :, None])[:, :, 0]
     prior = np.empty((band, g.shape[2]))
-    strength = np.sum(np.abs(g) ** 2 / levels[:, :, None], axis=1)
-    prior[:, :acting] = 1.0 / np.median(strength[:, :acting], axis=0)
+    prior[:, :acting] = 1.0 / np.median(np.einsum("fqq->fq", curvature).real[:, :acting], axis=0)
     prior[:, acting:] = np.maximum(e.unsure[:band], 1e-15) ** 2
     kernel = np.hanning(2 * max(int(0.5 / e.frequencies[1]), 3) + 1)
     weight = np.convolve(np.ones(band), kernel, "same")
     for again in range(8):
-        gp = g * prior[:, None, :]
-        gain = np.conj(np.swapaxes(gp, 1, 2)) @ np.linalg.inv(gp @ np.conj(np.swapaxes(g, 1, 2)) + sensor)
+        root = np.sqrt(prior)  # the inverse is that of q x q numbers, of which none is below 1
+        inner = np.linalg.inv(np.eye(len(root.T)) + root[:, :, None] * curvature * root[:, None, :])
         if again < 7:
-            left = prior - np.real(np.einsum("fqi,fiq->fq", gain, gp))
-            power = np.abs((gain @ r[:, :, None])[:, :, 0]) ** 2 + np.maximum(left, 0.0)
+            left = prior * np.einsum("fqq->fq", inner).real
+            power = np.abs(root * (inner @ (root * slope)[:, :, None])[:, :, 0]) ** 2 + np.maximum(left, 0.0)
             for q in range(acting):
                 prior[:, q] = np.maximum(np.convolve(power[:, q], kernel, "same") / weight, 1e-30)
-    return gain
+    return root[:, :, None] * inner * root[:, None, :] @ heard
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,27 +153,48 @@ class Candidate:
 
 
 class Regression:
-    """Whitened effects [candidates, rows] of all candidates against the whitened residual of a fit, its free values projected out."""
+    """Whitened effects [candidates, rows] of all candidates against the whitened residual of a fit, its free values projected out.
 
-    def __init__(self, fit: Fit, candidates: Sequence[Candidate], effects: Array, whole: Array | None = None):
-        self.candidates, self.effects = tuple(candidates), effects
-        self.whole = effects @ effects.T if whole is None else whole
-        movable = [i for i, f in enumerate(fit.free) if f.low < f.value < f.high]  # the others stand at their bounds
-        free = [fit.free[i] for i in movable]
-        priors = np.array([f.unit / f.sigma for f in free])
-        q = np.zeros((len(fit.residual), 0))
-        if free:
-            q = np.linalg.qr(np.concatenate([fit.jacobian[:, movable], np.diag(priors)]))[0]
-        r, offsets = fit.residual, np.array([f.offset for f in free])
-        top, low = q[: len(r)], q[len(r) :]
-        xt, tr = effects @ top, top.T @ r - low.T @ offsets  # effects have no part in the rows of the priors
-        self.gram = self.whole - xt @ xt.T
-        self.slope = effects @ r - xt @ tr
-        self.scale = np.sqrt(np.maximum(np.diag(self.gram), 1e-300))
-        self.alive = np.diag(self.gram) > 1e-9 * np.diag(self.whole)  # what nuisances do not imitate altogether
-        self.gram /= np.outer(self.scale, self.scale)
+    Effects are single; what free values do of them is taken away before they are multiplied with each other, so that nothing
+    cancels that is more than rounding. Rows of the priors, in which effects have no part at first, come behind the others.
+    """
+
+    def __init__(self, fit: Fit, candidates: Sequence[Candidate], effects: Single, parameters: Sequence[str]):
+        """`effects` [candidates and parameters, rows] is used up; of the parameters the rows are still empty."""
+        self.candidates = (*candidates, *(Candidate("wrong_parameter", p, 0, False, p) for p in parameters))
+        self.free = [f for f in fit.free if f.low < f.value < f.high]  # the others stand at their bounds
+        index = {f.target: i for i, f in enumerate(fit.free)}
+        derivatives = fit.jacobian[:, [index[f.target] for f in self.free]]
+        self.spread = np.concatenate([derivatives, np.diag([f.unit / f.sigma for f in self.free])])
+        self.basis = np.linalg.qr(self.spread)[0]
+        top, low = np.split(self.basis, [len(fit.residual)])
+        law, own = effects[: len(candidates)], fit.jacobian[:, [index[p] for p in parameters]].T
+        quick = top.astype(np.float32)
+        self.along = np.concatenate([law @ quick, own @ top])
+        self.sizes = np.concatenate([np.einsum("ij,ij->i", law, law), np.sum(own**2, axis=1)])
+        for k in range(0, len(law), BLOCK // 16):
+            law[k : k + BLOCK // 16] -= self.along[k : k + BLOCK // 16][: len(law) - k].astype(np.float32) @ quick.T
+        effects[len(law) :] = own - self.along[len(law) :] @ top.T
+        self.left, self.beyond = effects, -self.along @ low.T
+        self.product = self.beyond @ self.beyond.T
+        for k in range(0, effects.shape[1], BLOCK):
+            self.product += effects[:, k : k + BLOCK] @ effects[:, k : k + BLOCK].T
+        self._against(fit, self.product, self.along[:, :0], self.basis[:, :0])
+
+    def _against(self, fit: Fit, product: Array, more: Array, span: Array) -> None:
+        """Gram matrix, slope and chi2 from the residual of a fit; `more` [candidates, k]: what effects have in `span`
+        [rows, k], which is not free there."""
+        offset = {f.target: f.offset for f in fit.free}
+        r = np.concatenate([fit.residual, [-offset.get(f.target, 0.0) for f in self.free]])
+        rest = r - self.basis @ (self.basis.T @ r)
+        top, low = np.split(rest, [len(fit.residual)])
+        along = span.T @ r
+        self.slope = self.left @ top.astype(np.float32) + self.beyond @ low + more @ along
+        self.scale = np.sqrt(np.maximum(np.diag(product), 1e-300))
+        self.alive = np.diag(product) > 1e-9 * self.sizes  # what nuisances do not imitate altogether
+        self.gram = product / np.outer(self.scale, self.scale)
         self.slope /= self.scale
-        self.chi2 = float(r @ r + offsets @ offsets - tr @ tr)
+        self.chi2 = float(rest @ rest + along @ along)
 
     def gain(self, chosen: Sequence[int]) -> tuple[float, Array]:
         """How much chi2 falls with these columns, signs as their kinds demand, and their gains in SI."""
@@ -180,8 +209,9 @@ class Regression:
         flips = np.array(flip)
         gram = self.gram[np.ix_(index, index)] * np.outer(flips, flips)
         slope = self.slope[index] * flips
-        lower = np.linalg.cholesky(gram + 1e-9 * np.eye(len(index)))
-        x, _ = optimize.nnls(lower.T, np.linalg.solve(lower, slope))
+        values, vectors = np.linalg.eigh(gram)
+        root = np.sqrt(np.maximum(values, ROUND))
+        x, _ = optimize.nnls(root[:, None] * vectors.T, vectors.T @ slope / root)
         found = np.zeros(len(chosen))
         order = {c: k for k, c in enumerate(chosen)}
         for c, f, value in zip(index, flips, x):
@@ -189,8 +219,16 @@ class Regression:
         return float(2.0 * x @ slope - x @ gram @ x), found
 
     def without(self, fit: Fit) -> Regression:
-        """The same effects against another residual and other free values."""
-        return Regression(fit, self.candidates, self.effects, self.whole)
+        """The same effects against another residual, with fewer of the values free."""
+        kept = {f.target for f in fit.free}
+        gone = np.array([f.target not in kept for f in self.free], dtype=bool)
+        fewer = np.linalg.qr(self.spread[:, ~gone])[0]
+        lost = self.spread[:, gone]
+        span = np.linalg.qr(lost - fewer @ (fewer.T @ lost))[0]
+        more = self.along @ (self.basis.T @ span)
+        other = copy(self)
+        other._against(fit, self.product + more @ more.T, more, span)
+        return other
 
     def beside(self, taken: Sequence[int]) -> Regression:
         """The regression with these columns free in size and sign, so that only what none of them can do is left."""
@@ -220,7 +258,7 @@ class Regression:
         c, p = list(chosen), np.array(pool)
         slope, curve = self.slope[p].copy(), np.ones(len(p))
         if c:
-            inverse = np.linalg.pinv(self.gram[np.ix_(c, c)], rcond=1e-9)
+            inverse = np.linalg.pinv(self.gram[np.ix_(c, c)], rcond=ROUND)
             cross = self.gram[np.ix_(c, p)]
             slope -= cross.T @ (inverse @ self.slope[c])
             curve -= np.einsum("ij,ij->j", cross, inverse @ cross)
@@ -246,57 +284,77 @@ def where(kind: str, place: Place, model: Model) -> str:
 
 def collect(
     model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], seen: Sequence[Seen], found: Sequence[Place],
-    sensor_names: Sequence[str], fit: Fit, parameters: Sequence[str], kinds: Collection[str] = (),
-) -> tuple[list[Candidate], Array]:  # fmt: skip
-    """All candidates, or those of some kinds, and their whitened effects [candidates, rows]."""
+    sensor_names: Sequence[str], parameters: int = 0, kinds: Collection[str] = (),
+) -> tuple[list[Candidate], Single]:  # fmt: skip
+    """All candidates, or those of some kinds, and their whitened effects [candidates, rows], with room for `parameters` more."""
+    rows = sum(2 * x.band * len(sensor_names) for x in experiments)
     groups: list[tuple[list[Candidate], Callable[[int, Array], object]]] = []  # and what writes their effects in a recording
     most = max(int(COARSE / experiments[0].step + 1e-6), 1)
     every = max(q for q in range(1, most + 1) if all(len(x.time) % q == 0 for x in experiments))
     step = every * experiments[0].step
 
     holes = [np.flatnonzero(~x.good.all(axis=0)) for x in experiments]  # sensors that have any
-    white = [s.white(m) for s, m in zip(seen, metrics)]
+    metrics = [replace(m, root=m.root.astype(np.complex64)) for m in metrics]
+    plain = [s.single() for s in seen]
+    white = [s.white(m) for s, m in zip(plain, metrics)]
 
     @cache
-    def turns(e: int, j: int) -> Complex:
-        """By how much the samples of a sensor that do not count are turned at each frequency."""
+    def turns(e: int, j: int) -> Single:
+        """By how much the samples of a sensor that do not count are turned at each frequency [samples, numbers]."""
         good = experiments[e].good[:, j]
-        return np.exp(-2j * np.pi / len(good) * (np.outer(np.arange(experiments[e].band), np.flatnonzero(~good)) % len(good)))
+        turn = np.exp(-2j * np.pi / len(good) * (np.outer(np.flatnonzero(~good), np.arange(experiments[e].band)) % len(good)))
+        return turn.astype(np.complex64).view(np.float32)
+
+    @cache
+    def shows(e: int, j: int) -> Single:
+        """Where the samples of a sensor count, as far as that is felt in the band: at few samples, and slowly."""
+        good, band = experiments[e].good[:, j], experiments[e].band
+        few = fft.next_fast_len(4 * band, real=True)
+        slow = fft.rfft(good.astype(float))[: 2 * band]
+        return (fft.irfft(slow, few) * few / len(good)).astype(np.float32)
+
+    def transformed(rows: Array, band: int) -> Complex:
+        """Spectra [k, f] of signals [k, n], in single but for their means."""
+        mean = np.mean(rows, axis=1, keepdims=True)
+        spectra = fft.rfft((rows - mean).astype(np.float32), axis=1)[:, :band]
+        spectra[:, :1] = rows.shape[1] * mean
+        return spectra
 
     def masked(e: int, spectra: Complex) -> Complex:
         """Spectra [k, f, sensors] of effects without the samples that do not count."""
         good, band = experiments[e].good, experiments[e].band
         for j in holes[e]:
             if np.count_nonzero(~good[:, j]) <= FEW:
-                turn = turns(e, j)
-                twice = np.where(np.arange(band) > 0, 2.0, 1.0)[:, None] / len(good)
-                spectra[:, :, j] -= (spectra[:, :, j] @ (np.conj(turn) * twice)).real @ turn.T
+                turn, whole = turns(e, j), np.ascontiguousarray(spectra[:, :, j])
+                lost = (2.0 * whole.view(np.float32) @ turn.T - whole[:, :1].real) / len(good)  # the mean counts once
+                spectra[:, :, j] -= (lost @ turn).view(np.complex64)
             else:
-                signals = fft.irfft(spectra[:, :, j].astype(np.complex64), len(good), axis=1)  # quicker, and fine enough for a column
-                signals *= good[:, j]
+                shown = shows(e, j)
+                signals = fft.irfft(spectra[:, :, j], len(shown), axis=1)
+                signals *= shown
                 spectra[:, :, j] = fft.rfft(signals, axis=1)[:, :band]
         return spectra
 
     def answered(force: Complex, place: int, e: int, out: Array, settled: Sequence[bool] = ()) -> None:
         if len(holes[e]):
-            metrics[e].white(masked(e, seen[e].answer(force, place, settled)), out)
+            metrics[e].white(masked(e, plain[e].answer(force, place, settled)), out)
         else:
             white[e].answer(force, place, settled, out)
 
     def acted(place: int, laws: Sequence[Basis], e: int, out: Array) -> None:
         rows = np.stack([b.series[e] for b in laws])
-        phi = every * fft.rfft(rows, axis=1)[:, : experiments[e].band]
+        phi = np.float32(every) * transformed(rows, experiments[e].band)
         answered(phi, place, e, out, [b.settled for b in laws])
 
     def pulled(place: int, body: Sequence[Array], tried: Array, e: int, out: Array) -> None:
         x = experiments[e].frequencies[: experiments[e].band] / tried[:, :1]
         damped = 2j * tried[:, 1:] * x
-        answered((1.0 + damped) / (1.0 - x**2 + damped) * body[e], place, e, out)
+        answered(((1.0 + damped) / (1.0 - x**2 + damped) * body[e]).astype(np.complex64), place, e, out)
 
     def faulty(sensor: int, faults: Sequence[Fault], e: int, out: Array) -> None:
         x = experiments[e]
-        spectra = fft.rfft(np.stack([f.series[e] for f in faults]) * x.good[:, sensor], axis=1)[:, : x.band]
-        out = out.view(complex).reshape(len(faults), len(sensor_names), x.band, copy=False)
+        spectra = transformed(np.stack([f.series[e] for f in faults]) * x.good[:, sensor], x.band)
+        out = out.view(np.complex64).reshape(len(faults), len(sensor_names), x.band, copy=False)
         np.multiply(spectra[:, None], metrics[e].triangle[:, sensor], out=out)
 
     for k, place in enumerate(found):
@@ -320,14 +378,11 @@ def collect(
         drift = hy.clock([s.sensors for s in seen], [e.time - e.time[0] for e in experiments], experiments[0].step)
         apart = Candidate(drift.kind, "", drift.sign, drift.companion, drift)
         groups.append(([apart], lambda e, out: metrics[e].white(metrics[e].spectrum(drift.series[e] * experiments[e].good)[None], out)))
-    index = {f.target: i for i, f in enumerate(fit.free)}
-    chosen = [p for p in parameters if p in index]
     candidates = [c for own, _ in groups for c in own]
-    effects = np.empty((len(candidates) + len(chosen), len(fit.residual)))
-    effects[len(candidates) :] = fit.jacobian[:, [index[p] for p in chosen]].T
+    effects = np.empty((len(candidates) + parameters, rows), dtype=np.float32)
     column = 0
     for e, x in enumerate(experiments):
         row, columns = 0, slice(column, column := column + 2 * x.band * len(sensor_names))
         for own, write in groups:
             write(e, effects[row : (row := row + len(own)), columns])
-    return [*candidates, *(Candidate("wrong_parameter", p, 0, False, p) for p in chosen)], effects
+    return candidates, effects

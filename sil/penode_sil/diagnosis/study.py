@@ -157,7 +157,9 @@ def regression(study: Study, fit: Fit, parameters: Sequence[str], kinds: Collect
     """All hypotheses beside a fit, or those of some kinds and all wrong parameters."""
     seen = look(study, fit)
     names = [s.name for s in study.model.sensors]
-    return Regression(fit, *collect(study.model, study.experiments, study.metrics, seen, study.places, names, fit, parameters, kinds))
+    fitted = {f.target for f in fit.free}
+    own = [p for p in parameters if p in fitted]
+    return Regression(fit, *collect(study.model, study.experiments, study.metrics, seen, study.places, names, len(own), kinds), own)
 
 
 def watch(study: Study, fit: Fit) -> list[Array]:
