@@ -27,7 +27,8 @@ from .noise import Experiment, Metric, Thinning, thinning
 from .plant import anonymous
 
 Array = NDArray[np.float64]
-STIFF = 2.5e-4  # [s] longest step of a law that follows a short way or a short time
+CLOSE = 1e-3  # [s] of samples through which parabolas are the inputs in between; their rates, of samples at half of it
+LONGEST = {"loose_damper": 2.5e-4, "presliding": 2.5e-4, "friction": 5e-4, "tanh(v/": 5e-4}  # [s] step of laws that follow short ways
 KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
 FAR = 1e20  # residual of a run that cannot be simulated
@@ -107,13 +108,16 @@ class Problem:
     ):  # fmt: skip
         self.model, self.experiments, self.metrics, self.set_name = model, experiments, metrics, set_name
         self.faults = faults
-        self.fine = 4 if moving(model) else 2  # see _drive
+        self.moving = moving(model)
+        close = model.sample_time <= CLOSE * (0.5 if self.moving else 1.0)
+        self.fine = (1 if close else 2) * (2 if self.moving else 1)  # see _drive
         step = model.sample_time / self.fine
-        stiff = any(e.law == "loose_damper" or "presliding" in e.arguments for e in model.elements)
-        substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / STIFF - 1e-6)) * stiff, -(-model.substeps // self.fine))
-        exact = replace(_folded(model), method="rk4", interpolation="linear", substeps=substeps, sample_time=step)
+        least = min([np.inf, *(LONGEST[k] for k in LONGEST for e in model.elements if k in e.law or k in e.arguments)])
+        substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / least - 1e-6)), -(-model.substeps // self.fine))
+        way = "parabola" if close else "linear"
+        exact = replace(_folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
         self.batch = _compiled(anonymous(exact))
-        self.inputs = [_drive(e, self.fine) for e in experiments]
+        self.inputs = [(_finer if close else _drive)(e, self.fine) for e in experiments]
 
     def simulate(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array]:
         """Sensors [runs, n, n_z] and named states of recording e for shifts [runs, free]."""
@@ -141,7 +145,7 @@ class Problem:
                 faults.append((f.target[0], f.target[1], values))
         run = self.batch.run(self.inputs[e], x0=start, parameters=parameters, set_name=self.set_name, states=states, every=self.fine)
         z = run.z.transpose(1, 2, 0)  # [n, n_z, runs], as they lie in memory
-        if self.fine == 4 and len(z) > 2:
+        if self.moving and len(z) > 2:
             z[0] = 2.0 * z[1] - z[2]  # the step knows no rate of an input at its first sample
         z[:, :, run.first_bad >= 0] = 1e30
         skews = np.zeros(z.shape[1:])
@@ -312,6 +316,12 @@ def _thinned(e: Experiment) -> tuple[Thinning, NDArray[np.bool_] | None, NDArray
     """How signals of an experiment are thinned, where they are good (None: everywhere), and spectra [n_z, 1, f] of its own."""
     thin, good = thinning(len(e.time), e.band), None if e.good.all() else e.good
     return thin, good, thin(e.y[:, :, None], good)
+
+
+@lru_cache(maxsize=KEPT)
+def _finer(e: Experiment, fine: int) -> Array:
+    """Inputs with `fine` - 1 samples between each two, for a step that joins them by parabolas."""
+    return CubicSpline(e.time, e.drive)(np.linspace(e.time[0], e.time[-1], fine * (len(e.time) - 1) + 1)) if fine > 1 else e.drive
 
 
 @lru_cache(maxsize=KEPT)
