@@ -9,7 +9,7 @@ suits it, so that slow noise and a cause compete like any two causes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,7 @@ CURVES = {  # kinds of one family at one place are one curve with one name
 }  # fmt: skip
 FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
+LESS = 0.3  # of all that was gained: an explanation that gains less by that is not gone on with
 SMALL = 0.03  # of all that was gained: a cause worth less than that may be a remainder of another
 PART = 0.1  # of the size a law has alone: left to it where its companions do the rest
 WHOLE = 0.97  # share that is a whole explanation
@@ -61,6 +62,7 @@ TAKING = {  # laws that take an element away: its law and argument
 }
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK)  # a formula after all
+SINGLE = ("wrong_parameter", "sensor_delay", "hidden_resonance", CLOCK)  # kinds that have one law only
 FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
 LOADS = {"constant_force", "sensor_bias"}  # one looks like the other
 Group = tuple[str, str]
@@ -201,7 +203,7 @@ def acting(terms: Sequence[Term]) -> list[Term]:
     return [t for t in terms if t in forceful or t.group in bare and not t.candidate.companion]
 
 
-def singles(study: Study, r: Regression, few: int = 4) -> list[Explanation]:
+def singles(study: Study, r: Regression, few: int = 3) -> list[Explanation]:
     """The best explanations by one kind, fitted."""
     ranked = []
     for group, pool in pools(r).items():
@@ -233,8 +235,18 @@ def in_series(study: Study, r: Regression, group: Group) -> list[Term]:
     return [tied for tied in (whole(study, t) for t in terms) if tied]
 
 
-def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str]) -> tuple[Explanation, Regression]:
-    """Give each kind of an explanation more elementary laws, as long as they earn their cost."""
+def refined(study: Study, e: Explanation, parameters: Sequence[str]) -> Explanation:
+    """The explanation with more elementary laws of its kinds, where they earn their cost."""
+    kinds = {kind for kind, _ in e.groups if kind not in SINGLE}
+    e = e.whole()
+    return refine(study, e, regression(study, e.fit, parameters, kinds), parameters, kinds)[0] if kinds else e
+
+
+def refine(
+    study: Study, e: Explanation, r: Regression, parameters: Sequence[str], kinds: Collection[str] = ()
+) -> tuple[Explanation, Regression]:
+    """Give each kind of an explanation more elementary laws, as long as they earn their cost; `kinds`: that the regression is about,
+    if not all."""
     for _ in range(2):
         best = None
         for group in e.groups:
@@ -250,7 +262,7 @@ def refine(study: Study, e: Explanation, r: Regression, parameters: Sequence[str
         if wider.score < e.score + 2e-3 * e.gain:
             break
         e = wider.whole()
-        r = regression(study, e.fit, parameters)
+        r = regression(study, e.fit, parameters, kinds)
     return e, r
 
 
@@ -380,11 +392,11 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
     study = replace(study, nothing=loss(study, study.null))
     bare = requieted(study, study.null, coloured=False)
     bare = replace(bare, nothing=min(study.nothing, loss(bare, bare.null)))
-    first = singles(bare, regression(bare, bare.null, parameters), 3)
+    first = singles(bare, regression(bare, bare.null, parameters), 2)
     white = bool(first) and first[0].score > 0.0 and requieted(bare, first[0].fit) is bare
     if bare.metrics is not study.metrics and not white:
         slow = replace(study, nothing=bare.nothing)
-        first = sorted([*first, *singles(slow, regression(slow, slow.null, parameters), 2)], key=lambda e: -e.score)
+        first = sorted([*first, *singles(slow, regression(slow, slow.null, parameters), 1)], key=lambda e: -e.score)
     for e in first:
         log(f"first {e.groups} {e.gain:.0f}")
     if not first or first[0].score <= 0.0 and not hopeful(bare, first[0]):
@@ -419,7 +431,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
     done = list(beam)
     for _ in (2, 3):
         grown: list[Explanation] = []
-        enough = beam[0].gain - 0.3 * abs(beam[0].gain)
+        enough = beam[0].gain - LESS * abs(beam[0].gain)
         for e in beam[:width]:
             alike = {curve(t.candidate) for t in e.terms} == {curve(t.candidate) for t in beam[0].terms}
             if e.gain < (max(enough, (1.0 - NEAR) * beam[0].gain) if alike else enough):
@@ -630,9 +642,11 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
         worth = without.chi2 - r.chi2
         kept = [t for t in e.terms if t.group != group]
         if worth < SMALL * e.gain:  # it may have stood in for what another cause can do by itself
-            alone = explain(study, kept, start=e.fit, formulas=e.formulas).whole()
-            found.append(refine(study, alone, regression(study, alone.fit, parameters), parameters)[0])
-            log(f"  without {group}: {found[-1].gain:.0f} for {e.gain:.0f}, x{len(found[-1].terms)}")
+            alone = explain(study, kept, start=e.fit, formulas=e.formulas)
+            if alone.gain > (1.0 - LESS) * e.gain:
+                alone = refined(study, alone, parameters)
+            found.append(alone)
+            log(f"  without {group}: {alone.gain:.0f} for {e.gain:.0f}, x{len(alone.terms)}")
         ranked = []
         for other, pool in pools(r).items():
             if other not in e.groups:
@@ -644,8 +658,8 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
             found.append(explain(study, [*kept, *new], start=e.fit, formulas=e.formulas))
             log(f"  {group} for {found[-1].groups[-1]}: {found[-1].gain:.0f}")
     close = [x for x in found if set(x.groups) != set(e.groups) and x.gain > (1.0 - CLOSE) * e.gain]
-    for other in [x.whole() for x in distinct(close)[:2]]:
-        found.append(refine(study, other, regression(study, other.fit, parameters), parameters)[0])
+    for other in distinct(close)[:2]:
+        found.append(refined(study, other, parameters))
         log(f"  refined {found[-1].groups} x{len(found[-1].terms)}: {found[-1].gain:.0f}")
     return found
 
