@@ -219,6 +219,21 @@ def test_a_sensor_that_drops_out_does_so_near_its_value_too():
     assert share.ci95[0] < share.value < share.ci95[1] < 1.15 * share.value
 
 
+@pytest.mark.parametrize(
+    "held, away, quantum, told", [(3, 0.25, 0.0, True), (2, 0.25, 0.0, False), (4, 0.15, 0.0, False), (4, 0.25, 0.05, False)]
+)
+def test_few_samples_that_are_far_off_are_enough(held, away, quantum, told):
+    """Three zeros, 25 deviations of the noise from the model; not two, not at 15, nor of a sensor that is coarse."""
+    y, mask = np.full(ROWS, away) + 0.01 * np.random.default_rng(1).normal(size=ROWS), np.ones(ROWS, bool)
+    y[5000 : 5000 + held], mask[5000 : 5000 + held] = 0.0, False
+    quality = SimpleNamespace(rows=ROWS, low=None, high=None, quantum=quantum, held=held, missing=0, spikes=0)
+    measured = SimpleNamespace(z={"a": y}, mask={"a": mask}, quality=SimpleNamespace(channels={"a": quality}))
+    study = SimpleNamespace(experiments=[SimpleNamespace(time=np.arange(ROWS))], levels=[np.full((1, 1), 1e-4)])
+    sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
+    found = engine.broken_sensors(sensors, [measured], study, [np.full((ROWS, 1), away)], [np.zeros((ROWS, 1), bool)])
+    assert [c.kind for c in found] == ["sensor_dropout"] * told
+
+
 def test_parameters_are_those_of_the_wider_explanation(values):
     """Of a cause that is in it; another keeps its own."""
     values["bump_stop"] = {"gap": (0.02, 0.019, 0.021)}

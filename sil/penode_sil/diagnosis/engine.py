@@ -29,6 +29,7 @@ from .study import MOVING, Study, begin, look
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it
+FAR = 3, 20.0  # or so many that are as many standard deviations of its noise off
 ENDS = 2.0  # samples by which the ends of a hole may be wrong
 WILD = 2.0  # standard deviations of the noise that bursts have together: one sample in nine that is far out
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
@@ -219,7 +220,7 @@ def broken_sensors(
     found = []
     for j, sensor in enumerate(model.sensors):
         unit = units.si(sensor.unit)
-        clipped, dropped, railed, lost, more, holes, total = 0, 0, 0, 0.0, 0, 0, 0
+        clipped, dropped, railed, lost, more, far, holes, total = 0, 0, 0, 0.0, 0, 0, 0, 0
         proven = False
         rails: dict[str, float] = {}
         quantum = 0.0
@@ -232,7 +233,8 @@ def broken_sensors(
             quantum = max(quantum, channel.quantum)
             sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
             flagged = ~m.mask[sensor.name][:n]
-            off = np.abs(m.z[sensor.name][:n] - simulated[k][:, j]) > 4.0 * sigma
+            away = np.abs(m.z[sensor.name][:n] - simulated[k][:, j])
+            off = away > 4.0 * sigma
             railing = np.zeros(n, bool)
             for side, name, rail in ((-1.0, "low", channel.low), (1.0, "high", channel.high)):
                 if rail is None:
@@ -248,6 +250,7 @@ def broken_sensors(
             bad, wrong = channel.held + channel.missing + channel.spikes, flagged & off & ~railing
             still = channel.held > max(FEW, STILL * n) and channel.quantum < 0.3 * sigma  # noise does not repeat itself
             proven |= bad > 0 and bool(channel.missing or still or np.count_nonzero(wrong) > 0.2 * bad)
+            far += int(np.count_nonzero(wrong & (away > FAR[1] * sigma))) if channel.quantum < 0.3 * sigma else 0
             lost += bad * len(m.mask[sensor.name]) / channel.rows  # of a file that may be parted, or slower
             burst = bursts[k][:n, j] if len(bursts) > k else np.zeros(n, bool)
             dropped += int(np.count_nonzero(burst))
@@ -267,7 +270,7 @@ def broken_sensors(
             exact = {k: Value(x, unit, (x - sure[k], x + sure[k])) for k, x in sizes.items()}
             found.append(Cause("sensor_clipping", sensor.name, exact, 0.99))
         dropped += round(lost) if proven else 0
-        if dropped >= FEW:
+        if dropped >= FEW or dropped and far >= FAR[0]:
             share, blur = (dropped + more) / total, ENDS * holes / total
             size = Value(share, "1", (max(share - blur, 0.0), share + blur))
             found.append(Cause("sensor_dropout", sensor.name, {"share": size}, 0.99))
