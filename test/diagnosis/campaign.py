@@ -15,6 +15,7 @@ import resource
 import secrets
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -162,19 +163,26 @@ def main() -> int:
                 print(job.result(), flush=True)
             return 0
         more = (commands, asked.simulate, asked.timeout, asked.out, asked.keep or bool(asked.only))
-        for done, job in enumerate([pool.submit(run, *one, *more) for one in chosen], 1):
-            for row in job.result():
-                rows[row["command"]].append(row)
-                if not row["right"] or asked.only:
-                    print(line(row), flush=True)
-            if sys.stderr.isatty():
-                print(f"{done} of {len(chosen)}", end="\r", file=sys.stderr)
+        jobs = [pool.submit(run, *one, *more) for one in chosen]
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        try:
+            for done, job in enumerate(jobs, 1):
+                for row in job.result():
+                    rows[row["command"]].append(row)
+                    if not row["right"] or asked.only:
+                        print(line(row), flush=True)
+                if sys.stderr.isatty():
+                    print(f"{done} of {len(chosen)}", end="\r", file=sys.stderr)
+        except KeyboardInterrupt:  # its tables are of the cases so far
+            pool.shutdown(wait=False, cancel_futures=True)
+    through = len(next(iter(rows.values())))
+    count = f"{through} cases" + f", the first of {len(chosen)}" * (through < len(chosen))
     tables = {name: score.summary(own) for name, own in rows.items()}
     texts = {name: f"{score.text(own)}\n\n{score.confusion(own)}\n" for name, own in tables.items()}
     side = score.compare(tables)
     if not asked.brief:
         print("".join(f"\n{name}: {commands[name]}\n{own}" for name, own in texts.items()) + f"\n{side}\n")
-    page = [f"# Campaign of {len(chosen)} cases, seed {seed}\n\n{side}\n", *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items())]
+    page = [f"# Campaign of {count}, seed {seed}\n\n{side}\n", *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items())]
     for path in filter(None, (asked.out / "campaign.md", asked.page)):
         path.write_text("".join(page))
     result = {"seed": seed, "commands": commands, "tables": tables, "rows": rows}

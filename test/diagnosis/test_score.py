@@ -5,7 +5,9 @@
 import itertools
 import json
 import math
+import subprocess
 import sys
+import time
 
 import pytest
 from scipy import stats
@@ -227,6 +229,24 @@ def test_campaign_runs_a_command_and_survives_it(tmp_path, answer, outcome):
     )
     assert row["stratum"] == "null" and (row["why"] or row["outcome"]).startswith(outcome)
     assert json.loads((tmp_path / "out" / "truth" / "1-1.json").read_text())["effects"] == []
+
+
+def test_campaign_that_is_stopped_has_tables_of_what_is_through(tmp_path):
+    """As soon as one of four cases is; the second never ends by itself."""
+    mark, script, page = tmp_path / "second", tmp_path / "explain.py", tmp_path / "page.md"
+    script.write_text(
+        "import json, pathlib, sys, time\nout = pathlib.Path(sys.argv[sys.argv.index('-o') + 1])\n"
+        f"if '-1/' in sys.argv[1]:\n    pathlib.Path({str(mark)!r}).touch()\n    time.sleep(600)\n"
+        f"out.mkdir()\n{ANSWERS['honest']}\n"
+    )
+    call = [sys.executable, campaign.__file__, "--cases", "4", "--seed", "1", "--out", tmp_path / "out", "--page", page, "--timeout", "5"]
+    running = subprocess.Popen([*map(str, call), "--command", f"{sys.executable} {script}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not mark.exists():
+        assert running.poll() is None
+        time.sleep(0.1)
+    running.terminate()
+    assert running.wait(60) == 0
+    assert page.read_text().startswith("# Campaign of 1 cases, the first of 4, seed 1\n")
 
 
 def test_extended_model_is_simulated_again(tmp_path):
