@@ -245,6 +245,7 @@ def test_effects_are_weighed_as_least_squares_do(tmp_path, model):
     z = road(1)
     one, _ = study.begin(model, [experiment(m, model) for m in load([record(tmp_path / "r.csv", z, drive(z, lambda s, v: 9e3 * max(s - 0.006, 0.0)), 2)], model)])
     candidates, effects = score.collect(model, one.experiments, one.metrics, study.look(one, one.null), one.places, list(NOISE), 1)
+    effects[5] *= 1e-25  # of which the square is none in single
     double = effects.astype(float)
     fit = one.null
     index = {f.target: i for i, f in enumerate(fit.free)}
@@ -262,7 +263,8 @@ def test_effects_are_weighed_as_least_squares_do(tmp_path, model):
         rest = residual - wide @ np.linalg.lstsq(wide, residual, rcond=None)[0]
         size = np.linalg.norm(left, axis=0)
         alive = size > 1e-4 * np.linalg.norm(padded, axis=0)  # singles are rounded by 6e-8: of 1e-4 that is a thousandth
-        assert alive[-1] and np.all(got.alive[alive])
+        assert alive[[5, -1]].all() and np.all(got.alive[alive])
+        assert np.allclose(got.scale[alive], size[alive], rtol=1e-3)
         assert got.chi2 == pytest.approx(float(rest @ rest), rel=1e-9)
         assert np.max(np.abs(got.slope - left.T @ rest / size)[alive]) < 1e-3 * np.linalg.norm(rest)
         assert np.max(np.abs(got.gram - left.T @ left / np.outer(size, size))[np.ix_(alive, alive)]) < 1e-3

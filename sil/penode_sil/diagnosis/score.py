@@ -170,6 +170,9 @@ class Regression:
         top, low = np.split(self.basis, [len(fit.residual)])
         law, own = effects[: len(candidates)], fit.jacobian[:, [index[p] for p in parameters]].T
         quick = top.astype(np.float32)
+        largest = np.maximum(np.max(law, axis=1, initial=0.0), -np.min(law, axis=1, initial=0.0))
+        self.unit = np.concatenate([np.where(largest > 0.0, largest, 1.0), np.ones(len(own))])  # squares of small ones would be 0
+        law /= self.unit[: len(law), None].astype(np.float32)
         self.along = np.concatenate([law @ quick, own @ top])
         self.sizes = np.concatenate([np.einsum("ij,ij->i", law, law), np.sum(own**2, axis=1)])
         for k in range(0, len(law), BLOCK // 16):
@@ -194,6 +197,7 @@ class Regression:
         self.alive = np.diag(product) > 1e-9 * self.sizes  # what nuisances do not imitate altogether
         self.gram = product / np.outer(self.scale, self.scale)
         self.slope /= self.scale
+        self.scale = self.scale * self.unit
         self.chi2 = float(rest @ rest + along @ along)
 
     def gain(self, chosen: Sequence[int]) -> tuple[float, Array]:

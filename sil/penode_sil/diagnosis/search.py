@@ -238,8 +238,10 @@ def in_series(study: Study, r: Regression, group: Group) -> list[Term]:
 def refined(study: Study, e: Explanation, parameters: Sequence[str]) -> Explanation:
     """The explanation with more elementary laws of its kinds, where they earn their cost."""
     kinds = {kind for kind, _ in e.groups if kind not in SINGLE}
+    if not kinds:
+        return e
     e = e.whole()
-    return refine(study, e, regression(study, e.fit, parameters, kinds), parameters, kinds)[0] if kinds else e
+    return refine(study, e, regression(study, e.fit, parameters, kinds), parameters, kinds)[0]
 
 
 def refine(
