@@ -9,6 +9,7 @@ from types import SimpleNamespace as Simple
 import numpy as np
 import pytest
 
+from penode_sil.diagnosis import noise
 from penode_sil.diagnosis.engine import WILD, still_wild
 from penode_sil.diagnosis.noise import Experiment, bursts, repeats
 
@@ -45,6 +46,19 @@ def test_a_signal_that_fades_is_found_though_the_motion_turns():
     (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
     far = np.abs(y[:, 0] - MOVE) > 0.06
     assert found[far, 0].all() and not found[:, 1].any() and np.count_nonzero(found) < 60
+
+
+@pytest.mark.parametrize("falls, quantum, found", [(20, 0.0, True), (7, 0.0, False), (20, 0.02, False)])
+def test_what_a_filter_forgets_is_found_however_near(falls, quantum, found):
+    """A filter of 30 samples without input, in the noise of the motion and for half of its time constant; a coarse sensor steps."""
+    y = np.round(noisy(6) / max(quantum, 1e-12)) * max(quantum, 1e-12)
+    begin = MOVE[3000]
+    y[3001 : 3001 + falls, 0] = begin * np.exp(-np.arange(falls) / 30.0)
+    if quantum:
+        y[3001 : 3001 + falls, 0] = np.round(y[3001 : 3001 + falls, 0] / quantum) * quantum
+    y[5000:5400:2, 1], y[5001:5400:2, 1] = 0.01, -0.01  # about nothing, from step to step
+    told = noise._decayed(y)
+    assert told[3002 : 3000 + falls, 0].all() == found and told.any() == found
 
 
 @pytest.mark.parametrize("discharges", [True, False])

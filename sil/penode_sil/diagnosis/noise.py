@@ -274,6 +274,8 @@ def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Met
 
 
 CHANCE = 1e-3  # that a whole recording has one row of repeated samples as long
+EVEN = 1e-4  # of the square of a fall: falls that differ less are of the same share
+STEADY = 6  # in a row: noise has not one of a thousand
 LAST = 8  # samples: so far the end of a spline is felt
 
 
@@ -292,7 +294,7 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
         few = np.mean(wild & alone, axis=0) < 0.01
         many = np.sum(wild & alone, axis=0) >= np.where(np.max(rough, axis=0) > 30.0 * usual, 2, 5)
         often = np.mean(e.good, axis=0) > 0.5  # a sensor slower than the raster has no neighbours to be far beyond
-        found.append(((alone & few & many) | _sunken(e, z, r) | _frozen(e, z, r)) & often & e.good)
+        found.append(((alone & few & many) | _sunken(e, z, r) | _frozen(e, z, r) | _decayed(e.y)) & often & e.good)
     return found
 
 
@@ -363,6 +365,21 @@ def _discharges(y: Array) -> bool:
     falls = -np.diff(np.log(np.abs(y)))
     usual = float(np.median(falls))
     return usual > 0.0 and float(np.median(np.abs(falls - usual))) < 0.05 * usual
+
+
+def _decayed(y: Array) -> NDArray[np.bool_]:
+    """Samples [n, n_z] that fall to zero by the same share each, to four digits: a digital filter that has lost its input."""
+    found = np.zeros(y.shape, dtype=bool)
+    change = np.diff(y, axis=0)
+    even = np.abs(y[2:] * y[:-2] - y[1:-1] ** 2) < EVEN * change[1:] ** 2
+    less = (np.abs(y[1:]) < np.abs(y[:-1])) & (y[1:] * y[:-1] > 0.0)
+    falls = even & less[1:] & less[:-1]
+    for j in range(y.shape[1]):
+        edges = np.flatnonzero(np.diff(falls[:, j].astype(np.int8), prepend=0, append=0))
+        for a, b in zip(edges[::2], edges[1::2]):
+            if b - a >= STEADY:
+                found[a + 1 : b + 2, j] = True
+    return found
 
 
 @dataclass(frozen=True)
