@@ -27,7 +27,7 @@ from .noise import Experiment, Metric, Thinning, thinning
 from .plant import anonymous
 
 Array = NDArray[np.float64]
-CLOSE = 1e-3  # [s] of samples through which parabolas are the inputs in between; their rates, of samples at half of it
+CLOSE = 1e-3  # [s] of samples through which parabolas are the inputs in between, but for their rates
 LONGEST = {"loose_damper": 2.5e-4, "presliding": 2.5e-4, "friction": 5e-4, "tanh(v/": 5e-4}  # [s] step of laws that follow short ways
 KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
@@ -109,15 +109,15 @@ class Problem:
         self.model, self.experiments, self.metrics, self.set_name = model, experiments, metrics, set_name
         self.faults = faults
         self.moving = moving(model)
-        close = model.sample_time <= CLOSE * (0.5 if self.moving else 1.0)
-        self.fine = (1 if close else 2) * (2 if self.moving else 1)  # see _drive
+        close = model.sample_time <= CLOSE and not self.moving
+        self.fine = 1 if close else 3 if self.moving else 2  # see _drive
         step = model.sample_time / self.fine
         least = min([np.inf, *(LONGEST[k] for k in LONGEST for e in model.elements if k in e.law or k in e.arguments)])
         substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / least - 1e-6)), -(-model.substeps // self.fine))
         way = "parabola" if close else "linear"
         exact = replace(_folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
         self.batch = _compiled(anonymous(exact))
-        self.inputs = [(_finer if close else _drive)(e, self.fine) for e in experiments]
+        self.inputs = [e.drive if close else _drive(e, self.fine) for e in experiments]
 
     def simulate(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array]:
         """Sensors [runs, n, n_z] and named states of recording e for shifts [runs, free]."""
@@ -319,17 +319,11 @@ def _thinned(e: Experiment) -> tuple[Thinning, NDArray[np.bool_] | None, NDArray
 
 
 @lru_cache(maxsize=KEPT)
-def _finer(e: Experiment, fine: int) -> Array:
-    """Inputs with `fine` - 1 samples between each two, for a step that joins them by parabolas."""
-    return CubicSpline(e.time, e.drive)(np.linspace(e.time[0], e.time[-1], fine * (len(e.time) - 1) + 1)) if fine > 1 else e.drive
-
-
-@lru_cache(maxsize=KEPT)
 def _drive(e: Experiment, fine: int) -> Array:
     """Inputs with `fine` - 1 samples between each two, for a step that joins them by straight lines.
 
     At the samples they are what they are, for that is what sensors see. In between, the middle one is such that the
-    integral over each interval, which moves the plant, is that of the smooth input; and of 4, the last is such that the
+    integral over each interval, which moves the plant, is that of the smooth input; and of 3, the last is such that the
     line to the next sample has its rate, which sensors may see as well.
     """
     smooth = CubicSpline(e.time, e.drive)
@@ -340,9 +334,8 @@ def _drive(e: Experiment, fine: int) -> Array:
     if fine == 2:
         parts[:, 1] = 2.0 * whole - 0.5 * (u[:-1] + u[1:])
     else:
-        parts[:, 1] = smooth(e.time[:-1] + 0.25 * h)
-        parts[:, 3] = u[1:] - 0.25 * h * e.rate[1:]
-        parts[:, 2] = 4.0 * whole - 0.5 * (u[:-1] + u[1:]) - parts[:, 1] - parts[:, 3]
+        parts[:, 2] = u[1:] - h * e.rate[1:] / 3.0
+        parts[:, 1] = 3.0 * whole - 0.5 * (u[:-1] + u[1:]) - parts[:, 2]
     return np.concatenate([parts.reshape(-1, u.shape[1]), u[-1:]])
 
 
