@@ -53,7 +53,7 @@ TEXTBOOK = {
     "asymmetric_spring": (BENDS["s"], "linear_spring"), "asymmetric_damper": (BENDS["v"], "linear_damper"),
     "coulomb_friction": ("coulomb_friction",), "bouc_wen": ("bouc_wen_loop",), "maxwell_bushing": ("maxwell_bushing",),
     "stribeck_friction": (STRIBECK,), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
-    "degressive_damper": (KNEE,), "damper_fading": ("heating_damper",),
+    "degressive_damper": (KNEE,), "damper_fading": ("heating_damper",), "tyre_damping": ("linear_damper",),
 }  # fmt: skip
 TAKING = {  # laws that take an element away: its law and argument
     "backlash": ("linear_spring", "stiffness"),
