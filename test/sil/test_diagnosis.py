@@ -286,8 +286,8 @@ def test_simulation_of_the_fit_is_exact(model):
 @pytest.mark.parametrize("step, damping", [(1e-3, 0.0), (5e-4, 0.0), (1e-3, 300.0), (5e-4, 300.0)])
 def test_simulation_between_close_samples_is_exact(tmp_path, step, damping):
     """Against SciPy on a road of sines up to 20 Hz that begins at rest, with and without a tyre that feels its rate. A parabola
-    through samples 1 ms apart misses (omega h)^3/24 = 8e-5 of the input on average; its slope at the end, 0.25 ms apart,
-    (omega h)^2/3 = 3e-4 of the rate, and that is a fifth of the tyre's force at most."""
+    through samples 1 ms apart misses (omega h)^3/24 = 8e-5 of the input on average; lines where the rate is felt, of which there
+    are three a sample, have its integral and its last rate, and miss less."""
     text = MODEL.replace('"2 ms"', f'"{step * 1e3:g} ms"').replace("[outputs]", 'rubber = { between = ["wheel", "z_road"], law = "linear_damper", damping = "d_t" }\n[outputs]')
     (tmp_path / "car.toml").write_text(text.replace("[inputs]", f'd_t = {{ value = {damping}, unit = "N*s/m" }}\n[inputs]') if damping else MODEL.replace('"2 ms"', f'"{step * 1e3:g} ms"'))
     omega = 2.0 * np.pi * np.array([0.7, 2.3, 6.1, 12.9, 20.0])
