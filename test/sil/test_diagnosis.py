@@ -590,6 +590,17 @@ def test_what_only_the_holdout_shows_has_no_name(tmp_path, model, sound):
     assert diagnosis.diagnose(model, sound, sane).verdict == "no_discrepancy"
 
 
+def test_a_cause_that_makes_the_holdout_worse_is_not_shipped(tmp_path, model, sound):
+    """A stop in the training and none in the hold-out: the file stays as it was, and a note says what was tried."""
+    z = road(5)
+    train = load([record(tmp_path / "stops.csv", z, drive(z, lambda s, v: 10e3 * max(s - 0.006, 0.0)), 15)], model)
+    found = diagnosis.diagnose(model, train, sound, tmp_path / "out")
+    assert [c.kind for c in found.causes] == ["outside_taxonomy"] and found.verdict == "unexplained"
+    assert any("bump_stop at spring would explain the training" in note for note in found.notes)
+    assert penode_gen.load(tmp_path / "out" / "model_extended.toml").elements == model.elements
+    assert all(g.after_rmse < 1.05 * g.before_rmse for g in found.gain.values())
+
+
 def test_a_small_mass_gets_steps_that_it_is_stable_in(model):
     """A rate of 2560 1/s at 2 ms is beyond the 2.785 of Runge-Kutta; a step is to be at most 1 of it."""
     values = {"x0_mass": 5.0, "x0_stiffness": 7e4, "x0_damping": 12_800.0}

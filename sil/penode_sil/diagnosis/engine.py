@@ -42,6 +42,7 @@ DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it 
 MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks only stand in for it
 LATE = 0.008  # of a sample: less delay than that is no fault of a sensor
 UNSEEN = 1.5  # times the noise: a hold-out that is that far off, where training showed nothing, is of another vehicle
+FARTHER = 0.02  # share of samples outside of what was trained, from which a hold-out says little about a name
 OUTSIDE = "outside_taxonomy"
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
 SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "maxwell_bushing": "stiffness", "hidden_resonance": "frequency"}
@@ -136,22 +137,31 @@ def diagnose(
         explained = nameless.share(study, unnamed.fit)
         notes.append(f"a small network beside {nameless.beside(study, unnamed)} takes a part of it, and has no name")
     text, extended = extension.extend_file(study, named, causes)
+    held: list[residual.Channel] = []
+    if holdout:
+        tell(0.85, "measuring the gain")
+        lost = {c.where for c in causes if c.kind == "sensor_dropout"}
+        gain, more, held = extension.measure(study, extended, unused, lost)
+        worse = [s for s, g in gain.items() if g.after_rmse > 1.05 * g.before_rmse]
+        if causes and any(gain[s].after_rmse > UNSEEN * gain[s].noise_floor and gain[s].outside < FARTHER for s in worse):
+            told = " and ".join(f"{c.kind} at {c.where}" for c in causes)
+            notes.append(f"{told} would explain the training, but makes {', '.join(worse)} of the hold-out worse: train with more excitations")
+            causes, verdict, explained, named, unnamed = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0, None, None
+            text, extended = extension.extend_file(study, named, causes)
+            gain, more, held = extension.measure(study, extended, unused)
+        else:
+            notes += [f"{s} gets worse by the extended model: do not use it" for s in worse]
+        notes += more
+        unseen = [s for s, g in gain.items() if g.after_rmse > UNSEEN * g.noise_floor] if not causes else []
+        if unseen:
+            causes, verdict, explained = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0
+            notes.append(f"{', '.join(unseen)}: the hold-out shows what the training does not: train with recordings like it")
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
         nominal = model.path.resolve()
         beside = Path(os.path.relpath(nominal, output.resolve()))  # so that both can be moved together
         (output / "model_extended.toml").write_text(text.replace(extension.extends(nominal), extension.extends(beside), 1))
         extended = penode_gen.load(output / "model_extended.toml")
-    held: list[residual.Channel] = []
-    if holdout:
-        tell(0.85, "measuring the gain")
-        lost = {c.where for c in causes if c.kind == "sensor_dropout"}
-        gain, more, held = extension.measure(study, extended, unused, lost)
-        notes += more + [f"{s} gets worse by the extended model: do not use it" for s, g in gain.items() if g.after_rmse > 1.05 * g.before_rmse]
-        unseen = [s for s, g in gain.items() if g.after_rmse > UNSEEN * g.noise_floor] if not causes else []
-        if unseen:
-            causes, verdict, explained = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0
-            notes.append(f"{', '.join(unseen)}: the hold-out shows what the training does not: train with recordings like it")
     absorbed: dict[str, object] = {}
     if learnt := absorb.taught(study, named) if named is not None and named.terms else []:
         absorbed, more = absorbing(study, named, learnt, unused, output)
