@@ -143,8 +143,9 @@ def diagnose(
         lost = {c.where for c in causes if c.kind == "sensor_dropout"}
         gain, more, held = extension.measure(study, extended, unused, lost)
         worse = [s for s, g in gain.items() if g.after_rmse > 1.05 * g.before_rmse]
-        if causes and any(gain[s].after_rmse > UNSEEN * gain[s].noise_floor and gain[s].outside < FARTHER for s in worse):
-            told = " and ".join(f"{c.kind} at {c.where}" for c in causes)
+        fitted = [c for c in causes if c not in faults]  # the others are seen in the samples, not by a simulation
+        if fitted and any(gain[s].after_rmse > UNSEEN * gain[s].noise_floor and gain[s].outside < FARTHER for s in worse):
+            told = " and ".join(f"{c.kind} at {c.where}" for c in fitted)
             notes.append(f"{told} would explain the training, but makes {', '.join(worse)} of the hold-out worse: train with more excitations")
             causes, verdict, explained, named, unnamed = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0, None, None
             text, extended = extension.extend_file(study, named, causes)

@@ -275,7 +275,7 @@ def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Met
 
 CHANCE = 1e-3  # that a whole recording has one row of repeated samples as long
 EVEN = 1e-4  # of the square of a fall: falls that differ less are of the same share
-STEADY = 6  # in a row: noise has not one of a thousand
+STEADY = 6  # falls in a row, of eight samples: of noise, fewer than one in a hundred is so even
 LAST = 8  # samples: so far the end of a spline is felt
 
 
