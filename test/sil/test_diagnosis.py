@@ -145,6 +145,30 @@ def test_a_fit_ends_at_its_bounds(model, sound):
     assert abs(bound.cost - held.cost) < 1e-2
 
 
+def test_derivatives_go_on_from_those_of_before(model, sound):
+    """Along the way they are what the residual shows; across it, in units in which all are as large, what they were."""
+    fit = study.null_study(model, [experiment(m, model) for m in sound]).null
+    size = np.sqrt(np.sum(fit.jacobian**2, axis=0))
+    way, other = np.random.default_rng(1).standard_normal((2, len(fit.free))) / (100.0 * size)
+    other -= way * ((size * way) @ (size * other)) / np.sum((size * way) ** 2)
+    free = tuple(replace(f, value=float(f.at(step))) for f, step in zip(fit.free, way))
+    there = fit.secant(free, fit.residual + np.random.default_rng(2).standard_normal(len(fit.residual)))
+    assert np.allclose(there.jacobian @ way, fit.residual - there.residual, atol=1e-9)
+    assert np.allclose(there.jacobian @ other, fit.jacobian @ other, atol=1e-9)
+    assert there.cost == pytest.approx(np.sum(there.residual**2) + sum(f.offset**2 for f in free))
+
+
+def test_a_fit_ends_with_derivatives_of_its_end(model, sound):
+    """However it got there: from afar they are those of simulation, not what has become of the first ones."""
+    one = study.null_study(model, [experiment(m, model) for m in sound])
+    problem = Problem(model, one.experiments, one.metrics, fastest=one.linear.fastest)
+    afar = [replace(f, value=1.1 * f.value) if f.target in ("c", "d") else f for f in one.nuisances]
+    for iterations in (1, 2, 3, 4, 5, 20):
+        fit = problem.solve(afar, iterations, 1e-4)
+        assert np.array_equal(fit.jacobian, problem.linear(fit.free)[1])
+    assert abs(fit.cost - one.null.cost) < 1e-2
+
+
 def test_bursts_are_of_samples_that_count():
     n = 1000
     good = np.ones((n, 1), bool)

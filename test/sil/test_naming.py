@@ -64,6 +64,13 @@ def test_a_stop_leaves_room(gaps, kind):
     assert named(naming._spring, *laws) == kind
 
 
+@pytest.mark.parametrize("static, kind", [(0.4, "tyre_liftoff"), (1e-4, "tyre_nonlinear")])
+def test_a_tyre_at_rest_bears_its_load(static, kind):
+    """It loses the road where it is less pressed than at rest by all of that; what softens from rest on is bent."""
+    law = ("tyre_liftoff", "liftoff", "stiffness", {"stiffness": 2e3, "static": static * REACH})
+    assert named(naming._tyre, law) == kind
+
+
 @pytest.mark.parametrize("relaxation", [1e-6, 1e-4, 1e-3, 1e-2])
 def test_damping_of_a_tyre_that_lags(relaxation):
     """

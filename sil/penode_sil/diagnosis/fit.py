@@ -33,7 +33,7 @@ KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
 FAR = 1e20  # residual of a run that cannot be simulated
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
-PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, others need not be tried
+PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, derivatives are about what they were
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of trial steps, relative to the curvature
 
 
@@ -97,6 +97,18 @@ class Fit:
         normed = curvature / np.outer(scale, scale)
         found = np.array([np.linalg.solve(normed + (1e-10 + d) * np.eye(len(scale)), slope / scale) / scale for d in DAMPING])
         return np.where([f.log for f in self.free], np.clip(found, -1.0, 1.0), found), float(found[0] @ slope)
+
+    def secant(self, free: tuple[Free, ...], residual: Array) -> Fit:
+        """The fit at values near its own, where `residual` has been simulated; derivatives differ from its own by what that shows of
+        them on the way there (Broyden 1965), in units in which all are as large."""
+        way = np.array([np.log(new.value / f.value) if f.log else (new.value - f.value) / f.unit for f, new in zip(self.free, free)])
+        weight = way * np.sum(self.jacobian**2, axis=0)
+        missed = self.residual - residual - self.jacobian @ way
+        chi2 = float(residual @ residual)
+        jacobian = self.jacobian + np.outer(missed, weight / (weight @ way))
+        return replace(
+            self, free=free, chi2=chi2, cost=chi2 + float(sum(f.offset**2 for f in free)), residual=residual, jacobian=jacobian
+        )
 
 
 class Problem:
@@ -184,37 +196,36 @@ class Problem:
         """The best free values from those given on, by damped Gauss-Newton; stops where a step gains less than `close`, or promises to.
         `known` derivatives (by number) are near enough and are not simulated: see `complete`.
 
-        Steps of all dampings are tried at once until the full one is the best. From then on it is gone where it keeps its promise.
+        Steps of all dampings are tried at once. After a full one that kept its promise, derivatives are not simulated but go on from
+        those of before (see `secant`); a fit does not end with such.
         """
-        known, bold = dict(known), False
+        known, fresh = dict(known), True
         fit = self.at(tuple(free), known)
         for k in range(1, iterations + 1):
             trials, promised = fit.steps()
-            if not np.isfinite(fit.cost) or promised < close:
-                break
-            moved = np.stack([f.at(t) for f, t in zip(fit.free, trials.T)])
-            further = None
-            if bold and k != REFRESHED:
-                further = self.at(_put(fit.free, moved[:, 0]), known)
-                bold = fit.cost - further.cost > PROMISE * promised
-            if further is None or not bold:
-                costs = np.zeros(len(trials))
-                for e in range(len(self.experiments)):
-                    r = self.residuals(e, *self.sensors(e, fit.free, trials)[:2])
-                    costs += np.einsum("ij,ij->i", r, r)
+            ended = not np.isfinite(fit.cost) or promised < close
+            if not ended:
+                parts = [self.residuals(e, *self.sensors(e, fit.free, trials)[:2]) for e in range(len(self.experiments))]
+                residuals = np.concatenate(parts, axis=1)
+                moved = np.stack([f.at(t) for f, t in zip(fit.free, trials.T)])
                 away = (moved - np.array([[f.origin] for f in fit.free])) / np.array([[f.sigma] for f in fit.free])
-                costs = np.where(np.isfinite(costs), costs + np.sum(away**2, axis=0), np.inf)
-                best = int(np.argmin(costs))
-                if not costs[best] < fit.cost - close:
-                    break
-                bold = best == 0
-                further = self.at(_put(fit.free, moved[:, best]), {} if k == REFRESHED else known)
-                if k == REFRESHED:
-                    known = {i: further.jacobian[:, i] for i in known}
-            gained, fit = fit.cost - further.cost, further
-            if gained < close:
+                costs = np.einsum("ij,ij->i", residuals, residuals) + np.sum(away**2, axis=0)
+                best = int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))
+                gained = fit.cost - costs[best]
+                ended = not gained >= close
+            if ended and fresh:
                 break
-        return fit
+            if ended:
+                fit, fresh = self.at(fit.free, known), True
+                continue
+            there = _put(fit.free, moved[:, best])
+            fresh = best > 0 or gained < PROMISE * promised or k == REFRESHED
+            if fresh:
+                fit = self.at(there, {} if k == REFRESHED else known)
+                known = {i: fit.jacobian[:, i] for i in known}
+            else:
+                fit = fit.secant(there, residuals[0])
+        return fit if fresh else self.at(fit.free, known)
 
     def at(self, free: tuple[Free, ...], known: Mapping[int, Array] = {}) -> Fit:
         """The fit that ends at these free values."""

@@ -36,7 +36,7 @@ SPRINGS = ("asymmetric_spring", "cubic_spring", "bump_stop", "network_extrapolat
 TYRES = ("tyre_nonlinear", "tyre_liftoff")
 QUIET = 0.25  # of the largest force that an element is wrong by: less where its network was trained, and it is not the element
 UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that makes it asymmetric
-EDGE = 0.15  # of the reach: a stop that acts from nearer than that to the middle is a spring that hardens, or has two stiffnesses
+EDGE = 0.15  # of the reach: a stop or a loss of contact that begins nearer than that to the middle is an element that bends there
 STRAIGHT = 0.02  # of the straight part of a curve: less than that beside it, and it is a straight line
 FLAT = 0.015  # of what a tyre lacks when stretched: bent by less than that when pressed in, it only loses contact
 PEAK = 1.2  # friction at low rates over that at high ones that makes it Stribeck's
@@ -103,14 +103,15 @@ def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: 
 
 
 def _tyre(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
-    if any(t.candidate.kind == "tyre_liftoff" for t in terms):
+    lost = [values[f"{n}_static"] for t, n in zip(terms, names) if t.candidate.what.law == "liftoff"]
+    if lost and max(lost) > EDGE * reach:
         return "tyre_liftoff"
     s = np.linspace(-reach, reach, 401)
     f = Curve(terms, names)(s, np.zeros_like(s), values)
     pressed = s < 0.0
     slope, level = np.polyfit(s[pressed], f[pressed], 1)
     off = f - slope * s - level
-    return "tyre_liftoff" if _size(off[pressed]) < -FLAT * off[-1] else "tyre_nonlinear"
+    return "tyre_liftoff" if not lost and _size(off[pressed]) < -FLAT * off[-1] else "tyre_nonlinear"
 
 
 def straight(

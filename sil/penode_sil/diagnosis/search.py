@@ -26,6 +26,7 @@ WANDERING = 5  # and of a bias, which may go any slow way
 COST = 10.0  # chi2 that an elementary law must gain for each of its numbers, and the choice among many
 NEW = 50.0  # chi2 that a further kind must gain beyond that
 FORM = 7e-4  # of what has been gained: a number more must gain that, or it only mends the form
+CLOSED = 1e-4  # of what there is to gain: a fit that gains less by an iteration is good enough to be compared
 LEAST = 1e-3  # of what has been gained: less, beside a curve, is a matter of its memory that no family has
 CURVES = {  # kinds of one family at one place are one curve with one name
     "coulomb_friction": "friction", "stribeck_friction": "friction", "bouc_wen": "friction",
@@ -47,6 +48,7 @@ DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a co
 MENDS = 4  # laws, at most, that only mend the form of what is named
 SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
 WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
+HEAVY = 1e5  # steps: a simulation of more is gone on with only from the best explanation, and with one rival of each cause
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
     "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
@@ -175,7 +177,7 @@ def pair(r: Regression) -> tuple[float, list[int]]:
 
 
 def explain(
-    study: Study, terms: Sequence[Term], iterations: int = 10, start: Fit | None = None, formulas: float = 0.0
+    study: Study, terms: Sequence[Term], iterations: int = 12, start: Fit | None = None, formulas: float = 0.0
 ) -> Explanation:
     """Fit some terms by simulation, with everything else from where a fit has left it. What ends without force is left out."""
     recordings = len(study.experiments)
@@ -187,7 +189,8 @@ def explain(
         for i, f in enumerate(all_free(study.null.free, built))
     ]
     near = {i: study.null.jacobian[:, i] for i, f in enumerate(study.null.free) if f.target not in built.loosened}
-    fit = problem.solve(problem.eased(free), iterations, 0.5, near)
+    most = rows(study) * np.log(max(study.null.cost / rows(study), 1.0))  # that noise of one level could gain by being as quiet as it may
+    fit = problem.solve(problem.eased(free), iterations, max(CLOSED * most, 0.5), near)
     gain = study.nothing - loss(study, fit) if np.isfinite(fit.cost) else -np.inf
     found = fitted(terms, built, fit)
     if len(acting(found)) < len(found):
@@ -410,6 +413,11 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
     return grow(quiet, distinct(again), log)
 
 
+def heavy(e: Explanation) -> bool:
+    """Does a simulation of it take so many steps that the search has to be narrow to end in time?"""
+    return sum(len(u) for u in e.problem.inputs) * e.problem.batch.model.substeps > HEAVY
+
+
 def hopeful(study: Study, e: Explanation) -> bool:
     """Does a cause take most of what is more than noise, though noise of another colour would do as well? Then another cause is left
     that was hidden in that noise, such as a bias, and both together may do better."""
@@ -434,7 +442,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
     for _ in (2, 3):
         grown: list[Explanation] = []
         enough = beam[0].gain - LESS * abs(beam[0].gain)
-        for e in beam[:width]:
+        for e in beam[: 1 if heavy(beam[0]) else width]:
             alike = {curve(t.candidate) for t in e.terms} == {curve(t.candidate) for t in beam[0].terms}
             if e.gain < (max(enough, (1.0 - NEAR) * beam[0].gain) if alike else enough):
                 break  # of one curve, the worse form of it will not become the better one
@@ -492,7 +500,7 @@ def settled(study: Study, e: Explanation) -> Explanation:
     """The explanation fitted to the end in the noise of the study."""
     free = [replace(f, value=v.value) for f, v in zip(all_free(study.null.free, e.built), e.fit.free)]
     problem = Problem(e.built.model, study.experiments, study.metrics, study.set_name, study.linear.fastest, e.built.faults)
-    return replace(e, problem=problem, fit=problem.solve(free, 4))
+    return replace(e, problem=problem, fit=problem.solve(free))
 
 
 def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Explanation:
@@ -656,7 +664,7 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
                 if chosen and gain > RIVAL * worth:
                     ranked.append((gain - sum(cost(r.candidates[c]) for c in chosen), chosen))
         ways = [terms_of(without, chosen) for _, chosen in sorted(ranked, key=lambda x: -x[0])[:2]]
-        for new in [*filter(None, ways), *sprung(study, e, r, group)]:
+        for new in [*filter(None, ways[: 1 if heavy(e) else 2]), *sprung(study, e, r, group)]:
             found.append(explain(study, [*kept, *new], start=e.fit, formulas=e.formulas))
             log(f"  {group} for {found[-1].groups[-1]}: {found[-1].gain:.0f}")
     close = [x for x in found if set(x.groups) != set(e.groups) and x.gain > (1.0 - CLOSE) * e.gain]

@@ -91,7 +91,7 @@ def begin(model: Model, experiments: Sequence[Experiment], set_name: str = "defa
 
 def refit(study: Study, free: Sequence[Free]) -> Fit:
     """The null fit with other nuisances."""
-    return Problem(study.model, study.experiments, study.metrics, study.set_name, study.linear.fastest).solve(free, 8)
+    return Problem(study.model, study.experiments, study.metrics, study.set_name, study.linear.fastest).solve(free)
 
 
 def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = "default") -> Study:
@@ -116,7 +116,7 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
             metrics[e] = metric(experiment, levels[e], h)
         problem = Problem(model, experiments, metrics, set_name)
         free = fit.free
-    fit = problem.solve(free, 8)
+    fit = problem.solve(free)
     study = Study(model, set_name, experiments, found, linear, tuple(levels), tuple(metrics), fit.free, fit)
     seen = look(study, fit)
     return replace(study, sizes=tuple(size([s.motions[k] for s in seen]) for k in range(len(found))))
