@@ -12,7 +12,7 @@ import pytest
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.score import Candidate, Regression
-from penode_sil.diagnosis.search import PART, Explanation, acting, distinct, hopeful, pursue, renamed, sprung, terms_of
+from penode_sil.diagnosis.search import PART, Explanation, acting, distinct, heavy, hopeful, pursue, renamed, sprung, terms_of
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
 
@@ -71,6 +71,13 @@ def test_a_cause_that_takes_most_is_not_given_up(null, left, so):
     """In 10 000 samples: most of what is more than noise; less than most; and what may be noise of a colour."""
     study = SimpleNamespace(null=SimpleNamespace(cost=null, residual=np.zeros(10_000)), experiments=[SimpleNamespace(good=np.ones(10_000, bool))])
     assert hopeful(study, SimpleNamespace(fit=SimpleNamespace(cost=left))) == so
+
+
+@pytest.mark.parametrize("seconds, substeps, so", [((30.0, 30.0), 1, False), ((30.0, 30.0), 2, True), ((30.0, 30.0, 60.0), 1, True)])
+def test_long_recordings_in_small_steps_are_searched_narrowly(seconds, substeps, so):
+    """Steps of a millisecond: 60 000, and twice that."""
+    problem = SimpleNamespace(inputs=[np.zeros((int(1e3 * t), 1)) for t in seconds], batch=SimpleNamespace(model=SimpleNamespace(substeps=substeps)))
+    assert heavy(SimpleNamespace(problem=problem)) == so
 
 
 @pytest.mark.parametrize("value, masses", [(460.0, 3), (380.0, 0)])

@@ -330,7 +330,7 @@ def power_lost(over: np.ndarray, load: float, p: float) -> np.ndarray:
 
 def power_contact(r: Rng, at: Place) -> Build:
     def build(size: float) -> Change:
-        p, depth = 1 + size, at.s * 1.6 * (1 + size)  # m, at which the contact would be lost
+        p, depth = 1 + size, max(1.6 * at.s, 1.1 * at.high) * (1 + size)  # m, at which the contact would be lost; the motion stays below
         total = lambda s: at.stiffness * depth / p * (1 - np.maximum(1 - s / depth, 0) ** p)
         return Change({"exponent": p}, {"hidden": at.law(Kind.DEFLECTION_CURVE, curve=lambda s: total(s) - at.stiffness * s)})
 
