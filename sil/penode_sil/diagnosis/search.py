@@ -124,7 +124,7 @@ def cost(c: Candidate) -> float:
     """What the freedom of an elementary law is worth in chi2."""
     if isinstance(c.what, tuple):
         return 4.0 * COST  # three numbers, found among hundreds of places in the spectrum
-    own = 1.5 if c.kind == "constant_force" else 1.0  # where a bias explains as much, it is the bias
+    own = 2.0 if c.kind == "constant_force" else 1.0  # where a bias explains as much, it is the bias
     return COST * (own + (len(c.what.shapes) if isinstance(c.what, Basis) else 0))
 
 
