@@ -30,7 +30,7 @@ from .plant import Linear, Place
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 Complex = NDArray[np.complex128] | NDArray[np.complex64]
-RESONANCES = np.geomspace(0.5, 40.0, 36)  # [Hz] of hidden masses that are tried
+RESONANCES = np.geomspace(0.25, 40.0, 40)  # [Hz] of hidden masses that are tried
 DAMPINGS = (0.03, 0.1, 0.3)  # and their damping ratios
 COARSE = 0.002  # [s] step at which forces along a motion are looked at, if their recordings have a finer one
 TOGETHER = 8  # candidates whose effects are computed together: they stay in the cache
