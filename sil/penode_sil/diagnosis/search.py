@@ -26,6 +26,7 @@ WANDERING = 5  # and of a bias, which may go any slow way
 COST = 10.0  # chi2 that an elementary law must gain for each of its numbers, and the choice among many
 NEW = 50.0  # chi2 that a further kind must gain beyond that
 FORM = 7e-4  # of what has been gained: a number more must gain that, or it only mends the form
+OCTAVE = 2.0  # factor of frequency, within which another form of a hidden mass is seen
 CLOSED = 1e-4  # of what there is to gain: a fit that gains less by an iteration is good enough to be compared
 LEAST = 1e-3  # of what has been gained: less, beside a curve, is a matter of its memory that no family has
 CURVES = {  # kinds of one family at one place are one curve with one name
@@ -364,9 +365,18 @@ def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:
     return [k for k, c in enumerate(r.candidates) if curve(c) in own]
 
 
+def near(e: Explanation, c: Candidate) -> bool:
+    """May what another form of a cause of `e` does look like this candidate of its family? A hidden mass only near its frequency: at
+    all of them, masses do what any filter can."""
+    if c.kind != "hidden_resonance":
+        return True
+    own = [t.candidate.what[2] for t in e.terms if t.group == (c.kind, c.where)]
+    return any(f / OCTAVE < c.what[2] < OCTAVE * f for f in own)
+
+
 def further(study: Study, e: Explanation, r: Regression) -> list[list[int]]:
     """Choices of one more kind by what no curve of the causes so far can do, from best to worst."""
-    taken = family(study, r, e.groups)
+    taken = [k for k in family(study, r, e.groups) if near(e, r.candidates[k])]
     rest, kin = r.beside(taken), set(taken)
     least = 0.0 if exact(e.groups) else LEAST * e.gain
     found = []
