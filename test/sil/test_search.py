@@ -73,11 +73,11 @@ def test_a_cause_that_takes_most_is_not_given_up(null, left, so):
     assert hopeful(study, SimpleNamespace(fit=SimpleNamespace(cost=left))) == so
 
 
-@pytest.mark.parametrize("seconds, substeps, so", [((30.0, 30.0), 1, False), ((30.0, 30.0), 2, True), ((30.0, 30.0, 60.0), 1, True)])
+@pytest.mark.parametrize("seconds, substeps, so", [((30.0, 30.0), 1, False), ((30.0, 30.0), 3, True), ((30.0, 30.0, 60.0), 2, True)])
 def test_long_recordings_in_small_steps_are_searched_narrowly(seconds, substeps, so):
-    """Steps of a millisecond: 60 000, and twice that."""
+    """With 20 values and steps of a millisecond: 1.2 million, and three and four times that."""
     problem = SimpleNamespace(inputs=[np.zeros((int(1e3 * t), 1)) for t in seconds], batch=SimpleNamespace(model=SimpleNamespace(substeps=substeps)))
-    assert heavy(SimpleNamespace(problem=problem)) == so
+    assert heavy(SimpleNamespace(problem=problem, fit=SimpleNamespace(free=[None] * 20))) == so
 
 
 @pytest.mark.parametrize("value, masses", [(460.0, 3), (380.0, 0)])

@@ -49,7 +49,7 @@ DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a co
 MENDS = 4  # laws, at most, that only mend the form of what is named
 SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
 WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
-HEAVY = 1e5  # steps: a simulation of more is gone on with only from the best explanation, and with one rival of each cause
+HEAVY = 2e6  # steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
     "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
@@ -424,8 +424,8 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
 
 
 def heavy(e: Explanation) -> bool:
-    """Does a simulation of it take so many steps that the search has to be narrow to end in time?"""
-    return sum(len(u) for u in e.problem.inputs) * e.problem.batch.model.substeps > HEAVY
+    """Do its derivatives take so many steps that the search has to be narrow to end in time?"""
+    return len(e.fit.free) * sum(len(u) for u in e.problem.inputs) * e.problem.batch.model.substeps > HEAVY
 
 
 def hopeful(study: Study, e: Explanation) -> bool:
