@@ -625,6 +625,17 @@ def test_a_cause_that_makes_the_holdout_worse_is_not_shipped(tmp_path, model, so
     assert all(g.after_rmse < 1.05 * g.before_rmse for g in found.gain.values())
 
 
+def test_tolerances_that_make_the_holdout_worse_are_not_shipped(tmp_path, model, sound):
+    """A spring that is stiffer in the training by its tolerance, and as it should be in the hold-out: nothing is wrong, nothing is changed."""
+    z = road(5)
+    train = load([record(tmp_path / "stiffer.csv", z, drive(z, lambda s, v: 0.01 * C * s), 15)], model)
+    found = diagnosis.diagnose(model, train, sound, tmp_path / "out")
+    assert found.verdict == "no_discrepancy" and any("of the hold-out worse: left as they were" in note for note in found.notes)
+    shipped = penode_gen.load(tmp_path / "out" / "model_extended.toml")
+    assert {k: p.value for k, p in shipped.parameters.items()} == {k: p.value for k, p in model.parameters.items()}
+    assert all(g.after_rmse < 1.001 * g.before_rmse for g in found.gain.values())  # how inputs are joined may only help
+
+
 def test_a_small_mass_gets_steps_that_it_is_stable_in(model):
     """A rate of 2560 1/s at 2 ms is beyond the 2.785 of Runge-Kutta; a step is to be at most 1 of it."""
     values = {"x0_mass": 5.0, "x0_stiffness": 7e4, "x0_damping": 12_800.0}

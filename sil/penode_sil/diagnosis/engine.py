@@ -148,10 +148,15 @@ def diagnose(
             told = " and ".join(f"{c.kind} at {c.where}" for c in fitted)
             notes.append(f"{told} would explain the training, but makes {', '.join(worse)} of the hold-out worse: train with more excitations")
             causes, verdict, explained, named, unnamed = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0, None, None
-            text, extended = extension.extend_file(study, named, causes)
-            gain, more, held = extension.measure(study, extended, unused)
+        elif worse and not causes:
+            told = f"make {', '.join(worse)} of the hold-out worse: left as they were"
+            notes.append(f"parameters that fit the training within their tolerances {told}")
+            named = unnamed = None
         else:
             notes += [f"{s} gets worse by the extended model: do not use it" for s in worse]
+        if worse and named is None:
+            text, extended = extension.extend_file(study, named, causes)
+            gain, more, held = extension.measure(study, extended, unused)
         notes += more
         unseen = [s for s, g in gain.items() if g.after_rmse > UNSEEN * g.noise_floor] if not causes else []
         if unseen:
