@@ -156,6 +156,8 @@ def test_derivatives_go_on_from_those_of_before(model, sound):
     assert np.allclose(there.jacobian @ way, fit.residual - there.residual, atol=1e-9)
     assert np.allclose(there.jacobian @ other, fit.jacobian @ other, atol=1e-9)
     assert there.cost == pytest.approx(np.sum(there.residual**2) + sum(f.offset**2 for f in free))
+    still = replace(fit, jacobian=np.zeros_like(fit.jacobian)).secant(free, fit.residual)  # as of a vehicle that stands
+    assert not still.jacobian.any()
 
 
 def test_a_fit_ends_with_derivatives_of_its_end(model, sound):

@@ -105,7 +105,8 @@ class Fit:
         weight = way * np.sum(self.jacobian**2, axis=0)
         missed = self.residual - residual - self.jacobian @ way
         chi2 = float(residual @ residual)
-        jacobian = self.jacobian + np.outer(missed, weight / (weight @ way))
+        size = float(weight @ way)
+        jacobian = self.jacobian + np.outer(missed, weight / size) if size > 0.0 else self.jacobian  # what nothing shows stays
         return replace(
             self, free=free, chi2=chi2, cost=chi2 + float(sum(f.offset**2 for f in free)), residual=residual, jacobian=jacobian
         )
