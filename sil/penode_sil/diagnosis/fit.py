@@ -2,7 +2,7 @@
 # Copyright (c) 2026 the penode authors
 """Output-error fits: free parameters of a model, start states and sensors, so that the simulated sensors meet the measured.
 
-Each iteration simulates all finite differences at once, one in each lane (see batch), and tries several steps at once.
+An iteration tries several steps at once, one in each lane (see batch), and so simulates all finite differences where it needs new ones.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class Fit:
 
     def secant(self, free: tuple[Free, ...], residual: Array) -> Fit:
         """The fit at values near its own, where `residual` has been simulated; derivatives differ from its own by what that shows of
-        them on the way there (Broyden 1965), in units in which all are as large."""
+        them on the way there (Broyden 1965), in units in which all are as large. The sensors are those of before."""
         way = np.array([np.log(new.value / f.value) if f.log else (new.value - f.value) / f.unit for f, new in zip(self.free, free)])
         weight = way * np.sum(self.jacobian**2, axis=0)
         missed = self.residual - residual - self.jacobian @ way

@@ -365,7 +365,7 @@ def family(study: Study, r: Regression, groups: Sequence[Group]) -> list[int]:
     return [k for k, c in enumerate(r.candidates) if curve(c) in own]
 
 
-def near(e: Explanation, c: Candidate) -> bool:
+def resembles(e: Explanation, c: Candidate) -> bool:
     """May what another form of a cause of `e` does look like this candidate of its family? A hidden mass only near its frequency: at
     all of them, masses do what any filter can."""
     if c.kind != "hidden_resonance":
@@ -376,7 +376,7 @@ def near(e: Explanation, c: Candidate) -> bool:
 
 def further(study: Study, e: Explanation, r: Regression) -> list[list[int]]:
     """Choices of one more kind by what no curve of the causes so far can do, from best to worst."""
-    taken = [k for k in family(study, r, e.groups) if near(e, r.candidates[k])]
+    taken = [k for k in family(study, r, e.groups) if resembles(e, r.candidates[k])]
     rest, kin = r.beside(taken), set(taken)
     least = 0.0 if exact(e.groups) else LEAST * e.gain
     found = []
@@ -673,8 +673,9 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
                 gain, chosen = pursue(without, pool)
                 if chosen and gain > RIVAL * worth:
                     ranked.append((gain - sum(cost(r.candidates[c]) for c in chosen), chosen))
-        ways = [terms_of(without, chosen) for _, chosen in sorted(ranked, key=lambda x: -x[0])[:2]]
-        for new in [*filter(None, ways[: 1 if heavy(e) else 2]), *sprung(study, e, r, group)]:
+        best = sorted(ranked, key=lambda x: -x[0])[: 1 if heavy(e) else 2]
+        ways = [terms_of(without, chosen) for _, chosen in best]
+        for new in [*filter(None, ways), *sprung(study, e, r, group)]:
             found.append(explain(study, [*kept, *new], start=e.fit, formulas=e.formulas))
             log(f"  {group} for {found[-1].groups[-1]}: {found[-1].gain:.0f}")
     close = [x for x in found if set(x.groups) != set(e.groups) and x.gain > (1.0 - CLOSE) * e.gain]
