@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import engine
+from penode_sil.diagnosis import engine, noise
 from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.result import Cause, Value
 
@@ -51,6 +51,20 @@ def judged(*explanations, study=STUDY, faults=(), alike=0.0, shared=0.0, pure=Fa
 OUT = ([engine.OUTSIDE], "unexplained")
 
 
+@pytest.mark.parametrize(
+    "losses, costs, told, so",
+    [
+        ((1000.0, 1020.0), (1000.0, 1090.0), False, True),  # eight numbers gain 20 beside a load that costs 70
+        ((1000.0, 1030.0), (1000.0, 1100.0), False, False),
+        ((1000.0, 1030.0), (1000.0, 1070.0), False, True),  # more than noise, and yet less than they cost
+        ((1000.0, 1030.0), (1000.0, 1030.0), True, False),  # with the same causes, it moved
+        ((1000.0, 1020.0), (1000.0, 1020.0), True, True),
+    ],
+)
+def test_a_load_put_on_at_rest_is_no_start_in_motion(losses, costs, told, so):
+    assert engine.rested(losses, costs, told, 8) == so
+
+
 def test_nothing_found(values):
     """Six deviations of chi2 are a discrepancy, fifteen hundredths of it or a tone or a kinship one that has no name."""
     assert judged(study=QUIET) == ([], "no_discrepancy")
@@ -59,7 +73,7 @@ def test_nothing_found(values):
         doubtful = SimpleNamespace(**vars(QUIET) | {"null": SimpleNamespace(residual=np.zeros(ROWS), cost=ROWS + sigmas * SIGMA)})
         assert judged(study=doubtful) == ([], verdict)
     assert judged(study=QUIET, pure=True) == OUT
-    assert judged(study=QUIET, alike=engine.ALIKE + 0.1) == OUT
+    assert judged(study=QUIET, alike=noise.ALIKE + 0.1) == OUT
     assert judged() == OUT
 
 
@@ -73,11 +87,11 @@ def test_a_cause_has_to_take_most_of_it_away(values):
 
 
 def test_what_sensors_share_is_no_noise(values):
-    assert judged(found(("bump_stop", "spring")), alike=engine.ALIKE + 0.1, shared=0.2 * 4.0 * ROWS) == OUT
-    assert judged(found(("bump_stop", "spring")), alike=engine.ALIKE - 0.1, shared=0.2 * 4.0 * ROWS) == (["bump_stop"], "explained")
+    assert judged(found(("bump_stop", "spring")), alike=noise.ALIKE + 0.1, shared=0.2 * 4.0 * ROWS) == OUT
+    assert judged(found(("bump_stop", "spring")), alike=noise.ALIKE - 0.1, shared=0.2 * 4.0 * ROWS) == (["bump_stop"], "explained")
     patchwork = found(("bump_stop", "spring"), ("quadratic_damper", "damper"))
-    assert judged(patchwork, alike=engine.ALIKE + 0.1, shared=0.02 * 4.0 * ROWS) == OUT
-    assert judged(patchwork, alike=engine.ALIKE + 0.1, shared=0.01 * 4.0 * ROWS)[1] == "explained"
+    assert judged(patchwork, alike=noise.ALIKE + 0.1, shared=0.02 * 4.0 * ROWS) == OUT
+    assert judged(patchwork, alike=noise.ALIKE + 0.1, shared=0.01 * 4.0 * ROWS)[1] == "explained"
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,9 @@ import pytest
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.score import Candidate, Regression
-from penode_sil.diagnosis.search import PART, Explanation, acting, distinct, heavy, hopeful, pursue, renamed, sprung, terms_of
+from penode_sil.diagnosis.search import (
+    NEW, PART, Explanation, acting, distinct, elsewhere, heavy, hopeful, pursue, renamed, sprung, strongest, sufficient, terms_of,
+)  # fmt: skip
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
 
@@ -59,6 +61,43 @@ def test_form_is_a_part_of_what_formulas_leave():
     alone, both = explanation("constant_force", gain=150_000.0), explanation("constant_force", "tyre_liftoff", gain=151_000.0, formulas=150_000.0)
     assert 900.0 < both.score - alone.score < 950.0  # 50 for the kind, 10 for its number, and thousandths of 1 000
     assert explanation("constant_force", "tyre_liftoff", gain=151_000.0).score < alone.score + 800.0
+
+
+def test_a_second_mass_pays_as_a_form():
+    """Two masses are a filter: though both are formulas, the second one must gain as much as what only mends a form."""
+    one = explanation("hidden_resonance", gain=900_000.0)
+    two = explanation("hidden_resonance", "hidden_resonance", gain=900_500.0, formulas=900_000.0)
+    other = explanation("hidden_resonance", "wrong_parameter", gain=900_500.0, formulas=900_000.0)
+    assert two.score < one.score < other.score
+
+
+def test_a_fit_that_failed_begins_with_another_law():
+    """Of laws that promise about the same, the best one of those that have not been tried."""
+    laws = [SimpleNamespace(law=name, shapes={}) for name in ("loose_damper", "loose_damper", "maxwell_bushing")]
+    candidates = [Candidate("maxwell_bushing", "spring", 1, False, law) for law in laws]
+    fit = SimpleNamespace(free=(), residual=np.array([20.0, 10.0]), jacobian=np.zeros((2, 0)))
+    r = Regression(fit, candidates, np.array([[1.0, 0.4], [1.0, 0.3], [1.0, 0.0]], dtype=np.float32), [])
+    assert pursue(r, [0, 1, 2], terms=1)[1] == [0]
+    assert elsewhere(r, ("maxwell_bushing", "spring"), [0]) == [2]
+    assert elsewhere(r, ("maxwell_bushing", "spring"), [0, 2]) == []
+
+
+@pytest.mark.parametrize("deviations, left", [((30.0, 1.0), ["m_b"]), ((30.0, 20.0), []), ((1.0, 2.0), ["c_t", "m_b"])])
+def test_a_parameter_that_another_one_does_without_goes(deviations, left):
+    """Two wrong parameters, so many deviations off their nominal values: 7.7 are worth a cause."""
+    assert (NEW + 10.0) ** 0.5 == pytest.approx(7.7, abs=0.1)
+    names = ("m_b", "c_t")
+    terms = tuple(Term(Candidate("wrong_parameter", name, 0, False, name), 0.0) for name in names)
+    free = [SimpleNamespace(target=name, value=100.0 + d, unit=1.0) for name, d in zip(names, deviations)]
+    fit = SimpleNamespace(free=free, covariance=lambda: np.eye(2))
+    model = SimpleNamespace(parameters={name: SimpleNamespace(value=100.0) for name in names})
+    e = Explanation(terms, SimpleNamespace(names=names), None, fit, 0.0)
+    assert [t.candidate.what for t in sufficient(SimpleNamespace(model=model), e)] == left
+
+
+def test_the_strongest_other_kind_counts_what_is_taken():
+    r = regression([1.0, 0.0], [1.0, 1.0], [30.0, 10.0])
+    assert strongest(r, [("hidden_resonance", "body")]) == [0, 1] and strongest(r, [("tyre_damping", "tyre")]) == []
 
 
 def test_a_law_that_mends_a_form_leaves_the_name():

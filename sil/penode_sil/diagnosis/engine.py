@@ -33,7 +33,6 @@ FAR = 3, 20.0  # or so many that are as many standard deviations of its noise of
 ENDS = 2.0  # samples by which the ends of a hole may be wrong
 WILD = 2.0  # standard deviations of the noise that bursts have together: one sample in nine that is far out
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
-ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
 PATCHED = 0.985  # share that several causes must take away if sensors still share a residual
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
@@ -94,9 +93,9 @@ def diagnose(
     if study.moving and found:
         costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
+        losses = [s.nothing - max((x.gain for x in e), default=0.0) for s, e in ((study, equals), (other, found[:1]))]
         told = set(found[0].groups) in (set(e.groups) for e in equals)
-        spare = (IDLE if told else MOVING) * len(model.states) * len(experiments)
-        if costs[1] < costs[0] + spare:
+        if rested(losses, costs, told, len(model.states) * len(experiments)):
             study, explanations = other, found
     best = explanations[0] if explanations else None
     if best is not None:  # bursts and spikes that a cause explains were none
@@ -181,6 +180,12 @@ def diagnose(
         verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), data,
         shown.numbers(), absorbed, time.perf_counter() - started, compilers() - compiled, shown,
     )  # fmt: skip
+
+
+def rested(losses: Sequence[float], costs: Sequence[float], told: bool, starts: int) -> bool:
+    """Did recordings start at rest? Losses, and what they cost with the causes, [in motion, at rest], whether the causes are the same,
+    and how many start states are free in motion. Where these gain no more than noise gives them nothing moved, though it costs a load."""
+    return losses[1] < losses[0] + IDLE * starts or not told and costs[1] < costs[0] + MOVING * starts
 
 
 def compilers() -> float:
@@ -302,17 +307,17 @@ def judge(
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)
     if not explanations:
-        if evidence > DOUBT and excess > 0.15 * rows or alike > ALIKE or pure:
+        if evidence > DOUBT and excess > 0.15 * rows or alike > noise.ALIKE or pure:
             return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0, evidence
         verdict = "explained" if faults else "not_identifiable" if evidence > DOUBT else "no_discrepancy"
         return tuple(faults), verdict, 1.0, evidence
     best = explanations[0]
-    left = max(best.fit.chi2 - rows, shared if alike > ALIKE else 0.0, 0.0)  # in the noise that the best explanation leaves
+    left = max(best.fit.chi2 - rows, shared if alike > noise.ALIKE else 0.0, 0.0)  # in the noise that the best explanation leaves
     gained = study.null.cost - best.fit.cost
     share = gained / (gained + left) if gained + left > 0.0 else 1.0
-    if share < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > ALIKE):
+    if share < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > noise.ALIKE):
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
-    if len(best.groups) > 1 and share < PATCHED and alike > ALIKE:  # several causes, and still no whole: a patchwork
+    if len(best.groups) > 1 and share < PATCHED and alike > noise.ALIKE:  # several causes, and still no whole: a patchwork
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
     if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < search.FILTER * best.gain:

@@ -273,6 +273,7 @@ def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Met
     return Metric(len(e.time), root)
 
 
+ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
 CHANCE = 1e-3  # that a whole recording has one row of repeated samples as long
 EVEN = 1e-4  # of the square of a fall: falls that differ less are of the same share
 STEADY = 6  # falls in a row, of eight samples: of noise, fewer than one in a hundred is so even

@@ -18,6 +18,7 @@ from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
 from .hypotheses import BENDS, CLOCK, KNEE, STRIBECK, VALUED, Basis, Fault
 from .naming import christened, straight
+from .noise import ALIKE, kinship
 from .score import DAMPINGS, Candidate, Regression
 from .study import Study, heard, loss, regression, requieted
 
@@ -38,6 +39,7 @@ CURVES = {  # kinds of one family at one place are one curve with one name
 }  # fmt: skip
 FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
+KEPT = 0.5  # of what a regression promises: a fit that keeps less than that of it began in the wrong place
 LESS = 0.3  # of all that was gained: an explanation that gains less by that is not gone on with
 SMALL = 0.03  # of all that was gained: a cause worth less than that may be a remainder of another
 PART = 0.1  # of the size a law has alone: left to it where its companions do the rest
@@ -106,8 +108,10 @@ class Explanation:
         form = 0.0
         plain = len(self.terms) == len(self.groups) and all(kind in (*EXACT, *FORMULAS) for kind, _ in self.groups)
         slow = all(kind == "sensor_bias" or kind in EXACT for kind, _ in self.groups)  # a bias is no form, however it wanders
-        if not plain and not slow:
-            form = (FORM * self.freedom / COST + LEAST * (len(self.groups) - 1)) * (self.gain - self.formulas)
+        filtering = sum(t.candidate.kind == "hidden_resonance" for t in self.terms) > 1  # a second mass may be any form of the first
+        if not plain and not slow or filtering:
+            bent = self.gain - (0.0 if filtering else self.formulas)
+            form = (FORM * self.freedom / COST + LEAST * (len(self.groups) - 1)) * bent
         return self.gain - self.price - max(form, 0.0)
 
 
@@ -227,13 +231,42 @@ def singles(study: Study, r: Regression, few: int = 3) -> list[Explanation]:
         choices.append(both)
     ways = [terms_of(r, chosen) for chosen in choices]
     ways += [in_series(study, r, group) for _, group, _ in taken]
-    return distinct([e for e in (explain(study, terms) for terms in ways if terms) if e.groups])
+    found = []
+    for k, terms in enumerate(ways):
+        if terms:
+            found.append(explain(study, terms))
+            kept = study.null.cost - found[-1].fit.cost
+            if k < len(taken) and kept < KEPT * r.gain(choices[k])[0] and (other := terms_of(r, elsewhere(r, taken[k][1], choices[k]))):
+                found.append(explain(study, other))
+    found += [explain(study, [needed], start=e.fit) for e in found for needed in sufficient(study, e)]
+    return distinct([e for e in found if e.groups])
+
+
+def elsewhere(r: Regression, group: Group, chosen: Sequence[int]) -> list[int]:
+    """The best choice of one law of a kind that is none of those chosen: another one to begin with."""
+    failed = {_law(r.candidates[k]) for k in chosen}
+    return pursue(r, [k for k in pools(r)[group] if _law(r.candidates[k]) not in failed], terms=1)[1]
+
+
+def sufficient(study: Study, e: Explanation) -> list[Term]:
+    """Of two causes of one number each, those beside which the other one is worth less than it costs: a regression may have asked for
+    two parameters in place of one that is far off."""
+    if len(e.terms) != 2 or len(e.groups) != 2:
+        return []
+    variance, index = np.diag(e.fit.covariance()), {f.target: i for i, f in enumerate(e.fit.free)}
+    found = []
+    for other, target in zip(e.terms[::-1], gains(e.terms, e.built.names)):
+        f = e.fit.free[index[target]]
+        nominal = study.model.parameters[target].value if target in study.model.parameters else 0.0
+        if ((f.value - nominal) / f.unit) ** 2 < (NEW + COST) * variance[index[target]]:
+            found.append(other)
+    return found
 
 
 def in_series(study: Study, r: Regression, group: Group) -> list[Term]:
     """A spring or a play in series with all of a damper; none if that is not of the group. With a damping of its own,
     many values of the rest do about as well, and a fit may end in the wrong ones."""
-    pool = [k for k in pools(r)[group] if _law(Term(r.candidates[k], 0.0)) == "loose_damper"]
+    pool = [k for k in pools(r)[group] if _law(r.candidates[k]) == "loose_damper"]
     _, best = r.best_single([], pool, dict.fromkeys(pool, 0.0))
     terms = terms_of(r, [best]) if best >= 0 else []
     return [tied for tied in (whole(study, t) for t in terms) if tied]
@@ -241,7 +274,7 @@ def in_series(study: Study, r: Regression, group: Group) -> list[Term]:
 
 def refined(study: Study, e: Explanation, parameters: Sequence[str]) -> Explanation:
     """The explanation with more elementary laws of its kinds, where they earn their cost."""
-    kinds = {kind for kind, _ in e.groups if kind not in SINGLE}
+    kinds = related(e.groups) - set(SINGLE)
     if not kinds:
         return e
     e = e.whole()
@@ -258,7 +291,7 @@ def refine(
         for group in e.groups:
             if group[0] != "hidden_resonance" and sum(t.group == group for t in e.terms) < room(group[0]) + 1:
                 own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
-                pool = [k for k in pools(r).get(group, []) if _fault(r.candidates[k]) not in own]
+                pool = [k for k in family(study, r, [group]) if _fault(r.candidates[k]) not in own]
                 gain, chosen = pursue(r, pool, terms=1, alone=group[0] != "sensor_bias")
                 if chosen and gain > max(cost(r.candidates[chosen[0]]), 2e-3 * e.gain) and (best is None or gain > best[0]):
                     best = gain, chosen[0], r.gain(chosen)[1][0]
@@ -280,6 +313,12 @@ def filtered(study: Study, e: Explanation, r: Regression) -> Explanation | None:
             if chosen and gain > (1.0 / FILTER - 1.0) * e.gain:
                 return explain(study, [*e.terms, *terms_of(r, chosen)], start=e.fit, formulas=e.formulas)
     return None
+
+
+def strongest(r: Regression, groups: Collection[Group]) -> list[int]:
+    """The choice of another kind than some that takes most, whether or not these could take it as well."""
+    found = [pursue(r, pool) for group, pool in pools(r).items() if group not in groups]
+    return max(found, key=lambda x: x[0] - sum(cost(r.candidates[c]) for c in x[1]), default=(0.0, []))[1]
 
 
 def gains(terms: Sequence[Term], names: Sequence[str]) -> list[str | tuple[str, int]]:
@@ -456,17 +495,19 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
             alike = {curve(t.candidate) for t in e.terms} == {curve(t.candidate) for t in beam[0].terms}
             if e.gain < (max(enough, (1.0 - NEAR) * beam[0].gain) if alike else enough):
                 break  # of one curve, the worse form of it will not become the better one
-            here = requieted(study, e.fit)
+            akin, _ = kinship(study.experiments, study.metrics, e.fit.simulated)
+            here = requieted(study, e.fit, coloured=akin < ALIKE)  # what sensors share is no noise
             if here is not study:
                 e = explain(here, e.terms, 4, e.fit, e.formulas)
             e = e.whole()
             e, r = refine(here, e, regression(here, e.fit, parameters), parameters)
             done.append(e)
-            log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f} {[_law(t) for t in e.terms]}")
+            log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f} {[_law(t.candidate) for t in e.terms]}")
             if second := filtered(here, e, r):
                 done.append(second)
                 log(f"  two masses: {second.gain:.0f}")
-            ways = [*filter(None, (terms_of(r, chosen) for chosen in further(here, e, r)[:2]))]
+            choices = further(here, e, r)[:2] + ([strongest(r, e.groups)] if second else [])  # what is taken for a second mass
+            ways = [*filter(None, (terms_of(r, chosen) for chosen in choices))]
             if not ways and e.fit.chi2 - rows(here) < (1.0 - WHOLE) * e.gain:
                 enough = (1.0 - NEAR) * e.gain  # it is whole: only what is about as good may take its place
             for new in ways:
@@ -517,7 +558,7 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
     """The explanation with the textbook law of a kind in place of several laws, where it does about as well: its parameters
     are known better."""
     e = leaner(study, unbent(study, e, log), log)
-    laws = {g: [_law(t) for t in e.terms if t.group == g] for g in e.groups if g[0] in TEXTBOOK}
+    laws = {g: [_law(t.candidate) for t in e.terms if t.group == g] for g in e.groups if g[0] in TEXTBOOK}
     laws = {g: own for g, own in laws.items() if own != ["loose_damper"]}  # one as well
     bent = [g for g, own in laws.items() if len(own) > len(TEXTBOOK[g[0]]) or not set(own) <= set(TEXTBOOK[g[0]])]
     if not bent:
@@ -525,7 +566,7 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
     whole = e.whole()
     r = regression(study, whole.fit, parameters, {kind for kind, _ in bent})
     for group in bent:
-        pool = [k for k in pools(r).get(group, []) if _law(Term(r.candidates[k], 0.0)) in TEXTBOOK[group[0]]]
+        pool = [k for k in pools(r).get(group, []) if _law(r.candidates[k]) in TEXTBOOK[group[0]]]
         without = r.without(missing(whole, group))
         chosen = pursue(without, pool, terms=len(TEXTBOOK[group[0]]))[1]
         if group[0] in TWO and len(chosen) == 1:
@@ -593,7 +634,7 @@ def owned(study: Study, e: Explanation, log) -> Explanation:
 
 def whole(study: Study, t: Term) -> Term | None:
     """A law that takes away all of the element at its place; None if it is no such law, or already does."""
-    law, argument = TAKING.get(_law(t), ("", ""))
+    law, argument = TAKING.get(_law(t.candidate), ("", ""))
     near = {name for name, _ in study.places[t.candidate.what.place].elements} if law and not t.own else set()
     own = [x.arguments[argument] for x in study.model.elements if x.law == law and x.name in near]
     if len(own) != 1:
@@ -609,8 +650,8 @@ def _fault(c: Candidate) -> tuple[str, float] | None:
     return (c.what.what, 0.0 if c.what.what == "scale_bend" else c.what.shape) if isinstance(c.what, Fault) else None
 
 
-def _law(t: Term) -> str:
-    return getattr(t.candidate.what, "law", "")
+def _law(c: Candidate) -> str:
+    return getattr(c.what, "law", "")
 
 
 def mended(study: Study, e: Explanation, log) -> Explanation:
