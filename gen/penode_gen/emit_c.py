@@ -141,8 +141,10 @@ class _Emitter:
         self.at = sets.offsets(model)
         everything = [*self.causal.rates, *self.causal.outputs, *self.causal.sensors]
         self.uses_input_rate = self.causal.uses(everything, self.causal.input_rates)
-        self.parabola = model.interpolation == "parabola" and bool(model.states or self.uses_input_rate)
+        self.curved = model.interpolation in ("parabola", "cubic") and bool(model.states or self.uses_input_rate)
+        self.cubic = self.curved and model.interpolation == "cubic"
         self.drive = self.causal.inputs + (self.causal.input_rates if self.uses_input_rate else ())
+        self.kept = len(self.drive) + (2 * self.curved + self.cubic) * len(model.inputs)  # and differences of the inputs
         self.networks = self._network_code()
         self.code_of = {user: code for code in self.networks for user in code.users}
         self.constants: dict[str, sp.Symbol] = {}
@@ -171,7 +173,7 @@ class _Emitter:
             "states": [{"name": s, "unit": self._unit(s), "start": literal(x)} for s, x in zip(model.states, model.start)],
             "n_x": len(model.states), "n_q": causal.n_mechanical, "n_u": len(model.inputs), "n_drive": len(self.drive),
             "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
-            "parabola": self.parabola,
+            "curved": self.curved, "cubic": self.cubic, "kept": self.kept,
             "functions": functions, "constants": self._constants(), "networks": self.networks,
             "network_lines": {c.name: self._network_lines(c) for c in self.networks},
             "bend_lines": {c.name: _by_value(c, self._bend_lines(c)) for c in self.networks if self._bent(c, functions)},
@@ -185,7 +187,7 @@ class _Emitter:
             "folded": folded,
             "uses_p": uses_p, "uses_f": uses_f, "reads_set": reads_set,
             "sample_time": real(model.sample_time), "real": real, "si": units.si,
-            "columns": len(model.states) + (3 if self.parabola else 2) * len(model.inputs),
+            "columns": len(model.states) + (2 + self.curved + self.cubic) * len(model.inputs),
         }  # fmt: skip
 
     @staticmethod

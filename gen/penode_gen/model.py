@@ -8,7 +8,7 @@ from pathlib import Path
 from .networks import Network
 
 METHODS = ("euler", "heun", "rk4", "ros1", "ros2")
-INTERPOLATIONS = ("held", "linear", "parabola")
+INTERPOLATIONS = ("held", "linear", "parabola", "cubic")
 OUTSIDE = ("extrapolate", "clamp", "fade")
 MORE_PIECES = ("refuse", "layers")
 GROUND = "ground"

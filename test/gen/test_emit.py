@@ -123,7 +123,7 @@ def test_no_warnings(tmp_path, method):
     """All policies, inputs and substeps, in float and double, by every compiler that is installed."""
     assert COMPILERS
     folders = []
-    curved = [("parabola", "clamp", 1), ("parabola", "fade", 3)]
+    curved = [("parabola", "clamp", 1), ("parabola", "fade", 3), ("cubic", "clamp", 3)]
     for input, outside, substeps in [*itertools.product(INPUTS, OUTSIDE, SUBSTEPS), *curved]:
         model = penode_gen.load(models.rich(tmp_path, method, input=input, outside=outside, substeps=substeps))
         folders.append(tmp_path / f"{input}_{outside}_{substeps}")
@@ -147,7 +147,7 @@ def test_no_warnings_where_little_is_used(tmp_path, method):
     """Models that need only some of state, input, parameters and networks leave nothing unused; any name is fine."""
     models.network_file(tmp_path / "n.json", [1, 4, 1], ["tanh", "identity"], 2)
     folders = []
-    curved = itertools.product(("constant rate", "input only", "state only"), ["parabola"])
+    curved = itertools.product(("constant rate", "input only", "state only"), ["parabola", "cubic"])
     for name, input in [*itertools.product(SPARSE, INPUTS), *curved]:
         equation, output = SPARSE[name]
         own = "".join(f'{n} = {{ unit = "1" }}\n' for n in ("x", "y", "p", "fx", "node", "rates", "status", "h", "t1")) if name == "names" else ""

@@ -211,7 +211,7 @@ FAULTS = [
     ("fade_width = 0.5", "fade_width = 0", "model.fade_width: is out of range"),
     ("fade_width = 0.5", "fade_width = nan", "model.fade_width: is out of range"),
     ('method = "rk4"', 'method = "rk5"', "model.method: 'rk5' is unknown; choose one of euler, heun"),
-    ('input = "linear"', 'input = "cubic"', "model.input: 'cubic' is unknown"),
+    ('input = "linear"', 'input = "quintic"', "model.input: 'quintic' is unknown"),
     ('outside = "fade"', 'outside = "explode"', "model.outside: 'explode' is unknown"),
     # elements and networks
     ('law = "linear_damper"', 'law = "linear_dampr"', "elements.damp.law: law 'linear_dampr' is unknown; did you mean 'linear_damper'?"),

@@ -19,33 +19,33 @@ ORDERS = {"euler": 1, "heun": 2, "rk4": 4, "ros1": 1, "ros2": 2}
 EXTRA = 0x10  # PEN_OUTSIDE
 
 
-@pytest.mark.parametrize("input", ["parabola", "linear", "held"])
+@pytest.mark.parametrize("input", ["cubic", "parabola", "linear", "held"])
 @pytest.mark.parametrize("method", ORDERS)
 def test_order_of_convergence(tmp_path, method, input, show):
-    """Halving the sample time divides the error by 2^order. The inputs are parabolas, straight lines or constant, so that
-    sampling them loses nothing; the reference is the model's equations by hand, integrated by SciPy to 1e-12. The steps
-    begin at the third sample."""
-    slope, bend = float(input != "held"), float(input == "parabola")
+    """Halving the sample time divides the error by 2^order. The inputs are cubics, parabolas, straight lines or constant,
+    so that sampling them loses nothing; the reference is the model's equations by hand, integrated by SciPy to 1e-12. The
+    steps begin at the fourth sample."""
+    slope, bend, twist = float(input != "held"), float(input in ("parabola", "cubic")), float(input == "cubic")
 
     def force(t):
-        return 1.0 + slope * 2.0 * t - bend * 40.0 * t**2
+        return 1.0 + slope * 2.0 * t - bend * 40.0 * t**2 + twist * 60.0 * t**3
 
     def foot(t):
-        return 0.02 + slope * 0.1 * t + bend * 0.5 * t**2
+        return 0.02 + slope * 0.1 * t + bend * 0.5 * t**2 - twist * 0.7 * t**3
 
     def foot_rate(t):
-        return slope * 0.1 + bend * t
+        return slope * 0.1 + bend * t - twist * 2.1 * t**2
 
     duration, errors = 0.32, []
     for h in (4e-3, 2e-3, 1e-3):
         path = models.rich(tmp_path, method, h, input)
         n = round(duration / h)
-        t = np.arange(-2, n + 1) * h
+        t = np.arange(-3, n + 1) * h
         u = np.stack([force(t), foot(t)], axis=1)
         instance = Sil(penode_gen.load(path), np.float64).instance()
-        instance.run(u[:3])
+        instance.run(u[:4])
         instance.set_state(np.array([0.01, 0.0, 0.5]))
-        run = instance.run(u[3:])
+        run = instance.run(u[4:])
         assert not np.any(run.status & ~np.uint32(EXTRA))
         data = json.loads((tmp_path / "n2.json").read_text())
         damping = 3.0 if input != "held" else 0.0
@@ -74,10 +74,10 @@ F = {{ value = "F_damper", unit = "N" }}
 """
 
 
-@pytest.mark.parametrize("input, order, share", [("linear", 1, 1 / 2), ("parabola", 2, 1 / 3)])
+@pytest.mark.parametrize("input, order, share", [("linear", 1, 1 / 2), ("parabola", 2, 1 / 3), ("cubic", 3, 1 / 4)])
 def test_rate_of_an_input_at_a_sample(tmp_path, input, order, share):
-    """Of a sine at 5 Hz a line errs by h/2 of the second derivative, the parabola by h^2/3 of the third (Taylor at the
-    sample); what that leaves out is a share of 2 pi f h = 0.06 at most. Two samples make a line; a bad one is passed over."""
+    """Of a sine at 5 Hz a line errs by h/2 of the second derivative, the parabola by h^2/3 of the third, the cubic by
+    h^3/4 of the fourth (Taylor at the sample); what that leaves out is a share of 2 pi f h = 0.06 at most. Two samples make a line; a bad one is passed over."""
     omega = 2 * math.pi * 5
     for h in (2e-3, 1e-3):
         path = tmp_path / f"{input}_{h}.toml"
@@ -86,20 +86,20 @@ def test_rate_of_an_input_at_a_sample(tmp_path, input, order, share):
         z = np.sin(omega * t)
         y = sil.run(z[:, None]).y[:, 0]
         assert y[0] == 0.0 and y[1] == pytest.approx(2 * (z[1] - z[0]) / h, rel=1e-12)
-        error = np.max(np.abs(y[2:] - 2 * omega * np.cos(omega * t[2:])))
+        error = np.max(np.abs(y[order:] - 2 * omega * np.cos(omega * t[order:])))
         assert error == pytest.approx(share * 2 * omega * (omega * h) ** order, rel=omega * h)
         broken = z.copy()
         broken[100] = np.nan
         run = sil.run(broken[:, None])
-        assert run.status[100] & 0x1 and run.y[100, 0] == y[99] and np.array_equal(run.y[103:, 0], y[103:])
+        assert run.status[100] & 0x1 and run.y[100, 0] == y[99] and np.array_equal(run.y[101 + order :, 0], y[101 + order :])
 
 
 def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: int) -> dict[str, np.ndarray]:
     """The parts of the jacobian struct by name; `moving`: how many inputs before this one the outputs depend on themselves."""
     shapes = {"x_x": (n_x, n_x), "x_u_before": (n_x, n_u), "x_u": (n_x, n_u)}
-    shapes |= {"x_u_earlier": (n_x, n_u)} if moving == 2 else {}
+    shapes |= {name: (n_x, n_u) for name in ("x_u_earlier", "x_u_earliest")[: max(moving - 1, 0)]}
     shapes |= {"y_x": (n_y, n_x), "y_u": (n_y, n_u)}
-    shapes |= {name: (n_y, n_u) for name in ("y_u_before", "y_u_earlier")[:moving]}
+    shapes |= {name: (n_y, n_u) for name in ("y_u_before", "y_u_earlier", "y_u_earliest")[:moving]}
     parts, at = {}, 0
     for name, (rows, columns) in shapes.items():
         parts[name] = jacobian[at : at + rows * columns].reshape(rows, columns)
@@ -108,25 +108,25 @@ def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: int) -> 
 
 
 @pytest.mark.parametrize("outside", ["extrapolate", "clamp", "fade"])
-@pytest.mark.parametrize("input, moving", [("held", 0), ("linear", 1), ("parabola", 2)])
+@pytest.mark.parametrize("input, moving", [("held", 0), ("linear", 1), ("parabola", 2), ("cubic", 3)])
 @pytest.mark.parametrize("method", ORDERS)
 def test_step_jacobian_against_differences(tmp_path, method, input, moving, outside):
     """Central differences of the discrete step in double, at random states inside, on and outside of the envelope, behind one
-    or two samples."""
+    to three samples."""
     model = penode_gen.load(models.rich(tmp_path, method, 5e-3, input, outside, substeps=2, low=-0.3, high=0.3))
     sil, draw = Sil(model, np.float64), np.random.default_rng(11)
     n_x, n_u, n_y = 3, 2, 2
-    size = n_x * n_x + (3 if moving == 2 else 2) * n_x * n_u + n_y * n_x + n_y * n_u * (1 + moving)
+    size = n_x * n_x + max(moving + 1, 2) * n_x * n_u + n_y * n_x + n_y * n_u * (1 + moving)
 
-    def started(x, earlier, before):
+    def started(x, earliest, earlier, before):
         instance = sil.instance()
-        for u in (earlier, before)[-behind:]:
+        for u in (earliest, earlier, before)[-behind:]:
             instance.step(u)
         instance.set_state(x)
         return instance
 
-    def step(x, earlier, before, now):
-        instance = started(x, earlier, before)
+    def step(x, earliest, earlier, before, now):
+        instance = started(x, earliest, earlier, before)
         state, y, status = instance.step(now)
         assert status in (0, EXTRA)
         return np.concatenate([state, y])
@@ -136,30 +136,35 @@ def test_step_jacobian_against_differences(tmp_path, method, input, moving, outs
         d[i] = 1e-5
         return (function(at + d) - function(at - d)) / 2e-5
 
-    for behind in (1, 2, 2, 2, 2, 2):
-        x, (earlier, before, now) = draw.uniform(-0.5, 0.5, n_x), draw.uniform(-1, 1, (3, n_u)) * [1, 0.1]
-        instance = started(x, earlier, before)
+    for behind in (1, 2, 3, 3, 3, 3):
+        x, past = draw.uniform(-0.5, 0.5, n_x), draw.uniform(-1, 1, (4, n_u)) * [1, 0.1]
+        earliest, earlier, before, now = past
+        instance = started(x, earliest, earlier, before)
         y, found, status = instance.step_jacobian(now, size)
         assert status in (0, EXTRA)
-        plain = step(x, earlier, before, now)
+        plain = step(x, *past)
         assert np.array_equal(instance.get_state(), plain[:n_x]) and np.array_equal(y, plain[n_x:])  # to the bit
         j = flatten(found, n_x, n_u, n_y, moving)
         # differences: third derivative (about 1e3) * 1e-10 / 6 + rounding 1e-16 / 1e-5 * values of 1e2; relative 1e-6
         tolerance = dict(rtol=1e-6, atol=2e-7)
         for i in range(n_x):
-            column = difference(lambda v: step(v, earlier, before, now), x, i)
+            column = difference(lambda v: step(v, *past), x, i)
             np.testing.assert_allclose(j["x_x"][:, i], column[:n_x], **tolerance)
             np.testing.assert_allclose((j["y_x"] @ j["x_x"])[:, i], column[n_x:], rtol=1e-6, atol=1e-5)
         for i in range(n_u):
-            column = difference(lambda v: step(x, earlier, v, now), before, i)
+            column = difference(lambda v: step(x, earliest, earlier, v, now), before, i)
             np.testing.assert_allclose(j["x_u_before"][:, i], column[:n_x], **tolerance)
             direct = j["y_u_before"][:, i] if moving else 0.0
             np.testing.assert_allclose((j["y_x"] @ j["x_u_before"])[:, i] + direct, column[n_x:], rtol=1e-6, atol=1e-5)
-            column = difference(lambda v: step(x, earlier, before, v), now, i)
+            column = difference(lambda v: step(x, earliest, earlier, before, v), now, i)
             np.testing.assert_allclose(j["x_u"][:, i], column[:n_x], **tolerance)
             np.testing.assert_allclose((j["y_x"] @ j["x_u"])[:, i] + j["y_u"][:, i], column[n_x:], rtol=1e-6, atol=1e-5)
-            column = difference(lambda v: step(x, v, before, now), earlier, i)
-            along, direct = (j["x_u_earlier"][:, i], j["y_u_earlier"][:, i]) if moving == 2 else (np.zeros(n_x), 0.0)
+            column = difference(lambda v: step(x, earliest, v, before, now), earlier, i)
+            along, direct = (j["x_u_earlier"][:, i], j["y_u_earlier"][:, i]) if moving > 1 else (np.zeros(n_x), 0.0)
+            np.testing.assert_allclose(along, column[:n_x], **tolerance)
+            np.testing.assert_allclose(j["y_x"] @ along + direct, column[n_x:], rtol=1e-6, atol=1e-5)
+            column = difference(lambda v: step(x, v, earlier, before, now), earliest, i)
+            along, direct = (j["x_u_earliest"][:, i], j["y_u_earliest"][:, i]) if moving > 2 else (np.zeros(n_x), 0.0)
             np.testing.assert_allclose(along, column[:n_x], **tolerance)
             np.testing.assert_allclose(j["y_x"] @ along + direct, column[n_x:], rtol=1e-6, atol=1e-5)
 

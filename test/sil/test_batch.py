@@ -155,6 +155,8 @@ def everything(model) -> dict[str, tuple[str, ...]]:
         ("euler", "parabola", "extrapolate", 2, "tanh"),
         ("ros1", "parabola", "clamp", 1, "sigmoid"),
         ("ros2", "parabola", "extrapolate", 2, "tanh"),
+        ("rk4", "cubic", "extrapolate", 2, "tanh"),
+        ("ros2", "cubic", "clamp", 2, "sigmoid"),
     ],
 )
 def test_each_lane_has_the_bits_of_the_step(tmp_path, choices, dtype):
