@@ -481,6 +481,30 @@ def test_what_is_foretold_is_as_good_as_the_true_law(tmp_path, model):
         assert gain.after_rmse < 1.08 * np.sqrt(np.mean((held[0].z[name] - said) ** 2)), name
 
 
+@pytest.mark.parametrize("hiss, way", [(0.0, "cubic"), (2e-4, "linear")])
+def test_inputs_are_joined_as_well_as_their_noise_allows(tmp_path, hiss, way):
+    """A damper on a prescribed motion up to 20 Hz at 2 ms: its force needs the rate of the last sample. A noise of 0.2 mm in the
+    motion is louder in the rate the more samples it is taken from."""
+    text = MODEL[: MODEL.index("[inputs]")] + """[inputs]
+z_road = { unit = "m" }
+[elements]
+damper = { between = ["z_road", "ground"], law = "linear_damper", damping = "d" }
+[outputs]
+F = { value = "F_damper", unit = "N" }
+[sensors]
+force = { value = "F_damper", unit = "N", noise = 2 }
+"""
+    (tmp_path / "law.toml").write_text(text)
+    z, rng = road(5), np.random.default_rng(6)
+    force = D * CubicSpline(np.arange(SAMPLES) * STEP, z)(np.arange(SAMPLES) * STEP, 1) + 2.0 * rng.standard_normal(SAMPLES)
+    columns = np.stack([np.arange(SAMPLES) * STEP, z + hiss * rng.standard_normal(SAMPLES), force], axis=1)
+    np.savetxt(tmp_path / "law.csv", columns, delimiter=",", header="time [s],z_road [m],force [N]", comments="", fmt="%.9g")
+    model = penode_gen.load(tmp_path / "law.toml")
+    one = study.null_study(model, [experiment(m, model) for m in load([tmp_path / "law.csv"], model)])
+    text, extended = extension.extend_file(one, None, ())
+    assert extended.interpolation == way and (way == "linear" or f'input = "{way}"' in text)
+
+
 def test_a_mass_on_rubber_is_foretold(tmp_path, model):
     """40 kg on the body, on a spring beside a spring in series with a damper. One resonance of the list leaves 9 % more than the noise
     in a_body; a second one under the same name takes half of it."""

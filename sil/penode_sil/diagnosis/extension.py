@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import penode_gen
 from penode_gen import units
 from penode_gen.laws import LAWS
-from penode_gen.model import Model, Signal
+from penode_gen.model import INTERPOLATIONS, Model, Signal
 
 from ..batch import Batch
 from ..targets import Sil
@@ -160,25 +160,31 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     return _joined(study, "\n".join(lines))
 
 
-ROUGH = 0.1  # of a sensor's noise: what straight lines between samples may cost, 0.5 % of the RMSE
+ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast
 
 
 def _joined(study: Study, text: str) -> tuple[str, Model]:
-    """The model of a text; its inputs follow parabolas if straight lines between samples are too rough for the first recording,
-    and the C then meets it better."""
+    """The model of a text; its inputs follow a curve through more samples if the way between them is too rough for the first recording,
+    and the C then meets it better. The more samples, the finer, but the louder the noise of the inputs."""
     model, e = _load(text), study.experiments[0]
-    if model.interpolation != "linear":
+    ways = INTERPOLATIONS[INTERPOLATIONS.index(model.interpolation) + 1 :]
+    if model.interpolation == "held" or not ways:
         return text, model
     start, exact = started(model, e, study)
     scale = np.sqrt(np.mean(study.levels[0], axis=0))
     stepped = deployed(model, e, start, study.set_name)
-    if np.max(np.sqrt(np.mean(((stepped - exact) / scale) ** 2, axis=0))) < ROUGH:
-        return text, model
     plain = text.replace('input = "linear"\n', "")
-    better = plain.replace("sample_time =", 'input = "parabola"\nsample_time =', 1)
-    curved = _load(better)
-    missed = [rms(((z - e.y) * e.good / scale).ravel()) for z in (stepped, deployed(curved, e, start, study.set_name))]
-    return (better, curved) if missed[1] < missed[0] else (text, model)
+    for way in ways:
+        if np.max(np.sqrt(np.mean(((stepped - exact) / scale) ** 2, axis=0))) < ROUGH:
+            break
+        better = plain.replace("sample_time =", f'input = "{way}"\nsample_time =', 1)
+        curved = _load(better)
+        finer = deployed(curved, e, start, study.set_name)
+        before, after = (rms(((z - e.y) * e.good / scale).ravel()) for z in (stepped, finer))
+        if after >= before:
+            break
+        text, model, stepped = better, curved, finer
+    return text, model
 
 
 def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
