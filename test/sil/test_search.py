@@ -13,7 +13,7 @@ from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.score import Candidate, Regression
 from penode_sil.diagnosis.search import (
-    NEW, PART, Explanation, acting, distinct, elsewhere, heavy, hopeful, pursue, renamed, sprung, strongest, sufficient, terms_of,
+    NEW, PART, Explanation, acting, called, distinct, elsewhere, heavy, hopeful, pursue, sprung, strongest, sufficient, terms_of,
 )  # fmt: skip
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
@@ -101,8 +101,23 @@ def test_the_strongest_other_kind_counts_what_is_taken():
 
 
 def test_a_law_that_mends_a_form_leaves_the_name():
-    e = renamed(explanation("tyre_liftoff", "tyre_liftoff", "sensor_bias"), [("tyre_nonlinear", "tyre")] * 2 + [("sensor_bias", "body")])
-    assert e.groups == (("tyre_nonlinear", "tyre"), ("sensor_bias", "body")) and [t.gain for t in e.terms] == [1.0] * 3
+    """What the curve of the tyre is called now does not count, also if a law fell out of it; a curve elsewhere keeps its own name."""
+    known = explanation("tyre_nonlinear", "tyre_nonlinear", "sensor_bias")
+    for kinds in (("tyre_liftoff", "tyre_liftoff", "sensor_bias"), ("tyre_nonlinear", "tyre_liftoff", "tyre_liftoff", "sensor_bias"), ("tyre_liftoff", "sensor_bias")):
+        e = called(explanation(*kinds), known)
+        assert e.groups == known.groups and [t.gain for t in e.terms] == [1.0] * len(kinds)
+    assert called(explanation("coulomb_friction"), known).groups == (("coulomb_friction", "body"),)
+
+
+def test_what_mends_a_form_may_take_away():
+    """A residual that asks for less than nothing of a law has a use for it only where its sign does not count."""
+    series = (np.ones(2),)
+    law = Basis("bouc_wen", 0, "bouc_wen", ("force", "N"), {}, 1, series)
+    fit = SimpleNamespace(free=(), residual=np.array([-30.0, 10.0]), jacobian=np.zeros((2, 0)))
+    r = Regression(fit, [Candidate("bouc_wen", "spring", 1, False, law)], np.array([[1.0, 0.0]], dtype=np.float32), [])
+    assert pursue(r, [0]) == (0.0, []) and pursue(r.unsigned(), [0])[1] == [0]
+    (term,) = terms_of(r.unsigned(), [0])
+    assert term.gain == pytest.approx(-30.0, rel=1e-4) and term.candidate.what.sign == 0 and r.candidates[0].sign == 1
 
 
 @pytest.mark.parametrize("null, left, so", [(31_000, 14_000, True), (31_000, 24_000, False), (14_000, 11_000, False), (10_000, 9_900, False)])

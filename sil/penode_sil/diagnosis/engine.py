@@ -124,8 +124,9 @@ def diagnose(
     gain: dict[str, Gain] = {}
     named = None  # what has no name does not go into a model
     if not any(c.kind == OUTSIDE for c in causes):
-        named = search.mended(study, best, log) if best is not None and causes else search.explain(study, [])
-        causes = tuple(resized(study, named, c) for c in causes)
+        idle = search.explain(study, []) if best is None or not causes else None
+        sized, named = search.mended(study, best, log) if idle is None else (idle, idle)
+        causes = tuple(resized(study, sized, c) for c in causes)
     unnamed = nameless.fitted(study, best) if verdict == "unexplained" and not doubt and not drift else None
     if unnamed is not None and unused:
         tell(0.83, "fitting what has no name")

@@ -287,7 +287,7 @@ def functions(
             return {"difference": ("N/m", lambda p: -2.0 * line(np.abs(s), curve(s, zero, p), s, np.ones_like(s)))}
         case "bump_stop":
             ends = np.array([-reach, reach])
-            main = max(range(len(terms)), key=lambda i: np.max(np.abs(Curve(terms[i : i + 1], names[i : i + 1])(ends, 0.0 * ends, {}))))
+            main = max(having(terms, "gap"), key=lambda i: np.max(np.abs(Curve(terms[i : i + 1], names[i : i + 1])(ends, 0.0 * ends, {}))))
             n, law = names[main], terms[main].candidate.what.law
             side = -1.0 if law == "rebound_stop" or "min" in law else 1.0
 
@@ -298,7 +298,7 @@ def functions(
 
             return {"gap": ("m", lambda p: p[f"{n}_gap"]), "stiffness": ("N/m", stiffness)}
         case "backlash":
-            main = max(range(len(terms)), key=lambda i: terms[i].gain)
+            main = max(having(terms, "gap", "presliding"), key=lambda i: terms[i].gain)
             n, slack = names[main], terms[main].candidate.what.law == "slack_friction"
             return {"gap": ("m", lambda p: 1.4 * p[f"{n}_presliding"] if slack else 2.0 * p[f"{n}_gap"])}
         case "asymmetric_damper":
@@ -331,10 +331,12 @@ def functions(
                 for t, n in zip(terms, names):
                     if t.candidate.what.law == "fading_damper":
                         slow, end, kept = "faded", 1.0 - np.exp(-m.t[-1] / p[f"{n}_time"]), np.exp(-m.t[-1] / p[f"{n}_time"])
-                    else:
+                    elif t.candidate.what.law == "heating_damper":
                         work, cooling = p[f"{n}_work"], p[f"{n}_cooling"]
                         slow, end = "warm", warm(m.v, m.t, work, cooling)[-1]
                         kept = np.exp(-np.trapezoid(m.v**2, m.t) / work - m.t[-1] / cooling)
+                    else:  # what only mends the form
+                        continue
                     before = p.get(("start", 0, e.built.model.states.index(f"{n}_{slow}")), 0.0)
                     total += p[f"{n}_damping"] * (end + kept * before)
                 return -total / d0(p)
@@ -394,6 +396,11 @@ def functions(
             sense = 1.0 if any(end in {i.name for i in model.inputs} for end in place.ends) else -1.0
             return {"force": ("N", lambda p: sense * sum(p[f"{n}_force"] for n in names))}  # in the end
     raise AssertionError(f"no parameters are known for {kind}")
+
+
+def having(terms: Sequence[Term], *shapes: str) -> list[int]:
+    """Which terms have one of these shapes; others only mend their form."""
+    return [i for i, t in enumerate(terms) if not t.candidate.what.shapes.keys().isdisjoint(shapes)]
 
 
 def _fault(model: Model, kind: str, what: Fault) -> dict[str, tuple[str, Callable[[Values], float]]]:

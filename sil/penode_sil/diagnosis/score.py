@@ -234,6 +234,13 @@ class Regression:
         other._against(fit, self.product + more @ more.T, more, span)
         return other
 
+    def unsigned(self) -> Regression:
+        """The same effects, each law with either sign."""
+        other = copy(self)
+        laws = (replace(c, sign=0, what=replace(c.what, sign=0)) if isinstance(c.what, Basis) else c for c in self.candidates)
+        other.candidates = tuple(laws)
+        return other
+
     def beside(self, taken: Sequence[int]) -> Regression:
         """The regression with these columns free in size and sign, so that only what none of them can do is left."""
         c = [k for k in taken if self.alive[k]]

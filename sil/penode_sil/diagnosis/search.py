@@ -654,16 +654,28 @@ def _law(c: Candidate) -> str:
     return getattr(c.what, "law", "")
 
 
-def mended(study: Study, e: Explanation, log) -> Explanation:
-    """The explanation with as many more laws of its causes as are worth their numbers, under the same names. A name is what a curve
-    does in the large; what the extended model foretells depends on all of the curve."""
+def mended(study: Study, e: Explanation, log) -> tuple[Explanation, Explanation]:
+    """The explanation with as many more laws of its causes as are worth their numbers, under the same names: with laws of the sign of
+    their kinds, from which its causes have their sizes; and then of any sign. A name is what a curve does in the large; what the
+    extended model foretells depends on all of the curve, and may need less of a law as well as more."""
+    most = len(e.terms) + MENDS
+    study, sized, r = formed(study, e, None, most, log)
+    more = r is not None and not heavy(sized)
+    return sized, formed(study, sized, r.unsigned(), most, log)[1] if more else sized
+
+
+def formed(
+    study: Study, e: Explanation, r: Regression | None, most: int, log
+) -> tuple[Study, Explanation, Regression | None]:
+    """The explanation with more laws as they are in a regression about it, if it is known already, up to so many terms; with the study
+    that has the noise it leaves, and the regression about it. Laws may have any sign if they may in the regression."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
     spare = [g for g in e.groups if g[0] not in ("wrong_parameter", "constant_force", "sensor_delay", CLOCK)]
-    most, r = len(e.terms) + MENDS, None
+    anyway = r is not None
+    if spare and r is None:
+        e = e.whole()
+        r = regression(study, e.fit, parameters, related(spare))
     while spare and len(e.terms) < most:
-        if r is None:
-            e = e.whole()
-            r = regression(study, e.fit, parameters, related(spare))
         found = []
         for group in spare:
             own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
@@ -674,21 +686,23 @@ def mended(study: Study, e: Explanation, log) -> Explanation:
         if not found:
             break
         _, group, new = max(found, key=lambda x: x[0])
-        wider = explain(study, [*e.terms, new], start=e.fit, formulas=e.formulas)
+        wider = called(explain(study, [*e.terms, new], start=e.fit, formulas=e.formulas), e)
         log(f"  mended {group}: {wider.gain:.0f} for {e.gain:.0f}")
-        if len(wider.terms) == len(e.terms) + 1 and len(wider.groups) == len(e.groups):  # whatever its curve is called now
-            wider = renamed(wider, [*(t.group for t in e.terms), group])
         if set(wider.groups) == set(e.groups) and wider.gain > e.gain + 2.0 * cost(new.candidate):
             levels, metrics = heard(study, wider.fit)  # what is mended had been taken for noise
             study = replace(study, levels=levels, metrics=metrics)
-            e, r = settled(study, wider), None
+            e = settled(study, wider).whole()
+            r = regression(study, e.fit, parameters, related(spare))
+            r = r.unsigned() if anyway else r
         else:
             spare.remove(group)
-    return e
+    return study, e, r
 
 
-def renamed(e: Explanation, groups: Sequence[Group]) -> Explanation:
-    """The explanation with other names for its terms."""
+def called(e: Explanation, known: Explanation) -> Explanation:
+    """The explanation with its curves called what they are in a known one."""
+    names = {curve(t.candidate): t.group for t in known.terms}
+    groups = [names.get(curve(t.candidate), t.group) for t in e.terms]
     candidates = [replace(t.candidate, kind=kind, where=where) for t, (kind, where) in zip(e.terms, groups)]
     return replace(e, terms=tuple(replace(t, candidate=c) for t, c in zip(e.terms, candidates)))
 
