@@ -463,6 +463,19 @@ def test_hidden_cause(tmp_path, model, kind, show):
     assert set(extended.parameters) >= set(model.parameters)
 
 
+def test_a_play_off_the_middle_has_two_halves(tmp_path, model):
+    """3 mm to one side and 1 mm to the other, of all of the spring: the gap is both together, and the law foretells."""
+    paths = [record(tmp_path / f"{n}.csv", road(n), drive(road(n), lambda s, v: -C * np.clip(s, -1e-3, 3e-3)), n + 10) for n in (5, 6)]
+    found = diagnosis.diagnose(model, load(paths[:1], model), load(paths[1:], model), tmp_path / "out")
+    (cause,) = found.causes
+    gap = cause.parameters["gap"]
+    assert cause.kind == "backlash" and gap.value == pytest.approx(4e-3, rel=0.02) and gap.ci95[1] - gap.ci95[0] < 0.05 * gap.value
+    halves = penode_gen.load(tmp_path / "out" / "model_extended.toml").elements[-2:]
+    assert all(e.law == "expression" and e.expression.startswith("c*") for e in halves)
+    for name, gain in found.gain.items():
+        assert gain.after_rmse < 1.05 * NOISE[name], name
+
+
 def test_what_is_foretold_is_as_good_as_the_true_law(tmp_path, model):
     """A damping force that grows like no law on the list, large against the noise: its name needs fewer laws than its
     curve. Measure is the same C with the law that the plant has. The laws that name it leave 14 % more than that in a_wheel: 8 % are

@@ -84,7 +84,8 @@ def element(term: Term, place: Place, name: str, model: Model) -> tuple[Element,
     if what.law in LAWS:
         arguments = {key: f"{name}_{key}" for key in LAWS[what.law].arguments} | ({gain: term.own} if term.own else {})
         return Element(name, place.ends, what.law, arguments), parameters, free
-    text = re.sub(rf"\b({'|'.join((gain, *what.shapes, *what.fixed))})\b", lambda m: f"{name}_{m[1]}", what.law)
+    known = {gain: term.own} if term.own else {}
+    text = re.sub(rf"\b({'|'.join((gain, *what.shapes, *what.fixed))})\b", lambda m: known.get(m[1], f"{name}_{m[1]}"), what.law)
     return Element(name, place.ends, "expression", expression=text), parameters, free
 
 

@@ -165,6 +165,8 @@ def bent(x: Array, knee: float) -> Array:
     return knee * (np.logaddexp(0.0, 2.0 * x / knee) - np.log(2.0)) - x
 
 
+HALVES = ("k*(max(s - gap, 0) - max(s, 0))", "k*(min(s + gap, 0) - min(s, 0))")  # of a play: what it takes of a spring to either side
+
 GAPS = (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5)
 GRID = (0.03, 0.06, 0.12, 0.25, 0.5)
 
@@ -373,7 +375,7 @@ def _force_laws(
     for w in GAPS:
         g = w * reach
         yield law("backlash", "backlash", k, {"gap": (g, "m")}, 1, lambda s, v, t: -np.clip(s, -g, g))
-        for side, text in ((1, "k*(max(s - gap, 0) - max(s, 0))"), (-1, "k*(min(s + gap, 0) - min(s, 0))")):
+        for side, text in zip((1, -1), HALVES):
             yield law("backlash", text, ("k", "N/m"), {"gap": (g, "m")}, 1, lambda s, v, t: -side * np.clip(side * s, 0.0, g), True)
 
 

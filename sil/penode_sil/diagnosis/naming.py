@@ -19,7 +19,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from .build import Term
-from .hypotheses import STRIBECK, Basis, Fault, lag, size, warm
+from .hypotheses import HALVES, STRIBECK, Basis, Fault, lag, size, warm
 from .plant import Place
 from .fit import Fit
 from .result import Value
@@ -298,6 +298,9 @@ def functions(
 
             return {"gap": ("m", lambda p: p[f"{n}_gap"]), "stiffness": ("N/m", stiffness)}
         case "backlash":
+            halves = [n for t, n in zip(terms, names) if t.own and t.candidate.what.law in HALVES]
+            if len(halves) == 2:
+                return {"gap": ("m", lambda p: sum(p[f"{n}_gap"] for n in halves))}
             main = max(having(terms, "gap", "presliding"), key=lambda i: terms[i].gain)
             n, slack = names[main], terms[main].candidate.what.law == "slack_friction"
             return {"gap": ("m", lambda p: 1.4 * p[f"{n}_presliding"] if slack else 2.0 * p[f"{n}_gap"])}

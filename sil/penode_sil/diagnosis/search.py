@@ -16,7 +16,7 @@ import numpy as np
 
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
-from .hypotheses import BENDS, CLOCK, KNEE, STRIBECK, VALUED, Basis, Fault
+from .hypotheses import BENDS, CLOCK, HALVES, KNEE, STRIBECK, VALUED, Basis, Fault
 from .naming import christened, straight
 from .noise import ALIKE, kinship
 from .score import DAMPINGS, Candidate, Regression
@@ -64,6 +64,7 @@ TAKING = {  # laws that take an element away: its law and argument
     "backlash": ("linear_spring", "stiffness"),
     "liftoff": ("linear_spring", "stiffness"),
     "loose_damper": ("linear_damper", "damping"),
+    **dict.fromkeys(HALVES, ("linear_spring", "stiffness")),
 }
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK)  # a formula after all
@@ -623,13 +624,32 @@ def unbent(study: Study, e: Explanation, log) -> Explanation:
 
 def owned(study: Study, e: Explanation, log) -> Explanation:
     """The explanation with laws that take away all of an element, where they do as well as with a share of it: else how
-    wide a play is would be known no better than how much it takes."""
-    terms = [whole(study, t) or t for t in e.terms]
-    if terms == list(e.terms):
-        return e
-    tied = explain(study, terms, start=e.fit, formulas=e.formulas)
-    log(f"  all of an element: {tied.gain:.0f} for {e.gain:.0f}")
-    return tied if tied.groups == e.groups and tied.score > e.score else e
+    wide a play is would be known no better than how much it takes. A play that is not in the middle has two halves."""
+    best = e
+    for terms in ([t if t.candidate.companion else whole(study, t) or t for t in e.terms], halved(study, e)):
+        if terms != list(e.terms):
+            tied = explain(study, terms, start=e.fit, formulas=e.formulas)
+            log(f"  all of an element: {tied.gain:.0f} for {e.gain:.0f}")
+            best = tied if tied.groups == e.groups and tied.score > best.score else best
+    return best
+
+
+def halved(study: Study, e: Explanation) -> list[Term]:
+    """The terms with two halves, each of which takes away all of a spring, for a play with one half beside it."""
+    terms = list(e.terms)
+    for group in [g for g in e.groups if g[0] == "backlash"]:
+        laws = {_law(t.candidate): t for t in terms if t.group == group}
+        play, beside = laws.get("backlash"), [law for law in HALVES if law in laws]
+        if play is not None and len(laws) == 2 and len(beside) == 1:
+            half = laws[beside[0]]
+            gap, more = (t.candidate.what.shapes["gap"][0] for t in (play, half))
+            gaps = {law: gap + (half.gain / play.gain * more if law in beside else 0.0) for law in HALVES}
+            basis = play.candidate.what
+            kinds = [replace(basis, law=law, gain=half.candidate.what.gain, shapes={"gap": (x, "m")}) for law, x in gaps.items()]
+            both = [whole(study, replace(play, own="", candidate=replace(play.candidate, what=kind))) for kind in kinds]
+            if all(both):
+                terms = [*(t for t in terms if t.group != group), *both]
+    return terms
 
 
 def whole(study: Study, t: Term) -> Term | None:
