@@ -293,7 +293,7 @@ def _check_result(causal: Causal) -> None:
     known |= {ex.symbol(p) for p in model.parameters}
     for section, found in (("outputs", causal.outputs), ("sensors", causal.sensors)):
         for signal, value in zip(getattr(model, section), found):
-            value = value.subs({ex.derivative(q.name): v for q, v in causal.kinematics.items()})
+            value = value.xreplace({ex.derivative(q.name): v for q, v in causal.kinematics.items()})
             for missing in sorted(s.name for s in value.free_symbols - known):
                 problems.append(((section, signal.name), f"'{missing}' is not computed by the model", "add an equation for it"))
             if value.atoms(AppliedUndef):

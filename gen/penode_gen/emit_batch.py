@@ -12,7 +12,7 @@ import sympy as sp
 from . import expressions as ex
 from . import sets
 from .c_text import Printer, fold, real
-from .causalise import Step
+from .causalise import Causal, Step
 from .emit_c import _RUNGE_KUTTA, _TEMPLATES, VERSION, _Emitter, _NetworkCode
 from .model import Model
 from .networks import Affine, Dense, Layer
@@ -29,9 +29,10 @@ class BatchCode:
     parameters: tuple[tuple[str, bool], ...]
 
 
-def render_batch(model: Model) -> BatchCode:
-    """The batch C of a model: to be compiled with sil/firmware/pen_lanes.h beside the runtime."""
-    emitter = _LaneEmitter(model)
+def render_batch(model: Model, causal: Causal | None = None) -> BatchCode:
+    """The batch C of a model: to be compiled with sil/firmware/pen_lanes.h beside the runtime. `causal`: its equations in
+    order, where they are known already."""
+    emitter = _LaneEmitter(model, causal)
     text = fold(_TEMPLATES.get_template("batch.c.j2").render(emitter.context()))
     return BatchCode(text, tuple(emitter.taken))
 
@@ -54,8 +55,8 @@ class _LanePrinter(Printer):
 
 
 class _LaneEmitter(_Emitter):
-    def __init__(self, model: Model):
-        super().__init__(model)
+    def __init__(self, model: Model, causal: Causal | None = None):
+        super().__init__(model, causal)
         self.weights_at = self.at
         self.folded = [(user, code) for code in self.networks if code.folded for user in code.users]
         self.taken: list[tuple[str, bool]] = [(p.name, False) for p in model.tunable]

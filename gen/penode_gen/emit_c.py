@@ -131,9 +131,9 @@ class _NetworkCode:
 
 
 class _Emitter:
-    def __init__(self, model: Model):
+    def __init__(self, model: Model, causal: Causal | None = None):
         self.model = model
-        self.causal: Causal = causalise(model)
+        self.causal: Causal = causal or causalise(model)
         first = model.sets.get("default")
         straight = [n for n, net in (first.networks if first else {}).items() if net.is_piecewise_linear and model.outside != "fade"]
         self.derivatives = Derivatives(self.causal, frozenset(straight))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 import re
+import unicodedata
 import warnings
 from collections.abc import Collection
+from functools import cache, lru_cache
 
 import sympy as sp
 
@@ -13,6 +15,7 @@ _LARGEST = 3.4e38  # what a float holds, and the least it holds with all its dig
 _LEAST = 1.2e-38
 _LONGEST = 2000  # characters of an expression
 _HIGHEST = 8  # power
+_KEPT = 4096  # parsed expressions: models that differ in one element share all the others
 
 
 class ExpressionError(ValueError):
@@ -85,6 +88,7 @@ class Absolute(sp.Function):
         return Sign(self.args[0])
 
 
+@cache
 def symbol(name: str) -> sp.Symbol:
     """The one real symbol of that name."""
     return sp.Symbol(name, real=True)
@@ -132,7 +136,15 @@ def parse(text: str, names: Collection[str], networks: dict[str, int], moving: C
     Parse `text`. Known: numbers, `names`, + - * / ^, der(name) of `moving` names, where(a < b, x, y), FUNCTIONS, and
     `networks` with their number of inputs. Raises ExpressionError.
     """
-    text = text.strip()
+    words = re.findall(r"\w+", unicodedata.normalize("NFKC", text))  # as Python reads names
+    known, moved = (frozenset(w for w in words if w in some) for some in (names, moving))
+    return _parse(text.strip(), known, frozenset(networks.items()), moved)
+
+
+@lru_cache(_KEPT)
+def _parse(text: str, names: frozenset[str], calls: frozenset[tuple[str, int]], moving: frozenset[str]) -> sp.Expr:
+    """The same of those names that the text has."""
+    networks = dict(calls)
     shown = text if len(text) <= 60 else f"{text[:57]}..."
 
     def refuse(what: str) -> ExpressionError:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import penode_gen
+from penode_gen.causalise import Causal
 from penode_gen.emit_batch import BatchCode, render_batch
 
 from .errors import UserError
@@ -62,11 +63,11 @@ class _Job(ctypes.Structure):
 class Batch:
     """A model's batch library, compiled for this processor; `lanes` runs go at once. Without `exact` sums and products
     may be fused and put in another order, and subnormal numbers are 0: in about half of the time, but other bits than
-    NAME_step has, and other ones from machine to machine. For fits."""
+    NAME_step has, and other ones from machine to machine. For fits. `causal`: see render_batch."""
 
-    def __init__(self, model: penode_gen.Model, dtype: type = np.float64, exact: bool = True):
+    def __init__(self, model: penode_gen.Model, dtype: type = np.float64, exact: bool = True, causal: Causal | None = None):
         self.model, self.dtype, self.exact = model, dtype, exact
-        self._code = render_batch(model)
+        self._code = render_batch(model, causal)
         self._libraries: dict[bool, ctypes.CDLL] = {}
         self.lanes = ctypes.c_size_t.in_dll(self._library(False), "batch_lanes").value
 

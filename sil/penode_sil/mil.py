@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DOP853, LSODA
 
 import penode_gen
 
@@ -97,6 +96,8 @@ def solve(
     progress: Progress = lambda t: None,
 ) -> Trajectory:
     """Exact states, outputs and sensors of one instance at `times` [s] (increasing, within 0..duration)."""
+    from scipy.integrate import DOP853, LSODA  # here, for other commands need not wait for it
+
     signals = tuple(inputs[signal.name] for signal in model.inputs)
     knots = {knot for signal in signals for knot in signal.knots()}
     equations = {name: penode_gen.numeric(model, name) for name in model.sets}

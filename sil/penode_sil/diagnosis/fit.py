@@ -18,7 +18,7 @@ from scipy import fft
 from scipy.interpolate import CubicSpline
 
 from penode_gen import fold
-from penode_gen.causalise import causalise
+from penode_gen.causalise import Causal, causalise
 from penode_gen.model import Model
 
 from ..batch import Batch
@@ -129,7 +129,7 @@ class Problem:
         substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / least - 1e-6)), -(-model.substeps // self.fine))
         way = "parabola" if close else "linear"
         exact = replace(_folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
-        self.batch = _compiled(anonymous(exact))
+        self.batch = _compiled(anonymous(exact), _ordered(model)[0])
         self.inputs = [e.drive if close else _drive(e, self.fine) for e in experiments]
 
     def simulate(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array]:
@@ -295,7 +295,7 @@ def _folded(model: Model) -> Model:
 
 
 _BATCHES: dict[tuple[object, ...], Batch] = {}
-_MOVING: dict[tuple[object, ...], bool] = {}
+_ORDERED: dict[tuple[object, ...], tuple[Causal, bool]] = {}
 
 
 def _structure(model: Model) -> tuple[object, ...]:
@@ -306,18 +306,23 @@ def _structure(model: Model) -> tuple[object, ...]:
 
 def moving(model: Model) -> bool:
     """Does anything in it depend on the rate of an input?"""
+    return _ordered(model)[1]
+
+
+def _ordered(model: Model) -> tuple[Causal, bool]:
+    """The equations of a model in order, which no method of integration changes, and whether anything depends on the rate of an input."""
     key = _structure(model)
-    if key not in _MOVING:
+    if key not in _ORDERED:
         causal = causalise(replace(model, interpolation="linear"))
-        _MOVING[key] = causal.uses([*causal.rates, *causal.outputs, *causal.sensors], causal.input_rates)
-    return _MOVING[key]
+        _ORDERED[key] = causal, causal.uses([*causal.rates, *causal.outputs, *causal.sensors], causal.input_rates)
+    return _ORDERED[key]
 
 
-def _compiled(model: Model) -> Batch:
-    """The batch library of a model."""
+def _compiled(model: Model, causal: Causal) -> Batch:
+    """The batch library of a model with the equations `causal`."""
     key = _structure(model)
     if key not in _BATCHES:
-        _BATCHES[key] = Batch(model, exact=False)
+        _BATCHES[key] = Batch(model, exact=False, causal=replace(causal, model=model))
     found = copy(_BATCHES[key])
     found.model = model
     return found
