@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import extension, hypotheses, naming, noise, plant, score, search, study
+from penode_sil.diagnosis import extension, hypotheses, naming, noise, plant, score, search, steady, study
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.engine import experiment
 from penode_sil.diagnosis.fit import Problem
@@ -64,14 +64,16 @@ def road(seed: int) -> np.ndarray:
     return 0.006 * z / np.std(z) * np.minimum(np.arange(SAMPLES) * STEP, 1.0) ** 2
 
 
-def drive(z: np.ndarray, force, mass: float = M_B, load: float = 0.0) -> dict[str, np.ndarray]:
-    """Sensors without noise of a quarter vehicle with an extra force(s, v) in its suspension and a load on its body, by SciPy."""
+def drive(z: np.ndarray, force, mass: float = M_B, load: float = 0.0, stiffer: float = 0.0) -> dict[str, np.ndarray]:
+    """Sensors without noise of a quarter vehicle with an extra force(s, v) in its suspension and a load on its body, by SciPy. Within
+    half a second in the middle its spring gets stiffer, by a share."""
     t = np.arange(SAMPLES) * STEP
     spline = CubicSpline(t, z)
 
     def rates(time: float, x: np.ndarray) -> list[float]:
         s, v = x[0] - x[1], x[2] - x[3]
-        pull = C * s + D * v + force(s, v)
+        raised = 1.0 + stiffer * np.clip((time - 0.5 * t[-1]) / 0.5, 0.0, 1.0)
+        pull = C * raised * s + D * v + force(s, v)
         return [x[2], x[3], (load - pull) / mass, (pull - C_T * (x[1] - spline(time))) / M_W]
 
     x = solve_ivp(rates, (0.0, t[-1]), np.zeros(4), method="RK45", rtol=1e-7, atol=1e-10, max_step=STEP, t_eval=t).y
@@ -604,6 +606,22 @@ def test_clocks_that_drift_apart_are_on_no_list(tmp_path, model):
     assert [c.kind for c in found.causes] == ["outside_taxonomy"] and found.verdict == "unexplained"
     (said,) = [n for n in found.notes if "clocks" in n]
     assert float(said.split(" by ")[1].split(" ppm")[0]) == pytest.approx(100.0, rel=0.03)
+
+
+def test_a_spring_that_gets_stiffer_is_on_no_list(tmp_path, model):
+    """By 3 % while it drives: constant laws that fit see nothing of it, since on the mean it is within the tolerance."""
+    z = road(6)
+    sensors = drive(z, lambda s, v: 0.0, stiffer=0.03)
+    found = diagnosis.diagnose(model, load([record(tmp_path / "levelled.csv", z, sensors, 16)], model))
+    assert [c.kind for c in found.causes] == ["outside_taxonomy"] and found.verdict == "unexplained"
+    assert any("stiffness of spring changes" in n for n in found.notes)
+
+
+def test_noise_does_not_change_a_vehicle(model, sound):
+    own, _ = study.begin(model, [experiment(m, model) for m in sound])
+    seen = study.look(own, own.null)
+    found = steady.change(own, own.null, seen)
+    assert found.surprise < 10.0  # chance of e^-10, of four that are looked at
 
 
 def test_a_start_in_motion_is_the_start(tmp_path):

@@ -20,7 +20,7 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
-from . import absorb, extension, nameless, naming, noise, plausible, residual, search
+from . import absorb, extension, nameless, naming, noise, plausible, residual, search, steady
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
@@ -33,7 +33,8 @@ FAR = 3, 20.0  # or so many that are as many standard deviations of its noise of
 ENDS = 2.0  # samples by which the ends of a hole may be wrong
 WILD = 2.0  # standard deviations of the noise that bursts have together: one sample in nine that is far out
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
-PATCHED = 0.985  # share that several causes must take away if sensors still share a residual
+CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
+PATCHED = 0.985  # share that several causes must take away if sensors still share a residual, and any cause if something still changes
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
@@ -110,12 +111,17 @@ def diagnose(
     log(f"kinship {kinship:.1f}, shared {shared:.0f}")
     tone = noise.tone(study.experiments, best.fit.simulated if best else study.null.simulated)
     log(str(tone))
-    causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.purity > noise.PURE)
+    change = steady.change(study, best.fit if best else study.null, study.seen)
+    log(str(change))
+    changed = change.gain if change.surprise > -np.log(CHANGING) else 0.0
+    causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.purity > noise.PURE, changed)
     if doubt := plausible.doubt(study, best, verdict):
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
     notes: list[str] = []
+    if changed and verdict == "unexplained":
+        notes.append(f"{change.what} of {change.place} changes while it is measured: a controller, a leak?")
     if tone.purity > noise.PURE:
         notes.append(f"{model.sensors[tone.sensor].name} has a tone of its own at {tone.frequency:.0f} Hz: an engine, a wheel, the mains?")
     drift = sum(t.gain for t in best.terms if t.candidate.kind == CLOCK) if best else 0.0
@@ -300,25 +306,25 @@ def broken_sensors(
 
 
 def judge(
-    study: Study, explanations: Sequence[Explanation], faults: list[Cause], alike: float, shared: float, pure: bool
+    study: Study, explanations: Sequence[Explanation], faults: list[Cause], alike: float, shared: float, pure: bool, changed: float = 0.0
 ) -> tuple[tuple[Cause, ...], str, float, float]:
     """Causes, verdict, share explained, and the evidence that there is anything at all; `alike`, `shared`: see
-    noise.kinship; `pure`: a tone is left."""
+    noise.kinship; `pure`: a tone is left; `changed`: chi2 of what changes with time, if that is beyond chance."""
     rows = search.rows(study)
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)
     if not explanations:
-        if evidence > DOUBT and excess > 0.15 * rows or alike > noise.ALIKE or pure:
+        if evidence > DOUBT and excess > 0.15 * rows or alike > noise.ALIKE or pure or changed:
             return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0, evidence
         verdict = "explained" if faults else "not_identifiable" if evidence > DOUBT else "no_discrepancy"
         return tuple(faults), verdict, 1.0, evidence
     best = explanations[0]
-    left = max(best.fit.chi2 - rows, shared if alike > noise.ALIKE else 0.0, 0.0)  # in the noise that the best explanation leaves
+    left = max(best.fit.chi2 - rows, shared if alike > noise.ALIKE else 0.0, changed)  # in the noise that the best explanation leaves
     gained = study.null.cost - best.fit.cost
     share = gained / (gained + left) if gained + left > 0.0 else 1.0
     if share < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > noise.ALIKE):
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
-    if len(best.groups) > 1 and share < PATCHED and alike > noise.ALIKE:  # several causes, and still no whole: a patchwork
+    if share < PATCHED and (len(best.groups) > 1 and alike > noise.ALIKE or changed):  # several causes, and still no whole: a patchwork
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
     if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < search.FILTER * best.gain:

@@ -401,12 +401,12 @@ def tone(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> Tone:
     found = [Tone()]
     for e, z in zip(experiments, simulated):
         second = int(round(1.0 / e.step))  # samples
-        if 0.4 * second >= 6 * HALF and len(e.time) >= 3 * second and not _swept(e.u, e.step):
+        if 0.4 * second >= 6 * HALF and len(e.time) >= 3 * second and not swept(e.u, e.step):
             found += _tones(np.where(e.good, e.y - z, 0.0), e.step)
     return max(found, key=lambda t: t.purity)
 
 
-def _swept(inputs: Array, step: float) -> bool:
+def swept(inputs: Array, step: float) -> bool:
     """Is an input [n, any] a sine, most of the time, though one whose frequency may change?"""
     size = int(round(1.0 / step))
     window = np.hanning(size)[:, None]
