@@ -43,8 +43,8 @@ def values(monkeypatch):
     return said
 
 
-def judged(*explanations, study=STUDY, faults=(), alike=0.0, shared=0.0, pure=False):
-    causes, verdict, _, _ = engine.judge(study, explanations, list(faults), alike, shared, pure)
+def judged(*explanations, study=STUDY, faults=(), alike=0.0, shared=0.0, pure=False, changed=0.0):
+    causes, verdict, _, _ = engine.judge(study, explanations, list(faults), alike, shared, pure, changed)
     return [c.kind for c in causes], verdict
 
 
@@ -92,6 +92,14 @@ def test_what_sensors_share_is_no_noise(values):
     patchwork = found(("bump_stop", "spring"), ("quadratic_damper", "damper"))
     assert judged(patchwork, alike=noise.ALIKE + 0.1, shared=0.02 * 4.0 * ROWS) == OUT
     assert judged(patchwork, alike=noise.ALIKE + 0.1, shared=0.01 * 4.0 * ROWS)[1] == "explained"
+
+
+def test_what_changes_is_no_small_part_of_the_whole(values):
+    """Beside nothing it is on no list; beside a cause only if it takes more than a patchwork may leave."""
+    gained = 4.0 * ROWS
+    assert judged(study=QUIET, changed=60.0) == OUT
+    assert judged(found(("bump_stop", "spring")), changed=0.02 * gained) == OUT
+    assert judged(found(("bump_stop", "spring")), changed=0.01 * gained) == (["bump_stop"], "explained")
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,16 @@ def test_friction_that_falls_is_stribecks(rise, width, kind):
     assert named(naming._friction, law) == kind
 
 
+def test_a_little_that_yields_is_no_hysteresis():
+    """Where an element yields far with a fifth of its friction it is friction; where all of it does, hysteresis."""
+    stiff = ("coulomb_friction", "coulomb_friction", "force", {"force": 20.0, "transition": 1e-3})
+    yielding = lambda force: ("bouc_wen", "bouc_wen", "force", {"force": force, "presliding": 0.003})
+    assert named(naming._friction, stiff, yielding(5.0)) == "coulomb_friction"
+    assert named(naming._friction, yielding(5.0)) == "bouc_wen"
+    hump = ("coulomb_friction", HUMP, "k", {"k": 20.0, "width": 0.5})  # friction of a gain of its own counts as well
+    assert named(naming._friction, hump, yielding(5.0)) != "bouc_wen"
+
+
 def test_friction_that_rises_again_is_still_stribecks():
     """Friction that falls by two thirds, with what a damper adds at the rates that are reached."""
     falling = ("stribeck_friction", STRIBECK, "force", {"force": 6.0, "knee": 1e-3, "width": 0.05, "rise": 2.0})

@@ -319,12 +319,13 @@ def judge(
         verdict = "explained" if faults else "not_identifiable" if evidence > DOUBT else "no_discrepancy"
         return tuple(faults), verdict, 1.0, evidence
     best = explanations[0]
-    left = max(best.fit.chi2 - rows, shared if alike > noise.ALIKE else 0.0, changed)  # in the noise that the best explanation leaves
+    left = max(best.fit.chi2 - rows, shared if alike > noise.ALIKE else 0.0, 0.0)  # in the noise that the best explanation leaves
     gained = study.null.cost - best.fit.cost
     share = gained / (gained + left) if gained + left > 0.0 else 1.0
     if share < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > noise.ALIKE):
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
-    if share < PATCHED and (len(best.groups) > 1 and alike > noise.ALIKE or changed):  # several causes, and still no whole: a patchwork
+    patched = len(best.groups) > 1 and share < PATCHED and alike > noise.ALIKE  # several causes, and still no whole
+    if patched or changed > (1.0 - PATCHED) * gained:
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
     if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < search.FILTER * best.gain:

@@ -64,15 +64,11 @@ def christened(terms: Sequence[Term], names: Sequence[str], fit: Fit, study: Stu
 
 
 def _friction(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
-    force = travel = 0.0
-    for term, name in zip(terms, names):
-        if term.candidate.what.gain[0] == "force":
-            gain = values[f"{name}_force"]
-            force += gain
-            travel += gain * values.get(f"{name}_presliding", 0.0)
+    own = [name for term, name in zip(terms, names) if term.candidate.what.gain[0] == "force"]
+    travel = sum(values[f"{name}_force"] * values.get(f"{name}_presliding", 0.0) for name in own)
     v = np.geomspace(0.004 * speed, speed, 200)
     f = Curve(terms, names)(np.zeros_like(v), v, values)
-    if travel > ELASTIC * reach * force:
+    if travel > ELASTIC * reach * np.max(f):
         return "bouc_wen"
     if not travel and np.interp(0.05 * speed, v, f) < STEP * np.max(f):
         return "degressive_damper"

@@ -37,6 +37,7 @@ CURVES = {  # kinds of one family at one place are one curve with one name
     "network_extrapolation": "spring",
     "tyre_nonlinear": "tyre", "tyre_liftoff": "tyre",
 }  # fmt: skip
+MEMORY = {"bouc_wen", "damper_fading", "backlash"}  # of such a kind is a curve with memory, whatever is beside it
 FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
 KEPT = 0.5  # of what a regression promises: a fit that keeps less than that of it began in the wrong place
@@ -292,7 +293,8 @@ def refine(
         for group in e.groups:
             if group[0] != "hidden_resonance" and sum(t.group == group for t in e.terms) < room(group[0]) + 1:
                 own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
-                pool = [k for k in family(study, r, [group]) if _fault(r.candidates[k]) not in own]
+                mixed = [k for k in family(study, r, [group]) if r.candidates[k].kind == group[0] or not MEMORY & {r.candidates[k].kind, group[0]}]
+                pool = [k for k in mixed if _fault(r.candidates[k]) not in own]
                 gain, chosen = pursue(r, pool, terms=1, alone=group[0] != "sensor_bias")
                 if chosen and gain > max(cost(r.candidates[chosen[0]]), 2e-3 * e.gain) and (best is None or gain > best[0]):
                     best = gain, chosen[0], r.gain(chosen)[1][0]
@@ -502,6 +504,11 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
                 e = explain(here, e.terms, 4, e.fit, e.formulas)
             e = e.whole()
             e, r = refine(here, e, regression(here, e.fit, parameters), parameters)
+            if any(kind == "backlash" for kind, _ in e.groups):  # else another cause may come in for what two halves of a play do
+                tied = owned(here, e, log)
+                if tied is not e:
+                    e = tied.whole()
+                    r = regression(here, e.fit, parameters)
             done.append(e)
             log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f} {[_law(t.candidate) for t in e.terms]}")
             if second := filtered(here, e, r):
@@ -640,7 +647,7 @@ def halved(study: Study, e: Explanation) -> list[Term]:
     for group in [g for g in e.groups if g[0] == "backlash"]:
         laws = {_law(t.candidate): t for t in terms if t.group == group}
         play, beside = laws.get("backlash"), [law for law in HALVES if law in laws]
-        if play is not None and len(laws) == 2 and len(beside) == 1:
+        if play is not None and len(beside) == 1:
             half = laws[beside[0]]
             gap, more = (t.candidate.what.shapes["gap"][0] for t in (play, half))
             gaps = {law: gap + (half.gain / play.gain * more if law in beside else 0.0) for law in HALVES}
