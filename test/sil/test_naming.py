@@ -53,13 +53,6 @@ def test_a_little_that_yields_is_no_hysteresis():
     assert named(naming._friction, hump, yielding(5.0)) != "bouc_wen"
 
 
-def test_friction_that_rises_again_is_still_stribecks():
-    """Friction that falls by two thirds, with what a damper adds at the rates that are reached."""
-    falling = ("stribeck_friction", STRIBECK, "force", {"force": 6.0, "knee": 1e-3, "width": 0.05, "rise": 2.0})
-    rising = ("stribeck_friction", HUMP, "k", {"k": 25.0, "width": 1.0})
-    assert named(naming._friction, falling, rising) == "stribeck_friction"
-
-
 @pytest.mark.parametrize("width, kind", [(0.02, "stribeck_friction"), (0.25, "degressive_damper")])
 def test_friction_is_there_at_once(width, kind):
     """A force that comes with the rate, as that of a damper, and goes again is no friction: at a twentieth of the rates a width of

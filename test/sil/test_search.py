@@ -13,7 +13,7 @@ from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.score import Candidate, Regression
 from penode_sil.diagnosis.search import (
-    NEW, PART, Explanation, acting, called, distinct, elsewhere, heavy, hopeful, pursue, sprung, strongest, sufficient, terms_of,
+    NEW, PART, Explanation, acting, called, distinct, elsewhere, heavy, hopeful, pursue, spared, sprung, strongest, sufficient, terms_of,
 )  # fmt: skip
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
@@ -61,6 +61,15 @@ def test_form_is_a_part_of_what_formulas_leave():
     alone, both = explanation("constant_force", gain=150_000.0), explanation("constant_force", "tyre_liftoff", gain=151_000.0, formulas=150_000.0)
     assert 900.0 < both.score - alone.score < 950.0  # 50 for the kind, 10 for its number, and thousandths of 1 000
     assert explanation("constant_force", "tyre_liftoff", gain=151_000.0).score < alone.score + 800.0
+
+
+def test_a_formula_that_came_first_does_not_count():
+    """A bushing takes as much alone as with a mass, which is a formula and was there first: the bushing needs no mass."""
+    alone = explanation("maxwell_bushing", gain=370_534.0)
+    both = explanation("hidden_resonance", "maxwell_bushing", gain=370_544.0, formulas=366_787.0)
+    assert alone.score < both.score
+    one, two = spared([alone, both])
+    assert one.score > two.score == both.score
 
 
 def test_a_second_mass_pays_as_a_form():

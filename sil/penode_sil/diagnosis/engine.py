@@ -113,7 +113,8 @@ def diagnose(
     log(str(tone))
     change = steady.change(study, best.fit if best else study.null, study.seen)
     log(str(change))
-    changed = change.gain if change.surprise > -np.log(CHANGING) else 0.0
+    fades = best is not None and any(kind == "damper_fading" for kind, _ in best.groups)  # which changes by its nature
+    changed = change.gain if change.surprise > -np.log(CHANGING) and not fades else 0.0
     causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.purity > noise.PURE, changed)
     if doubt := plausible.doubt(study, best, verdict):
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"

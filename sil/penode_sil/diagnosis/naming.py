@@ -39,7 +39,7 @@ UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that make
 EDGE = 0.15  # of the reach: a stop or a loss of contact that begins nearer than that to the middle is an element that bends there
 STRAIGHT = 0.02  # of the straight part of a curve: less than that beside it, and it is a straight line
 FLAT = 0.015  # of what a tyre lacks when stretched: bent by less than that when pressed in, it only loses contact
-PEAK = 1.2  # friction at low rates over that at higher ones that makes it Stribeck's, though it may rise again
+PEAK = 1.2  # friction at low rates over that at high ones that makes it Stribeck's
 STEP = 0.5  # of its greatest force, that friction without memory has at a twentieth of the rates: with less, it is a damper
 Array = NDArray[np.float64]
 Values = Mapping[object, float]
@@ -72,7 +72,7 @@ def _friction(terms: Sequence[Term], names: Sequence[str], values: Values, reach
         return "bouc_wen"
     if not travel and np.interp(0.05 * speed, v, f) < STEP * np.max(f):
         return "degressive_damper"
-    return "stribeck_friction" if np.any(np.maximum.accumulate(f) > PEAK * f) else "coulomb_friction"
+    return "stribeck_friction" if np.max(f) > PEAK * f[-1] else "coulomb_friction"
 
 
 def _damper(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:

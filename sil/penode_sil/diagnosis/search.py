@@ -17,7 +17,7 @@ import numpy as np
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
 from .hypotheses import BENDS, CLOCK, HALVES, KNEE, STRIBECK, VALUED, Basis, Fault
-from .naming import christened, straight
+from .naming import DAMPERS, FRICTION, christened, straight
 from .noise import ALIKE, kinship
 from .score import DAMPINGS, Candidate, Regression
 from .study import Study, heard, loss, regression, requieted
@@ -37,7 +37,7 @@ CURVES = {  # kinds of one family at one place are one curve with one name
     "network_extrapolation": "spring",
     "tyre_nonlinear": "tyre", "tyre_liftoff": "tyre",
 }  # fmt: skip
-MEMORY = {"bouc_wen", "damper_fading", "backlash"}  # of such a kind is a curve with memory, whatever is beside it
+SHAPED = {*FRICTION[:2], *DAMPERS}  # kinds whose names follow from the shape of a curve alone, whatever laws it is made of
 FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
 KEPT = 0.5  # of what a regression promises: a fit that keeps less than that of it began in the wrong place
@@ -293,8 +293,8 @@ def refine(
         for group in e.groups:
             if group[0] != "hidden_resonance" and sum(t.group == group for t in e.terms) < room(group[0]) + 1:
                 own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
-                mixed = [k for k in family(study, r, [group]) if r.candidates[k].kind == group[0] or not MEMORY & {r.candidates[k].kind, group[0]}]
-                pool = [k for k in mixed if _fault(r.candidates[k]) not in own]
+                laws = family(study, r, [group]) if group[0] in SHAPED else pools(r).get(group, [])
+                pool = [k for k in laws if r.candidates[k].kind in {group[0], *SHAPED} and _fault(r.candidates[k]) not in own]
                 gain, chosen = pursue(r, pool, terms=1, alone=group[0] != "sensor_bias")
                 if chosen and gain > max(cost(r.candidates[chosen[0]]), 2e-3 * e.gain) and (best is None or gain > best[0]):
                     best = gain, chosen[0], r.gain(chosen)[1][0]
@@ -527,7 +527,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
         if not grown:
             break
         beam = sorted(grown, key=lambda e: -e.score)
-    done = sorted((e for e in done if e.score > 0.0), key=lambda e: -e.score)
+    done = sorted((e for e in spared(done) if e.score > 0.0), key=lambda e: -e.score)
     if done:
         study = requieted(study, done[0].fit)
     if done and len(done[0].groups) > 1:
@@ -545,6 +545,13 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
     alike = equals(study, best, parameters, log)
     swapped = max([best, *alike], key=lambda e: e.score)
     return study, [swapped if swapped is best else settled(study, swapped), *([] if swapped is best else [best]), *done[1:], *alike]
+
+
+def spared(found: Sequence[Explanation]) -> list[Explanation]:
+    """Explanations with the gain by formulas of those that have more causes beside the same: what a formula takes there leaves no form
+    here either, and in which order causes came in does not count."""
+    most = {frozenset(e.groups): max(o.formulas for o in found if set(e.groups) <= set(o.groups)) for e in found}
+    return [replace(e, formulas=most[frozenset(e.groups)]) for e in found]
 
 
 def level(found: Sequence[Explanation]) -> list[Explanation]:
