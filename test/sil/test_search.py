@@ -4,16 +4,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from penode_sil.diagnosis.build import Term
-from penode_sil.diagnosis.hypotheses import Basis
+from penode_sil.diagnosis.hypotheses import HALVES, Basis
 from penode_sil.diagnosis.score import Candidate, Regression
 from penode_sil.diagnosis.search import (
-    NEW, PART, Explanation, acting, called, distinct, elsewhere, heavy, hopeful, pursue, spared, sprung, strongest, sufficient, terms_of,
+    NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, pursue, spared, sprung, strongest, sufficient, terms_of,
 )  # fmt: skip
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
@@ -107,6 +108,21 @@ def test_a_parameter_that_another_one_does_without_goes(deviations, left):
 def test_the_strongest_other_kind_counts_what_is_taken():
     r = regression([1.0, 0.0], [1.0, 1.0], [30.0, 10.0])
     assert strongest(r, [("hidden_resonance", "body")]) == [0, 1] and strongest(r, [("tyre_damping", "tyre")]) == []
+
+
+@pytest.mark.parametrize("play, half, gaps", [(2e4, 1e4, (0.004, 0.003)), (0.0, 1e4, None), (2e4, -8e4, None)])
+def test_a_play_with_a_half_beside_it_has_two_halves(play, half, gaps):
+    """A play of 3 mm to either side and a half as strong one of 2 mm: what it takes of the spring's travel; where there is no play, or
+    none is left of it, the terms stay."""
+    shapes = lambda gap: {"gap": (gap, "m")}
+    laws = [("backlash", play, shapes(0.003)), (HALVES[0], half, shapes(0.002))]
+    group = Candidate("backlash", "spring", 1, False, None)
+    terms = tuple(Term(replace(group, what=Basis("backlash", 0, law, ("k", "N/m"), gap, 1, ())), gain) for law, gain, gap in laws)
+    spring = SimpleNamespace(law="linear_spring", name="spring", arguments={"stiffness": "c"})
+    model = SimpleNamespace(elements=[spring], parameters={"c": SimpleNamespace(value=2e4)})
+    study = SimpleNamespace(model=model, places=[SimpleNamespace(elements=[("spring", 1)])])
+    found = halved(study, Explanation(terms, None, None, None, 0.0))
+    assert found == list(terms) if gaps is None else [t.candidate.what.shapes["gap"][0] for t in found] == pytest.approx(gaps)
 
 
 def test_a_law_that_mends_a_form_leaves_the_name():

@@ -654,14 +654,14 @@ def halved(study: Study, e: Explanation) -> list[Term]:
     for group in [g for g in e.groups if g[0] == "backlash"]:
         laws = {_law(t.candidate): t for t in terms if t.group == group}
         play, beside = laws.get("backlash"), [law for law in HALVES if law in laws]
-        if play is not None and len(beside) == 1:
+        if play is not None and play.gain > 0.0 and len(beside) == 1:
             half = laws[beside[0]]
             gap, more = (t.candidate.what.shapes["gap"][0] for t in (play, half))
             gaps = {law: gap + (half.gain / play.gain * more if law in beside else 0.0) for law in HALVES}
             basis = play.candidate.what
             kinds = [replace(basis, law=law, gain=half.candidate.what.gain, shapes={"gap": (x, "m")}) for law, x in gaps.items()]
             both = [whole(study, replace(play, own="", candidate=replace(play.candidate, what=kind))) for kind in kinds]
-            if all(both):
+            if all(both) and min(gaps.values()) > 0.0:
                 terms = [*(t for t in terms if t.group != group), *both]
     return terms
 
