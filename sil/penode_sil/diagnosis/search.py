@@ -37,7 +37,7 @@ CURVES = {  # kinds of one family at one place are one curve with one name
     "network_extrapolation": "spring",
     "tyre_nonlinear": "tyre", "tyre_liftoff": "tyre",
 }  # fmt: skip
-SHAPED = {*FRICTION[:2], *DAMPERS}  # kinds whose names follow from the shape of a curve alone, whatever laws it is made of
+SHAPED = {*FRICTION, *DAMPERS} - {"bouc_wen"}  # kinds whose names follow from the shape of a curve alone, whatever laws it is made of
 FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
 KEPT = 0.5  # of what a regression promises: a fit that keeps less than that of it began in the wrong place
