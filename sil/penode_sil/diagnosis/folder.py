@@ -8,7 +8,6 @@ is through first.
 
 from __future__ import annotations
 
-import asyncio
 import hashlib
 import json
 import logging
@@ -166,6 +165,8 @@ def _in_processes(jobs: Sequence[Job], count: int) -> Iterator[tuple[int, Answer
 
 def _on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[int, Answer]]:
     """The same by the workers of a Dask scheduler. UserError if it, or a worker with this penode, cannot be had."""
+    import asyncio  # with it comes SSL: slow to load, and for a cluster only
+
     try:
         from distributed import Client, Security, wait
         from distributed.comm import connect

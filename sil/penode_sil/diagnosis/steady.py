@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, stats
+from scipy import fft, special
 
 from .fit import Fit
 from .noise import Experiment, Metric, swept
@@ -83,8 +83,14 @@ def change(study: Study, fit: Fit, seen: Sequence[Seen]) -> Change:
             u = u[:, values > OWN]
             gain = float(np.sum((u.T @ r) ** 2))
             if u.shape[1]:
-                found.append(Change(study.places[k].name, what, gain, -float(stats.chi2.logsf(gain, u.shape[1]))))
+                found.append(Change(study.places[k].name, what, gain, surprise(gain, u.shape[1])))
     return max(found, key=lambda c: c.surprise)
+
+
+def surprise(gain: float, freedom: int) -> float:
+    """-log of the chance that chi-square of so many degrees exceeds a gain; infinite where that is no number."""
+    with np.errstate(divide="ignore"):
+        return -float(np.log(special.chdtrc(freedom, gain)))
 
 
 def _forces(e: Experiment, m: Metric, seen: Seen, paths: Array, place: int, n_z: int, pieces: int) -> Array:
