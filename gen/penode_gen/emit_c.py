@@ -23,8 +23,19 @@ from .model import Model
 from .networks import Affine, Dense, Layer, Network
 
 VERSION = "0.1.0"
+
+
+def _compiled() -> jinja2.BytecodeCache | None:
+    """What Jinja has made of the templates, in a folder of the user's own among the temporary files; None where there is none that is
+    safe."""
+    try:
+        return jinja2.FileSystemBytecodeCache(pattern=f"penode-{VERSION}-%s")
+    except (OSError, RuntimeError):
+        return None
+
+
 _TEMPLATES = jinja2.Environment(
-    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"), bytecode_cache=_compiled(),
     undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
 )  # fmt: skip
 
