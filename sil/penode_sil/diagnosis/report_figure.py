@@ -112,7 +112,11 @@ def thinned(x: Array, y: Array, points: int) -> tuple[Array, Array]:
         return x, y
     edges = np.linspace(0, len(x), points // 2 + 1).astype(int)
     filled = np.where(np.isfinite(y), y, 0.0)
-    kept = sorted({int(a + f(filled[a:b])) for a, b in zip(edges, edges[1:]) for f in (np.argmin, np.argmax)})
+    stretch = np.repeat(np.arange(len(edges) - 1), np.diff(edges))
+    kept = np.zeros(len(x), dtype=bool)
+    for extreme in (np.minimum, np.maximum):
+        at = np.flatnonzero(filled == extreme.reduceat(filled, edges[:-1])[stretch])
+        kept[at[np.unique(stretch[at], return_index=True)[1]]] = True  # the first one of each
     return x[kept], y[kept]
 
 
