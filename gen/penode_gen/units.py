@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from pickle import PickleError
 from typing import Callable
 
 import pint
@@ -11,7 +12,17 @@ import sympy as sp
 
 from . import expressions as ex
 
-_registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=False)
+
+
+def _known() -> pint.UnitRegistry:
+    """All units, as pint keeps them in the user's cache; read anew where it cannot, or another process is about to write there."""
+    try:
+        return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, cache_folder=":auto:")
+    except (OSError, EOFError, PickleError):
+        return pint.UnitRegistry(autoconvert_offset_to_baseunit=False)
+
+
+_registry = _known()
 Dimension = pint.util.UnitsContainer
 NONE: Dimension = _registry.dimensionless.dimensionality
 
