@@ -190,11 +190,15 @@ def _force_laws(
     if reach <= 0.0 or speed <= 0.0:
         return
 
-    def each(function) -> tuple[Array, ...]:
-        return tuple(function(m.s, m.v, m.t) for m in motions)
+    forces: dict[object, tuple[Array, ...]] = {}  # of a law with its shapes, whatever its kind and sign
 
     def law(kind, name, gain, shapes, sign, function, companion=False, fixed={}) -> Basis | None:
-        return Basis(kind, place, name, gain, shapes, sign, each(function), companion, False, fixed) if wanted(kind) else None
+        if not wanted(kind):
+            return None
+        key = name, *shapes.items(), *fixed.items()
+        if key not in forces:
+            forces[key] = tuple(function(m.s, m.v, m.t) for m in motions)
+        return Basis(kind, place, name, gain, shapes, sign, forces[key], companion, False, fixed)
 
     k, d, n = ("stiffness", "N/m"), ("damping", "N*s/m"), ("force", "N")
     if p.role == "tyre":
@@ -402,10 +406,14 @@ def _sensor_faults(
 ) -> Iterator[Fault | None]:
     """The same, None for what is not wanted."""
 
+    series: dict[tuple[str, float], tuple[Array, ...]] = {}  # of a fault with its shape, whatever its kind and sign
+
     def fault(kind, what, sign, function, shape=0.0, companion=False) -> Fault | None:
         if kinds and kind not in kinds:
             return None
-        return Fault(kind, sensor, what, sign, tuple(function(y, t) for y, t in zip(signals, times)), shape, companion)
+        if (what, shape) not in series:
+            series[what, shape] = tuple(function(y, t) for y, t in zip(signals, times))
+        return Fault(kind, sensor, what, sign, series[what, shape], shape, companion)
 
     yield fault("sensor_bias", "bias", 0, lambda y, t: np.ones_like(y))
     yield fault("sensor_scale", "scale", 0, lambda y, t: y)
