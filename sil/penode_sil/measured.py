@@ -238,7 +238,8 @@ def _parts(
     u = np.column_stack([np.zeros((raster.size, 0)), *(taken[name].values for name in inputs)])
     rest = {name: _standstill(u, taken[name].values, sound & taken[name].usable, step) for name in sensors}
     still = np.logical_and.reduce(list(rest.values()))
-    laws = {name: _noise(name, taken, inputs, sound, rest.get(name), step) for name in taken}
+    kept: noise.Kept = {}
+    laws = {name: _noise(name, taken, inputs, sound, rest.get(name), step, kept) for name in taken}
     info = Quality({name: _channel(name, taken[name], laws[name]) for name in taken}, tuple(notes))
     return [
         Measured(
@@ -264,7 +265,7 @@ def _channel(name: str, taken: _Taken, law: noise.Noise | None) -> Channel:
 
 
 def _noise(
-    name: str, taken: dict[str, _Taken], inputs: list[str], sound: Flags, rest: Flags | None, step: float
+    name: str, taken: dict[str, _Taken], inputs: list[str], sound: Flags, rest: Flags | None, step: float, kept: noise.Kept
 ) -> noise.Noise | None:
     """Noise of a channel: on the raster together with inputs and other sensors; by itself if its rows are slower."""
     own, quantum = taken[name], taken[name].faults.quantum * abs(taken[name].scale)
@@ -281,7 +282,7 @@ def _noise(
         if n not in (name, *inputs) and t.clock.interval < 1.001 * step
     ]
     company = [drive, np.column_stack([drive, *others])] if others else [drive]
-    return noise.estimate(filled(own.values, own.usable), own.usable & sound, step, company, rest, quantum)
+    return noise.estimate(filled(own.values, own.usable), own.usable & sound, step, company, rest, quantum, kept)
 
 
 def _tell(

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Spectra = NDArray[np.complex128]  # [stretches of time, bins]
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+Kept = dict[tuple[object, ...], tuple[Spectra, Index]]  # transforms of channels, see estimate
 TOP = 0.8  # of the Nyquist frequency: above it a resampling filter may have been
 POLES = np.concatenate(
     (-np.geomspace(0.98, 0.02, 40), [0.0], np.geomspace(0.02, 0.5, 40), 1.0 - np.geomspace(0.49, 0.002, 60))
@@ -58,19 +59,21 @@ def estimate(
     known: list[Array] | None = None,
     rest: Flags | None = None,
     quantum: float = 0.0,
+    kept: Kept | None = None,
 ) -> Noise | None:
     """Noise of samples [n] at a constant interval [s]; None if there are too few for a spectrum, or they hardly change.
 
     `known`: channels [n, any] whose noise is another's: the inputs; the inputs and the other sensors. `rest` marks the
-    samples of a standstill.
+    samples of a standstill. `kept`, one dictionary for all channels of a recording, saves that each is transformed for every other.
     """
+    kept = {} if kept is None else kept
     floor = quantum**2 / 12.0
     if rest is not None:
-        spectrum = _spectrum(values, usable & rest, [], 0)
+        spectrum = _spectrum(values, usable & rest, [], 0, kept)
         if spectrum is not None:
             cycles, level, weight, _ = spectrum
             return _fit(cycles, level, weight, interval, floor, 0.0, True)
-    spectrum = _spectrum(values, usable, known or [], 2)
+    spectrum = _spectrum(values, usable, known or [], 2, kept)
     if spectrum is None:
         return None
     cycles, level, weight, unrest = spectrum
@@ -96,8 +99,16 @@ def _bending(cycles: Array, bends: int) -> Array:
     return (2.0 * np.sin(np.pi * cycles)) ** (2 * bends)
 
 
-def _frames(values: Array, usable: Flags, bends: int, size: int, hop: int) -> tuple[Spectra, Index]:
-    """Transforms [stretches, bins] of windowed stretches of differences, of those with usable samples only; starts.
+def _frames(values: Array, usable: Flags, bends: int, size: int, kept: Kept) -> tuple[Spectra, Index]:
+    """Transforms [stretches, bins] of windowed stretches of differences, of those with usable samples only; starts. Not to be written to."""
+    key = values.tobytes(), usable.tobytes(), bends, size
+    if key not in kept:
+        kept[key] = _transformed(values, usable, bends, size, size // 2)
+    return kept[key]
+
+
+def _transformed(values: Array, usable: Flags, bends: int, size: int, hop: int) -> tuple[Spectra, Index]:
+    """The same, computed.
 
     The window's side lobes lie 92 dB below; its power is 1, so that the squares' mean is the variance per bin.
     """
@@ -114,7 +125,9 @@ def _frames(values: Array, usable: Flags, bends: int, size: int, hop: int) -> tu
     return np.fft.rfft(stretches * (window / math.sqrt(np.sum(window**2))), axis=1), starts
 
 
-def _spectrum(values: Array, usable: Flags, known: list[Array], bends: int) -> tuple[Array, Array, Array, Array] | None:
+def _spectrum(
+    values: Array, usable: Flags, known: list[Array], bends: int, kept: Kept
+) -> tuple[Array, Array, Array, Array] | None:
     """Frequency [cycles per sample], variance density [unit^2 per half a cycle per sample], weight, unrest; by bands.
 
     What each of `known` [n, channels] explains linearly is left out; of them counts the one that leaves least. `weight`
@@ -124,7 +137,7 @@ def _spectrum(values: Array, usable: Flags, known: list[Array], bends: int) -> t
     """
     best, least = None, math.inf
     for size in (1024, 512, 256, 128, 64):
-        found = _bands(values, usable, known, bends, size)
+        found = _bands(values, usable, known, bends, size, kept)
         if found is not None:
             top = float(np.mean(found[1][found[0] >= 0.25 * TOP]))
             if top < 0.8 * least:
@@ -133,11 +146,11 @@ def _spectrum(values: Array, usable: Flags, known: list[Array], bends: int) -> t
 
 
 def _bands(
-    values: Array, usable: Flags, known: list[Array], bends: int, size: int
+    values: Array, usable: Flags, known: list[Array], bends: int, size: int, kept: Kept
 ) -> tuple[Array, Array, Array, Array] | None:
     """The same from stretches of `size` samples; None if there are too few."""
     enough = 24 if size > 64 else 8
-    transform, starts = _frames(values, usable, bends, size, size // 2)
+    transform, starts = _frames(values, usable, bends, size, kept)
     if starts.size < enough:
         return None
     first = 6 if bends else 4  # the window's main lobe reaches to 4; differences leave a slope beside it
@@ -152,7 +165,7 @@ def _bands(
             continue
         rest = transform
         if company.shape[1]:
-            drive = np.stack([_frames(u, usable, bends, size, size // 2)[0][:, bins] for u in company.T], axis=-1)
+            drive = np.stack([_frames(u, usable, bends, size, kept)[0][:, bins] for u in company.T], axis=-1)
             rest = transform - _explained(drive, transform)
         power = np.abs(rest) ** 2 / _bending(bins / size, bends) * starts.size / free
         quiet = _quiet(power[:, bins >= 0.25 * TOP * size])
