@@ -65,7 +65,7 @@ class Free:
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Where a fit ended: chi2 with and without priors, whitened residual, and its derivatives [rows, free] in the units of
-    `free`."""
+    `free`; `whole`: all of these are as they are there."""
 
     model: Model
     free: tuple[Free, ...]
@@ -75,6 +75,7 @@ class Fit:
     jacobian: Array
     simulated: tuple[Array, ...]
     faults: tuple[Fault, ...] = ()
+    whole: bool = False
 
     def value(self, target: object) -> float:
         return next(f.value for f in self.free if f.target == target)
@@ -108,8 +109,9 @@ class Fit:
         size = float(weight @ way)
         jacobian = self.jacobian + np.outer(missed, weight / size) if size > 0.0 else self.jacobian  # what nothing shows stays
         return replace(
-            self, free=free, chi2=chi2, cost=chi2 + float(sum(f.offset**2 for f in free)), residual=residual, jacobian=jacobian
-        )
+            self, free=free, chi2=chi2, cost=chi2 + float(sum(f.offset**2 for f in free)), residual=residual, jacobian=jacobian,
+            whole=False,
+        )  # fmt: skip
 
 
 class Problem:
@@ -233,7 +235,7 @@ class Problem:
         residual, jacobian, simulated = self.linear(free, known)
         chi2 = float(residual @ residual)
         cost = chi2 + float(sum(f.offset**2 for f in free))
-        return Fit(self.model, free, chi2, cost, residual, jacobian, simulated, tuple(self.faults))
+        return Fit(self.model, free, chi2, cost, residual, jacobian, simulated, tuple(self.faults), not known)
 
     def eased(self, free: Sequence[Free]) -> tuple[Free, ...]:
         """The free values with all gains of laws scaled down as far as the simulation starts best: a regression that
@@ -252,7 +254,7 @@ class Problem:
 
     def complete(self, fit: Fit) -> Fit:
         """The fit with all of its derivatives as they are where it ended."""
-        return replace(fit, jacobian=self.linear(fit.free)[1])
+        return fit if fit.whole else replace(fit, jacobian=self.linear(fit.free)[1], whole=True)
 
     def linear(self, free: Sequence[Free], known: Mapping[int, Array] = {}) -> tuple[Array, Array, tuple[Array, ...]]:
         """Whitened residual [rows], minus its derivatives [rows, free], and the sensors simulated, at the free values."""

@@ -837,8 +837,9 @@ def missing(e: Explanation, group: Group) -> Fit:
             effect += e.fit.jacobian[:, i] * (f.value - f.origin) / f.unit
     rest = [i for i in range(len(e.fit.free)) if i not in own]
     return replace(
-        e.fit, free=tuple(e.fit.free[i] for i in rest), residual=e.fit.residual + effect, jacobian=e.fit.jacobian[:, rest]
-    )
+        e.fit, free=tuple(e.fit.free[i] for i in rest), residual=e.fit.residual + effect, jacobian=e.fit.jacobian[:, rest],
+        whole=False,
+    )  # fmt: skip
 
 
 def group_parameter(e: Explanation, group: Group) -> str:

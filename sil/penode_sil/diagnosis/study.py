@@ -22,6 +22,7 @@ from .score import Regression, Seen, collect, smooth
 Array = NDArray[np.float64]
 SKEW = 0.001  # of a sample: channels are never sampled at quite the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
+FEW = 4  # studies with other noise that are kept: the next step of a search may ask for one again
 SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 
 
@@ -143,6 +144,7 @@ def loss(study: Study, fit: Fit) -> float:
     return total
 
 
+@lru_cache(maxsize=FEW)
 def requieted(study: Study, fit: Fit, coloured: bool = True) -> Study:
     """The study with noise as a fit's residual shows it; itself if that is no other noise."""
     levels, metrics = heard(study, fit, coloured)
