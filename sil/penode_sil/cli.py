@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import sys
@@ -232,6 +233,7 @@ def diagnose(
     """
     from .diagnosis import files, folder, sentences, table  # SciPy's parts are slow to load
 
+    gc.freeze()  # what has been loaded stays to the end: not to be looked through for garbage again and again
     files.check_folder(output)
     job = files.Job(model, data, holdout, output, set_name, channel)
     if not each and not any(path.is_dir() for path in data):
