@@ -70,7 +70,7 @@ class Fault:
             case "scale_side":
                 return np.abs(y)
             case "scale_bend":
-                return y**3 / max(self.shape, 1e-300) ** 2
+                return y * y * y / max(self.shape, 1e-300) ** 2
             case "scale_drift":
                 return y * (np.arange(y.shape[-1]) / max(map(len, self.series)) - 0.5)
             case "clip":
