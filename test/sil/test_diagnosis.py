@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
-from scipy.signal import lfilter
+from scipy.signal import lfilter, lsim
 
 import penode_gen
 from penode_sil import diagnosis
@@ -564,11 +564,25 @@ LATE = 12e-3  # s
 FAULTS = {  # sensor, what it shows, and its kind
     "late": ("a_body", lambda y: CubicSpline(SHARE, y)(np.maximum(SHARE - LATE / (STEP * (SAMPLES - 1)), 0.0)), "sensor_delay"),
     "a little late": ("a_body", lambda y: CubicSpline(SHARE, y)(np.maximum(SHARE - 0.08 * LATE / (STEP * (SAMPLES - 1)), 0.0)), "sensor_delay"),
+    "behind a filter": ("a_body", lambda y: lsim(([1.0], [LATE**2 / 36.0, LATE / 3.0, 1.0]), y, STEP * np.arange(SAMPLES))[1], "sensor_delay"),
     "warming up": ("deflection", lambda y: y + 2e-3 * (1.0 - 0.3 * np.exp(-3.0 * SHARE)), "sensor_bias"),
     "wandering": ("deflection", lambda y: y + 2e-3 * (1.0 + 0.2 * np.sin(5.0 * SHARE + 1.0)), "sensor_bias"),
     "drifting gain": ("a_body", lambda y: y * (1.1 + 0.04 * (SHARE - 0.5)), "sensor_scale"),
     "named like a state": ("z_b", lambda y: 1.1 * y, "sensor_scale"),
 }
+
+
+@pytest.mark.parametrize("bend", [-2.0, -0.3, 0.0, 1.0 / 6.0, 0.5, 2.0])
+def test_a_delay_is_written_as_near_as_two_states_can(bend):
+    """Fraction and function agree up to x^4, so their difference falls by 2^5 where x is halved; the next power adds 0.1 of x each."""
+    stiff, drag, direct, own = extension._pade(bend)
+
+    def off(x: complex) -> float:
+        late = stiff / (x * x + drag * x + stiff)
+        return abs(late + direct * (1.0 - late) - own * x * late - np.exp(-x) * (1.0 + bend * x * x))
+
+    assert off(0.2j) / off(0.1j) == pytest.approx(32.0, rel=0.1)
+    assert drag > 0.0 and stiff > 0.0
 
 
 @pytest.mark.parametrize("fault", FAULTS)

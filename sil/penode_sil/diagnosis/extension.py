@@ -119,12 +119,13 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         if bent:
             expression = f"{expression} + {bent}"
         if values.get(("delay", j), 0.0) > 0.02 * model.sample_time:
-            delay, late, rate = (f"{what}_{s.name}" for what in ("delay", "late", "late_rate"))  # Pade's of order 2
+            delay, late, rate = (f"{what}_{s.name}" for what in ("delay", "late", "late_rate"))
+            stiff, drag, direct, own = _pade(sum(k for f, k in _series(e, values, j) if f.what == "roll_off") / values[("delay", j)] ** 2)
             parameters.append(f"{delay} = {_table({'value': max(values[('delay', j)], 1e-9), 'unit': 's'})}")
             states += [f"{name} = {_table({'unit': unit})}" for name in (late, rate)]
             equations.append(f"{late} = {_toml(f'der({late})*{delay} = {rate}')}")
-            equations.append(f"{rate} = {_toml(f'der({rate})*{delay} = 12*({expression} - {late}) - 6*{rate}')}")
-            expression = f"{expression} - {rate}"
+            equations.append(f"{rate} = {_toml(f'der({rate})*{delay} = {stiff:.7g}*({expression} - {late}) - {drag:.7g}*{rate}')}")
+            expression = f"{late} + {direct:.7g}*({expression} - {late}) - {own:.7g}*{rate}" if direct != 1.0 else f"{expression} - {rate}"
         if ("scale", j) in values:
             parameters.append(f"gain_{s.name} = {_table({'value': 1.0 + values[('scale', j)], 'unit': '1'})}")
             expression = f"gain_{s.name}*({expression})"
@@ -208,6 +209,16 @@ def _series(e: Explanation, values: dict[object, float], sensor: int) -> list[tu
     faults = [t.candidate.what for t in e.terms if isinstance(t.candidate.what, Fault)]
     series = [f for f in faults if f.what not in VALUED]
     return [(f, values[("fault", i)]) for i, f in enumerate(series) if f.sensor == sensor]
+
+
+def _pade(bend: float) -> tuple[float, float, float, float]:
+    """Pade's fraction of order 2 of exp(-x) (1 + bend x^2), x = s*delay: a delay that also turns the size of what is fast. With two
+    states, x*late = rate and x*rate = stiff*(u - late) - drag*rate, it is late + direct*(u - late) - own*rate. Without a bend that is
+    12, 6, 1 and 1; its poles are stable for any."""
+    x2, x3, x4 = 1.0 / 2.0 + bend, -1.0 / 6.0 - bend, 1.0 / 24.0 + bend / 2.0
+    d1, d2 = np.linalg.solve([[x2, -1.0], [x3, x2]], [-x3, -x4])
+    direct = (x2 - d1 + d2) / d2
+    return 1.0 / d2, d1 / d2, float(np.round(direct, 12)), 1.0 - d1 + direct * d1
 
 
 def _bent(

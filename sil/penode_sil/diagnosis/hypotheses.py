@@ -73,6 +73,8 @@ class Fault:
                 return y * y * y / max(self.shape, 1e-300) ** 2
             case "scale_drift":
                 return y * (np.arange(y.shape[-1]) / max(map(len, self.series)) - 0.5)
+            case "roll_off":
+                return np.gradient(np.gradient(y, self.shape, axis=-1), self.shape, axis=-1)
             case "clip":
                 return -np.sign(self.shape) * np.maximum(np.sign(self.shape) * y - abs(self.shape), 0.0)
         return self.series[recording]
@@ -418,6 +420,7 @@ def _sensor_faults(
     yield fault("sensor_bias", "bias", 0, lambda y, t: np.ones_like(y))
     yield fault("sensor_scale", "scale", 0, lambda y, t: y)
     yield fault("sensor_delay", "delay", 1, lambda y, t: -np.gradient(y, step))
+    yield fault("sensor_delay", "roll_off", 0, lambda y, t: np.gradient(np.gradient(y, step), step), step, True)
     top = max(float(np.max(np.abs(y))) for y in signals)
     for side in (1, -1):
         for w in (0.3, 0.5, 0.7, 0.85):

@@ -69,7 +69,7 @@ TAKING = {  # laws that take an element away: its law and argument
 }
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK)  # a formula after all
-SINGLE = ("wrong_parameter", "sensor_delay", "hidden_resonance", CLOCK)  # kinds that have one law only
+SINGLE = ("wrong_parameter", "hidden_resonance", CLOCK)  # kinds that have one law only
 FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
 LOADS = {"constant_force", "sensor_bias"}  # one looks like the other
 Group = tuple[str, str]
