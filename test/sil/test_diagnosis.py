@@ -20,7 +20,7 @@ from penode_sil import diagnosis
 from penode_sil.diagnosis import extension, hypotheses, naming, noise, plant, score, search, steady, study
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.engine import experiment
-from penode_sil.diagnosis.fit import Problem
+from penode_sil.diagnosis.fit import Problem, delayed
 from penode_sil.measured import load
 from penode_sil.targets import Sil
 
@@ -572,17 +572,20 @@ FAULTS = {  # sensor, what it shows, and its kind
 }
 
 
-@pytest.mark.parametrize("bend", [-2.0, -0.3, 0.0, 1.0 / 6.0, 0.5, 2.0])
-def test_a_delay_is_written_as_near_as_two_states_can(bend):
-    """Fraction and function agree up to x^4, so their difference falls by 2^5 where x is halved; the next power adds 0.1 of x each."""
-    stiff, drag, direct, own = extension._pade(bend)
-
-    def off(x: complex) -> float:
-        late = stiff / (x * x + drag * x + stiff)
-        return abs(late + direct * (1.0 - late) - own * x * late - np.exp(-x) * (1.0 + bend * x * x))
-
-    assert off(0.2j) / off(0.1j) == pytest.approx(32.0, rel=0.1)
-    assert drag > 0.0 and stiff > 0.0
+@pytest.mark.parametrize("roll_off", [0.0, 0.05, 0.3, 0.49])
+def test_a_delay_is_written_as_it_was_fitted(roll_off):
+    """At a tenth of a radian within the delay: dead time and Pade's fraction with a roll-off r differ by less than (1/720 + r^2/2) x^4,
+    two poles not at all, and one pole leaves out the (1/2 - r) x^2 of the other."""
+    n, delay, step = 4000, 0.02, 1e-3
+    x = 0.1j
+    stiff, drag, direct, own = extension._late(roll_off)
+    late = stiff / (x * x + drag * x + stiff) if stiff else 1.0 / (1.0 + x)
+    written = late + direct * (1.0 - late) - own * x * late
+    t = step * np.arange(n)
+    wave = np.exp(x * t / delay)
+    shown = sum(part * delayed(f(wave)[:, None], np.array([delay]), np.array([roll_off * delay**2]), step)[2000, 0] for part, f in ((1.0, np.real), (1.0j, np.imag)))
+    most = {0.0: 1e-4 / 720, 0.05: 1e-4 * (1 / 720 + 0.05**2 / 2), 0.3: 0.0, 0.49: 0.01 * 1e-2}[roll_off]
+    assert abs(written - shown / wave[2000]) < 1.1 * most + 1e-9
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -103,7 +103,7 @@ def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recor
         elif isinstance(what, Fault):
             size = max(abs(term.gain), 1e-12)
             if what.what in VALUED:
-                free.append(Free((what.what, what.sensor), term.gain, size, low=0.0 if what.what == "delay" else -np.inf))
+                free.append(Free((what.what, what.sensor), term.gain, size, low=0.0 if what.sign > 0 else -np.inf))
             else:
                 free.append(Free(("fault", len(faults)), term.gain, size))
                 faults.append(what)

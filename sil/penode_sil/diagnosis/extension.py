@@ -74,8 +74,9 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         lines[-1:] = ['method = "rk4"', 'input = "linear"', ""]
     if e is not None:
         substeps = max([1, *(_fine(study, t, n, e) for t, n in zip(e.terms, e.built.names))])
-        delays = [f.value for f in e.fit.free if f.target[0] == "delay" and f.value > 0.02 * model.sample_time]
-        substeps = max([substeps, *(int(np.ceil(np.sqrt(12.0) * model.sample_time / d)) for d in delays)])
+        values = {f.target: f.value for f in e.fit.free}
+        late = [(d, _late(_rolled(values, k[1]))) for k, d in values.items() if k[0] == "delay" and d > 0.02 * model.sample_time]
+        substeps = max([substeps, *(int(np.ceil(max(abs(np.roots([1.0, drag, stiff]))) * model.sample_time / d)) for d, (stiff, drag, _, _) in late)])
         if substeps > model.substeps:
             lines.insert(-1, f"substeps = {substeps}")
     if e is None:
@@ -120,12 +121,17 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
             expression = f"{expression} + {bent}"
         if values.get(("delay", j), 0.0) > 0.02 * model.sample_time:
             delay, late, rate = (f"{what}_{s.name}" for what in ("delay", "late", "late_rate"))
-            stiff, drag, direct, own = _pade(sum(k for f, k in _series(e, values, j) if f.what == "roll_off") / values[("delay", j)] ** 2)
             parameters.append(f"{delay} = {_table({'value': max(values[('delay', j)], 1e-9), 'unit': 's'})}")
-            states += [f"{name} = {_table({'unit': unit})}" for name in (late, rate)]
-            equations.append(f"{late} = {_toml(f'der({late})*{delay} = {rate}')}")
-            equations.append(f"{rate} = {_toml(f'der({rate})*{delay} = {stiff:.7g}*({expression} - {late}) - {drag:.7g}*{rate}')}")
-            expression = f"{late} + {direct:.7g}*({expression} - {late}) - {own:.7g}*{rate}" if direct != 1.0 else f"{expression} - {rate}"
+            stiff, drag, direct, own = _late(_rolled(values, j))
+            slope = rate if stiff else f"{expression} - {late}"
+            equations.append(f"{late} = {_toml(f'der({late})*{delay} = {slope}')}")
+            if stiff:
+                equations.append(f"{rate} = {_toml(f'der({rate})*{delay} = {stiff:.7g}*({expression} - {late}) - {drag:.7g}*{rate}')}")
+            states += [f"{name} = {_table({'unit': unit})}" for name in ((late, rate) if stiff else (late,))]
+            if direct == 1.0:
+                expression = f"{expression} - {rate}"
+            else:
+                expression = f"{late} + {direct:.7g}*({expression} - {late}) - {own:.7g}*{rate}" if direct else late
         if ("scale", j) in values:
             parameters.append(f"gain_{s.name} = {_table({'value': 1.0 + values[('scale', j)], 'unit': '1'})}")
             expression = f"gain_{s.name}*({expression})"
@@ -161,6 +167,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     return _joined(study, "\n".join(lines))
 
 
+ONE_POLE = 0.48  # of a delay squared: beyond that the second pole of a filter is 50 times as fast as the first
 ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast
 
 
@@ -211,11 +218,21 @@ def _series(e: Explanation, values: dict[object, float], sensor: int) -> list[tu
     return [(f, values[("fault", i)]) for i, f in enumerate(series) if f.sensor == sensor]
 
 
-def _pade(bend: float) -> tuple[float, float, float, float]:
-    """Pade's fraction of order 2 of exp(-x) (1 + bend x^2), x = s*delay: a delay that also turns the size of what is fast. With two
-    states, x*late = rate and x*rate = stiff*(u - late) - drag*rate, it is late + direct*(u - late) - own*rate. Without a bend that is
-    12, 6, 1 and 1; its poles are stable for any."""
-    x2, x3, x4 = 1.0 / 2.0 + bend, -1.0 / 6.0 - bend, 1.0 / 24.0 + bend / 2.0
+def _rolled(values: dict[object, float], sensor: int) -> float:
+    """The roll-off of a sensor's signal, of the square of its delay."""
+    return values.get(("roll_off", sensor), 0.0) / values[("delay", sensor)] ** 2
+
+
+def _late(roll_off: float) -> tuple[float, float, float, float]:
+    """A delay with a roll-off (of its square, see `delayed`) in two states, x*late = rate and x*rate = stiff*(u - late) - drag*rate
+    with x = s*delay: late + direct*(u - late) - own*rate. Two poles are themselves; one of them alone (all 0: x*late = u - late) if
+    the other is far faster. With less roll-off, Pade's fraction of order 2 of exp(-x) (1 + roll_off x^2): 12, 6, 1, 1 without any."""
+    if roll_off > ONE_POLE:
+        return 0.0, 0.0, 0.0, 0.0
+    if roll_off > 1.0 / 6.0:
+        stiff = 1.0 / (0.5 - roll_off)
+        return stiff, stiff, 0.0, 0.0
+    x2, x3, x4 = 1.0 / 2.0 + roll_off, -1.0 / 6.0 - roll_off, 1.0 / 24.0 + roll_off / 2.0
     d1, d2 = np.linalg.solve([[x2, -1.0], [x3, x2]], [-x3, -x4])
     direct = (x2 - d1 + d2) / d2
     return 1.0 / d2, d1 / d2, float(np.round(direct, 12)), 1.0 - d1 + direct * d1

@@ -39,7 +39,7 @@ DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of trial 
 
 @dataclass(frozen=True)
 class Free:
-    """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "skew", sensor index),
+    """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "roll_off" | "skew", sensor index),
     ("fault", its number), or ("start", recording, state index). `unit` steps of it are natural; a `log` one stays positive. `sigma`: its prior."""
 
     target: str | tuple[str, int] | tuple[str, int, int]
@@ -177,7 +177,8 @@ class Problem:
             elif what == "clock":
                 z = drifted(z, values)
             elif what == "delay":
-                z[:, j] = delayed(z[:, j], values, self.experiments[e].step)
+                roll = next((more for kind, sensor, more in faults if (kind, sensor) == ("roll_off", j)), np.zeros(len(shifts)))
+                z[:, j] = delayed(z[:, j], values, roll, self.experiments[e].step)
         return z, skews, run.x
 
     def residuals(self, e: int, z: Array, skews: Array) -> Array:
@@ -368,11 +369,15 @@ def drifted(signals: Array, drift: Array) -> Array:
     return here + 0.5 * part * (after - before + part * (after - 2.0 * here + before))
 
 
-def delayed(signals: Array, delay: Array, step: float) -> Array:
-    """Signals [n, runs] later by delays [runs] [s]; before its start a signal is what it was there."""
+def delayed(signals: Array, delay: Array, roll_off: Array, step: float) -> Array:
+    """Signals [n, runs] later by delays [runs] [s] and less of them where they are fast, by -roll_off [runs] [s^2] of the second
+    derivative. That is a dead time before two poles as evenly late as they can be: the poles alone from delay^2/6 on (Bessel's of
+    order 2) to delay^2/2 (one pole), the dead time alone without. Before its start a signal is what it was there."""
     n = len(signals)
-    lead = int(np.ceil(np.max(np.abs(delay)) / step)) + 16
+    lead = int(np.ceil(8.0 * np.max(np.abs(delay)) / step)) + 16
     padded = np.concatenate([np.repeat(signals[:1], lead, 0), signals, np.repeat(signals[-1:], lead, 0)])
     size = fft.next_fast_len(len(padded), real=True)
-    f = fft.rfftfreq(size, step)[:, None]
-    return fft.irfft(fft.rfft(padded, size, axis=0) * np.exp(-2j * np.pi * f * delay), size, axis=0)[lead : lead + n]
+    s = 2j * np.pi * fft.rfftfreq(size, step)[:, None]
+    lag = np.minimum(delay, np.sqrt(6.0 * roll_off))
+    poles = 1.0 + s * lag + s * s * (lag**2 / 2.0 - roll_off)
+    return fft.irfft(fft.rfft(padded, size, axis=0) * np.exp(-s * (delay - lag)) / poles, size, axis=0)[lead : lead + n]

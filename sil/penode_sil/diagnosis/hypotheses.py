@@ -19,6 +19,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.polynomial import Legendre
 from numpy.typing import NDArray
+from scipy import fft
 from scipy.linalg import solve_banded
 
 import penode_gen
@@ -48,7 +49,8 @@ class Basis:
     least: dict[str, float] = field(default_factory=dict)  # what shapes may be at least: less cannot be told
 
 
-VALUED = ("bias", "scale", "delay", "clock")  # faults of a value alone; the others add a series
+VALUED = ("bias", "scale", "delay", "roll_off", "clock")  # faults of a value alone; the others add a series
+ROLLED = 0.006  # [s] lag of the filter that a sensor may be behind: it only has to be of the size of one
 CLOCK = "clock_drift"  # kind of what is not on the list, but would pass for something that is
 
 
@@ -73,8 +75,6 @@ class Fault:
                 return y * y * y / max(self.shape, 1e-300) ** 2
             case "scale_drift":
                 return y * (np.arange(y.shape[-1]) / max(map(len, self.series)) - 0.5)
-            case "roll_off":
-                return np.gradient(np.gradient(y, self.shape, axis=-1), self.shape, axis=-1)
             case "clip":
                 return -np.sign(self.shape) * np.maximum(np.sign(self.shape) * y - abs(self.shape), 0.0)
         return self.series[recording]
@@ -420,7 +420,7 @@ def _sensor_faults(
     yield fault("sensor_bias", "bias", 0, lambda y, t: np.ones_like(y))
     yield fault("sensor_scale", "scale", 0, lambda y, t: y)
     yield fault("sensor_delay", "delay", 1, lambda y, t: -np.gradient(y, step))
-    yield fault("sensor_delay", "roll_off", 0, lambda y, t: np.gradient(np.gradient(y, step), step), step, True)
+    yield fault("sensor_delay", "roll_off", 1, lambda y, t: rolled_off(y, ROLLED, step), 0.0, True)
     top = max(float(np.max(np.abs(y))) for y in signals)
     for side in (1, -1):
         for w in (0.3, 0.5, 0.7, 0.85):
@@ -436,6 +436,13 @@ def _sensor_faults(
     yield fault("sensor_scale", "scale_drift", 0, lambda y, t: y * (t / last - 0.5), 0.0, True)
     yield fault("sensor_scale", "scale_side", 0, lambda y, t: np.abs(y), 0.0, True)
     yield fault("sensor_scale", "scale_bend", 0, lambda y, t: y**3 / max(top, 1e-300) ** 2, top, True)
+
+
+def rolled_off(y: Array, lag: float, step: float) -> Array:
+    """The second derivative of a signal [n], as a filter takes it from one: of what is fast, no more than there is."""
+    both = np.concatenate([y, y[::-1]])  # ends where it began
+    s = 2j * np.pi * fft.rfftfreq(len(both), step)
+    return fft.irfft(fft.rfft(both) * s * s / (1.0 - (s * lag) ** 2), len(both))[: len(y)]
 
 
 def clock(signals: Sequence[Array], times: Sequence[Array], step: float) -> Fault:
