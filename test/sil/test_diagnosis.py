@@ -588,6 +588,14 @@ def test_a_delay_is_written_as_it_was_fitted(roll_off):
     assert abs(written - shown / wave[2000]) < 1.1 * most + 1e-9
 
 
+@pytest.mark.parametrize("roll_off", [0.0, 0.3, 0.5])
+def test_a_delay_is_written_in_steps_that_it_is_stable_in(roll_off):
+    """Steps of 1 of the faster pole; Runge-Kutta of order 4 is stable to 2.785. Pade's poles are at sqrt(12), those of 1/(1 + x + x^2/5)
+    at 5/2 (1 +- sqrt(1/5)), that of one pole at 1."""
+    stiff, drag, *_ = extension._late(roll_off)
+    assert extension._fastest(stiff, drag) == pytest.approx({0.0: 12.0**0.5, 0.3: 2.5 * (1.0 + 0.2**0.5), 0.5: 1.0}[roll_off])
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_file_has_the_fault_of_a_sensor(tmp_path, fault, show):
     """Named; the C of the extended file shows it as well: what is left of a new recording is its noise. The height of the body is

@@ -75,8 +75,8 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     if e is not None:
         substeps = max([1, *(_fine(study, t, n, e) for t, n in zip(e.terms, e.built.names))])
         values = {f.target: f.value for f in e.fit.free}
-        late = [(d, _late(_rolled(values, k[1]))) for k, d in values.items() if k[0] == "delay" and d > 0.02 * model.sample_time]
-        substeps = max([substeps, *(int(np.ceil(max(abs(np.roots([1.0, drag, stiff]))) * model.sample_time / d)) for d, (stiff, drag, _, _) in late)])
+        delays = [(d, _late(_rolled(values, k[1]))) for k, d in values.items() if k[0] == "delay" and d > SHORT * model.sample_time]
+        substeps = max([substeps, *(int(np.ceil(_fastest(stiff, drag) * model.sample_time / d)) for d, (stiff, drag, _, _) in delays)])
         if substeps > model.substeps:
             lines.insert(-1, f"substeps = {substeps}")
     if e is None:
@@ -119,7 +119,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         bent = _bent(e, values, j, f"({expression})", s.name, unit, f"min({age}/{recorded}, 1)", parameters)
         if bent:
             expression = f"{expression} + {bent}"
-        if values.get(("delay", j), 0.0) > 0.02 * model.sample_time:
+        if values.get(("delay", j), 0.0) > SHORT * model.sample_time:
             delay, late, rate = (f"{what}_{s.name}" for what in ("delay", "late", "late_rate"))
             parameters.append(f"{delay} = {_table({'value': max(values[('delay', j)], 1e-9), 'unit': 's'})}")
             stiff, drag, direct, own = _late(_rolled(values, j))
@@ -167,6 +167,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     return _joined(study, "\n".join(lines))
 
 
+SHORT = 0.02  # of a sample: a delay that is left out
 ONE_POLE = 0.48  # of a delay squared: beyond that the second pole of a filter is 50 times as fast as the first
 ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast
 
@@ -236,6 +237,11 @@ def _late(roll_off: float) -> tuple[float, float, float, float]:
     d1, d2 = np.linalg.solve([[x2, -1.0], [x3, x2]], [-x3, -x4])
     direct = (x2 - d1 + d2) / d2
     return 1.0 / d2, d1 / d2, float(np.round(direct, 12)), 1.0 - d1 + direct * d1
+
+
+def _fastest(stiff: float, drag: float) -> float:
+    """The faster pole of a delay's states, or the one of one, times the delay."""
+    return float(np.max(np.abs(np.roots([1.0, drag, stiff])))) if stiff else 1.0
 
 
 def _bent(
