@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -41,6 +42,25 @@ def named(rule, *laws: tuple[str, str, str, dict[str, float]]) -> str:
 def test_friction_that_falls_is_stribecks(rise, width, kind):
     law = ("stribeck_friction", STRIBECK, "force", {"force": 20.0, "knee": 1e-3, "width": width, "rise": rise})
     assert named(naming._friction, law) == kind
+
+
+@pytest.mark.parametrize("damping, kind", [(0.0, "stribeck_friction"), (20.0, "coulomb_friction")])
+def test_friction_that_falls_for_a_stronger_damper_is_coulombs(damping, kind):
+    """It falls from 16 to 12 N while the damper beside it is fitted 20 N*s/m stronger than nominal, which is 10 N at the greatest rate."""
+    law = ("stribeck_friction", STRIBECK, "force", {"force": 12.0, "knee": 1e-3, "width": 0.2, "rise": 0.35})
+    assert named(partial(naming._friction, damping=damping), law) == kind
+
+
+@pytest.mark.parametrize("damping", [-10.0, 0.0, 30.0])
+def test_the_force_of_friction_is_where_its_line_begins(damping):
+    """However much of the damper beside it is in its curve."""
+    laws = [("coulomb_friction", "coulomb_friction", {"force": 20.0, "transition": 1e-3}), ("coulomb_friction", "linear_damper", {"damping": damping})]
+    terms = [term("coulomb_friction", law, next(iter(shapes)), {k: x for k, x in shapes.items() if k == "transition"}) for _, law, shapes in laws]
+    values = {f"x{i}_{k}": x for i, (_, _, shapes) in enumerate(laws) for k, x in shapes.items()}
+    study = SimpleNamespace(model=None, places=[None])
+    e = SimpleNamespace(terms=terms, built=SimpleNamespace(names=["x0", "x1"]))
+    force = naming.functions(study, e, ("coulomb_friction", "spring"), REACH, SPEED)["force"][1]
+    assert force(values) == pytest.approx(20.0, rel=1e-9)
 
 
 def test_a_little_that_yields_is_no_hysteresis():

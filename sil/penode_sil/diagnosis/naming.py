@@ -39,7 +39,8 @@ UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that make
 EDGE = 0.15  # of the reach: a stop or a loss of contact that begins nearer than that to the middle is an element that bends there
 STRAIGHT = 0.02  # of the straight part of a curve: less than that beside it, and it is a straight line
 FLAT = 0.015  # of what a tyre lacks when stretched: bent by less than that when pressed in, it only loses contact
-PEAK = 1.2  # friction at low rates over that at high ones that makes it Stribeck's
+SLIDING = 0.1  # of the rates: friction there slides; its line, gone on to no rate, is the same however a damper beside it is parted from it
+PEAK = 1.2  # friction at low rates over that at higher ones that makes it Stribeck's
 STEP = 0.5  # of its greatest force, that friction without memory has at a twentieth of the rates: with less, it is a damper
 Array = NDArray[np.float64]
 Values = Mapping[object, float]
@@ -54,7 +55,8 @@ def christened(terms: Sequence[Term], names: Sequence[str], fit: Fit, study: Stu
         for place in {t.candidate.what.place for t in terms if t.candidate.kind in kinds}:
             own = [i for i, t in enumerate(terms) if t.candidate.kind in kinds and t.candidate.what.place == place]
             curve = Curve([terms[i] for i in own], [names[i] for i in own])
-            kind = name([terms[i] for i in own], [names[i] for i in own], values, *study.sizes[place])
+            more = (stronger(study.model, study.places[place], fit),) if kinds is FRICTION else ()
+            kind = name([terms[i] for i in own], [names[i] for i in own], values, *study.sizes[place], *more)
             if kinds is SPRINGS and _beyond(curve, values, study.places[place], study.sizes[place][0]):
                 kind = "network_extrapolation"
             for i in own:
@@ -63,7 +65,9 @@ def christened(terms: Sequence[Term], names: Sequence[str], fit: Fit, study: Stu
     return tuple(named)
 
 
-def _friction(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
+def _friction(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float, damping: float = 0.0) -> str:
+    """`damping`: by what the linear damper beside it is stronger than nominal within its tolerance; friction that falls only for that
+    does not fall."""
     own = [name for term, name in zip(terms, names) if term.candidate.what.gain[0] == "force"]
     travel = sum(values[f"{name}_force"] * values.get(f"{name}_presliding", 0.0) for name in own)
     v = np.geomspace(0.004 * speed, speed, 200)
@@ -72,7 +76,15 @@ def _friction(terms: Sequence[Term], names: Sequence[str], values: Values, reach
         return "bouc_wen"
     if not travel and np.interp(0.05 * speed, v, f) < STEP * np.max(f):
         return "degressive_damper"
-    return "stribeck_friction" if np.max(f) > PEAK * f[-1] else "coulomb_friction"
+    f = f + damping * v
+    least = np.minimum.accumulate(f[::-1])[::-1]  # from each rate on
+    return "stribeck_friction" if np.any(f > PEAK * least) else "coulomb_friction"
+
+
+def stronger(model: Model, place: Place, fit: Fit) -> float:
+    """By what the linear dampers of a place are fitted stronger than nominal, where none of them is a cause [N*s/m]."""
+    dampers = {e.arguments["damping"] for e in model.elements if e.law == "linear_damper" and e.name in {name for name, _ in place.elements}}
+    return sum(max(f.value - f.origin, 0.0) for f in fit.free if f.target in dampers and np.isfinite(f.sigma))
 
 
 def _damper(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
@@ -250,7 +262,8 @@ def functions(
     flat = np.zeros_like(up)
     match kind:
         case "coulomb_friction":
-            return {"force": ("N", lambda p: float(curve(zero[:1], np.array([speed]), p)[0]))}
+            sliding = up[up > SLIDING * speed]
+            return {"force": ("N", lambda p: line(np.ones_like(sliding), curve(np.zeros_like(sliding), sliding, p), sliding))}
         case "stribeck_friction":
             if [t.candidate.what.law for t in terms] == [STRIBECK]:
                 n = names[0]

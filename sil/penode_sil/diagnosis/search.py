@@ -596,12 +596,12 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
 
 
 def leaner(study: Study, e: Explanation, log) -> Explanation:
-    """The explanation without laws that the others of their kind do as well without: they only blur its parameters."""
+    """The explanation without laws that the others of their kind do as well without: they only blur its parameters, or its name."""
     kept: list[Term] = []
     while spare := [t for t in weak(e) if t not in kept]:
         simple = explain(study, [t for t in e.terms if t is not spare[0]], start=e.fit, formulas=e.formulas)
         log(f"  lean {spare[0].group}: {simple.gain:.0f} for {e.gain:.0f}")
-        if set(simple.groups) == set(e.groups) and simple.score > e.score:
+        if len(simple.groups) == len(e.groups) and simple.score > e.score:
             e, kept = simple, []
         else:
             kept.append(spare[0])
