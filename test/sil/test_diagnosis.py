@@ -588,6 +588,12 @@ def test_a_delay_is_written_as_it_was_fitted(roll_off):
     assert abs(written - shown / wave[2000]) < 1.1 * most + 1e-9
 
 
+def test_a_delay_beyond_the_recording_leaves_its_start():
+    """A fit may try it, and must not ask for as much memory."""
+    late = delayed(np.arange(100.0)[:, None] + 3.0, np.array([1e10]), np.zeros(1), 1e-3)
+    assert late[:, 0] == pytest.approx(np.full(100, 3.0), abs=1e-9)
+
+
 @pytest.mark.parametrize("roll_off", [0.0, 0.3, 0.5])
 def test_a_delay_is_written_in_steps_that_it_is_stable_in(roll_off):
     """Steps of 1 of the faster pole; Runge-Kutta of order 4 is stable to 2.785. Pade's poles are at sqrt(12), those of 1/(1 + x + x^2/5)

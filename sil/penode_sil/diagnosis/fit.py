@@ -372,9 +372,11 @@ def drifted(signals: Array, drift: Array) -> Array:
 def delayed(signals: Array, delay: Array, roll_off: Array, step: float) -> Array:
     """Signals [n, runs] later by delays [runs] [s] and less of them where they are fast, by -roll_off [runs] [s^2] of the second
     derivative. That is a dead time before two poles as evenly late as they can be: the poles alone from delay^2/6 on (Bessel's of
-    order 2) to delay^2/2 (one pole), the dead time alone without. Before its start a signal is what it was there."""
+    order 2) to delay^2/2 (one pole), the dead time alone without. Before its start a signal is what it was there, and all of that
+    with a delay that is as long as itself: a fit may try any."""
     n = len(signals)
-    lead = int(np.ceil(8.0 * np.max(np.abs(delay)) / step)) + 16
+    delay = np.minimum(delay, n * step)
+    lead = min(int(np.ceil(8.0 * np.max(delay) / step)), n) + 16
     padded = np.concatenate([np.repeat(signals[:1], lead, 0), signals, np.repeat(signals[-1:], lead, 0)])
     size = fft.next_fast_len(len(padded), real=True)
     s = 2j * np.pi * fft.rfftfreq(size, step)[:, None]
