@@ -20,7 +20,7 @@ from penode_sil import diagnosis
 from penode_sil.diagnosis import extension, hypotheses, naming, noise, plant, score, search, steady, study
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.engine import experiment
-from penode_sil.diagnosis.fit import Problem, delayed
+from penode_sil.diagnosis.fit import Problem, delayed, railed
 from penode_sil.measured import load
 from penode_sil.targets import Sil
 
@@ -568,6 +568,7 @@ FAULTS = {  # sensor, what it shows, and its kind
     "warming up": ("deflection", lambda y: y + 2e-3 * (1.0 - 0.3 * np.exp(-3.0 * SHARE)), "sensor_bias"),
     "wandering": ("deflection", lambda y: y + 2e-3 * (1.0 + 0.2 * np.sin(5.0 * SHARE + 1.0)), "sensor_bias"),
     "drifting gain": ("a_body", lambda y: y * (1.1 + 0.04 * (SHARE - 0.5)), "sensor_scale"),
+    "near its limits": ("a_body", lambda y: y / np.sqrt(1.0 + (y / 0.75) ** 2), "sensor_clipping"),
     "named like a state": ("z_b", lambda y: 1.1 * y, "sensor_scale"),
 }
 
@@ -586,6 +587,32 @@ def test_a_delay_is_written_as_it_was_fitted(roll_off):
     shown = sum(part * delayed(f(wave)[:, None], np.array([delay]), np.array([roll_off * delay**2]), step)[2000, 0] for part, f in ((1.0, np.real), (1.0j, np.imag)))
     most = {0.0: 1e-4 / 720, 0.05: 1e-4 * (1 / 720 + 0.05**2 / 2), 0.3: 0.0, 0.49: 0.01 * 1e-2}[roll_off]
     assert abs(written - shown / wave[2000]) < 1.1 * most + 1e-9
+
+
+def test_rails_are_between_a_tanh_and_a_hard_limit():
+    """At sharpness 0.3 a relative a^2/12 off the first, and log(2) of the width off the second; and its slope is 1 at nothing."""
+    y = np.linspace(-3.0, 3.0, 61)[:, None]
+    soft, hard = (railed(y, np.array([0.5]), np.array([a]))[:, 0] for a in (0.0, 200.0))
+    assert soft == pytest.approx(2.0 * np.tanh(0.5 * y[:, 0]), rel=0.3**2 / 12.0)
+    assert hard == pytest.approx(np.clip(y[:, 0], -2.0, 2.0), abs=1.01 * np.log(2.0) * 2.0 / 200.0)
+    assert railed(np.array([[1e-6]]), np.array([0.5]), np.array([4.0]))[0, 0] == pytest.approx(1e-6, rel=1e-5)
+
+
+@pytest.mark.parametrize("sharpness", [0.0, 1.0, 30.0])
+def test_rails_are_written_as_they_were_fitted(sharpness):
+    """But for the seven digits of the text."""
+    parameters: list[str] = []
+    text = extension._railed("y", 0.5, sharpness, "a", "1", parameters)
+    y = np.linspace(-3.0, 3.0, 61)
+    known = {key: float(entry.split("value = ")[1].split(",")[0]) for key, entry in (p.split(" = ", 1) for p in parameters)}
+    written = eval(text, known | {"y": y, "softplus": lambda x: np.logaddexp(0.0, x)})
+    assert written == pytest.approx(railed(y[:, None], np.array([0.5]), np.array([sharpness]))[:, 0], rel=1e-4)
+
+
+def test_loads_that_cancel_each_other_count_in_full(model):
+    """A start in motion of a quarter vehicle of 445 kg, told as loads of 191 kN and -229 kN."""
+    terms = [SimpleNamespace(candidate=SimpleNamespace(kind="constant_force"), gain=g) for g in (-190.8e3, 228.8e3)]
+    assert search.loaded(SimpleNamespace(terms=terms)) == pytest.approx(419.6e3) and search.weight(model) == pytest.approx(9.81 * (M_B + M_W))
 
 
 def test_a_delay_beyond_the_recording_leaves_its_start():

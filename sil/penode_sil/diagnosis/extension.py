@@ -23,7 +23,7 @@ from penode_gen.model import INTERPOLATIONS, Model, Signal
 from ..batch import Batch
 from ..targets import Sil
 from .build import SPREAD, Term
-from .fit import Free, Problem, moving
+from .fit import BLUNT, Free, Problem, moving
 from .hypotheses import VALUED, Basis, Fault, size
 from .noise import Experiment, bursts, metric
 from .plant import anonymous
@@ -140,6 +140,8 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
             expression = f"{expression} + bias_{s.name}"
         if drift := _drift(e, values, j, s.name, unit, f"min({age}/{recorded}, 1)", parameters):
             expression = f"{expression} + {drift}"
+        if ("rail", j) in values:
+            expression = _railed(expression, values[("rail", j)], values[("sharpness", j)], s.name, unit, parameters)
         rails = next((c.parameters for c in causes if (c.kind, c.where) == ("sensor_clipping", s.name)), {})
         for side, cut in (("high", "min"), ("low", "max")):
             if side in rails:
@@ -247,7 +249,7 @@ def _fastest(stiff: float, drag: float) -> float:
 def _bent(
     e: Explanation, values: dict[object, float], sensor: int, signal: str, name: str, unit: str, share: str, parameters: list[str]
 ) -> str:
-    """What a scale of two sides, a bent or a drifting one adds to a signal; `share` of the recording is over."""
+    """What a scale of two sides, of several pieces, a bent or a drifting one adds to a signal; `share` of the recording is over."""
     parts = []
     bends = [(f.shape, k) for f, k in _series(e, values, sensor) if f.what == "scale_bend"]
     if bends:  # one cube, however many causes share it
@@ -259,7 +261,21 @@ def _bent(
             parts.append(f"{k:.7g}*abs{signal}")
         if f.what == "scale_drift":
             parts.append(f"{k:.7g}*{signal}*({share} - 0.5)")
+        if f.what == "clip":
+            side, edge = np.sign(f.shape), f"edge_{name}_{len(parts)}"
+            parts.append(f"{-side * k:.7g}*max({side:.0f}*{signal} - {edge}, 0)")
+            parameters.append(f"{edge} = {_table({'value': abs(f.shape), 'unit': unit})}")
     return " + ".join(parts)
+
+
+def _railed(signal: str, rail: float, sharpness: float, name: str, unit: str, parameters: list[str]) -> str:
+    """A signal that comes near its limits smoothly: see `railed`."""
+    sharpness = max(sharpness, BLUNT)
+    slope = np.tanh(0.5 * sharpness)
+    knee, width = f"knee_{name}", f"width_{name}"
+    parameters += [f"{key} = {_table({'value': x * slope / rail, 'unit': unit})}" for key, x in ((knee, 1.0), (width, 1.0 / sharpness))]
+    ends = f"softplus(({signal} - {knee})/{width}) - softplus((-({signal}) - {knee})/{width})"
+    return f"({signal} - {width}*({ends}))/{slope:.7g}"
 
 
 def _drift(e: Explanation, values: dict[object, float], sensor: int, name: str, unit: str, share: str, parameters: list[str]) -> str:

@@ -31,6 +31,7 @@ CLOSE = 1e-3  # [s] of samples through which parabolas are the inputs in between
 LONGEST = {"loose_damper": 2.5e-4, "presliding": 2.5e-4, "friction": 5e-4, "tanh(v/": 5e-4}  # [s] step of laws that follow short ways
 KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
+BLUNT = 0.3  # sharpness of a rail: with less it is about the same tanh, as a small difference of large numbers
 FAR = 1e20  # residual of a run that cannot be simulated
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
 PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, derivatives are about what they were
@@ -39,7 +40,7 @@ DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of trial 
 
 @dataclass(frozen=True)
 class Free:
-    """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "roll_off" | "skew", sensor index),
+    """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "roll_off" | "rail" | "sharpness" | "skew", sensor index),
     ("fault", its number), or ("start", recording, state index). `unit` steps of it are natural; a `log` one stays positive. `sigma`: its prior."""
 
     target: str | tuple[str, int] | tuple[str, int, int]
@@ -164,10 +165,13 @@ class Problem:
             z[0] = 2.0 * z[1] - z[2]  # the step knows no rate of an input at its first sample
         z[:, :, run.first_bad >= 0] = 1e30
         skews = np.zeros(z.shape[1:])
+        companions = {(what, j): values for what, j, values in faults if what in ("roll_off", "sharpness")}
+        plain: dict[int, Array] = {}  # [n, runs], of sensors with faults
         for what, j, values in faults:
             if what == "fault":
                 fault = self.faults[j]
-                z[:, fault.sensor] += (values[:, None] * fault.of(z[:, fault.sensor].T, e)).T
+                signal = plain.setdefault(fault.sensor, z[:, fault.sensor].copy())
+                z[:, fault.sensor] += (values[:, None] * fault.of(signal.T, e)).T
             elif what == "scale":
                 z[:, j] *= 1.0 + values
             elif what == "bias":
@@ -177,8 +181,10 @@ class Problem:
             elif what == "clock":
                 z = drifted(z, values)
             elif what == "delay":
-                roll = next((more for kind, sensor, more in faults if (kind, sensor) == ("roll_off", j)), np.zeros(len(shifts)))
-                z[:, j] = delayed(z[:, j], values, roll, self.experiments[e].step)
+                z[:, j] = delayed(z[:, j], values, companions.get(("roll_off", j), np.zeros(len(shifts))), self.experiments[e].step)
+        for what, j, values in faults:
+            if what == "rail":  # after all else that a sensor does
+                z[:, j] = railed(z[:, j], values, companions["sharpness", j])
         return z, skews, run.x
 
     def residuals(self, e: int, z: Array, skews: Array) -> Array:
@@ -383,3 +389,12 @@ def delayed(signals: Array, delay: Array, roll_off: Array, step: float) -> Array
     lag = np.minimum(delay, np.sqrt(6.0 * roll_off))
     poles = 1.0 + s * lag + s * s * (lag**2 / 2.0 - roll_off)
     return fft.irfft(fft.rfft(padded, size, axis=0) * np.exp(-s * (delay - lag)) / poles, size, axis=0)[lead : lead + n]
+
+
+def railed(signals: Array, rail: Array, sharpness: Array) -> Array:
+    """Signals [n, runs] that a sensor shows less and less of towards its limits of 1/rail [runs]: by a tanh with no sharpness [runs],
+    all of them up to the limits with an endless one. In between, the slope is that of two logistic steps at the limits."""
+    sharpness, rail = np.maximum(sharpness, BLUNT), np.maximum(rail, 1e-12)
+    slope = np.tanh(0.5 * sharpness)
+    x = signals * rail * (sharpness / slope)
+    return signals / slope + (np.logaddexp(0.0, -x - sharpness) - np.logaddexp(0.0, x - sharpness)) / (sharpness * rail)

@@ -49,7 +49,7 @@ class Basis:
     least: dict[str, float] = field(default_factory=dict)  # what shapes may be at least: less cannot be told
 
 
-VALUED = ("bias", "scale", "delay", "roll_off", "clock")  # faults of a value alone; the others add a series
+VALUED = ("bias", "scale", "delay", "roll_off", "rail", "sharpness", "clock")  # faults of a value alone; the others add a series
 ROLLED = 0.006  # [s] lag of the filter that a sensor may be behind: it only has to be of the size of one
 CLOCK = "clock_drift"  # kind of what is not on the list, but would pass for something that is
 

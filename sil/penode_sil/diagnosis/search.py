@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from penode_gen.model import Model
+
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
 from .hypotheses import BENDS, CLOCK, HALVES, KNEE, STRIBECK, VALUED, Basis, Fault
@@ -22,6 +24,9 @@ from .noise import ALIKE, kinship
 from .score import DAMPINGS, Candidate, Regression
 from .study import Study, heard, loss, regression, requieted
 
+GRAVITY = 9.81  # [m/s^2]
+SHARP = 3.0  # of a sensor's limits, to begin with
+BENT = 0.1  # more of a signal at its largest, to begin with
 TERMS = 3  # elementary laws of one kind
 WANDERING = 5  # and of a bias, which may go any slow way
 COST = 10.0  # chi2 that an elementary law must gain for each of its numbers, and the choice among many
@@ -386,7 +391,18 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     if beam[0].score < max(idle + NEW, (1.0 - NEAR) * moving - NEW):
         return rest, []
     quiet = requieted(rest, beam[0].fit)
-    return grow(quiet, [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]], log, 1)  # the rest was found in motion
+    quiet, found = grow(quiet, [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]], log, 1)  # the rest was found in motion
+    return quiet, [e for e in found if loaded(e) < weight(rest.model)]
+
+
+def loaded(e: Explanation) -> float:
+    """What the loads of an explanation are at most, all together [N]: some that nearly cancel each other count in full."""
+    return sum(abs(t.gain) for t in e.terms if t.candidate.kind == "constant_force")
+
+
+def weight(model: Model) -> float:
+    """Of all bodies [N], without any no bound. A load beyond it is a start in motion in disguise."""
+    return GRAVITY * sum(model.parameters[b.mass].value for b in model.bodies) or np.inf
 
 
 def related(groups: Sequence[Group]) -> set[str]:
@@ -509,6 +525,11 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
                 if tied is not e:
                     e = tied.whole()
                     r = regression(here, e.fit, parameters)
+            if any(kind == "sensor_clipping" for kind, _ in e.groups):
+                soft = softened(here, e, log)
+                if soft is not e:
+                    soft = soft.whole()
+                    e, r = refine(here, soft, regression(here, soft.fit, parameters), parameters)
             done.append(e)
             log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f} {[_law(t.candidate) for t in e.terms]}")
             if second := filtered(here, e, r):
@@ -615,7 +636,7 @@ def weak(e: Explanation) -> list[Term]:
     found = []
     for term, target in zip(e.terms, gains(e.terms, e.built.names)):
         several = sum(t.group == term.group for t in e.terms) > 1 and term.group[0] != "sensor_bias"
-        if several and not term.own:
+        if several and not term.own and getattr(term.candidate.what, "what", "") not in ("rail", "sharpness"):
             i = places[target]
             f = e.fit.free[i]
             found.append(((f.value / f.unit) ** 2 / max(variance[i], 1e-300), term))
@@ -646,6 +667,21 @@ def owned(study: Study, e: Explanation, log) -> Explanation:
             log(f"  all of an element: {tied.gain:.0f} for {e.gain:.0f}")
             best = tied if tied.groups == e.groups and tied.score > best.score else best
     return best
+
+
+def softened(study: Study, e: Explanation, log) -> Explanation:
+    """The explanation with a sensor that comes near its limits smoothly in place of one that is bent at several values."""
+    for group in [g for g in e.groups if g[0] == "sensor_clipping"]:
+        own = [t for t in e.terms if t.group == group]
+        sensor = own[0].candidate.what.sensor
+        top = max(float(np.max(np.abs(x.y[x.good[:, sensor], sensor]), initial=1e-300)) for x in study.experiments)
+        for laws in ({"sharpness": SHARP}, {"sharpness": 0.0, "scale_bend": BENT}):  # a tanh of what is bent is sharper than one
+            faults = {Fault("sensor_clipping", sensor, what, what != "scale_bend", (), top): x for what, x in ({"rail": 1.0 / top} | laws).items()}
+            soft = [Term(replace(own[0].candidate, what=what), x) for what, x in faults.items()]
+            smooth = explain(study, [*(t for t in e.terms if t.group != group), *soft], start=e.fit, formulas=e.formulas)
+            log(f"  smooth {group}: {smooth.gain:.0f} for {e.gain:.0f}")
+            e = smooth if smooth.score > e.score else e
+    return e
 
 
 def halved(study: Study, e: Explanation) -> list[Term]:
