@@ -358,6 +358,24 @@ def test_laws_that_do_the_same_are_one(tmp_path, model):
     assert gap.value == pytest.approx(0.006, rel=0.02) and gap.ci95[0] < 0.006 < gap.ci95[1] < 0.0062
 
 
+def test_a_curve_has_the_parameter_of_its_element_in_it(tmp_path, model):
+    """A damper that is 10 % stronger at low rates and 10 % weaker beyond 0.1 m/s is one curve; told as a wrong damping with a degressive
+    damper beside it, it is that curve, with the same slopes."""
+    z = road(5)
+    path = record(tmp_path / "knee.csv", z, drive(z, lambda s, v: 0.1 * D * v - 0.2 * D * (v - np.clip(v, -0.1, 0.1))), 15)
+    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
+    one = replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+    r = study.regression(one, one.null, ["d"])
+    kinks = [c for c in r.candidates if c.kind == "degressive_damper" and "min(v + knee" in c.what.law]
+    kink = min(kinks, key=lambda c: abs(c.what.shapes["knee"][0] - 0.1))
+    wrong = next(c for c in r.candidates if c.kind == "wrong_parameter" and c.where == "d")
+    two = search.explain(one, [Term(kink, 0.1 * D), Term(wrong, 0.0)])
+    curve = search.joined(one, two, lambda text: None)
+    assert len(two.groups) == 2 and curve.groups == (("degressive_damper", "damper"),) and curve.gain > two.gain - 10.0
+    low, high = (naming.values(one, curve, curve.groups[0])[f"{rate}_rate_damping"] for rate in ("low", "high"))
+    assert low.value == pytest.approx(1.1 * D, rel=0.01) and high.value == pytest.approx(0.9 * D, rel=0.02)
+
+
 def test_a_narrow_play_takes_all_of_the_spring(tmp_path, model):
     """Of 0.2 mm in 30 mm of travel: play and stiffness are seen as a product only, but what is lost is the spring's own
     stiffness."""

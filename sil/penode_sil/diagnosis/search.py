@@ -72,6 +72,8 @@ TAKING = {  # laws that take an element away: its law and argument
     "loose_damper": ("linear_damper", "damping"),
     **dict.fromkeys(HALVES, ("linear_spring", "stiffness")),
 }
+LINES = {"linear_spring": ("stiffness", "N/m"), "linear_damper": ("damping", "N*s/m")}  # laws and their gains
+LINES_OF = {"spring": "linear_spring", "damper": "linear_damper"}
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK)  # a formula after all
 SINGLE = ("wrong_parameter", "hidden_resonance", CLOCK)  # kinds that have one law only
@@ -598,7 +600,7 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
     laws = {g: own for g, own in laws.items() if own != ["loose_damper"]}  # one as well
     bent = [g for g, own in laws.items() if len(own) > len(TEXTBOOK[g[0]]) or not set(own) <= set(TEXTBOOK[g[0]])]
     if not bent:
-        return e
+        return joined(study, e, log)
     whole = e.whole()
     r = regression(study, whole.fit, parameters, {kind for kind, _ in bent})
     for group in bent:
@@ -613,6 +615,24 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
             log(f"  plain {group}: {simple.gain:.0f} for {e.gain:.0f}")
             if set(simple.groups) == set(e.groups) and (simple.gain > e.gain - SLACK or simple.score > e.score - SLACK):
                 e = simple
+    return joined(study, e, log)
+
+
+def joined(study: Study, e: Explanation, log) -> Explanation:
+    """The explanation with the straight part of a curve in place of a wrong parameter of the element at its place: together they are
+    one curve, which has one name."""
+    for group in [g for g in e.groups if g[0] == "wrong_parameter"]:
+        linear = {x.law: x.name for x in study.model.elements if group[1] in x.arguments.values() and x.law in LINES}
+        for t in [t for t in e.terms if t.candidate.kind in (*DAMPERS, "cubic_spring", "asymmetric_spring")]:
+            what = t.candidate.what
+            law = LINES_OF[CURVES[t.candidate.kind]]
+            if linear.get(law) in {name for name, _ in study.places[what.place].elements} and group in e.groups:
+                line = replace(what, law=law, gain=LINES[law], shapes={}, sign=0, series=(), companion=True, fixed={}, least={})
+                more = e.fit.value(group[1]) - study.model.parameters[group[1]].value
+                term = Term(replace(t.candidate, sign=0, companion=True, what=line), more)
+                one = explain(study, [*(x for x in e.terms if x.group != group), term], start=e.fit, formulas=e.formulas)
+                log(f"  {group} in {t.group}: {one.gain:.0f} for {e.gain:.0f}")
+                e = one if one.score > e.score else e
     return e
 
 
