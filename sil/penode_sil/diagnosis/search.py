@@ -21,7 +21,7 @@ from .fit import Fit, Problem
 from .hypotheses import BENDS, CLOCK, HALVES, KNEE, STRIBECK, VALUED, Basis, Fault
 from .naming import DAMPERS, FRICTION, christened, straight
 from .noise import ALIKE, kinship
-from .score import DAMPINGS, Candidate, Regression
+from .score import DAMPINGS, Candidate, Regression, where
 from .study import Study, heard, loss, regression, requieted
 
 GRAVITY = 9.81  # [m/s^2]
@@ -248,7 +248,7 @@ def singles(study: Study, r: Regression, few: int = 3) -> list[Explanation]:
             if k < len(taken) and kept < KEPT * r.gain(choices[k])[0] and (other := terms_of(r, elsewhere(r, taken[k][1], choices[k]))):
                 found.append(explain(study, other))
     found += [explain(study, [needed], start=e.fit) for e in found for needed in sufficient(study, e)]
-    return distinct([e for e in found if e.groups])
+    return distinct([softened(study, e) for e in found if e.groups])
 
 
 def elsewhere(r: Regression, group: Group, chosen: Sequence[int]) -> list[int]:
@@ -595,7 +595,7 @@ def settled(study: Study, e: Explanation) -> Explanation:
 def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Explanation:
     """The explanation with the textbook law of a kind in place of several laws, where it does about as well: its parameters
     are known better."""
-    e = leaner(study, unbent(study, e, log), log)
+    e = leaner(study, unlagged(study, unbent(study, e, log), log), log)
     laws = {g: [_law(t.candidate) for t in e.terms if t.group == g] for g in e.groups if g[0] in TEXTBOOK}
     laws = {g: own for g, own in laws.items() if own != ["loose_damper"]}  # one as well
     bent = [g for g, own in laws.items() if len(own) > len(TEXTBOOK[g[0]]) or not set(own) <= set(TEXTBOOK[g[0]])]
@@ -616,6 +616,19 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
             if set(simple.groups) == set(e.groups) and (simple.gain > e.gain - SLACK or simple.score > e.score - SLACK):
                 e = simple
     return joined(study, e, log)
+
+
+def unlagged(study: Study, e: Explanation, log) -> Explanation:
+    """The explanation with a spring that hardens in place of a bushing that hardens, where it does as well without its memory."""
+    for t in [t for t in e.terms if _law(t.candidate) == "hardening_bushing"]:
+        if t.group in e.groups:
+            what = replace(t.candidate.what, kind="cubic_spring", law="cubic_spring", shapes={})
+            place = where("cubic_spring", study.places[what.place], study.model)
+            term = replace(t, candidate=replace(t.candidate, kind="cubic_spring", where=place, companion=False, what=what))
+            spring = explain(study, [*(x for x in e.terms if x.group != t.group), term], start=e.fit, formulas=e.formulas)
+            log(f"  no memory in {t.group}: {spring.gain:.0f} for {e.gain:.0f}")
+            e = spring if spring.score > e.score - SLACK else e
+    return e
 
 
 def joined(study: Study, e: Explanation, log) -> Explanation:
@@ -689,10 +702,12 @@ def owned(study: Study, e: Explanation, log) -> Explanation:
     return best
 
 
-def softened(study: Study, e: Explanation, log) -> Explanation:
+def softened(study: Study, e: Explanation, log=lambda text: None) -> Explanation:
     """The explanation with a sensor that comes near its limits smoothly in place of one that is bent at several values."""
     for group in [g for g in e.groups if g[0] == "sensor_clipping"]:
         own = [t for t in e.terms if t.group == group]
+        if any(t.candidate.what.what == "rail" for t in own):
+            continue
         sensor = own[0].candidate.what.sensor
         top = max(float(np.max(np.abs(x.y[x.good[:, sensor], sensor]), initial=1e-300)) for x in study.experiments)
         for laws in ({"sharpness": SHARP}, {"sharpness": 0.0, "scale_bend": BENT}):  # a tanh of what is bent is sharper than one
