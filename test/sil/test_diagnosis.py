@@ -376,6 +376,20 @@ def test_a_curve_has_the_parameter_of_its_element_in_it(tmp_path, model):
     assert low.value == pytest.approx(1.1 * D, rel=0.01) and high.value == pytest.approx(0.9 * D, rel=0.02)
 
 
+def test_a_bushing_without_memory_is_a_spring(tmp_path, model):
+    """A hardening spring, told as a bushing that hardens and forgets within 1000 s."""
+    z = road(5)
+    path = record(tmp_path / "cubic.csv", z, drive(z, lambda s, v: 2e7 * s**3), 15)
+    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
+    one = replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+    laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == "hardening_bushing"]
+    slow = replace(laws[0].what, shapes={"relaxation": (1000.0, "s")})
+    bushing = search.explain(one, [Term(replace(laws[0], companion=False, what=slow), 2e7)])
+    spring = search.unlagged(one, bushing, lambda text: None)
+    assert bushing.groups == (("maxwell_bushing", "spring"),) and spring.groups == (("cubic_spring", "spring"),)
+    assert spring.terms[0].gain == pytest.approx(2e7, rel=0.02)
+
+
 def test_a_narrow_play_takes_all_of_the_spring(tmp_path, model):
     """Of 0.2 mm in 30 mm of travel: play and stiffness are seen as a product only, but what is lost is the spring's own
     stiffness."""

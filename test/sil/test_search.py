@@ -14,7 +14,8 @@ from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import HALVES, Basis
 from penode_sil.diagnosis.score import Candidate, Regression
 from penode_sil.diagnosis.search import (
-    NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, pursue, spared, sprung, strongest, sufficient, terms_of,
+    NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, pursue, spared, sprung, strongest, sufficient, terms_of, weak,
+    whole,
 )  # fmt: skip
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
@@ -123,6 +124,26 @@ def test_a_play_with_a_half_beside_it_has_two_halves(play, half, gaps):
     study = SimpleNamespace(model=model, places=[SimpleNamespace(elements=[("spring", 1)])])
     found = halved(study, Explanation(terms, None, None, None, 0.0))
     assert found == list(terms) if gaps is None else [t.candidate.what.shapes["gap"][0] for t in found] == pytest.approx(gaps)
+
+
+@pytest.mark.parametrize("companion, spare", [(True, [1]), (False, [0, 1])])
+def test_the_law_that_makes_a_cause_is_not_spared(companion, spare):
+    """Two laws that are worth nothing: if one may only help the other, that stays, for a helper alone is no cause."""
+    first = Candidate("maxwell_bushing", "spring", 1, False, Basis("maxwell_bushing", 0, "maxwell_bushing", ("k", "N/m"), {}, 1, ()))
+    second = replace(first, companion=companion, what=replace(first.what, companion=companion))
+    free = tuple(SimpleNamespace(target=f"x{k}_k", value=1.0, unit=1.0) for k in range(2))
+    fit = SimpleNamespace(free=free, covariance=lambda: np.eye(2))
+    e = Explanation((Term(first, 1.0), Term(second, 1.0)), SimpleNamespace(names=("x0", "x1")), None, fit, 100.0)
+    assert [e.terms.index(t) for t in weak(e)] == spare
+
+
+def test_a_play_of_nothing_takes_away_nothing():
+    """Else its gap is none, and no fit can make it wider."""
+    what = Basis("backlash", 0, "backlash", ("k", "N/m"), {"gap": (0.003, "m")}, 1, ())
+    spring = SimpleNamespace(law="linear_spring", name="spring", arguments={"stiffness": "c"})
+    model = SimpleNamespace(elements=[spring], parameters={"c": SimpleNamespace(value=2e4)})
+    study = SimpleNamespace(model=model, places=[SimpleNamespace(elements=[("spring", 1)])])
+    assert whole(study, Term(Candidate("backlash", "spring", 1, False, what), 0.0)) is None
 
 
 def test_a_law_that_mends_a_form_leaves_the_name():

@@ -669,6 +669,8 @@ def weak(e: Explanation) -> list[Term]:
     found = []
     for term, target in zip(e.terms, gains(e.terms, e.built.names)):
         several = sum(t.group == term.group for t in e.terms) > 1 and term.group[0] != "sensor_bias"
+        if not term.candidate.companion and sum(t.group == term.group and not t.candidate.companion for t in e.terms) == 1:
+            continue  # companions alone are no cause
         if several and not term.own and getattr(term.candidate.what, "what", "") not in ("rail", "sharpness"):
             i = places[target]
             f = e.fit.free[i]
@@ -742,7 +744,7 @@ def whole(study: Study, t: Term) -> Term | None:
     law, argument = TAKING.get(_law(t.candidate), ("", ""))
     near = {name for name, _ in study.places[t.candidate.what.place].elements} if law and not t.own else set()
     own = [x.arguments[argument] for x in study.model.elements if x.law == law and x.name in near]
-    if len(own) != 1:
+    if len(own) != 1 or t.gain == 0.0:
         return None
     what, all_of_it = t.candidate.what, study.model.parameters[own[0]].value
     share = t.gain / all_of_it  # of a narrow play, only its gap times what it takes is seen
