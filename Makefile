@@ -43,7 +43,7 @@ bench: setup ## The same with the steps of other tools (ten minutes, downloads t
 campaign: campaign-diagnosis campaign-proofs ## Both campaigns, hours
 
 campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings and let the diagnosis and its rivals look for them
-	$(Q)$(PYTHON) test/diagnosis/campaign.py --cases $(CASES) --nulls 100 --jobs $$(nproc) --gate --page test/diagnosis/CAMPAIGN.md --command "$(PENODE) diagnose" \
+	$(Q)$(PYTHON) test/diagnosis/campaign.py --cases $(CASES) --nulls 100 --outside 60 --jobs $$(nproc) --gate --page test/diagnosis/CAMPAIGN.md --command "$(PENODE) diagnose" \
 	    --command "PySINDy=build/rivals/bin/python test/diagnosis/rivals/sindy.py" \
 	    --command "neural=build/rivals/bin/python test/diagnosis/rivals/neural.py"
 

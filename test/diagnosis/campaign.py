@@ -117,6 +117,13 @@ def line(row: dict) -> str:
     return f"{row['command']} {row['case']} {row['stratum']}: {row['outcome']}: {hidden} -> {answer}, {row['seconds']} s"
 
 
+def commit() -> str:
+    """What the code was, as far as Git knows it."""
+    call = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty"]
+    found = subprocess.run(call, capture_output=True, text=True) if shutil.which("git") else None
+    return f"commit {found.stdout.strip()}" if found and not found.returncode else "an unknown commit"
+
+
 def arguments() -> argparse.ArgumentParser:
     parse = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parse.add_argument
@@ -125,6 +132,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--only", action="append", default=[], metavar="SEED:INDEX", help="just this case; may be given again")
     add("--strata", default=",".join(cases.STRATA), help="take these only: " + ", ".join(cases.STRATA))
     add("--nulls", type=int, default=0, help="go on until so many cases had nothing hidden in them")
+    add("--outside", type=int, default=0, help="and until so many had an effect outside of the list")
     add("--kinds", default="", help="take only cases with one of these kinds")
     add("--command", action="append", default=[], metavar="[NAME=]COMMAND",
         help="called as COMMAND MODEL.toml --data REC... --holdout REC -o DIR (penode diagnose); may be given again")
@@ -150,9 +158,9 @@ def main() -> int:
     if not strata <= set(cases.STRATA) or not kinds <= set(cases.KINDS):
         parse.error(f"unknown: {', '.join((strata - set(cases.STRATA)) | (kinds - set(cases.KINDS)))}")
     chosen = [tuple(map(int, one.split(":"))) for one in asked.only] or choose(seed, asked.cases, strata, kinds)
-    if asked.nulls and not asked.only:
-        nulls = choose(seed, asked.nulls, {"null", "null_hard"}, set())
-        chosen += [one for one in nulls if one not in chosen]
+    for more, least in (({"null", "null_hard"}, asked.nulls), ({"outside"}, asked.outside)):
+        if least and not asked.only:
+            chosen += [one for one in choose(seed, least, more, set()) if one not in chosen]
     print(f"{len(chosen)} cases, seed {chosen[0][0] if chosen else seed}", flush=True)
     asked.out.mkdir(parents=True, exist_ok=True)
     commands = dict(c.split("=", 1) if "=" in c.split()[0] else ("diagnose", c) for c in asked.command or ["penode diagnose"])
@@ -182,7 +190,8 @@ def main() -> int:
     side = score.compare(tables)
     if not asked.brief:
         print("".join(f"\n{name}: {commands[name]}\n{own}" for name, own in texts.items()) + f"\n{side}\n")
-    page = [f"# Campaign of {count}, seed {seed}\n\n{side}\n", *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items())]
+    said = f"Code of {commit()}. Seconds are of the processor for a whole command, imports and files included, compilers not."
+    page = [f"# Campaign of {count}, seed {seed}\n\n{said}\n\n{side}\n", *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items())]
     for path in filter(None, (asked.out / "campaign.md", asked.page)):
         path.write_text("".join(page))
     result = {"seed": seed, "commands": commands, "tables": tables, "rows": rows}
