@@ -40,8 +40,9 @@ DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of trial 
 
 @dataclass(frozen=True)
 class Free:
-    """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "roll_off" | "rail" | "sharpness" | "skew", sensor index),
-    ("fault", its number), or ("start", recording, state index). `unit` steps of it are natural; a `log` one stays positive. `sigma`: its prior."""
+    """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "roll_off" | "rail" | "sharpness" | "skew",
+    sensor index), ("fault", its number), or ("start", recording, state index). `unit` steps of it are natural; a `log` one stays positive.
+    `sigma`: its prior."""
 
     target: str | tuple[str, int] | tuple[str, int, int]
     value: float

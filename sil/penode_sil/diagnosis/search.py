@@ -713,8 +713,9 @@ def softened(study: Study, e: Explanation, log=lambda text: None) -> Explanation
         sensor = own[0].candidate.what.sensor
         top = max(float(np.max(np.abs(x.y[x.good[:, sensor], sensor]), initial=1e-300)) for x in study.experiments)
         for laws in ({"sharpness": SHARP}, {"sharpness": 0.0, "scale_bend": BENT}):  # a tanh of what is bent is sharper than one
-            faults = {Fault("sensor_clipping", sensor, what, what != "scale_bend", (), top): x for what, x in ({"rail": 1.0 / top} | laws).items()}
-            soft = [Term(replace(own[0].candidate, what=what), x) for what, x in faults.items()]
+            sizes = {"rail": 1.0 / top} | laws
+            faults = [Fault("sensor_clipping", sensor, what, what != "scale_bend", (), top) for what in sizes]
+            soft = [Term(replace(own[0].candidate, what=fault), x) for fault, x in zip(faults, sizes.values())]
             smooth = explain(study, [*(t for t in e.terms if t.group != group), *soft], start=e.fit, formulas=e.formulas)
             log(f"  smooth {group}: {smooth.gain:.0f} for {e.gain:.0f}")
             e = smooth if smooth.score > e.score else e
