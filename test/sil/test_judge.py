@@ -100,6 +100,7 @@ def test_what_changes_is_no_small_part_of_the_whole(values):
     assert judged(study=QUIET, changed=60.0) == OUT
     assert judged(found(("bump_stop", "spring")), changed=0.02 * gained) == OUT
     assert judged(found(("bump_stop", "spring")), changed=0.01 * gained) == (["bump_stop"], "explained")
+    assert judged(found(("bump_stop", "spring")), changed=0.001 * gained, alike=noise.ALIKE + 0.1) == OUT  # and sensors share it
 
 
 @pytest.mark.parametrize(
@@ -145,6 +146,8 @@ def test_a_resonance_needs_little_damping_and_one_mass(values, monkeypatch):
     for ratio, answer in ((0.1, ([mass[0]], "explained")), (engine.DAMPED + 0.01, OUT)):
         values[mass[0]] = {"frequency": (8.0, 7.0, 9.0), "mass": (5.0, 4.0, 6.0), "damping_ratio": (ratio, 0.0, 1.0)}
         assert judged(found(mass)) == answer
+        lines = engine.damped([engine.cause(STUDY, [found(mass)], mass)])
+        assert [("body" in line and "5 kg at 8 Hz" in line and "0.21" in line) for line in lines] == [True] * (answer == OUT)
     values[mass[0]]["damping_ratio"] = (0.1, 0.0, 1.0)
     two = found(mass)
     two.terms *= 2

@@ -38,7 +38,7 @@ PATCHED = 0.985  # share that several causes must take away if sensors still sha
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
-DAMPED = 0.45  # a hidden mass with more damping than that has no resonance: it stands for some other dynamics
+DAMPED = 0.2  # a hidden mass with more damping is no part on rubber, whose loss factor is 0.4 at most: it stands for some other dynamics
 MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks only stand in for it
 LATE = 0.008  # of a sample: less delay than that is no fault of a sensor
 UNSEEN = 1.5  # times the noise: a hold-out that is that far off, where training showed nothing, is of another vehicle
@@ -115,7 +115,7 @@ def diagnose(
     log(str(change))
     fades = best is not None and any(kind == "damper_fading" for kind, _ in best.groups)  # which changes by its nature
     changed = change.gain if change.surprise > -np.log(CHANGING) and not fades else 0.0
-    causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.purity > noise.PURE, changed)
+    causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.loud > 1.0, changed)
     if doubt := plausible.doubt(study, best, verdict):
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
@@ -123,7 +123,10 @@ def diagnose(
     notes: list[str] = []
     if changed and verdict == "unexplained":
         notes.append(f"{change.what} of {change.place} changes while it is measured: a controller, a leak?")
-    if tone.purity > noise.PURE:
+    if verdict == "unexplained" and best is not None:
+        masses = [cause(study, explanations, g) for g in best.groups if g[0] == "hidden_resonance"]
+        notes += damped([c for c in masses if worth(study, c)])
+    if tone.loud > 1.0:
         notes.append(f"{model.sensors[tone.sensor].name} has a tone of its own at {tone.frequency:.0f} Hz: an engine, a wheel, the mains?")
     drift = sum(t.gain for t in best.terms if t.candidate.kind == CLOCK) if best else 0.0
     if drift:
@@ -326,7 +329,7 @@ def judge(
     if share < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > noise.ALIKE):
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     patched = len(best.groups) > 1 and share < PATCHED and alike > noise.ALIKE  # several causes, and still no whole
-    if patched or changed > (1.0 - PATCHED) * gained:
+    if patched or changed > (1.0 - PATCHED) * gained or changed and alike > noise.ALIKE:  # by two proofs something is left
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
     if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < search.FILTER * best.gain:
@@ -340,12 +343,23 @@ def judge(
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     kinds = [c.kind for c in causes]  # several wrong parameters are another vehicle, several delays another clock
     several = max(kinds.count("wrong_parameter"), kinds.count("sensor_delay")) > 1
-    if several or any(c.kind == "hidden_resonance" and c.parameters["damping_ratio"].value > DAMPED for c in causes):
+    if several or damped(causes):
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
     faulty = {(c.kind, c.where) for c in causes}
     causes += [f for f in faults if (f.kind, f.where) not in faulty]
     whole = (share > search.WHOLE or left < 0.15 * rows) and not pure
     return tuple(causes), ("explained" if whole else "partly_explained") if causes else "no_discrepancy", share, evidence
+
+
+def damped(causes: Sequence[Cause]) -> list[str]:
+    """A line on each hidden mass whose damping is more than that of a part on rubber."""
+    said = []
+    for c in (c for c in causes if c.kind == "hidden_resonance"):
+        v = {k: p.value for k, p in c.parameters.items()}
+        if v["damping_ratio"] > DAMPED:
+            like = f"a mass of {v['mass']:.3g} kg at {v['frequency']:.3g} Hz with a damping ratio of {v['damping_ratio']:.2f}"
+            said.append(f"what {c.where} lacks is like {like}, too much for a part on rubber: pitch, roll, an occupant, a load that moves?")
+    return said
 
 
 def resized(study: Study, e: Explanation, c: Cause) -> Cause:

@@ -11,7 +11,7 @@ road cannot be mistaken for a delay or a scale of a sensor.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -29,6 +29,9 @@ FINER = (1.2, 1.1, 1.05, 1.025)
 BINS = 16  # of a spectrum in which coherence is estimated
 HALF = 8  # bins to either side that say how loud it is around a tone
 PURE = 40.0  # see Tone: noise has 16 at most
+LASTING = 15.0  # see Tone: noise, and the resonances that the road's noise shakes, have 9 at most
+TAIL = 10.0  # how fast what a bin has of its neighbours' median falls off in noise: as (1 + x / TAIL)^-TAIL, at the most
+OVERLAP = 0.6  # of the windows that overlap by half: so many count as independent
 PARTS = (0.1, 2.0, 6.0, 20.0)  # [Hz] from which to which coherence is added up
 TOP = 100.0  # [Hz] what vehicles do above it is not looked at, but for the noise
 STOP = 120.0  # [dB] by which thinning damps what it would mirror into the band
@@ -385,37 +388,59 @@ def _decayed(y: Array) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Tone:
-    """The purest tone in any residual: how far it stands out of the spectrum around it, its frequency [Hz], and its sensor."""
+    """The purest tone in any residual: how far it stands out of the spectrum around it, wherever it is in each second; the
+    surprise [nat] that one frequency does so all the time; this frequency [Hz], and its sensor."""
 
     purity: float = 0.0
+    steady: float = 0.0
     frequency: float = 0.0
     sensor: int = 0
+
+    @property
+    def loud(self) -> float:
+        """Above 1: no noise."""
+        return max(self.purity / PURE, self.steady / LASTING)
 
 
 def tone(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> Tone:
     """The purest tone that residuals have and inputs have not: noise that makes one comes from a machine.
 
-    Recordings under a sine or a sweep do not count: there, an error of a model or a quantum is a tone as well. Nor do those of
-    less than 120 Hz or 3 s, which have too few bins or seconds.
+    Under a sine an error of a model or a quantum is a tone as well, and under a sweep one that moves: there, only those count
+    that stay. Recordings of less than 120 Hz or 3 s have too few bins or seconds.
     """
     found = [Tone()]
     for e, z in zip(experiments, simulated):
         second = int(round(1.0 / e.step))  # samples
-        if 0.4 * second >= 6 * HALF and len(e.time) >= 3 * second and not swept(e.u, e.step):
-            found += _tones(np.where(e.good, e.y - z, 0.0), e.step)
-    return max(found, key=lambda t: t.purity)
+        if 0.4 * second < 6 * HALF or len(e.time) < 3 * second:
+            continue
+        tones = _tones(np.where(e.good, e.y - z, 0.0), e.step)
+        if not swept(e.u, e.step):
+            found += tones
+        elif _moves(e.u, e.step):
+            found += [replace(t, purity=0.0) for t in tones]
+    return max(found, key=lambda t: t.loud)
 
 
 def swept(inputs: Array, step: float) -> bool:
     """Is an input [n, any] a sine, most of the time, though one whose frequency may change?"""
+    power = _seconds(np.diff(inputs, axis=0), step)[:, : int(TOP)]
+    near = np.lib.stride_tricks.sliding_window_view(power, 5, axis=1).sum(axis=-1)
+    shares = np.max(near, axis=1) / np.maximum(np.sum(power, axis=1), 1e-300)
+    return bool(len(shares)) and bool(np.any(np.median(shares, axis=0) > 0.9))
+
+
+def _moves(inputs: Array, step: float) -> bool:
+    """Does the frequency of each input [n, any], a sine, change by more than 1 Hz in the middle half of the time?"""
+    low, high = np.quantile(np.argmax(_seconds(np.diff(inputs, axis=0), step), axis=1), [0.25, 0.75], axis=0)
+    return bool(np.all(high - low > 1.0))
+
+
+def _seconds(signals: Array, step: float) -> Array:
+    """Periodograms [seconds, f, any] of signals [n, any], each of one second, which overlap by half."""
     size = int(round(1.0 / step))
     window = np.hanning(size)[:, None]
-    shares = []
-    for x in (inputs[a : a + size + 1] for a in range(0, len(inputs) - size, size // 2)):
-        power = np.abs(fft.rfft(np.diff(x, axis=0) * window, axis=0)[: int(TOP)]) ** 2
-        near = np.lib.stride_tricks.sliding_window_view(power, 5, axis=0).sum(axis=-1)
-        shares.append(np.max(near, axis=0) / np.maximum(np.sum(power, axis=0), 1e-300))
-    return bool(shares) and bool(np.any(np.median(shares, axis=0) > 0.9))
+    parts = [signals[a : a + size] for a in range(0, len(signals) - size + 1, size // 2)]
+    return np.array([np.abs(fft.rfft(x * window, axis=0)) ** 2 for x in parts]).reshape(len(parts), size // 2 + 1, signals.shape[1])
 
 
 def _tones(signals: Array, step: float) -> list[Tone]:
@@ -424,17 +449,25 @@ def _tones(signals: Array, step: float) -> list[Tone]:
     In each second it is the highest bin of the periodogram, in medians of the HALF bins to either side; what counts is the
     median over time, so that its frequency may wander. Noise of any smooth colour has the logarithm of the number of bins, 6,
     and the scatter of that median makes it 9 to 16.
+
+    A bin that is loud all the time needs much less of that: over n independent seconds noise has a median of x with a chance
+    of (4 p)^(n / 2) at most, p that of x in one. It is in means of three bins to either side here if these are more than the
+    median: a resonance is wider than a tone.
     """
     size = int(round(1.0 / step))
     top = int(0.4 * size)
-    window = np.hanning(size)[:, None]
-    parts = [signals[a : a + size] for a in range(0, len(signals) - size + 1, size // 2)]
-    power = np.array([np.abs(fft.rfft((x - x.mean(axis=0)) * window, axis=0)[: top + HALF]) ** 2 for x in parts])
+    power = _seconds(signals, step)[:, : top + HALF]
     around = np.lib.stride_tricks.sliding_window_view(power, 2 * HALF + 1, axis=1)
     beside = np.median(np.delete(around, [HALF - 1, HALF, HALF + 1], axis=-1), axis=-1) / np.log(2.0)
     ratio = power[:, HALF:top] / np.maximum(beside, 1e-300)
     purity, peak = np.median(np.max(ratio, axis=1), axis=0), np.median(np.argmax(ratio, axis=1), axis=0)
-    return [Tone(float(p), float(k + HALF) / (size * step), j) for j, (p, k) in enumerate(zip(purity, peak))]
+    sides = np.maximum(*(around[..., HALF + a : HALF + a + 3].mean(axis=-1) for a in (-4, 2)))
+    lasting = np.median(power[:, HALF:top] / np.maximum(np.maximum(beside, sides), 1e-300), axis=0)
+    surprise = 0.5 * OVERLAP * len(power) * (TAIL * np.log1p(np.max(lasting, axis=0) / TAIL) - np.log(4.0))
+    return [
+        Tone(float(p), float(s), float((k if s < LASTING else np.argmax(lasting[:, j])) + HALF) / (size * step), j)
+        for j, (p, k, s) in enumerate(zip(purity, peak, surprise))
+    ]
 
 
 def kinship(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> tuple[float, float]:
