@@ -124,6 +124,14 @@ def commit() -> str:
     return f"commit {found.stdout.strip()}" if found and not found.returncode else "an unknown commit"
 
 
+def least(text: str) -> tuple[str, int]:
+    """null=100: a stratum and a count."""
+    stratum, _, count = text.partition("=")
+    if stratum not in cases.STRATA or not count.isdigit():
+        raise argparse.ArgumentTypeError(f"not STRATUM=N: {text}; strata are {', '.join(cases.STRATA)}")
+    return stratum, int(count)
+
+
 def arguments() -> argparse.ArgumentParser:
     parse = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parse.add_argument
@@ -131,8 +139,7 @@ def arguments() -> argparse.ArgumentParser:
     add("--seed", type=int, help="of the draw; default: a new one, which is printed")
     add("--only", action="append", default=[], metavar="SEED:INDEX", help="just this case; may be given again")
     add("--strata", default=",".join(cases.STRATA), help="take these only: " + ", ".join(cases.STRATA))
-    add("--nulls", type=int, default=0, help="go on until so many cases of each null stratum had nothing hidden in them")
-    add("--outside", type=int, default=0, help="and until so many had an effect outside of the list")
+    add("--least", action="append", default=[], type=least, metavar="STRATUM=N", help="go on until so many are of it; may be given again")
     add("--kinds", default="", help="take only cases with one of these kinds")
     add("--command", action="append", default=[], metavar="[NAME=]COMMAND",
         help="called as COMMAND MODEL.toml --data REC... --holdout REC -o DIR (penode diagnose); may be given again")
@@ -158,9 +165,8 @@ def main() -> int:
     if not strata <= set(cases.STRATA) or not kinds <= set(cases.KINDS):
         parse.error(f"unknown: {', '.join((strata - set(cases.STRATA)) | (kinds - set(cases.KINDS)))}")
     chosen = [tuple(map(int, one.split(":"))) for one in asked.only] or choose(seed, asked.cases, strata, kinds)
-    for stratum, least in (("null", asked.nulls), ("null_hard", asked.nulls), ("outside", asked.outside)):
-        if least and not asked.only:
-            chosen += [one for one in choose(seed, least, {stratum}, set()) if one not in chosen]
+    for stratum, count in asked.least if not asked.only else ():
+        chosen += [one for one in choose(seed, count, {stratum}, set()) if one not in chosen]
     print(f"{len(chosen)} cases, seed {chosen[0][0] if chosen else seed}", flush=True)
     asked.out.mkdir(parents=True, exist_ok=True)
     commands = dict(c.split("=", 1) if "=" in c.split()[0] else ("diagnose", c) for c in asked.command or ["penode diagnose"])
