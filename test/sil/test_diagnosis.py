@@ -390,6 +390,53 @@ def test_a_bushing_without_memory_is_a_spring(tmp_path, model):
     assert spring.terms[0].gain == pytest.approx(2e7, rel=0.02)
 
 
+def test_friction_that_falls_for_nothing_is_coulomb(tmp_path, model):
+    """Friction that is constant, told as one that falls by a third: without the fall it does as well, and costs less."""
+    z = road(5)
+    path = record(tmp_path / "rubs.csv", z, drive(z, lambda s, v: 60.0 * v / np.hypot(v, 4e-3)), 15)
+    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
+    one = replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+    laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == hypotheses.STRIBECK]
+    falling = search.explain(one, [Term(laws[-1], 40.0)], iterations=0)
+    constant = search.plain(one, falling, [], lambda text: None)
+    assert falling.groups == (("stribeck_friction", "damper"),) and constant.groups == (("coulomb_friction", "damper"),)
+    force = naming.values(one, constant, constant.groups[0])["force"]
+    assert force.value == pytest.approx(60.0, rel=0.02)
+
+
+FADING = """
+[model]
+name = "fading"
+sample_time = "1 ms"
+[parameters]
+d = { value = 1000.0, unit = "N*s/m", tolerance = 0.01 }
+[inputs]
+rod = { unit = "m" }
+[elements]
+damper = { between = ["rod", "ground"], law = "linear_damper", damping = "d" }
+[outputs]
+out = { value = "F_damper", unit = "N" }
+[sensors]
+force = { value = "F_damper", unit = "N", noise = 1.0 }
+"""
+
+
+def test_a_loss_is_that_at_the_end_of_the_recording(tmp_path):
+    """A damper that loses 20 % in proportion to its work under a sweep that gets faster; of 22 999 samples the diagnosis takes 22 500,
+    until when it loses 19 %."""
+    (tmp_path / "fading.toml").write_text(FADING)
+    t = np.arange(22_999) * 1e-3
+    phase = 2.0 * np.pi * (0.3 * t + 0.06 * t**2)
+    s, v = 0.01 * np.sin(phase), 0.01 * np.cos(phase) * 2.0 * np.pi * (0.3 + 0.12 * t)
+    heat = np.cumsum(v**2)
+    force = 1000.0 * v * (1.0 - 0.2 * heat / heat[-1]) + np.random.default_rng(6).standard_normal(t.size)
+    np.savetxt(tmp_path / "f.csv", np.stack([t, s, force], axis=1), delimiter=",", header="time [s],rod [m],force [N]", comments="", fmt="%.9g")
+    model = penode_gen.load(tmp_path / "fading.toml")
+    (cause,) = diagnosis.diagnose(model, load([tmp_path / "f.csv"], model)).causes
+    assert heat[22_499] / heat[-1] < 0.95
+    assert cause.kind == "damper_fading" and cause.parameters["loss"].value == pytest.approx(0.2, rel=0.02)
+
+
 def test_a_narrow_play_takes_all_of_the_spring(tmp_path, model):
     """Of 0.2 mm in 30 mm of travel: play and stiffness are seen as a product only, but what is lost is the spring's own
     stiffness."""

@@ -146,6 +146,8 @@ def diagnose(
     if unnamed is not None:
         explained = nameless.share(study, unnamed.fit)
         notes.append(f"a small network beside {nameless.beside(study, unnamed)} takes a part of it, and has no name")
+    elif verdict == "unexplained":
+        explained = 0.0
     text, extended = extension.extend_file(study, named, causes)
     held: list[residual.Channel] = []
     if holdout:

@@ -338,15 +338,18 @@ def functions(
         case "damper_fading":
 
             def loss(p: Values) -> float:
-                m = study.seen[0].motions[what.place]
+                m, left = study.seen[0].motions[what.place], study.experiments[0].left
+                recent = float(np.mean(m.v[m.t > m.t[-1] - max(left, 0.25)] ** 2))  # heat goes on as before
                 total = 0.0
                 for t, n in zip(terms, names):
                     if t.candidate.what.law == "fading_damper":
-                        slow, end, kept = "faded", 1.0 - np.exp(-m.t[-1] / p[f"{n}_time"]), np.exp(-m.t[-1] / p[f"{n}_time"])
+                        kept = np.exp(-(m.t[-1] + left) / p[f"{n}_time"])
+                        slow, end = "faded", 1.0 - kept
                     elif t.candidate.what.law == "heating_damper":
                         work, cooling = p[f"{n}_work"], p[f"{n}_cooling"]
-                        slow, end = "warm", warm(m.v, m.t, work, cooling)[-1]
-                        kept = np.exp(-np.trapezoid(m.v**2, m.t) / work - m.t[-1] / cooling)
+                        warmer, colder = recent * left / work, left / cooling
+                        slow, end = "warm", warm(m.v, m.t, work, cooling)[-1] * np.exp(-warmer - colder) + warmer
+                        kept = np.exp(-np.trapezoid(m.v**2, m.t) / work - m.t[-1] / cooling - warmer - colder)
                     else:  # what only mends the form
                         continue
                     before = p.get(("start", 0, e.built.model.states.index(f"{n}_{slow}")), 0.0)

@@ -56,6 +56,7 @@ class Experiment:
     rate: Array
     unsure: Array
     quiet: Array  # variance per sample that a sensor's own record shows, [f, n_z]; NaN where it shows none
+    left: float = 0.0  # [s] for which it goes on after the last sample here
 
     @property
     def step(self) -> float:
@@ -80,7 +81,7 @@ def prepare(
     Where the noise exceeds the input's own spectrum, the measured input is damped to what is likely (Wiener), and the rest
     is unsure. The number of samples becomes one that Fourier transforms like.
     """
-    n = fft.prev_fast_len(len(time), real=True)
+    n, last = fft.prev_fast_len(len(time), real=True), float(time[-1])
     time, u, y, good = time[:n], u[:n], y[:n], good[:n]
     step = float(time[1] - time[0])
     f = fft.rfftfreq(2 * n, step)
@@ -101,7 +102,7 @@ def prepare(
     rate = CubicSpline(time, whole)(time, 1)
     f = fft.rfftfreq(n, step)
     quiet = np.stack([np.full(len(f), np.nan) if law is None else law.density(f, step) / (2.0 * step) for law in laws], axis=1)
-    return Experiment(name, time, u, y, good, whole, rate, unsure, quiet)
+    return Experiment(name, time, u, y, good, whole, rate, unsure, quiet, last - float(time[-1]))
 
 
 def _smoothed(power: Array, bin: float) -> Array:

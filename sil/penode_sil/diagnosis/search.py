@@ -598,22 +598,28 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
     e = leaner(study, unlagged(study, unbent(study, e, log), log), log)
     laws = {g: [_law(t.candidate) for t in e.terms if t.group == g] for g in e.groups if g[0] in TEXTBOOK}
     laws = {g: own for g, own in laws.items() if own != ["loose_damper"]}  # one as well
-    bent = [g for g, own in laws.items() if len(own) > len(TEXTBOOK[g[0]]) or not set(own) <= set(TEXTBOOK[g[0]])]
-    if not bent:
+    ways = [(g, g) for g, own in laws.items() if len(own) > len(TEXTBOOK[g[0]]) or not set(own) <= set(TEXTBOOK[g[0]])]
+    ways += [(g, ("coulomb_friction", g[1])) for g in laws if g[0] == "stribeck_friction"]  # a fall at rates that are rare is none
+    if not ways:
         return joined(study, e, log)
     whole = e.whole()
-    r = regression(study, whole.fit, parameters, {kind for kind, _ in bent})
-    for group in bent:
-        pool = [k for k in pools(r).get(group, []) if _law(r.candidates[k]) in TEXTBOOK[group[0]]]
+    r = regression(study, whole.fit, parameters, {kind for _, (kind, _) in ways})
+    for group, other in ways:
+        if group not in e.groups:
+            continue
+        pool = pools(r).get(other, [])
+        if group == other:
+            pool = [k for k in pool if _law(r.candidates[k]) in TEXTBOOK[group[0]]]
         without = r.without(missing(whole, group))
-        chosen = pursue(without, pool, terms=len(TEXTBOOK[group[0]]))[1]
+        chosen = pursue(without, pool, terms=len(TEXTBOOK[group[0]]) if group == other else TERMS)[1]
         if group[0] in TWO and len(chosen) == 1:
             chosen += [k for k in pool if without.candidates[k].companion]
         new = terms_of(without, chosen)
         if new:
             simple = explain(study, [*(t for t in e.terms if t.group != group), *new], start=e.fit, formulas=e.formulas)
-            log(f"  plain {group}: {simple.gain:.0f} for {e.gain:.0f}")
-            if set(simple.groups) == set(e.groups) and (simple.gain > e.gain - SLACK or simple.score > e.score - SLACK):
+            log(f"  plain {group} as {other[0]}, {simple.groups}: {simple.gain:.0f} for {e.gain:.0f}, {simple.score:.0f} for {e.score:.0f}")
+            same = set(simple.groups) == {other if g == group else g for g in e.groups}
+            if same and (group == other and simple.gain > e.gain - SLACK or simple.score > e.score - SLACK):
                 e = simple
     return joined(study, e, log)
 
