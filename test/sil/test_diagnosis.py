@@ -90,6 +90,29 @@ def record(path: Path, z: np.ndarray, sensors: dict[str, np.ndarray], seed: int,
     return path
 
 
+def studied(path: Path, model: penode_gen.Model) -> study.Study:
+    """What a search for causes begins with."""
+    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
+    return replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+
+
+def moved(tmp_path: Path, z: np.ndarray, force: np.ndarray) -> tuple[penode_gen.Model, Path]:
+    """A model of the damper alone on a prescribed motion, and its recording."""
+    text = MODEL[: MODEL.index("[inputs]")] + """[inputs]
+z_road = { unit = "m" }
+[elements]
+damper = { between = ["z_road", "ground"], law = "linear_damper", damping = "d" }
+[outputs]
+F = { value = "F_damper", unit = "N" }
+[sensors]
+force = { value = "F_damper", unit = "N", noise = 2 }
+"""
+    (tmp_path / "law.toml").write_text(text)
+    columns = np.stack([np.arange(len(z)) * STEP, z, force], axis=1)
+    np.savetxt(tmp_path / "law.csv", columns, delimiter=",", header="time [s],z_road [m],force [N]", comments="", fmt="%.9g")
+    return penode_gen.load(tmp_path / "law.toml"), tmp_path / "law.csv"
+
+
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
     path = tmp_path_factory.mktemp("model") / "car.toml"
@@ -346,8 +369,7 @@ def test_laws_that_do_the_same_are_one(tmp_path, model):
     """Two stops fitted to the recording of one share it in any way; the one that is left knows its gap."""
     z = road(5)
     path = record(tmp_path / "stop.csv", z, drive(z, lambda s, v: 10e3 * max(s - 0.006, 0.0)), 15)
-    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
-    one = replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+    one = studied(path, model)
     r = study.regression(one, one.null, [])
     stops = [c for c in r.candidates if c.kind == "bump_stop" and c.what.law == "bump_stop"]
     stops.sort(key=lambda c: abs(c.what.shapes["gap"][0] - 0.006))
@@ -363,8 +385,7 @@ def test_a_curve_has_the_parameter_of_its_element_in_it(tmp_path, model):
     damper beside it, it is that curve, with the same slopes."""
     z = road(5)
     path = record(tmp_path / "knee.csv", z, drive(z, lambda s, v: 0.1 * D * v - 0.2 * D * (v - np.clip(v, -0.1, 0.1))), 15)
-    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
-    one = replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+    one = studied(path, model)
     r = study.regression(one, one.null, ["d"])
     kinks = [c for c in r.candidates if c.kind == "degressive_damper" and "min(v + knee" in c.what.law]
     kink = min(kinks, key=lambda c: abs(c.what.shapes["knee"][0] - 0.1))
@@ -380,8 +401,7 @@ def test_a_bushing_without_memory_is_a_spring(tmp_path, model):
     """A hardening spring, told as a bushing that hardens and forgets within 1000 s."""
     z = road(5)
     path = record(tmp_path / "cubic.csv", z, drive(z, lambda s, v: 2e7 * s**3), 15)
-    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
-    one = replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+    one = studied(path, model)
     laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == "hardening_bushing"]
     slow = replace(laws[0].what, shapes={"relaxation": (1000.0, "s")})
     bushing = search.explain(one, [Term(replace(laws[0], companion=False, what=slow), 2e7)])
@@ -394,8 +414,7 @@ def test_friction_that_falls_for_nothing_is_coulomb(tmp_path, model):
     """Friction that is constant, told as one that falls by a third: without the fall it does as well, and costs less."""
     z = road(5)
     path = record(tmp_path / "rubs.csv", z, drive(z, lambda s, v: 60.0 * v / np.hypot(v, 4e-3)), 15)
-    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
-    one = replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
+    one = studied(path, model)
     laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == hypotheses.STRIBECK]
     falling = search.explain(one, [Term(laws[-1], 40.0)], iterations=0)
     constant = search.plain(one, falling, [], lambda text: None)
@@ -404,35 +423,15 @@ def test_friction_that_falls_for_nothing_is_coulomb(tmp_path, model):
     assert force.value == pytest.approx(60.0, rel=0.02)
 
 
-FADING = """
-[model]
-name = "fading"
-sample_time = "1 ms"
-[parameters]
-d = { value = 1000.0, unit = "N*s/m", tolerance = 0.01 }
-[inputs]
-rod = { unit = "m" }
-[elements]
-damper = { between = ["rod", "ground"], law = "linear_damper", damping = "d" }
-[outputs]
-out = { value = "F_damper", unit = "N" }
-[sensors]
-force = { value = "F_damper", unit = "N", noise = 1.0 }
-"""
-
-
 def test_a_loss_is_that_at_the_end_of_the_recording(tmp_path):
     """A damper that loses 20 % in proportion to its work under a sweep that gets faster; of 22 999 samples the diagnosis takes 22 500,
     until when it loses 19 %."""
-    (tmp_path / "fading.toml").write_text(FADING)
-    t = np.arange(22_999) * 1e-3
-    phase = 2.0 * np.pi * (0.3 * t + 0.06 * t**2)
-    s, v = 0.01 * np.sin(phase), 0.01 * np.cos(phase) * 2.0 * np.pi * (0.3 + 0.12 * t)
+    t = np.arange(22_999) * STEP
+    phase = 2.0 * np.pi * (0.3 * t + 0.03 * t**2)
+    s, v = 0.01 * np.sin(phase), 0.01 * np.cos(phase) * 2.0 * np.pi * (0.3 + 0.06 * t)
     heat = np.cumsum(v**2)
-    force = 1000.0 * v * (1.0 - 0.2 * heat / heat[-1]) + np.random.default_rng(6).standard_normal(t.size)
-    np.savetxt(tmp_path / "f.csv", np.stack([t, s, force], axis=1), delimiter=",", header="time [s],rod [m],force [N]", comments="", fmt="%.9g")
-    model = penode_gen.load(tmp_path / "fading.toml")
-    (cause,) = diagnosis.diagnose(model, load([tmp_path / "f.csv"], model)).causes
+    model, path = moved(tmp_path, s, D * v * (1.0 - 0.2 * heat / heat[-1]) + 2.0 * np.random.default_rng(6).standard_normal(t.size))
+    (cause,) = diagnosis.diagnose(model, load([path], model)).causes
     assert heat[22_499] / heat[-1] < 0.95
     assert cause.kind == "damper_fading" and cause.parameters["loss"].value == pytest.approx(0.2, rel=0.02)
 
@@ -579,22 +578,10 @@ def test_what_is_foretold_is_as_good_as_the_true_law(tmp_path, model):
 def test_inputs_are_joined_as_well_as_their_noise_allows(tmp_path, hiss, way):
     """A damper on a prescribed motion up to 20 Hz at 2 ms: its force needs the rate of the last sample. A noise of 0.2 mm in the
     motion is louder in the rate the more samples it is taken from."""
-    text = MODEL[: MODEL.index("[inputs]")] + """[inputs]
-z_road = { unit = "m" }
-[elements]
-damper = { between = ["z_road", "ground"], law = "linear_damper", damping = "d" }
-[outputs]
-F = { value = "F_damper", unit = "N" }
-[sensors]
-force = { value = "F_damper", unit = "N", noise = 2 }
-"""
-    (tmp_path / "law.toml").write_text(text)
     z, rng = road(5), np.random.default_rng(6)
     force = D * CubicSpline(np.arange(SAMPLES) * STEP, z)(np.arange(SAMPLES) * STEP, 1) + 2.0 * rng.standard_normal(SAMPLES)
-    columns = np.stack([np.arange(SAMPLES) * STEP, z + hiss * rng.standard_normal(SAMPLES), force], axis=1)
-    np.savetxt(tmp_path / "law.csv", columns, delimiter=",", header="time [s],z_road [m],force [N]", comments="", fmt="%.9g")
-    model = penode_gen.load(tmp_path / "law.toml")
-    one = study.null_study(model, [experiment(m, model) for m in load([tmp_path / "law.csv"], model)])
+    model, path = moved(tmp_path, z + hiss * rng.standard_normal(SAMPLES), force)
+    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
     text, extended = extension.extend_file(one, None, ())
     assert extended.interpolation == way and (way == "linear" or f'input = "{way}"' in text)
 

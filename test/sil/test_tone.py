@@ -57,7 +57,7 @@ def test_a_slow_raster_has_none(step):
 @pytest.mark.parametrize("loud, seconds", [(0.35, 12), (0.15, 40)])
 @pytest.mark.parametrize("sweep", [False, True])
 def test_a_faint_tone_that_stays_is_found(sweep, loud, seconds):
-    """Faint: a fortieth of the noise's power at the most. Under a sweep the residual has a third and a fifth of its frequency too."""
+    """Faint: a sixteenth of the noise's power at the most. Under a sweep the residual has three and five times its frequency too."""
     draw, t = np.random.default_rng(7), np.arange(seconds * 1000) * 1e-3
     phase = 2 * np.pi * (0.5 * t + 0.5 * 19.5 / seconds * t**2)
     y = draw.normal(size=(len(t), 2))

@@ -336,10 +336,10 @@ def functions(
         case "quadratic_damper":
             return {"coefficient": ("N*s^2/m^2", lambda p: line(v * np.abs(v), curve(zero, v, p), v))}
         case "damper_fading":
+            m, left = study.seen[0].motions[what.place], study.experiments[0].left
+            recent = float(np.mean(m.v[m.t > m.t[-1] - max(left, 0.25)] ** 2))  # heat goes on like that while nothing is looked at
 
             def loss(p: Values) -> float:
-                m, left = study.seen[0].motions[what.place], study.experiments[0].left
-                recent = float(np.mean(m.v[m.t > m.t[-1] - max(left, 0.25)] ** 2))  # heat goes on as before
                 total = 0.0
                 for t, n in zip(terms, names):
                     if t.candidate.what.law == "fading_damper":

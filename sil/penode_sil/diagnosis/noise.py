@@ -414,11 +414,10 @@ def tone(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> Tone:
         second = int(round(1.0 / e.step))  # samples
         if 0.4 * second < 6 * HALF or len(e.time) < 3 * second:
             continue
-        tones = _tones(np.where(e.good, e.y - z, 0.0), e.step)
-        if not swept(e.u, e.step):
-            found += tones
-        elif _moves(e.u, e.step):
-            found += [replace(t, purity=0.0) for t in tones]
+        sine = swept(e.u, e.step)
+        if not sine or _moves(e.u, e.step):
+            tones = _tones(np.where(e.good, e.y - z, 0.0), e.step)
+            found += [replace(t, purity=0.0) for t in tones] if sine else tones
     return max(found, key=lambda t: t.loud)
 
 

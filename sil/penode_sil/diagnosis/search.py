@@ -593,8 +593,8 @@ def settled(study: Study, e: Explanation) -> Explanation:
 
 
 def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Explanation:
-    """The explanation with the textbook law of a kind in place of several laws, where it does about as well: its parameters
-    are known better."""
+    """The explanation with the textbook law of a kind in place of several laws, and with constant friction in place of one that falls,
+    where it does about as well: its parameters are known better."""
     e = leaner(study, unlagged(study, unbent(study, e, log), log), log)
     laws = {g: [_law(t.candidate) for t in e.terms if t.group == g] for g in e.groups if g[0] in TEXTBOOK}
     laws = {g: own for g, own in laws.items() if own != ["loose_damper"]}  # one as well
