@@ -106,7 +106,7 @@ def score(
         for name, value in effect["parameters"].items():
             got = said.get(name)
             if isinstance(got, Mapping) and got.get("value") is not None and value:
-                row["errors"].append([f"{effect['kind']}.{name}", abs(got["value"] - value) / abs(value)])
+                row["errors"].append([f"{effect['kind']}.{name}", abs(got["value"] - value) / abs(value), effect["ratio"]])
                 if got.get("ci95"):
                     row["covered"].append([f"{effect['kind']}.{name}", bool(got["ci95"][0] <= value <= got["ci95"][1])])
     for signal, gain in (diagnosis.get("gain") or {}).items():
@@ -170,6 +170,7 @@ def summary(rows: Sequence[Mapping]) -> dict:
             instead = Counter(" + ".join(r["answer"]) or str(r["verdict"] or r["outcome"]) for r in own if not r["right"])
             out["kinds"].setdefault(kind, {})[name] = {**_share(own), "instead": dict(instead)}
     errors = [e for r in rows for e in r["errors"]]
+    loud = [e for e in errors if e[2] >= 1]
     covered = [c for r in rows for c in r["covered"]]
     named = [r for r in rows if r["right"] and r["answer"] and OUTSIDE not in r["kinds"]]
     inside = [max(g[1] for g in r["gain"].values()) for r in named if r["gain"] and r.get("inside")]
@@ -182,12 +183,13 @@ def summary(rows: Sequence[Mapping]) -> dict:
     seconds = [round(r["seconds"] - r.get("compiling", 0.0), 2) for r in rows]
     out["outcomes"] = dict(Counter(r["outcome"] for r in rows))
     out["no_answer"] = sum(r["verdict"] is None for r in rows)
-    out["parameters"] = {
-        "n": len(errors),
-        "median_error": quantile((e for _, e in errors), 0.5),
-        "error_95": quantile((e for _, e in errors), 0.95),
-        "worst": sorted(errors, key=lambda e: -e[1])[:10],
-    }
+    for name, own in (("parameters", errors), ("parameters_above_noise", loud)):
+        out[name] = {
+            "n": len(own),
+            "median_error": quantile((e for _, e, _ in own), 0.5),
+            "error_95": quantile((e for _, e, _ in own), 0.95),
+            "worst": sorted(own, key=lambda e: -e[1])[:10],
+        }
     out["coverage"] = {
         "n": len(covered),
         "share": sum(c for _, c in covered) / len(covered) if covered else None,
@@ -248,10 +250,12 @@ def text(out: Mapping) -> str:
             f"{kind:<20}{cell('single_common'):>9}{cell('single_foreign'):>10}{cell('hard'):>9}  "
             + ", ".join(f"{n}x {what}" for what, n in instead.items())
         )
-    p, c, g, t = out["parameters"], out["coverage"], out["gain"], out["time"]
+    p, a, c, g, t = (out[k] for k in ("parameters", "parameters_above_noise", "coverage", "gain", "time"))
     lines += [
         "",
-        f"parameters ({p['n']}): median error {_percent(p['median_error'], 2)} (asked 1 %), 95 % within {_percent(p['error_95'], 2)} (asked 6 %)",
+        f"parameters of effects above the noise ({a['n']}): median error {_percent(a['median_error'], 2)} (asked 1 %), "
+        f"95 % within {_percent(a['error_95'], 2)} (asked 6 %)",
+        f"parameters of all effects ({p['n']}): median error {_percent(p['median_error'], 2)}, 95 % within {_percent(p['error_95'], 2)}",
         f"95 % intervals ({c['n']}): cover {_percent(c['share'])} of the truths (asked 90 .. 98 %), {_percent(c['wilson95'][0])} .. {_percent(c['wilson95'][1])}",
         f"hold-out inside the trained range ({g['n']}): {_percent(g['within_5_percent_of_floor'])} within 5 % of the noise floor (asked 95 %)",
         f"time a case: median {t['median']} s, 90 % within {t['q90']} s (asked 10 s), longest {t['longest']} s (asked 40 s); "
@@ -288,8 +292,9 @@ def compare(tables: Mapping[str, Mapping]) -> str:
     nulls = [s for s in ("null", "null_hard") if s in first["strata"]]
     row("false alarms on null cases", lambda t: str(sum(t["strata"][s]["outcomes"].get("false alarm", 0) for s in nulls)))
     row("no answer", lambda t: str(t["no_answer"]))
-    row("parameter error, median", lambda t: _percent(t["parameters"]["median_error"]))
-    row("parameter error, 95 % within", lambda t: _percent(t["parameters"]["error_95"]))
+    for which, of in (("parameters_above_noise", "above the noise"), ("parameters", "of any size")):
+        row(f"parameter error, effects {of}: median; 95 % within",
+            lambda t: f"{_percent(t[which]['median_error'])}; {_percent(t[which]['error_95'])}")
     row("95 % intervals cover", lambda t: _percent(t["coverage"]["share"]))
     row("hold-out RMSE / noise floor before, median", lambda t: number(t["gain"]["all"]["before"]))
     row("hold-out RMSE / noise floor after, median", lambda t: number(t["gain"]["all"]["after"]))

@@ -21,6 +21,7 @@ FRICTION = {
     "form": "smooth_sign",
     "common": True,
     "energy": 900.0,
+    "ratio": 0.5,
     "parameters": {"force": 40.0},
     "rivals": [],
 }
@@ -30,6 +31,7 @@ LOAD = {
     "form": "settled_load",
     "common": True,
     "energy": 800.0,
+    "ratio": 0.5,
     "parameters": {"force": 100.0},
     "rivals": [{"kind": "sensor_bias", "where": ["deflection"], "left": 0.0}],
 }
@@ -40,6 +42,7 @@ WRONG = {
     "form": "another_value",
     "common": True,
     "energy": 700.0,
+    "ratio": 0.5,
     "parameters": {"c": 2e4},
     "rivals": [],
 }
@@ -49,6 +52,7 @@ ALIEN = {
     "form": "engine",
     "common": False,
     "energy": 900.0,
+    "ratio": 0.5,
     "parameters": {"amplitude": 9.0},
     "rivals": [],
 }
@@ -129,7 +133,7 @@ def test_without_an_answer_every_case_is_wrong():
 def test_errors_and_intervals_count_for_common_forms_that_are_named_themselves():
     force = {"value": 42.0, "unit": "N", "ci95": [39.0, 45.0]}
     row = score.score(truth(FRICTION), said(cause("coulomb_friction", "damper", force=force)), 1.0)
-    assert row["errors"] == [["coulomb_friction.force", pytest.approx(0.05)]] and row["covered"] == [
+    assert row["errors"] == [["coulomb_friction.force", pytest.approx(0.05), 0.5]] and row["covered"] == [
         ["coulomb_friction.force", True]
     ]
     narrow = score.score(truth(FRICTION), said(cause("coulomb_friction", "damper", force={**force, "ci95": [41.0, 43.0]})), 1.0)
@@ -137,6 +141,15 @@ def test_errors_and_intervals_count_for_common_forms_that_are_named_themselves()
     foreign = score.score(truth(FRICTION | {"common": False}), said(cause("coulomb_friction", "damper", force=force)), 1.0)
     rival = score.score(truth(LOAD), said(cause(*BIAS, ["constant_force"], bias=force)), 1.0)
     assert foreign["errors"] == foreign["covered"] == rival["errors"] == []
+
+
+def test_errors_are_told_of_effects_above_the_noise_and_of_all():
+    told = lambda value: said(cause("coulomb_friction", "damper", force={"value": value}))
+    own = [score.score(truth(FRICTION | {"ratio": ratio}), told(value), 1.0) for ratio, value in ((0.99, 44.0), (1.0, 40.4), (3.0, 40.0))]
+    out = score.summary(own)
+    assert (out["parameters"]["n"], out["parameters"]["error_95"]) == (3, pytest.approx(0.1))
+    assert (out["parameters_above_noise"]["n"], out["parameters_above_noise"]["error_95"]) == (2, pytest.approx(0.01))
+    assert "above the noise (2): median error 0.00 % (asked 1 %), 95 % within 1.00 % (asked 6 %)" in score.text(out)
 
 
 def test_gain_is_measured_against_the_true_noise_floor():

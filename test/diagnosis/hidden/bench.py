@@ -56,6 +56,11 @@ class Bench:
     def training(self) -> tuple[Drive, ...]:
         return self.drives[:-1]
 
+    @property
+    def samples(self) -> int:
+        """Measured values in the training data: what the energy of an effect as loud as the noise is."""
+        return sum(int(d.duration * self.rate) for d in self.training) * len(self.noise)
+
     def rng(self, *what: int) -> np.random.Generator:
         return np.random.default_rng([*self.seed, *what])
 

@@ -155,6 +155,7 @@ class Case:
                     "common": e.form.common,
                     "size": e.size,
                     "energy": round(self.energies[i], 1),
+                    "ratio": round(float(np.sqrt(self.energies[i] / bench.samples)), 3),
                     "parameters": {k: float(v) for k, v in values.items()},
                     "rivals": self.rivals(i),
                 }
@@ -219,8 +220,7 @@ class Case:
 def draw_effect(rng: np.random.Generator, bench: Bench, form: Form, where: str, least: float) -> Effect:
     """An effect that stands out of the noise by a random ratio from `least` to 4, as far as its size stays plausible."""
     build, (low, high) = form.make(rng, bench.place(where)), form.sizes
-    samples = sum(int(d.duration * bench.rate) for d in bench.training) * len(bench.noise)
-    wanted = samples * float(np.exp(rng.uniform(*np.log((least, 4.0))))) ** 2
+    wanted = bench.samples * float(np.exp(rng.uniform(*np.log((least, 4.0))))) ** 2
     size = float(np.sqrt(low * high))
     for _ in range(4):
         try:
