@@ -109,13 +109,13 @@ def diagnose(
     numbers, step = extension.numerics(study)
     kinship, shared = noise.kinship(study.experiments, study.metrics, best.fit.simulated if best else study.null.simulated)
     log(f"kinship {kinship:.1f}, shared {shared:.0f}")
-    tone = noise.tone(study.experiments, best.fit.simulated if best else study.null.simulated)
+    tone = noise.tone(study.experiments, study.metrics, best.fit.simulated if best else study.null.simulated)
     log(str(tone))
     change = steady.change(study, best.fit if best else study.null, study.seen)
     log(str(change))
     fades = best is not None and any(kind == "damper_fading" for kind, _ in best.groups)  # which changes by its nature
     changed = change.gain if change.surprise > -np.log(CHANGING) and not fades else 0.0
-    causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.loud > 1.0, changed)
+    causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.heard, changed)
     if doubt := plausible.doubt(study, best, verdict):
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
@@ -126,8 +126,8 @@ def diagnose(
     if verdict == "unexplained" and best is not None:
         masses = [cause(study, explanations, g) for g in best.groups if g[0] == "hidden_resonance"]
         notes += damped([c for c in masses if worth(study, c)])
-    if tone.loud > 1.0:
-        notes.append(f"{model.sensors[tone.sensor].name} has a tone of its own at {tone.frequency:.0f} Hz: an engine, a wheel, the mains?")
+    if tone.heard:
+        notes.append(f"{model.sensors[tone.sensor].name} has a tone of its own at {tone.frequency:.0f} Hz, or around it: an engine, a wheel, the mains?")
     drift = sum(t.gain for t in best.terms if t.candidate.kind == CLOCK) if best else 0.0
     if drift:
         notes.append(f"clocks of sensors and inputs drift apart by {1e6 * abs(drift):.3g} ppm: put both on one clock")

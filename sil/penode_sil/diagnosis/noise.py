@@ -19,6 +19,7 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
 
 from ..noise import Noise
 
@@ -28,10 +29,12 @@ SHARES = (0.03, 0.06, 0.12, 0.25, 0.5, 0.75, 1.0)  # of it in the room that ther
 FINER = (1.2, 1.1, 1.05, 1.025)
 BINS = 16  # of a spectrum in which coherence is estimated
 HALF = 8  # bins to either side that say how loud it is around a tone
-PURE = 40.0  # see Tone: noise has 16 at most
-LASTING = 15.0  # see Tone: noise, and the resonances that the road's noise shakes, have 9 at most
+HEARD = 12.0  # [nat] of surprise from which on a tone is one
+LEVELS = np.repeat([2.0, 4.0, 8.0], 2)[:, None]  # of tones, in the noise's power in a bin
+STAYS = np.tile([0.99, 0.5], 3)[:, None]  # chance that half a second later it is in the same bin
+MOST = 3.0  # [nat] that one second says: a blow is not a tone
+ORDERS = 8  # of a sweep that are not looked at
 TAIL = 10.0  # how fast what a bin has of its neighbours' median falls off in noise: as (1 + x / TAIL)^-TAIL, at the most
-OVERLAP = 0.6  # of the windows that overlap by half: so many count as independent
 PARTS = (0.1, 2.0, 6.0, 20.0)  # [Hz] from which to which coherence is added up
 TOP = 100.0  # [Hz] what vehicles do above it is not looked at, but for the noise
 STOP = 120.0  # [dB] by which thinning damps what it would mirror into the band
@@ -146,6 +149,11 @@ class Metric:
 
     def __call__(self, r: Array) -> Array:
         return self.white(self.spectrum(r))
+
+    @property
+    def power(self) -> Array:
+        """Variance of noise in each spectrum [f, sensors]."""
+        return np.sum(np.abs(np.linalg.inv(self.root)) ** 2, axis=-1)
 
     @property
     def volume(self) -> float:
@@ -389,40 +397,48 @@ def _decayed(y: Array) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Tone:
-    """The purest tone in any residual: how far it stands out of the spectrum around it, wherever it is in each second; the
-    surprise [nat] that one frequency does so all the time; this frequency [Hz], and its sensor."""
+    """The clearest tone in any residual: the surprise [nat] that it is noise, about where it is [Hz], and its sensor."""
 
-    purity: float = 0.0
-    steady: float = 0.0
+    surprise: float = 0.0  # and 0 if it is more likely
     frequency: float = 0.0
     sensor: int = 0
 
     @property
-    def loud(self) -> float:
-        """Above 1: no noise."""
-        return max(self.purity / PURE, self.steady / LASTING)
+    def heard(self) -> bool:
+        return self.surprise > HEARD
 
 
-def tone(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> Tone:
-    """The purest tone that residuals have and inputs have not: noise that makes one comes from a machine.
+def tone(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> Tone:
+    """The clearest tone that residuals have and inputs have not: noise that makes one comes from a machine.
 
-    Under a sine an error of a model or a quantum is a tone as well, and under a sweep one that moves: there, only those count
-    that stay. Recordings of less than 120 Hz or 3 s have too few bins or seconds.
+    Under a sine an error of a model or a quantum is a tone as well; under one whose frequency changes, only the multiples of
+    it do not count. Recordings of less than 120 Hz or 3 s have too few bins or seconds.
     """
     found = [Tone()]
-    for e, z in zip(experiments, simulated):
-        second = int(round(1.0 / e.step))  # samples
-        if 0.4 * second < 6 * HALF or len(e.time) < 3 * second:
-            continue
+    for e, m, z in zip(experiments, metrics, simulated):
+        size = int(round(1.0 / e.step))  # samples of a second
+        top = int(0.4 * size)
         sine = swept(e.u, e.step)
-        if not sine or _moves(e.u, e.step):
-            tones = _tones(np.where(e.good, e.y - z, 0.0), e.step)
-            found += [replace(t, purity=0.0) for t in tones] if sine else tones
-    return max(found, key=lambda t: t.loud)
+        if top < 6 * HALF or len(e.time) < 3 * size or (sine and not _moves(e.u, e.step)):
+            continue
+        power = _seconds(np.where(e.good, e.y - z, 0.0), e.step)[:, : top + HALF]
+        hertz = np.arange(top + HALF) / (size * e.step)
+        usual = m.power  # a resonance that the road's noise shakes is not a tone
+        power /= np.stack([np.interp(hertz, e.frequencies[: len(usual)], x) for x in usual.T], axis=-1)
+        moving = np.mean(_pureness(_seconds(z, e.step)[:, : top + HALF]), axis=0)  # nor is one that the model has as well
+        pure = _pureness(power) / np.maximum(maximum_filter1d(moving, 3, axis=0), 1.0)
+        if sine:
+            pure[_multiples(e.u, e.step, top)] = np.nan
+        for j in range(pure.shape[2]):
+            surprise, k = _followed(pure[..., j])
+            found.append(Tone(surprise, float(hertz[k + HALF]), j))
+    return max(found, key=lambda t: t.surprise)
 
 
 def swept(inputs: Array, step: float) -> bool:
-    """Is an input [n, any] a sine, most of the time, though one whose frequency may change?"""
+    """Is an input [n, any] a sine, most of the time, though one whose frequency may change? Below 10 Hz a second does not tell."""
+    if step > 0.1:
+        return False
     power = _seconds(np.diff(inputs, axis=0), step)[:, : int(TOP)]
     near = np.lib.stride_tricks.sliding_window_view(power, 5, axis=1).sum(axis=-1)
     shares = np.max(near, axis=1) / np.maximum(np.sum(power, axis=1), 1e-300)
@@ -435,6 +451,14 @@ def _moves(inputs: Array, step: float) -> bool:
     return bool(np.all(high - low > 1.0))
 
 
+def _multiples(inputs: Array, step: float, top: int) -> NDArray[np.bool_]:
+    """Where in each second the multiples of the frequency of an input are, a sine [seconds, HALF .. top]."""
+    bins = np.arange(HALF, top)[:, None]
+    own = np.argmax(_seconds(np.diff(inputs, axis=0, append=inputs[-1:]), step), axis=1)[:, None, None, :]
+    orders = np.arange(1, ORDERS + 1)[:, None]
+    return np.any(np.abs(bins[:, None] - orders * own) <= 2 + orders // 3, axis=(2, 3))
+
+
 def _seconds(signals: Array, step: float) -> Array:
     """Periodograms [seconds, f, any] of signals [n, any], each of one second, which overlap by half."""
     size = int(round(1.0 / step))
@@ -443,31 +467,42 @@ def _seconds(signals: Array, step: float) -> Array:
     return np.array([np.abs(fft.rfft(x * window, axis=0)) ** 2 for x in parts]).reshape(len(parts), size // 2 + 1, signals.shape[1])
 
 
-def _tones(signals: Array, step: float) -> list[Tone]:
-    """The purest tone of each signal [n, any], up to 0.4 of the sampling frequency.
+def _pureness(power: Array) -> Array:
+    """How far each bin stands out of a spectrum [seconds, f, any] around it, but for HALF bins at both ends.
 
-    In each second it is the highest bin of the periodogram, in medians of the HALF bins to either side; what counts is the
-    median over time, so that its frequency may wander. Noise of any smooth colour has the logarithm of the number of bins, 6,
-    and the scatter of that median makes it 9 to 16.
-
-    A bin that is loud all the time needs much less of that: over n independent seconds noise has a median of x with a chance
-    of (4 p)^(n / 2) at most, p that of x in one. It is in means of three bins to either side here if these are more than the
-    median: a resonance is wider than a tone.
+    In noise of any smooth colour this has a mean of 1 at the most and falls off as an exponential does: it is in means of what
+    is around it, by the median of the HALF bins to either side, and by three bins on either side if these are more.
     """
-    size = int(round(1.0 / step))
-    top = int(0.4 * size)
-    power = _seconds(signals, step)[:, : top + HALF]
     around = np.lib.stride_tricks.sliding_window_view(power, 2 * HALF + 1, axis=1)
     beside = np.median(np.delete(around, [HALF - 1, HALF, HALF + 1], axis=-1), axis=-1) / np.log(2.0)
-    ratio = power[:, HALF:top] / np.maximum(beside, 1e-300)
-    purity, peak = np.median(np.max(ratio, axis=1), axis=0), np.median(np.argmax(ratio, axis=1), axis=0)
     sides = np.maximum(*(around[..., HALF + a : HALF + a + 3].mean(axis=-1) for a in (-4, 2)))
-    lasting = np.median(power[:, HALF:top] / np.maximum(np.maximum(beside, sides), 1e-300), axis=0)
-    surprise = 0.5 * OVERLAP * len(power) * (TAIL * np.log1p(np.max(lasting, axis=0) / TAIL) - np.log(4.0))
-    return [
-        Tone(float(p), float(s), float((k if s < LASTING else np.argmax(lasting[:, j])) + HALF) / (size * step), j)
-        for j, (p, k, s) in enumerate(zip(purity, peak, surprise))
-    ]
+    return power[:, HALF:-HALF] / np.maximum(np.maximum(beside, sides), 1e-300)
+
+
+def _followed(pure: Array) -> tuple[float, int]:
+    """The surprise [nat] that a bin which stays, or goes to its neighbours, stands out [seconds, bins] by chance, and about which.
+
+    The sum over all its ways of the likelihood that a tone went there, of random phase and strength, over that of noise: in
+    noise its mean is 1 at the most, so that its chance to come to L is 1 / L (Markov). The sum is that of a hidden Markov
+    model, with a few levels of the tone and chances to stay.
+    """
+    x = TAIL * np.log1p(np.nan_to_num(pure) / TAIL)  # exponential, though medians of a few bins scatter
+    says = np.minimum(LEVELS * x[:, None] / (1.0 + LEVELS) - np.log1p(LEVELS), MOST)
+    ratio = np.exp(np.where(np.isnan(pure)[:, None], 0.0, says))  # [seconds, models, bins]
+    at = np.full(ratio.shape[1:], 1.0 / pure.shape[1])
+    surprise, where = np.zeros(len(at)), np.zeros(at.shape)
+    for second in ratio:
+        gone = 0.5 * (1.0 - STAYS) * at
+        at = at - 2.0 * gone
+        at[:, 1:] += gone[:, :-1]
+        at[:, :-1] += gone[:, 1:]
+        at *= second
+        total = np.sum(at, axis=1, keepdims=True)
+        surprise += np.log(total[:, 0])
+        at /= total
+        where += at
+    best = np.max(surprise)
+    return float(best + np.log(np.mean(np.exp(surprise - best)))), int(np.argmax(where[np.argmax(surprise)]))
 
 
 def kinship(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> tuple[float, float]:
