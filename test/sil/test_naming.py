@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,6 +15,7 @@ from penode_sil.diagnosis.hypotheses import STRIBECK, Basis, Motion
 from penode_sil.diagnosis.score import Candidate
 
 REACH, SPEED = 0.02, 0.5  # m, m/s
+KNEE = "-k*(max(v - knee, 0) + min(v + knee, 0))"
 HUMP = "2.3316439815971242*k*exp(-(v/width)^2)*v/width"
 
 
@@ -44,11 +44,25 @@ def test_friction_that_falls_is_stribecks(rise, width, kind):
     assert named(naming._friction, law) == kind
 
 
-@pytest.mark.parametrize("damping, kind", [(0.0, "stribeck_friction"), (20.0, "coulomb_friction")])
-def test_friction_that_falls_for_a_stronger_damper_is_coulombs(damping, kind):
-    """It falls from 16 to 12 N while the damper beside it is fitted 20 N*s/m stronger than nominal, which is 10 N at the greatest rate."""
-    law = ("stribeck_friction", STRIBECK, "force", {"force": 12.0, "knee": 1e-3, "width": 0.2, "rise": 0.35})
-    assert named(partial(naming._friction, damping=damping), law) == kind
+@pytest.mark.parametrize("rise, kind", [(0.0, "coulomb_friction"), (0.5, "stribeck_friction")])
+@pytest.mark.parametrize("damping", [-20.0, 0.0, 20.0])
+def test_a_damper_beside_friction_does_not_make_it_fall(damping, rise, kind):
+    """However much of that damper is in its curve, 10 N at the greatest rate, and though its laws are those of a damper."""
+    law = ("stribeck_friction", STRIBECK, "force", {"force": 12.0, "knee": 1e-3, "width": 0.05, "rise": rise})
+    beside = ("stribeck_friction", "linear_damper", "damping", {"damping": damping})
+    assert named(naming._friction, law, beside) == kind
+    knee = ("degressive_damper", KNEE, "k", {"k": 12.0 / 0.015, "knee": 0.015})
+    hump = ("degressive_damper", HUMP, "k", {"k": 12.0 * rise, "width": 0.03})
+    line = ("degressive_damper", "linear_damper", "damping", {"damping": damping + 12.0 / 0.015})
+    assert named(naming._damper, knee, hump, line) == kind
+
+
+@pytest.mark.parametrize("share, kind", [(0.04, "coulomb_friction"), (0.1, "degressive_damper"), (0.3, "degressive_damper")])
+def test_a_knee_at_the_lowest_rates_is_friction(share, kind):
+    """By the share of the rates below it, though the force goes on to grow; both rules have the same limit."""
+    k = 20.0 / (share * SPEED)
+    laws = [("damper", KNEE, "k", {"k": k, "knee": share * SPEED}), ("damper", "linear_damper", "damping", {"damping": k + 10.0})]
+    assert named(naming._damper, *laws) == named(naming._friction, *laws) == kind
 
 
 @pytest.mark.parametrize("damping", [-10.0, 0.0, 30.0])
