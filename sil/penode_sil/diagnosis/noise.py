@@ -412,7 +412,8 @@ def tone(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated
     """The clearest tone that residuals have and inputs have not: noise that makes one comes from a machine.
 
     Under a sine an error of a model or a quantum is a tone as well; under one whose frequency changes, only the multiples of
-    it do not count. Recordings of less than 120 Hz or 3 s have too few bins or seconds.
+    it do not count. A resonance narrower than some 2 Hz that neither the expected noise nor the model's motion has is taken for
+    a tone: it is not noise, but need not come from a machine. Recordings of less than 120 Hz or 3 s have too few bins or seconds.
     """
     found = [Tone()]
     for e, m, z in zip(experiments, metrics, simulated):
