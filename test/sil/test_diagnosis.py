@@ -748,6 +748,19 @@ def test_noise_does_not_change_a_vehicle(model, sound):
     assert found.surprise < 10.0  # chance of e^-10, of four that are looked at
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_noise_of_the_road_before_and_after_a_bump_does_not_change_a_vehicle(tmp_path, seed):
+    """Between bumps the noise of the road is all that moves the simulation, and nothing moves the vehicle."""
+    (tmp_path / "car.toml").write_text(MODEL.replace('z_road = { unit = "m" }', 'z_road = { unit = "m", noise = 3e-5 }'))
+    model = penode_gen.load(tmp_path / "car.toml")
+    t = STEP * np.arange(SAMPLES)
+    z = 0.01 * np.cos(np.pi * np.clip((t - 3.0) / 0.04, -0.5, 0.5)) ** 2
+    sensors = drive(z, lambda s, v: 0.0)
+    path = record(tmp_path / "bump.csv", z + 3e-5 * np.random.default_rng(seed).standard_normal(SAMPLES), sensors, seed + 10)
+    found = diagnosis.diagnose(model, load([path], model))
+    assert found.verdict == "no_discrepancy" and found.causes == ()
+
+
 def test_a_start_in_motion_is_the_start(tmp_path):
     """Free oscillation of a mass: at sample k the C is at cos(omega k h). A sample late it would be off by omega h = 0.06; float
     rounds 1000 sums to 1000 2^-24 = 6e-5 at most, RK4 leaves (omega h)^4/120 omega t = 7e-6."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
+from numpy.lib.stride_tricks import as_strided, sliding_window_view
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.interpolate import CubicSpline
@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 POLES = (0.0, 0.3, 0.5, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985)  # of slow noise, per sample
 SHARES = (0.03, 0.06, 0.12, 0.25, 0.5, 0.75, 1.0)  # of it in the room that there is, and by how much finer from the best
 FINER = (1.2, 1.1, 1.05, 1.025)
+LOUD = 4.0  # times its noise and its mean power from which on an input is there for a while
 BINS = 16  # of a spectrum in which coherence is estimated
 HALF = 8  # bins to either side that say how loud it is around a tone
 HEARD = 12.0  # [nat] of surprise from which on a tone is one
@@ -82,7 +83,7 @@ def prepare(
     """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors.
 
     Where the noise exceeds the input's own spectrum, the measured input is damped to what is likely (Wiener), and the rest
-    is unsure. The number of samples becomes one that Fourier transforms like.
+    is unsure; but a bump, or where a sweep is at a time, is kept. The number of samples becomes one that Fourier transforms like.
     """
     n, last = fft.prev_fast_len(len(time), real=True), float(time[-1])
     time, u, y, good = time[:n], u[:n], y[:n], good[:n]
@@ -100,12 +101,39 @@ def prepare(
             sigma = min(1.25 * sigma, np.sqrt(floor))
             share = np.maximum(1.0 - sigma**2 / np.maximum(power, 1e-300), 0.02)
             spectra[:, k] *= share
+            taken = rest[:, k] - fft.irfft(spectra[:, k], 2 * n)[:n]
+            blows, further = _blows(taken, sigma, f, share, power, step)
+            trend[:, k] += blows
+            share = share + further
             unsure[:, k] = sigma * np.sqrt(share)[: 2 * len(unsure) : 2][: len(unsure)]
     whole = fft.irfft(spectra, 2 * n, axis=0)[:n] + trend
     rate = CubicSpline(time, whole)(time, 1)
     f = fft.rfftfreq(n, step)
     quiet = np.stack([np.full(len(f), np.nan) if law is None else law.density(f, step) / (2.0 * step) for law in laws], axis=1)
     return Experiment(name, time, u, y, good, whole, rate, unsure, quiet, last - float(time[-1]))
+
+
+def _blows(taken: Array, sigma: float, f: Array, share: Array, power: Array, step: float) -> tuple[Array, Array]:
+    """What was there for a while of that which a damping has `taken` [n] as noise: most of the time it is, but not in a bump. And
+    which further share of the signal that is at frequencies f, in the mean over time, beside the `share` that the damping left of
+    its `power`.
+
+    Parts of a quarter of a second, each half over the next, whose windows add up to 1. What is taken has no slow motion, which
+    would leak through such short windows.
+    """
+    half = max(int(round(0.125 / step)), 2)
+    window = np.sin(np.pi * (np.arange(2 * half) + 0.5) / (2 * half))
+    long = np.pad(taken, (2 * half, 2 * half + -len(taken) % half))
+    spectra = fft.rfft(sliding_window_view(long, 2 * half)[::half] * window, axis=1)
+    at = fft.rfftfreq(2 * half, step)
+    left, lost = np.interp(at, f, share), np.maximum(1.0 - np.interp(at, f, share), 0.1)
+    own = np.array([_smoothed(p, at[1]) for p in np.abs(spectra) ** 2 / half]) / lost**2
+    likely = np.where(own > LOUD * np.maximum(np.interp(at, f, power), sigma**2), 1.0 - sigma**2 / np.maximum(own, 1e-300), 0.0)
+    more = np.maximum(likely - left, 0.0)
+    whole = np.zeros(len(long))
+    for k, part in enumerate(fft.irfft(more / lost * spectra, 2 * half, axis=1) * window):
+        whole[k * half : (k + 2) * half] += part
+    return whole[2 * half : 2 * half + len(taken)], np.interp(f, at, more.mean(axis=0))
 
 
 def _smoothed(power: Array, bin: float) -> Array:
@@ -441,7 +469,7 @@ def swept(inputs: Array, step: float) -> bool:
     if step > 0.1:
         return False
     power = _seconds(np.diff(inputs, axis=0), step)[:, : int(TOP)]
-    near = np.lib.stride_tricks.sliding_window_view(power, 5, axis=1).sum(axis=-1)
+    near = sliding_window_view(power, 5, axis=1).sum(axis=-1)
     shares = np.max(near, axis=1) / np.maximum(np.sum(power, axis=1), 1e-300)
     return bool(len(shares)) and bool(np.any(np.median(shares, axis=0) > 0.9))
 
@@ -474,7 +502,7 @@ def _pureness(power: Array) -> Array:
     In noise of any smooth colour this has a mean of 1 at the most and falls off as an exponential does: it is in means of what
     is around it, by the median of the HALF bins to either side, and by three bins on either side if these are more.
     """
-    around = np.lib.stride_tricks.sliding_window_view(power, 2 * HALF + 1, axis=1)
+    around = sliding_window_view(power, 2 * HALF + 1, axis=1)
     beside = np.median(np.delete(around, [HALF - 1, HALF, HALF + 1], axis=-1), axis=-1) / np.log(2.0)
     sides = np.maximum(*(around[..., HALF + a : HALF + a + 3].mean(axis=-1) for a in (-4, 2)))
     return power[:, HALF:-HALF] / np.maximum(np.maximum(beside, sides), 1e-300)

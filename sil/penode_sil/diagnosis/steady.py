@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, special
+from scipy import fft, ndimage, special
 
 from .fit import Fit
 from .noise import Experiment, Metric, swept
@@ -24,6 +24,7 @@ from .study import Study, watch
 Array = NDArray[np.float64]
 PIECES = 5  # hats over the time of a recording that a changing coefficient is made of
 OCTAVES = 8  # hats over the logarithm of frequency that an error of a measured input is made of
+NEAR = 0.5  # [s] over which an input is loud or quiet
 LOWEST = 0.3  # [Hz] where they begin
 TWIN = 1e-6  # of the largest singular value: less is rounding
 OWN = 1e-3  # of its length that a direction must have beside what is free
@@ -103,13 +104,18 @@ def _forces(e: Experiment, m: Metric, seen: Seen, paths: Array, place: int, n_z:
 
 
 def _errors(study: Study, e: Experiment, m: Metric, i: int) -> Array:
-    """White effects [rows, 2 OCTAVES] of an input that is larger or later than measured at some frequencies: noise may make it seem so."""
+    """White effects [rows, 4 OCTAVES] of an input that is larger or later than measured at some frequencies, while it is loud and while it
+    is quiet: noise may make it seem so, and between two bumps it is all there is."""
     f = e.frequencies[: e.band]
     h = study.linear.transfer(e.frequencies)[: e.band, : e.y.shape[1], i]
     at = np.log(np.maximum(f / LOWEST, 1.0)) / np.log(f[-1] / LOWEST) * (OCTAVES - 1.0)
     hats = np.maximum(1.0 - np.abs(at - np.arange(OCTAVES)[:, None]), 0.0)
-    drive = fft.rfft(e.drive[:, i] - e.drive[:, i].mean())[: e.band]
-    return _whitened(e, m, np.concatenate([hats, 1j * hats])[:, :, None] * (drive[:, None] * h))
+    near = ndimage.uniform_filter1d(e.rate[:, i] ** 2, max(int(NEAR / e.step), 1))
+    loud = near / (near + near.mean() + 1e-300)
+    drive = e.drive[:, i] - e.drive[:, i].mean()
+    spectra = fft.rfft([loud * drive, (1.0 - loud) * drive])[:, : e.band]
+    moved = np.concatenate([hats * x for x in (*spectra, *(1j * spectra))])
+    return _whitened(e, m, moved[:, :, None] * h)
 
 
 def _whitened(e: Experiment, m: Metric, spectra: NDArray[np.complex128]) -> Array:
