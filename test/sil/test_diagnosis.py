@@ -17,7 +17,7 @@ from scipy.signal import lfilter, lsim
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import extension, hypotheses, naming, noise, plant, score, search, steady, study
+from penode_sil.diagnosis import build, extension, hypotheses, naming, noise, plant, score, search, steady, study
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.engine import experiment
 from penode_sil.diagnosis.fit import Problem, delayed, railed
@@ -759,6 +759,17 @@ def test_noise_of_the_road_before_and_after_a_bump_does_not_change_a_vehicle(tmp
     path = record(tmp_path / "bump.csv", z + 3e-5 * np.random.default_rng(seed).standard_normal(SAMPLES), sensors, seed + 10)
     found = diagnosis.diagnose(model, load([path], model))
     assert found.verdict == "no_discrepancy" and found.causes == ()
+
+
+@pytest.mark.parametrize("loss", [0.1 * D, 10.0 * D])
+def test_a_damper_does_not_fade_farther_than_to_nothing(model, loss):
+    """Gained in a first part of a fall only, a loss of ten times the damping would drive the vehicle on a hotter road."""
+    place = plant.places(model)[0]
+    law = hypotheses.Basis("damper_fading", 0, "heating_damper", ("damping", "N*s/m"), {"work": (1.0, "m^2/s"), "cooling": (9.0, "s")}, -1, ())
+    term = Term(score.Candidate("damper_fading", "damper", -1, False, law), -loss)
+    _, parameters, free = build.element(term, place, "x", model)
+    (damping,) = (f for f in free if f.target == "x_damping")
+    assert (damping.low, damping.high) == (-D, 0.0) and damping.low < damping.value == parameters["x_damping"][0]
 
 
 def test_a_start_in_motion_is_the_start(tmp_path):

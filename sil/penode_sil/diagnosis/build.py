@@ -16,7 +16,7 @@ from penode_gen.model import GROUND, Element, Model
 
 from .fit import Free
 from .hypotheses import VALUED, Basis, Fault
-from .plant import Place, extend
+from .plant import Place, extend, nominal
 from .score import Candidate
 
 Array = NDArray[np.float64]
@@ -71,7 +71,10 @@ def element(term: Term, place: Place, name: str, model: Model) -> tuple[Element,
     gain, unit = what.gain
     size = max(abs(term.gain), 1e-12)
     low, high = (0.0, np.inf) if what.sign > 0 else (-np.inf, 0.0) if what.sign < 0 else (-np.inf, np.inf)
-    parameters = {} if term.own else {f"{name}_{gain}": (term.gain, unit)}
+    start, whole = term.gain, nominal(model, place, "linear_damper", "damping", {})
+    if what.kind == "damper_fading" and what.sign < 0 and whole > 0.0:  # farther than to nothing it does not fade, on whatever road
+        low, start = -whole, max(start, -0.9 * whole)
+    parameters = {} if term.own else {f"{name}_{gain}": (start, unit)}
     free = [Free(key, x, size, low=low, high=high) for key, (x, _) in parameters.items()]
     shapes = {f"{name}_{key}": value for key, value in what.shapes.items()}
     least = {f"{name}_{key}": value for key, value in what.least.items()}

@@ -20,7 +20,7 @@ from penode_gen.model import Model
 
 from .build import Term
 from .hypotheses import HALVES, STRIBECK, Basis, Fault, lag, size, warm
-from .plant import Place
+from .plant import Place, nominal
 from .fit import Fit
 from .result import Value
 from .score import where
@@ -171,16 +171,6 @@ def _parts(x: Array, f: Array) -> tuple[Array, Array]:
 
 def _size(f: Array) -> float:
     return float(np.sqrt(np.mean(f * f)))
-
-
-def nominal(model: Model, place: Place, law: str, argument: str, values: Values) -> float:
-    """Sum of what the linear elements of a place have already, with what was fitted."""
-    total = 0.0
-    for e in model.elements:
-        if e.law == law and any(name == e.name for name, _ in place.elements):
-            name = e.arguments[argument]
-            total += values.get(name, model.parameters[name].value)
-    return total
 
 
 class Curve:

@@ -41,6 +41,16 @@ class Place:
         return self.elements[0][0] if self.elements else self.ends[0]
 
 
+def nominal(model: Model, place: Place, law: str, argument: str, values: Mapping[object, float]) -> float:
+    """Sum of what the linear elements of a place have already, with what was fitted."""
+    total = 0.0
+    for e in model.elements:
+        if e.law == law and any(name == e.name for name, _ in place.elements):
+            name = e.arguments[argument]
+            total += values.get(name, model.parameters[name].value)
+    return total
+
+
 def places(model: Model, set_name: str = "default") -> tuple[Place, ...]:
     """All places of a model, those with elements first; ranges of networks are those of a set."""
     found: dict[tuple[str, str], list[tuple[str, int]]] = {}
