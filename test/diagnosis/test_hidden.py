@@ -248,6 +248,13 @@ def test_every_form_changes_the_signals_by_more_at_a_greater_size(form):
     assert 0 <= small < large < np.inf and large > cases.BOUND
 
 
+@pytest.mark.parametrize("kind, there", [("quarter", ["damper"]), ("mass", []), ("law", [])])
+def test_a_damper_beside_ground_does_not_switch(kind, there):
+    """Its body moves as it does: all that a skyhook makes of it is a bent curve, which is on the list."""
+    form, bench = next(f for f in FORMS if f.name == "switching_damper"), a_bench(kind)
+    assert effects.places(form, bench.plant, list(bench.noise)) == there
+
+
 def measured_loop(name, size, amplitude=0.02):
     """Deflection, rate and extra force of a form under a sine of 1 Hz, second half, and its truth."""
     form, bench = next(f for f in FORMS if f.name == name), a_bench("law")

@@ -77,7 +77,7 @@ class Place:
 class Form:
     kind: str
     name: str
-    places: tuple[str, ...]  # roles of elements and bodies; "sensor" and "parameter" mean any of the plant
+    places: tuple[str, ...]  # roles of elements and bodies; "sensor", "parameter": any of the plant; "strut": a damper between bodies
     common: bool
     sizes: tuple[float, float]  # what is plausible
     make: Callable[[Rng, Place], Build]
@@ -140,5 +140,5 @@ def places(form: Form, plant: Plant, sensors: list[str]) -> list[str]:
     here = {"quarter": "spring damper tyre body wheel", "mass": "spring damper mass", "law": "spring damper motion"}[
         plant.kind
     ].split()
-    meant = {"sensor": sensors, "parameter": list(plant.true), "clock": ["clock"]}
+    meant = {"sensor": sensors, "parameter": list(plant.true), "clock": ["clock"], "strut": ["damper"] * (plant.kind == "quarter")}
     return [place for role in form.places for place in meant.get(role, [role] if role in here else [])]

@@ -63,6 +63,7 @@ def pitch(r: Rng, at: Place) -> Build:
 
 
 def switching_damper(r: Rng, at: Place) -> Build:
+    """Skyhook: more damping while the body moves as the damper does. Beside ground it always does: a bent curve, which is on the list."""
     d = at.damping
     return lambda size: Change({"on": d * (1 + size), "off": d * (1 - size)}, {"damper": at.law(Kind.SKYHOOK, d, size * d)})
 
@@ -91,7 +92,7 @@ forms(OUTSIDE, "body mass motion", (0.01, 0.6), "", engine=engine)
 forms(OUTSIDE, "body mass", (0.01, 0.6), "", gusts=gusts)
 forms(OUTSIDE, "tyre", (0.01, 0.5), "", uneven_tyre=uneven_tyre, rocking_tyre=rocking_tyre)
 forms(OUTSIDE, "body", (0.05, 1.0), "", pitch=pitch)
-forms(OUTSIDE, "damper", (0.02, 0.8), "", switching_damper=switching_damper)
+forms(OUTSIDE, "strut", (0.02, 0.8), "", switching_damper=switching_damper)
 forms(OUTSIDE, "spring", (0.02, 0.4), "", levelling_spring=levelling_spring)
 forms(OUTSIDE, "sensor", (0.003, 0.2), "", mains_hum=mains_hum)
 forms(OUTSIDE, "clock", (0.01, 1.0), "", clock_drift=clock_drift)
