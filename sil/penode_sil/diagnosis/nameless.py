@@ -20,7 +20,10 @@ from .search import COST, Explanation
 from .study import Study, loss
 
 HIDDEN = 8  # neurons, of deflection and rate: 32 weights
-ITERATIONS = 12
+ITERATIONS = 30  # at the most
+FIRST = 8  # after which it has to look promising
+EARLY = 0.75  # of the share that it must take in the end
+CLOSED = 1e-3  # of the avoidable residual: the fit ends where an iteration takes less
 STARTS = 4  # of the regression before, which sees the force that the smoother estimates
 POINTS = 1500
 SHARE = 0.3  # of the avoidable residual that it must take away
@@ -53,9 +56,11 @@ def fitted(study: Study, best: Explanation | None) -> Explanation | None:
     model = extend(study.model, [Element("nameless", p.ends, "expression", expression=text)], parameters, [p])
     problem = Problem(model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
     plain = [replace(f, value=f.origin) if isinstance(f.target, str) else f for f in study.null.free]  # as it was stated
-    fit = problem.solve((*plain, *free), ITERATIONS, 1.0)
-    if not np.isfinite(fit.cost):
+    close = max(CLOSED * avoidable(study), COST)
+    fit = problem.solve((*plain, *free), FIRST, close)
+    if not np.isfinite(fit.cost) or share(study, fit) < EARLY * SHARE:
         return None
+    fit = problem.solve(fit.free, ITERATIONS - FIRST, close)
     gain = loss(study, study.null) - loss(study, fit)
     if gain < COST * len(free) or share(study, fit) < SHARE:
         return None
@@ -64,7 +69,12 @@ def fitted(study: Study, best: Explanation | None) -> Explanation | None:
 
 def share(study: Study, fit: Fit) -> float:
     """What a fit takes away of the avoidable residual."""
-    return min((study.null.cost - fit.cost) / max(study.null.cost - len(study.null.residual), 1.0), 1.0)
+    return min((study.null.cost - fit.cost) / max(avoidable(study), 1.0), 1.0)
+
+
+def avoidable(study: Study) -> float:
+    """The chi2 that the model as it is leaves beyond noise."""
+    return study.null.cost - len(study.null.residual)
 
 
 def beside(study: Study, e: Explanation) -> str:
