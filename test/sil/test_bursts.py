@@ -74,6 +74,15 @@ def test_what_discharges_is_found_however_often(discharges):
     assert found[far, 0].mean() > 0.9 if discharges else not found.any()
 
 
+@pytest.mark.parametrize("off", [0.5, -0.5, 0.02])
+def test_a_first_sample_that_is_far_off_does_not_count(off):
+    """What begins at that instant may be in it or not; two deviations of its noise are no more than noise."""
+    y = noisy(7)
+    y[0] += off
+    (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
+    assert found[0].all() == (abs(off) > 0.1) and not found[1:].any()
+
+
 @pytest.mark.parametrize("quantum", [0.0, 0.03, 0.1])
 def test_a_frozen_value_is_found_and_a_coarse_one_is_none(quantum):
     """A coarse sensor repeats values while it moves by less than a quantum; noise and rounding are within 6 of their deviations."""

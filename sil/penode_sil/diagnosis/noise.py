@@ -336,6 +336,7 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
         many = np.sum(wild & alone, axis=0) >= np.where(np.max(rough, axis=0) > 30.0 * usual, 2, 5)
         often = np.mean(e.good, axis=0) > 0.5  # a sensor slower than the raster has no neighbours to be far beyond
         found.append(((alone & few & many) | _sunken(e, z, r) | _frozen(e, z, r) | _decayed(e.y)) & often & e.good)
+        found[-1][0] |= (rough[0] > 14.0 * usual) & often & e.good[0]  # what begins just then may be in it or not
     return found
 
 
