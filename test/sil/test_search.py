@@ -14,8 +14,8 @@ from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import HALVES, Basis
 from penode_sil.diagnosis.score import Candidate, Regression
 from penode_sil.diagnosis.search import (
-    NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, pursue, spared, sprung, strongest, sufficient, terms_of, weak,
-    whole,
+    NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, pursue, rigid, spared, sprung, strongest, sufficient, terms_of,
+    weak, whole,
 )  # fmt: skip
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
@@ -190,6 +190,15 @@ def test_a_mass_that_is_too_small_may_have_one_on_a_spring(value, masses):
     ways = sprung(SimpleNamespace(model=model), fitted, r, ("wrong_parameter", "m_b"))
     assert [(t.candidate.what[2:], t.gain) for way in ways for t in way] == [((f, 0.1), 60.0) for f in (8.0, 16.0, 30.0)][:masses]
     assert sprung(SimpleNamespace(model=model), fitted, r, ("sensor_scale", "a_body")) == []
+
+
+@pytest.mark.parametrize("frequency, tolerance, masses", [(190.0, 0.01, ["m_b"]), (190.0, 0.0, []), (30.0, 0.01, [])])
+def test_a_mass_that_moves_with_its_body_is_a_part_of_it(frequency, tolerance, masses):
+    """Not one on a spring that gives way where hidden masses are, nor where the body's own mass is exact."""
+    model = SimpleNamespace(bodies=[SimpleNamespace(name="body", mass="m_b")], parameters={"m_b": SimpleNamespace(tolerance=tolerance)})
+    hidden = Term(Candidate("hidden_resonance", "body", 1, False, ("absorber", 0, frequency, 0.1)), 300.0)
+    found = SimpleNamespace(terms=(hidden,), groups=(hidden.group,))
+    assert [t.candidate.what for t in rigid(SimpleNamespace(model=model), found)] == masses
 
 
 def law(kind: str, gain: float, companion: bool = False) -> Term:

@@ -21,7 +21,7 @@ from .fit import Fit, Problem
 from .hypotheses import BENDS, CLOCK, HALVES, KNEE, STRIBECK, VALUED, Basis, Fault
 from .naming import DAMPERS, FRICTION, christened, straight
 from .noise import ALIKE, kinship
-from .score import DAMPINGS, Candidate, Regression, where
+from .score import DAMPINGS, RESONANCES, Candidate, Regression, where
 from .study import Study, heard, loss, regression, requieted
 
 GRAVITY = 9.81  # [m/s^2]
@@ -51,10 +51,12 @@ SMALL = 0.03  # of all that was gained: a cause worth less than that may be a re
 PART = 0.1  # of the size a law has alone: left to it where its companions do the rest
 WHOLE = 0.97  # share that is a whole explanation
 NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
+REST = 0.5  # of the noise: a load at rest that leaves so much more than a start in motion is none
 CLOSE = 0.02  # of the gain: an exchanged cause that is nearly as good gets more laws
 MOST = 0.5  # of what is more than noise
 DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a colour
 MENDS = 4  # laws, at most, that only mend the form of what is named
+STIFF = 1.5  # of the highest frequency of hidden masses: one that a fit has taken beyond it moves with its body
 SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
 WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
 HEAVY = 2e6  # steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause
@@ -247,7 +249,7 @@ def singles(study: Study, r: Regression, few: int = 3) -> list[Explanation]:
             kept = study.null.cost - found[-1].fit.cost
             if k < len(taken) and kept < KEPT * r.gain(choices[k])[0] and (other := terms_of(r, elsewhere(r, taken[k][1], choices[k]))):
                 found.append(explain(study, other))
-    found += [explain(study, [needed], start=e.fit) for e in found for needed in sufficient(study, e)]
+    found += [explain(study, [needed], start=e.fit) for e in found for needed in (*sufficient(study, e), *rigid(study, e))]
     return distinct([softened(study, e) for e in found if e.groups])
 
 
@@ -270,6 +272,14 @@ def sufficient(study: Study, e: Explanation) -> list[Term]:
         if ((f.value - nominal) / f.unit) ** 2 < (NEW + COST) * variance[index[target]]:
             found.append(other)
     return found
+
+
+def rigid(study: Study, e: Explanation) -> list[Term]:
+    """The parameter of a body in place of a hidden mass on a spring that does not give way: together they are a heavier body."""
+    if len(e.terms) != 1 or e.groups[0][0] != "hidden_resonance" or e.terms[0].candidate.what[2] < STIFF * RESONANCES[-1]:
+        return []
+    mass = next(b.mass for b in study.model.bodies if b.name == e.groups[0][1])
+    return [Term(Candidate("wrong_parameter", mass, 0, False, mass), 0.0)] if study.model.parameters[mass].tolerance > 0.0 else []
 
 
 def in_series(study: Study, r: Regression, group: Group) -> list[Term]:
@@ -390,7 +400,7 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     idle = explain(rest, unloaded).score if unloaded and set(unloaded) not in tried else 0.0
     moving = rest.nothing - free.nothing + (told[0].score if told else 0.0)
     log(f"at rest {idle:.0f}, with {beam[0].groups} {beam[0].score:.0f}, moving {moving:.0f}")
-    if beam[0].score < max(idle + NEW, (1.0 - NEAR) * moving - NEW):
+    if beam[0].score < max(idle + NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW):
         return rest, []
     quiet = requieted(rest, beam[0].fit)
     quiet, found = grow(quiet, [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]], log, 1)  # the rest was found in motion
