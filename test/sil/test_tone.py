@@ -73,6 +73,29 @@ def test_a_faint_tone_that_stays_is_found(sweep, loud, seconds):
     assert found.heard and found.sensor == 1 and found.frequency == 50.0
 
 
+@pytest.mark.parametrize("loud, alone", [(0.12, False), (0.2, True)])
+def test_a_tone_that_three_sensors_have_is_found_sooner(loud, alone):
+    """A part in 140 of the noise's power in each is too little for one sensor in 20 s, one in 50 is enough."""
+    draw, t = np.random.default_rng(13), np.arange(20_000) * 1e-3
+    y = draw.normal(size=(len(t), 3)) + loud * np.sin(2 * np.pi * 27.0 * t)[:, None]
+    assert heard(road(draw, len(t)), y[:, :1], 1e-3).heard == alone
+    found = heard(road(draw, len(t)), y, 1e-3)
+    assert found.heard and found.frequency == 27.0
+
+
+def test_noise_that_sensors_share_is_no_tone():
+    """Noise of an input, through a mode, is most of what each sees: the metric knows, and parts it from their own."""
+    draw, t = np.random.default_rng(12), np.arange(30_000) * 1e-3
+    w, z, loud = 2 * np.pi * 13.0, 0.08, 3.0
+    b, a = signal.cont2discrete(([2 * z * w * loud, 0.0], [1.0, 2 * z * w, w * w]), 1e-3, "bilinear")[:2]
+    shared = signal.lfilter(b.ravel(), a, draw.normal(size=len(t)))
+    y = draw.normal(size=(len(t), 2)) + shared[:, None]
+    power = np.abs(signal.freqz(b.ravel(), a, np.linspace(0.0, np.pi, len(t) // 2 + 1))[1]) ** 2
+    root = np.linalg.inv(np.linalg.cholesky(power[:, None, None] + np.eye(2))).astype(complex)
+    found = tone([recording(road(draw, len(t)), y, 1e-3)], [Metric(len(t), root)], [np.zeros_like(y)])
+    assert found.surprise < 0.6 * HEARD
+
+
 @pytest.mark.parametrize("damping, loud", [(0.08, 3.0), (0.04, 10.0)])
 @pytest.mark.parametrize("known", ["noise", "motion"])
 def test_a_resonance_is_none(known, damping, loud):

@@ -440,6 +440,7 @@ class Tone:
 def tone(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> Tone:
     """The clearest tone that residuals have and inputs have not: noise that makes one comes from a machine.
 
+    Each sensor is looked at by itself, and all together where the expected noise, turned white, is independent in each.
     Under a sine an error of a model or a quantum is a tone as well; under one whose frequency changes, only the multiples of
     it do not count. A resonance narrower than some 2 Hz that neither the expected noise nor the model's motion has is taken for
     a tone: it is not noise, but need not come from a machine. Recordings of less than 120 Hz or 3 s have too few bins or seconds.
@@ -451,18 +452,34 @@ def tone(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated
         sine = swept(e.u, e.step)
         if top < 6 * HALF or len(e.time) < 3 * size or (sine and not _moves(e.u, e.step)):
             continue
-        power = _seconds(np.where(e.good, e.y - z, 0.0), e.step)[:, : top + HALF]
+        left = np.where(e.good, e.y - z, 0.0)
+        power = _seconds(left, e.step)[:, : top + HALF]
         hertz = np.arange(top + HALF) / (size * e.step)
         usual = m.power  # a resonance that the road's noise shakes is not a tone
         power /= np.stack([np.interp(hertz, e.frequencies[: len(usual)], x) for x in usual.T], axis=-1)
         moving = np.mean(_pureness(_seconds(z, e.step)[:, : top + HALF]), axis=0)  # nor is one that the model has as well
-        pure = _pureness(power) / np.maximum(maximum_filter1d(moving, 3, axis=0), 1.0)
-        if sine:
-            pure[_multiples(e.u, e.step, top)] = np.nan
+        moving = np.maximum(maximum_filter1d(moving, 3, axis=0), 1.0)
+        swings = _multiples(e.u, e.step, top) if sine else np.zeros((len(power), top - HALF), bool)
+        pure = np.where(swings[..., None], np.nan, _pureness(power) / moving)
         for j in range(pure.shape[2]):
-            surprise, k = _followed(pure[..., j])
+            surprise, k = _followed(np.exp(_says(pure[..., j])))
             found.append(Tone(surprise, float(hertz[k + HALF]), j))
+        low = min(int(e.frequencies[len(usual) - 1]), top) - HALF  # bins of those that have any white residual
+        if pure.shape[2] > 1 and low > 0:
+            power = _seconds(_whitened(e, m, left), e.step)[:, : low + 2 * HALF]
+            pure = np.where(swings[:, :low, None], np.nan, _pureness(power)[:, :low] / moving[:low].max(axis=1, keepdims=True))
+            says = np.stack([_says(x) for x in np.moveaxis(pure, -1, 0)])  # [sensors, seconds, models, bins]
+            hears = 0.25 * (1.0 + np.exp(says[:, :, ::2]).sum(axis=2))  # a sensor a tone of any level, or of none
+            surprise, k = _followed(np.prod(hears, axis=0)[:, None])
+            found.append(Tone(surprise, float(hertz[k + HALF]), int(np.argmax(np.sum(np.log(hears[:, :, k]), axis=1)))))
     return max(found, key=lambda t: t.surprise)
+
+
+def _whitened(e: Experiment, m: Metric, residual: Array) -> Array:
+    """A residual [n, n_z] turned white within the band; what the noise of an input does to several sensors, one of them keeps."""
+    white = np.zeros((len(e.frequencies), residual.shape[1]), dtype=complex)
+    white[: len(m.root)] = np.einsum("fij,fj->fi", m.root, m.spectrum(residual))
+    return fft.irfft(white, len(e.time), axis=0)
 
 
 def swept(inputs: Array, step: float) -> bool:
@@ -509,17 +526,23 @@ def _pureness(power: Array) -> Array:
     return power[:, HALF:-HALF] / np.maximum(np.maximum(beside, sides), 1e-300)
 
 
-def _followed(pure: Array) -> tuple[float, int]:
-    """The surprise [nat] that a bin which stays, or goes to its neighbours, stands out [seconds, bins] by chance, and about which.
-
-    The sum over all its ways of the likelihood that a tone went there, of random phase and strength, over that of noise: in
-    noise its mean is 1 at the most, so that its chance to come to L is 1 / L (Markov). The sum is that of a hidden Markov
-    model, with a few levels of the tone and chances to stay.
-    """
+def _says(pure: Array) -> Array:
+    """The log likelihood ratio [seconds, models, bins] of a tone of random phase and strength against noise where bins stand out so far
+    [seconds, bins]."""
     x = TAIL * np.log1p(np.nan_to_num(pure) / TAIL)  # exponential, though medians of a few bins scatter
     says = np.minimum(LEVELS * x[:, None] / (1.0 + LEVELS) - np.log1p(LEVELS), MOST)
-    ratio = np.exp(np.where(np.isnan(pure)[:, None], 0.0, says))  # [seconds, models, bins]
-    at = np.full(ratio.shape[1:], 1.0 / pure.shape[1])
+    return np.where(np.isnan(pure)[:, None], 0.0, says)
+
+
+def _followed(ratio: Array) -> tuple[float, int]:
+    """The surprise [nat] that a bin which stays, or goes to its neighbours, stands out by chance, from likelihood ratios [seconds,
+    models or 1, bins] of a tone that is there; and about which.
+
+    The sum over all its ways of the likelihood that a tone went there over that of noise: in noise its mean is 1 at the most, so that
+    its chance to come to L is 1 / L (Markov). The sum is that of a hidden Markov model, with a few levels of the tone and chances to
+    stay.
+    """
+    at = np.full((len(STAYS), ratio.shape[2]), 1.0 / ratio.shape[2])
     surprise, where = np.zeros(len(at)), np.zeros(at.shape)
     for second in ratio:
         gone = 0.5 * (1.0 - STAYS) * at
