@@ -94,6 +94,16 @@ def test_what_sensors_share_is_no_noise(values):
     assert judged(patchwork, alike=noise.ALIKE + 0.1, shared=0.01 * 4.0 * ROWS)[1] == "explained"
 
 
+def test_several_causes_have_to_take_more_of_it_away(values):
+    """A sixteenth left beyond chance is a form that one cause may have and several may not."""
+    patchwork = found(("bump_stop", "spring"), ("quadratic_damper", "damper"), left=0.07 * 4.0 * ROWS)
+    assert judged(patchwork) == OUT
+    assert judged(found(("bump_stop", "spring"), left=0.07 * 4.0 * ROWS))[0] == ["bump_stop"]
+    assert judged(found(*patchwork.groups, left=0.05 * 4.0 * ROWS))[0] == ["bump_stop", "quadratic_damper"]
+    faint = SimpleNamespace(**vars(STUDY) | {"null": SimpleNamespace(residual=np.zeros(ROWS), cost=ROWS + 20.0 * SIGMA)})
+    assert judged(found(*patchwork.groups, left=5.0 * SIGMA), study=faint)[0] == ["bump_stop", "quadratic_damper"]
+
+
 def test_what_changes_is_no_small_part_of_the_whole(values):
     """Beside nothing it is on no list; beside a cause only if it takes more than a patchwork may leave."""
     gained = 4.0 * ROWS
