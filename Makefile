@@ -12,7 +12,7 @@ EXPERIMENT := gen/nqvm/nqvm.toml --scenario sil/scenarios/recalibration.toml
 RECORDED  := sil/recordings/friction
 CASES     := 192 # eight rounds of the 24 cases of a draw
 # and of each kind seven in a common form and five in a foreign one, so that one wrong answer is not below 85 or 70 %
-LEAST     := single_common=161 single_foreign=110 null=100 null_hard=100 outside=60
+LEAST     := single_common=161 single_foreign=110 pair=48 triple=16 null=100 null_hard=100 outside=60
 
 help: ## Show this text
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)

@@ -423,6 +423,28 @@ def test_friction_that_falls_for_nothing_is_coulomb(tmp_path, model):
     assert force.value == pytest.approx(60.0, rel=0.02)
 
 
+def test_friction_that_yields_a_little_is_coulomb(tmp_path, model):
+    """A force that slides after 50 um, told as one that falls as the rate grows; by SciPy, with the slip as a state."""
+    z = road(5)
+    t, spline = np.arange(SAMPLES) * STEP, CubicSpline(np.arange(SAMPLES) * STEP, z)
+
+    def rates(time: float, x: np.ndarray) -> list[float]:
+        s, v, slip = x[0] - x[1], x[2] - x[3], x[4]
+        pull = C * s + D * v + 30.0 * slip
+        return [x[2], x[3], -pull / M_B, (pull - C_T * (x[1] - spline(time))) / M_W, (v - abs(v) * slip) / 5e-5]
+
+    x = solve_ivp(rates, (0.0, t[-1]), np.zeros(5), method="LSODA", rtol=1e-7, atol=1e-10, max_step=STEP, t_eval=t).y
+    a = np.array([rates(time, state)[2:4] for time, state in zip(t, x.T)])
+    path = record(tmp_path / "yields.csv", z, {"a_body": a[:, 0], "a_wheel": a[:, 1], "deflection": x[0] - x[1]}, 15)
+    one = studied(path, model)
+    laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == "falling_friction"]
+    what = replace(laws[0].what, shapes={"presliding": (6e-5, "m"), "stribeck": (0.05, "m/s")})
+    falling = search.explain(one, [Term(replace(laws[0], what=what), 30.0)], iterations=0)
+    level = search.level_friction(one, falling, lambda text: None)
+    assert falling.groups == (("stribeck_friction", "damper"),) and level.groups == (("coulomb_friction", "damper"),)
+    assert naming.values(one, level, level.groups[0])["force"].value == pytest.approx(30.0, rel=0.02)
+
+
 def test_a_loss_is_that_at_the_end_of_the_recording(tmp_path):
     """A damper that loses 20 % in proportion to its work under a sweep that gets faster; of 22 999 samples the diagnosis takes 22 500,
     until when it loses 19 %."""

@@ -605,7 +605,7 @@ def settled(study: Study, e: Explanation) -> Explanation:
 def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Explanation:
     """The explanation with the textbook law of a kind in place of several laws, and with constant friction in place of one that falls,
     where it does about as well: its parameters are known better."""
-    e = leaner(study, unlagged(study, unbent(study, e, log), log), log)
+    e = level_friction(study, leaner(study, unlagged(study, unbent(study, e, log), log), log), log)
     laws = {g: [_law(t.candidate) for t in e.terms if t.group == g] for g in e.groups if g[0] in TEXTBOOK}
     laws = {g: own for g, own in laws.items() if own != ["loose_damper"]}  # one as well
     ways = [(g, g) for g, own in laws.items() if len(own) > len(TEXTBOOK[g[0]]) or not set(own) <= set(TEXTBOOK[g[0]])]
@@ -632,6 +632,20 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
             if same and (group == other and simple.gain > e.gain - SLACK or simple.score > e.score - SLACK):
                 e = simple
     return joined(study, e, log)
+
+
+def level_friction(study: Study, e: Explanation, log) -> Explanation:
+    """The explanation with friction of one level that yields as far in place of one that falls, where it does about as well: no candidate
+    yields as little as a fit has found."""
+    for t in [t for t in e.terms if _law(t.candidate) == "falling_friction"]:
+        what = t.candidate.what
+        one = replace(what, kind="coulomb_friction", law="dahl_friction", shapes={"presliding": what.shapes["presliding"]})
+        term = replace(t, candidate=replace(t.candidate, kind="coulomb_friction", what=one))
+        level = explain(study, [*(x for x in e.terms if x.group != t.group), term], start=e.fit, formulas=e.formulas)
+        log(f"  one level of {t.group}: {level.gain:.0f} for {e.gain:.0f}, {level.score:.0f} for {e.score:.0f}")
+        if len(level.groups) == len(e.groups) and level.score > e.score - SLACK:
+            return level
+    return e
 
 
 def unlagged(study: Study, e: Explanation, log) -> Explanation:
