@@ -488,6 +488,20 @@ def test_settled_force_and_bias_of_the_deflection_are_answers_of_each_other():
     }, "a height sensor tells them apart"
 
 
+def test_faint_force_on_the_body_may_be_one_on_the_wheel():
+    """That is put on over another time; not where it stands out of the noise."""
+    bench = a_bench()
+    bench = replace(bench, noise={s: bench.noise[s] for s in ("a_body", "a_wheel", "z_body")})
+    load = next(f for f in FORMS if f.name == "put_on_at_the_start")
+    build = load.make(np.random.default_rng(1), bench.place("body"))
+    faint, strong = (
+        cases.Case(0, 2, "single_foreign", bench, (cases.Effect(load, "body", size, build(size)),)) for size in (0.004, 0.05)
+    )
+    wheel = ("constant_force", "wheel")
+    assert faint.energies[0] > cases.BOUND and wheel in {(r["kind"], *r["where"]) for r in faint.rivals(0)}
+    assert wheel not in {(r["kind"], *r["where"]) for r in strong.rivals(0)}
+
+
 def test_holdout_floor_is_the_noise_that_is_left_of_a_perfect_model():
     """Of white noise at 12 s and 500 Hz or more: within 4 / sqrt(2 x 5000) = 4 %."""
     case = cases.make(33, 2)

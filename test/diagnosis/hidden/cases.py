@@ -112,6 +112,8 @@ class Case:
                 except ArithmeticError:
                     continue
                 tried.append((kind, where, y))
+        if effect.form.kind == "constant_force" and bench.plant.kind == "quarter":  # a load of another course on the wheel
+            tried += [("constant_force", "wheel", bench.response([on(0.1)], 2) - bench.linear) for on in faults.courses(rng, bench.place("wheel"))]
         found: dict[tuple[str, str], float] = {}
         hidden = {(e.form.kind, e.where) for e in self.effects}  # an answer names nothing twice
         for kind, where, y in tried:

@@ -50,6 +50,12 @@ def load(r: Rng, at: Place, of_time: Curve, settled: bool = False) -> Build:
     return build
 
 
+def courses(r: Rng, at: Place) -> list[Build]:
+    """Loads that have settled, that are put on at once, and within 0.1 s to 1 s."""
+    smooth = [load(r, at, lambda t, seconds=seconds: rise(t, 0.2, seconds)) for seconds in np.arange(0.1, 1.01, 0.05)]
+    return [load(r, at, np.ones_like, settled=True), load(r, at, lambda t: (t > 0).astype(float)), *smooth]
+
+
 forms("wrong_parameter", "parameter", (0.01, 0.5), "another_value", another_value=another_value)
 forms("hidden_resonance", "body wheel mass", (0.005, 0.3), "absorber",
       absorber=lambda r, at: absorber(r, at, lambda m, w, zeta: [(Kind.LINEAR, (m * w**2, 2 * zeta * m * w))]),
