@@ -20,10 +20,15 @@ def network(w: np.ndarray, scale: np.ndarray, places: int) -> Force:
     """Force of networks with weights w (25, lanes) at the first place; scale: of deflection, rate and force."""
     by_s, by_v, offset, out = (w[i * HIDDEN : (i + 1) * HIDDEN] for i in range(4))
     by_s, by_v, out, last = by_s / scale[0], by_v / scale[1], out * scale[2], w[-1] * scale[2]
+    f, inner, more = np.zeros((places, w.shape[1])), np.empty_like(out), np.empty_like(out)
 
     def force(s: np.ndarray, v: np.ndarray) -> np.ndarray:
-        f = np.zeros((places, w.shape[1]))
-        f[0] = (out * np.tanh(by_s * s[0] + by_v * v[0] + offset)).sum(axis=0) + last
+        np.multiply(by_s, s[0], out=inner)
+        np.multiply(by_v, v[0], out=more)
+        np.add(inner, more, out=inner)
+        np.add(inner, offset, out=inner)
+        np.multiply(out, np.tanh(inner, out=inner), out=inner)
+        np.add(np.add.reduce(inner, out=f[0]), last, out=f[0])
         return f
 
     return force

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import least_squares
-from scipy.signal import savgol_filter
+from scipy.signal import lfilter, savgol_filter
 
 Force = Callable[[np.ndarray, np.ndarray], np.ndarray]  # deflections, rates (places, lanes) -> additional forces, the same shape
 
@@ -49,6 +49,16 @@ class Linear:
     def observe(self, x: np.ndarray, u: np.ndarray, f: np.ndarray) -> np.ndarray:
         """Sensors (samples, sensors, lanes) of states (samples, n, lanes), inputs (samples, 2) and forces (samples, places, lanes)."""
         return self.c @ x + (u @ self.e.T)[:, :, None] + self.h @ f
+
+
+def modal(a: np.ndarray, inputs: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """States (samples, n, lanes) of x[k + 1] = a x[k] + inputs[k] from `start` (n, lanes), each mode by itself."""
+    poles, shapes = np.linalg.eig(a)
+    driven = np.vstack([np.zeros(len(a)), np.linalg.solve(shapes, inputs.T).T])[:-1]
+    moved = np.stack([lfilter([1.0], [1.0, -pole], w) for pole, w in zip(poles, driven.T)])
+    faded = poles[:, None] ** np.arange(len(inputs))
+    free = np.einsum("ij,jk,jl->kil", shapes, faded, np.linalg.solve(shapes, start.astype(complex)), optimize=True)
+    return ((shapes @ moved).T[:, :, None] + free).real
 
 
 class Rig:
@@ -165,16 +175,17 @@ class Rig:
                 f = np.stack([force(moved[:places, k], moved[places:, k]) for k in range(len(u))])
         else:
             a, g, inputs = drive
-            now = start
             with np.errstate(all="ignore"):
-                for k in range(len(u)):
-                    x[k] = now
-                    following = a @ now + inputs[k][:, None]
-                    if force:
-                        moved = lin.s @ now + offset[k][:, None]
-                        f[k] = force(moved[:places], moved[places:])
-                        following += g @ f[k]
-                    now = following
+                if force:
+                    both, shifts, now = np.vstack([lin.s, a]), np.hstack([offset, inputs])[:, :, None], start
+                    for k, shift in enumerate(shifts):
+                        x[k] = now
+                        now = both @ now
+                        now += shift
+                        f[k] = force(now[:places], now[places : 2 * places])
+                        now = now[2 * places :] + g @ f[k]
+                else:
+                    x = modal(a, inputs, start)
             x, f = (np.clip(np.nan_to_num(y, nan=1e9), -1e9, 1e9) for y in (x, f))
         return x, f, lin.observe(x, u, f)
 
