@@ -7,7 +7,8 @@ training recording train it, the rest decides whether it is kept. Levenberg-Marq
 """
 
 import numpy as np
-from rig import Force, Recording, Rig, run
+from numba import njit
+from rig import Recording, Rig, run
 
 HIDDEN = 6  # 2 * 6 inputs, 6 offsets, 6 outputs, 1 offset: 25 weights
 WEIGHTS = 4 * HIDDEN + 1
@@ -16,22 +17,47 @@ PRIOR = 10.0  # standard deviation of a weight: keeps flat directions where they
 SURE = 3.0  # standard errors of the mean by which blocks of a second have to become better
 
 
-def network(w: np.ndarray, scale: np.ndarray, places: int) -> Force:
-    """Force of networks with weights w (25, lanes) at the first place; scale: of deflection, rate and force."""
-    by_s, by_v, offset, out = (w[i * HIDDEN : (i + 1) * HIDDEN] for i in range(4))
-    by_s, by_v, out, last = by_s / scale[0], by_v / scale[1], out * scale[2], w[-1] * scale[2]
-    f, inner, more = np.zeros((places, w.shape[1])), np.empty_like(out), np.empty_like(out)
+@njit(error_model="numpy", cache=True)
+def walk(
+    w: np.ndarray, both: np.ndarray, shifts: np.ndarray, g: np.ndarray, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """States and forces (samples, rows, lanes) of networks with weights w (25, lanes), in SI, at the first place; see rig.stepped."""
+    places, (n, lanes) = g.shape[1], start.shape
+    x, f = np.zeros((len(shifts), n, lanes)), np.zeros((len(shifts), places, lanes))
+    now, sums = np.zeros(n), np.zeros(len(both))
+    for lane in range(lanes):
+        now[:] = start[:, lane]
+        for k in range(len(shifts)):
+            x[k, :, lane] = now
+            for i in range(len(both)):
+                sums[i] = shifts[k, i]
+                for j in range(n):
+                    sums[i] += both[i, j] * now[j]
+            s, v, total = sums[0], sums[places], w[-1, lane]
+            for h in range(HIDDEN):
+                inner = w[h, lane] * s + w[HIDDEN + h, lane] * v + w[2 * HIDDEN + h, lane]
+                total += w[3 * HIDDEN + h, lane] * np.tanh(inner)
+            f[k, 0, lane] = total
+            for i in range(n):
+                now[i] = sums[2 * places + i] + g[i, 0] * total
+    return x, f
 
-    def force(s: np.ndarray, v: np.ndarray) -> np.ndarray:
-        np.multiply(by_s, s[0], out=inner)
-        np.multiply(by_v, v[0], out=more)
-        np.add(inner, more, out=inner)
-        np.add(inner, offset, out=inner)
-        np.multiply(out, np.tanh(inner, out=inner), out=inner)
-        np.add(np.add.reduce(inner, out=f[0]), last, out=f[0])
+
+class Network:
+    """Forces of networks with weights w (25, lanes) at the first of some places; scale: of deflection, rate and force."""
+
+    def __init__(self, w: np.ndarray, scale: np.ndarray, places: int):
+        self.places = places
+        self.w = w * np.append(np.repeat([1 / scale[0], 1 / scale[1], 1.0, scale[2]], HIDDEN), scale[2])[:, None]
+
+    def __call__(self, s: np.ndarray, v: np.ndarray) -> np.ndarray:
+        by_s, by_v, offset, out = (self.w[i * HIDDEN : (i + 1) * HIDDEN] for i in range(4))
+        f = np.zeros((self.places, self.w.shape[1]))
+        f[0] = (out * np.tanh(by_s * s[0] + by_v * v[0] + offset)).sum(axis=0) + self.w[-1]
         return f
 
-    return force
+    def walk(self, *parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return walk(self.w, *map(np.ascontiguousarray, parts))
 
 
 def cut(r: Recording) -> Recording:
@@ -51,7 +77,7 @@ def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:
 
     def off(w: np.ndarray) -> np.ndarray:
         """Residuals (all samples, lanes) of the training part, with the prior's."""
-        force, parts = network(w, scale, places), []
+        force, parts = Network(w, scale, places), []
         for r, x0 in zip(train, starts):
             said = rig.simulate(r, np.repeat(x0, w.shape[1], axis=1), force, lin)[2]
             parts.append(rig.residual(r, said).reshape(-1, w.shape[1]))
@@ -79,7 +105,7 @@ def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:
             break
         lanes = off(w[:, None] + change * np.eye(WEIGHTS, WEIGHTS + 1))
 
-    force, won = network(w[:, None], scale, places), []
+    force, won = Network(w[:, None], scale, places), []
     for r, x0, (_, _, linear) in zip(data, starts, plain):
         n, second = 2 * len(r.given) // 3, round(1 / r.step)
         less = rig.residual(r, linear) ** 2 - rig.residual(r, rig.simulate(r, x0, force, lin)[2]) ** 2

@@ -61,6 +61,21 @@ def modal(a: np.ndarray, inputs: np.ndarray, start: np.ndarray) -> np.ndarray:
     return ((shapes @ moved).T[:, :, None] + free).real
 
 
+def stepped(force: Force, both: np.ndarray, shifts: np.ndarray, g: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """States and forces (samples, rows, lanes): deflections, rates and the next states are both @ x[k] + shifts[k], and f acts by g.
+
+    A force may have a faster `walk` of its own, which takes the rest.
+    """
+    places, now = g.shape[1], start
+    x, f = np.zeros((len(shifts), *start.shape)), np.zeros((len(shifts), places, start.shape[1]))
+    for k, shift in enumerate(shifts):
+        x[k] = now
+        now = both @ now + shift[:, None]
+        f[k] = force(now[:places], now[places : 2 * places])
+        now = now[2 * places :] + g @ f[k]
+    return x, f
+
+
 class Rig:
     """A model of masses on an axis with linear springs and dampers and one input. Places: pairs of ends with a spring or a damper."""
 
@@ -177,13 +192,8 @@ class Rig:
             a, g, inputs = drive
             with np.errstate(all="ignore"):
                 if force:
-                    both, shifts, now = np.vstack([lin.s, a]), np.hstack([offset, inputs])[:, :, None], start
-                    for k, shift in enumerate(shifts):
-                        x[k] = now
-                        now = both @ now
-                        now += shift
-                        f[k] = force(now[:places], now[places : 2 * places])
-                        now = now[2 * places :] + g @ f[k]
+                    walk = getattr(force, "walk", lambda *parts: stepped(force, *parts))
+                    x, f = walk(np.vstack([lin.s, a]), np.hstack([offset, inputs]), g, start)
                 else:
                     x = modal(a, inputs, start)
             x, f = (np.clip(np.nan_to_num(y, nan=1e9), -1e9, 1e9) for y in (x, f))
