@@ -19,6 +19,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -140,11 +141,28 @@ def least(text: str) -> tuple[str, int]:
     return stratum, int(count)
 
 
+def begun(file: Path, asked: argparse.Namespace, commands: Mapping[str, str]) -> tuple[int, list[dict]]:
+    """Seed and rows of the draw in a folder, which one that was stopped has left; a new seed, a new file and no rows else."""
+    head = {"commands": commands, "code": commit()}
+    if asked.resume and file.exists():
+        first, *rows = map(json.loads, file.read_text().splitlines())
+        seed = first.pop("seed")
+        if first != head or asked.seed not in (None, seed):
+            print(f"{file}: another draw, by {first['code']}, with seed {seed}; remove it, or leave --resume out", file=sys.stderr)
+            raise SystemExit(2)
+        return seed, rows
+    seed = secrets.randbelow(10**9) if asked.seed is None else asked.seed
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps({"seed": seed, **head}) + "\n")
+    return seed, []
+
+
 def arguments() -> argparse.ArgumentParser:
     parse = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parse.add_argument
     add("--cases", type=int, default=48, help="how many cases (48)")
     add("--seed", type=int, help="of the draw; default: a new one, which is printed")
+    add("--resume", action="store_true", help="go on with the draw that was stopped in this folder, with the code that began it")
     add("--only", action="append", default=[], metavar="SEED:INDEX", help="just this case; may be given again")
     add("--strata", default=",".join(cases.STRATA), help="take these only: " + ", ".join(cases.STRATA))
     add("--least", action="append", default=[], type=least, metavar="STRATUM=N", help="go on until so many are of it; may be given again")
@@ -168,27 +186,32 @@ def main() -> int:
     parse = arguments()
     asked = parse.parse_args()
     begin, paces = time.monotonic(), [pace()]
-    seed = secrets.randbelow(10**9) if asked.seed is None else asked.seed
+    commands = dict(c.split("=", 1) if "=" in c.split()[0] else ("diagnose", c) for c in asked.command or ["penode diagnose"])
     strata, kinds = set(asked.strata.split(",")), set(filter(None, asked.kinds.split(",")))
     if not strata <= set(cases.STRATA) or not kinds <= set(cases.KINDS):
         parse.error(f"unknown: {', '.join((strata - set(cases.STRATA)) | (kinds - set(cases.KINDS)))}")
+    seed, before = begun(asked.out / "rows.jsonl", asked, commands)
     chosen = [tuple(map(int, one.split(":"))) for one in asked.only] or choose(seed, asked.cases, strata, kinds)
     for stratum, count in asked.least if not asked.only else ():
         chosen += [one for one in choose(seed, count, {stratum}, set()) if one not in chosen]
     print(f"{len(chosen)} cases, seed {chosen[0][0] if chosen else seed}", flush=True)
-    asked.out.mkdir(parents=True, exist_ok=True)
-    commands = dict(c.split("=", 1) if "=" in c.split()[0] else ("diagnose", c) for c in asked.command or ["penode diagnose"])
-    rows: dict[str, list[dict]] = {name: [] for name in commands}
+    rows: dict[str, list[dict]] = {name: [r for r in before if r["command"] == name] for name in commands}
+    through = {r["case"] for r in before}
+    left = [(s, i) for s, i in chosen if f"{s}:{i}" not in through]
+    if before:
+        print(f"{len(chosen) - len(left)} of them are through", flush=True)
     with ProcessPoolExecutor(asked.jobs) as pool:
         if asked.generate:
             for job in [pool.submit(generate, *one, asked.out) for one in chosen]:
                 print(job.result(), flush=True)
             return 0
         more = (commands, asked.simulate, asked.timeout, asked.out, asked.keep or bool(asked.only))
-        jobs = [pool.submit(run, *one, *more) for one in chosen]
+        jobs = [pool.submit(run, *one, *more) for one in left]
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
-            for done, job in enumerate(jobs, 1):
+            for done, job in enumerate(jobs, 1 + len(chosen) - len(left)):
+                with (asked.out / "rows.jsonl").open("a") as file:
+                    file.write("".join(json.dumps(row) + "\n" for row in job.result()))
                 for row in job.result():
                     rows[row["command"]].append(row)
                     if not row["right"] or asked.only:
@@ -197,8 +220,8 @@ def main() -> int:
                     print(f"{done} of {len(chosen)}", end="\r", file=sys.stderr)
         except KeyboardInterrupt:  # its tables are of the cases so far
             pool.shutdown(wait=False, cancel_futures=True)
-    through = len(next(iter(rows.values())))
-    count = f"{through} cases" + f", the first of {len(chosen)}" * (through < len(chosen))
+    done = len(next(iter(rows.values())))
+    count = f"{done} cases" + f", the first of {len(chosen)}" * (done < len(chosen))
     tables = {name: score.summary(own) for name, own in rows.items()}
     texts = {name: f"{score.text(own)}\n\n{score.confusion(own)}\n" for name, own in tables.items()}
     side = score.compare(tables)

@@ -286,3 +286,22 @@ def test_the_floor_is_asked_of_rightly_named_cases():
     assert all(row["right"] for row in (right, faint, alien))
     found = score.summary([right, faint, alien])["gain"]
     assert (found["n"], found["within_5_percent_of_floor"]) == (1, 1.0)
+
+
+def test_a_draw_that_was_stopped_goes_on(tmp_path):
+    """With its own seed, and only the cases that are left; not by another command."""
+    call = [sys.executable, campaign.__file__, "--brief", "--out", tmp_path]
+
+    def run(*more: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([*call, *more], capture_output=True, text=True)
+
+    first = run("--cases", "1", "--command", "false")
+    again = run("--cases", "2", "--command", "false", "--resume")
+    head, *rows = (tmp_path / "rows.jsonl").read_text().splitlines()
+    seed = json.loads(head)["seed"]
+    assert first.stdout.startswith(f"1 cases, seed {seed}\n")
+    assert again.stdout.startswith(f"2 cases, seed {seed}\n1 of them are through\n")
+    assert [json.loads(r)["case"] for r in rows] == [f"{seed}:0", f"{seed}:1"]
+    assert "# Campaign of 2 cases" in (tmp_path / "campaign.md").read_text()
+    other = run("--cases", "2", "--command", "true", "--resume")
+    assert other.returncode == 2 and f"seed {seed}; remove it, or leave --resume out" in other.stderr
