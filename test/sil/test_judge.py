@@ -110,7 +110,9 @@ def test_what_changes_is_no_small_part_of_the_whole(values):
     assert judged(study=QUIET, changed=60.0) == OUT
     assert judged(found(("bump_stop", "spring")), changed=0.02 * gained) == OUT
     assert judged(found(("bump_stop", "spring")), changed=0.01 * gained) == (["bump_stop"], "explained")
-    assert judged(found(("bump_stop", "spring")), changed=0.001 * gained, alike=noise.ALIKE + 0.1) == OUT  # and sensors share it
+    shares = {"changed": 0.001 * gained, "alike": noise.ALIKE + 0.1}  # and sensors share it
+    assert judged(found(("bump_stop", "spring")), shared=0.006 * gained, **shares) == OUT
+    assert judged(found(("bump_stop", "spring")), shared=0.004 * gained, **shares) == (["bump_stop"], "explained")
 
 
 @pytest.mark.parametrize(

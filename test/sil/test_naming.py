@@ -133,3 +133,14 @@ def test_damping_of_a_tyre_that_lags(relaxation):
     half = omega * step / 2.0 * omega * relaxation  # half a step of delay, as a part of what is in phase
     found = damping({"x0_stiffness": stiffness, "x0_relaxation": relaxation})
     assert unit == "N*s/m" and abs(found / want - 1.0) < half + 0.03
+
+
+@pytest.mark.parametrize("quick, stiffness", [(2e-4, 1000.0), (4e-3, 51000.0)])
+def test_what_relaxes_within_a_sample_is_no_part_of_a_bushings_stiffness(quick, stiffness):
+    """It is a damper, whose stiffness nothing tells."""
+    bushings = [term("maxwell_bushing", "maxwell_bushing", "stiffness", {"relaxation": tau}) for tau in (0.1, quick)]
+    motion = Motion(np.zeros(9), np.zeros(9), np.arange(9.0))
+    study = SimpleNamespace(model=SimpleNamespace(sample_time=1e-3), places=[None], seen=[SimpleNamespace(motions=[motion])])
+    e = SimpleNamespace(terms=bushings, built=SimpleNamespace(names=["x0", "x1"]))
+    _, found = naming.functions(study, e, bushings[0].group, REACH, SPEED)["stiffness"]
+    assert found({"x0_stiffness": 1e3, "x0_relaxation": 0.1, "x1_stiffness": 5e4, "x1_relaxation": quick}) == stiffness

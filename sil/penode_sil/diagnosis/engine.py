@@ -35,6 +35,7 @@ WILD = 2.0  # standard deviations of the noise that bursts have together: one sa
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
 CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
 PATCHED = 0.985  # share that several causes must take away if sensors still share a residual, and any cause if something still changes
+TWICE = 0.995  # share from which on what is left by two proofs, that it changes and that sensors share it, may be of a cause's form
 WHOLE = 0.94  # share of several causes from which on a residual beyond chance may be of their form
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
@@ -333,7 +334,8 @@ def judge(
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     shown = alike > noise.ALIKE or share < WHOLE and left > DOUBT * np.sqrt(2.0 * rows)
     patched = len(best.groups) > 1 and share < PATCHED and shown  # several causes, and still no whole
-    if patched or changed > (1.0 - PATCHED) * gained or changed and alike > noise.ALIKE:  # by two proofs something is left
+    twice = changed and alike > noise.ALIKE and share < TWICE  # by two proofs something is left
+    if patched or twice or changed > (1.0 - PATCHED) * gained:
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
     if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < search.FILTER * best.gain:

@@ -368,7 +368,9 @@ def functions(
             force = lambda p: float(curve(zero[:1], np.array([speed]), p)[0])
             return {"force": ("N", force), "yield_deflection": ("m", lambda p: force(p) / max(stiff(p), 1e-300))}
         case "maxwell_bushing":
-            springs = [n for n, t in zip(names, terms) if t.candidate.what.law == "maxwell_bushing"]
+            times = {n: t.candidate.what.shapes["relaxation"][0] for n, t in zip(names, terms) if t.candidate.what.law == "maxwell_bushing"}
+            seen = min(study.model.sample_time, max(times.values(), default=0.0))  # what relaxes within a sample is a damper
+            springs = [n for n, tau in times.items() if tau >= seen]
             loose = [(n, t) for n, t in zip(names, terms) if t.candidate.what.law == "loose_damper"]
             series = [(t.own or f"{n}_damping", f"{n}_relaxation") for n, t in loose]
 
