@@ -250,6 +250,7 @@ def singles(study: Study, r: Regression, few: int = 3) -> list[Explanation]:
             if k < len(taken) and kept < KEPT * r.gain(choices[k])[0] and (other := terms_of(r, elsewhere(r, taken[k][1], choices[k]))):
                 found.append(explain(study, other))
     found += [explain(study, [needed], start=e.fit) for e in found for needed in (*sufficient(study, e), *rigid(study, e))]
+    found += [explain(study, poled) for e in found if (poled := through_a_pole(r, e))]
     return distinct([softened(study, e) for e in found if e.groups])
 
 
@@ -280,6 +281,15 @@ def rigid(study: Study, e: Explanation) -> list[Term]:
         return []
     mass = next(b.mass for b in study.model.bodies if b.name == e.groups[0][1])
     return [Term(Candidate("wrong_parameter", mass, 0, False, mass), 0.0)] if study.model.parameters[mass].tolerance > 0.0 else []
+
+
+def through_a_pole(r: Regression, e: Explanation) -> list[Term]:
+    """A dead time as late through one pole: where that is slower than the signal, no small step leads from one to the other."""
+    if len(e.terms) != 1 or e.groups[0][0] != "sensor_delay":
+        return []
+    [late] = e.terms
+    rolled = [c for c in r.candidates if (c.kind, c.where) == e.groups[0] and getattr(c.what, "what", "") == "roll_off"]
+    return [late, *(Term(c, 0.45 * late.gain**2) for c in rolled)]
 
 
 def in_series(study: Study, r: Regression, group: Group) -> list[Term]:
