@@ -488,6 +488,13 @@ def test_settled_force_and_bias_of_the_deflection_are_answers_of_each_other():
     }, "a height sensor tells them apart"
 
 
+def test_bias_that_wanders_may_be_a_load_that_does():
+    """Of a height over a single mass: it goes along with so slow a load; no acceleration tells."""
+    case = cases.make(717678205, 3)
+    assert [(e.form.name, e.where) for e in case.effects][0] == ("warming_up", "z_mass")
+    assert [r["kind"] for r in case.rivals(0)] == ["constant_force"]
+
+
 def test_faint_force_on_the_body_may_be_one_on_the_wheel():
     """That is put on over another time; not where it stands out of the noise."""
     bench = a_bench()

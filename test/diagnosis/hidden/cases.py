@@ -114,6 +114,10 @@ class Case:
                 tried.append((kind, where, y))
         if effect.form.kind == "constant_force" and bench.plant.kind == "quarter":  # a load of another course on the wheel
             tried += [("constant_force", "wheel", bench.response([on(0.1)], 2) - bench.linear) for on in faults.courses(rng, bench.place("wheel"))]
+        if effect.form.kind == "sensor_bias":  # or a load that goes its way
+            for where in {"quarter": ("body",), "mass": ("mass",)}.get(bench.plant.kind, ()):
+                on = faults.going(rng, bench.place(where), lambda t: effect.change.sensor[effect.where](0.0 * t, None, 1 / (t[1] - t[0])))
+                tried.append(("constant_force", where, bench.response([on(0.1)], 2) - bench.linear))
         found: dict[tuple[str, str], float] = {}
         hidden = {(e.form.kind, e.where) for e in self.effects}  # an answer names nothing twice
         for kind, where, y in tried:

@@ -56,6 +56,11 @@ def courses(r: Rng, at: Place) -> list[Build]:
     return [load(r, at, np.ones_like, settled=True), load(r, at, lambda t: (t > 0).astype(float)), *smooth]
 
 
+def going(r: Rng, at: Place, course: Curve) -> Build:
+    """A load that has settled and changes from then on as the course does."""
+    return load(r, at, lambda t: course(t) / course(t)[0], settled=True)
+
+
 forms("wrong_parameter", "parameter", (0.01, 0.5), "another_value", another_value=another_value)
 forms("hidden_resonance", "body wheel mass", (0.005, 0.3), "absorber",
       absorber=lambda r, at: absorber(r, at, lambda m, w, zeta: [(Kind.LINEAR, (m * w**2, 2 * zeta * m * w))]),
