@@ -42,6 +42,14 @@ def test_a_law_stays_beside_its_companions(residual, gains):
     assert pursue(r, [0, 1])[1] == [0, 1]
 
 
+@pytest.mark.parametrize("kind, chosen", [("sensor_bias", [0, 1]), ("cubic_spring", [0])])
+def test_a_bias_goes_any_slow_way(kind, chosen):
+    """What a second law takes, 1600 beside 1000000, is of the form of the first; but a bias has none."""
+    candidates = [Candidate(kind, "height", 0, False, LAW), Candidate(kind, "height", 0, True, LAW)]
+    fit = SimpleNamespace(free=(), residual=np.array([1000.0, 40.0]), jacobian=np.zeros((2, 0)))
+    assert pursue(Regression(fit, candidates, np.eye(2, dtype=np.float32), []), [0, 1])[1] == chosen
+
+
 def test_companions_alone_are_no_cause():
     assert terms_of(regression([1.0, 0.0], [1.0, 1.0], [-10.0, -5.0]), [0, 1]) == []
     assert terms_of(regression([1.0, 0.0], [1.0, 1.0], [30.0, 10.0]), [1]) == []

@@ -171,7 +171,8 @@ def pursue(r: Regression, pool: Sequence[int], base: Sequence[int] = (), terms: 
         if best < 0:
             break
         new = r.gain([*base, *chosen, best])[0]
-        if new - gain < max(costs[best], 2e-3 * (gain - start) if chosen else 0.0):
+        enough = 2e-3 * (gain - start) if chosen and r.candidates[chosen[0]].kind != "sensor_bias" else 0.0  # which is of no form
+        if new - gain < max(costs[best], enough):
             break
         gain, chosen = new, [*chosen, best]
     return gain - start, chosen
@@ -910,9 +911,9 @@ def lightened(study: Study, e: Explanation, log) -> list[Explanation]:
 
 
 def equals(study: Study, e: Explanation, parameters: Sequence[str], log) -> list[Explanation]:
-    """The explanation with a load or a bias, beside other causes, exchanged for the one of its like that does about as well."""
+    """The explanation with a load or a bias exchanged for the one of its like that does about as well, however it grows."""
     loads = [g for g in e.groups if g[0] in LOADS]
-    if not loads or len(e.groups) == 1:
+    if not loads:
         return []
     e = e.whole()
     r = regression(study, e.fit, parameters, LOADS)
@@ -920,12 +921,17 @@ def equals(study: Study, e: Explanation, parameters: Sequence[str], log) -> list
     for group in loads:
         without = r.without(missing(e, group))
         alike = [k for k, c in enumerate(r.candidates) if c.kind in LOADS and (c.kind, c.where) not in e.groups]
-        gain, chosen = pursue(without, alike, terms=1)
+        _, first = pursue(without, alike, terms=1)
+        gain, chosen = pursue(without, pools(without)[_group(without, first)]) if first else (0.0, [])
         if chosen and gain > RIVAL * (without.chi2 - r.chi2):
             kept = [t for t in e.terms if t.group != group]
             found.append(explain(study, [*kept, *terms_of(without, chosen)], start=e.fit, formulas=e.formulas))
             log(f"  {group} as {found[-1].groups[-1]}: {found[-1].gain:.0f} for {e.gain:.0f}")
     return found
+
+
+def _group(r: Regression, chosen: Sequence[int]) -> Group:
+    return r.candidates[chosen[0]].kind, r.candidates[chosen[0]].where
 
 
 def missing(e: Explanation, group: Group) -> Fit:
