@@ -34,8 +34,7 @@ ENDS = 2.0  # samples by which the ends of a hole may be wrong
 WILD = 2.0  # standard deviations of the noise that bursts have together: one sample in nine that is far out
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
 CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
-PATCHED = 0.985  # share that several causes must take away if sensors still share a residual, and any cause if something still changes
-TWICE = 0.995  # share from which on what is left by two proofs, that it changes and that sensors share it, may be of a cause's form
+PATCHED = 0.985  # share that several causes must take away if sensors still share a residual, and any cause if something changes too
 WHOLE = 0.94  # share of several causes from which on a residual beyond chance may be of their form
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
@@ -98,7 +97,7 @@ def diagnose(
         log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
         losses = [s.nothing - max((x.gain for x in e), default=0.0) for s, e in ((study, equals), (other, found[:1]))]
         told = set(found[0].groups) in (set(e.groups) for e in equals)
-        if rested(losses, costs, told, len(model.states) * len(experiments)):
+        if rested(losses, costs, told, len(model.states) * len(experiments), search.numbers(found[0])):
             study, explanations = other, found
     best = explanations[0] if explanations else None
     if best is not None:  # bursts and spikes that a cause explains were none
@@ -197,10 +196,11 @@ def diagnose(
     )  # fmt: skip
 
 
-def rested(losses: Sequence[float], costs: Sequence[float], told: bool, starts: int) -> bool:
+def rested(losses: Sequence[float], costs: Sequence[float], told: bool, starts: int, loads: int) -> bool:
     """Did recordings start at rest? Losses, and what they cost with the causes, [in motion, at rest], whether the causes are the same,
-    and how many start states are free in motion. Where these gain no more than noise gives them nothing moved, though it costs a load."""
-    return losses[1] < losses[0] + IDLE * starts or not told and costs[1] < costs[0] + MOVING * starts
+    how many start states are free in motion, and how many numbers are of loads that take their place at rest, two of which any load has.
+    Where the start states gain no more than noise gives them nothing moved, though it costs a load."""
+    return losses[1] < losses[0] + IDLE * (starts - max(loads - 2, 0)) or not told and costs[1] < costs[0] + MOVING * starts
 
 
 def compilers() -> float:
@@ -334,7 +334,7 @@ def judge(
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     shown = alike > noise.ALIKE or share < WHOLE and left > DOUBT * np.sqrt(2.0 * rows)
     patched = len(best.groups) > 1 and share < PATCHED and shown  # several causes, and still no whole
-    twice = changed and alike > noise.ALIKE and share < TWICE  # by two proofs something is left
+    twice = changed and alike > noise.ALIKE and share < PATCHED  # by two proofs something is left
     if patched or twice or changed > (1.0 - PATCHED) * gained:
         return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]

@@ -423,6 +423,11 @@ def loaded(e: Explanation) -> float:
     return sum(abs(t.gain) for t in e.terms if t.candidate.kind == "constant_force")
 
 
+def numbers(e: Explanation) -> int:
+    """How many numbers are of its loads: a size each, and when and how long one grows."""
+    return sum(1 + len(t.candidate.what.shapes) for t in e.terms if t.candidate.kind == "constant_force")
+
+
 def weight(model: Model) -> float:
     """Of all bodies [N], without any no bound. A load beyond it is a start in motion in disguise."""
     return GRAVITY * sum(model.parameters[b.mass].value for b in model.bodies) or np.inf
