@@ -17,7 +17,7 @@ from scipy.signal import lfilter, lsim
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import build, extension, hypotheses, naming, noise, plant, score, search, steady, study
+from penode_sil.diagnosis import build, echo, extension, hypotheses, naming, noise, plant, score, search, steady, study
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.engine import experiment
 from penode_sil.diagnosis.fit import Problem, delayed, railed
@@ -611,6 +611,20 @@ def test_a_sensor_that_lags_more_than_the_signal_is_late(tmp_path):
     assert [(c.kind, c.where) for c in found.causes] == [("sensor_delay", "force")]
     assert [(a.kind, a.where) for a in found.causes[0].alternatives] == [("maxwell_bushing", "spring")]
     assert found.causes[0].parameters["delay"].value == pytest.approx(0.02, rel=0.02)
+
+
+@pytest.mark.parametrize("lag", [0.25, 0.0, -0.25])
+def test_what_follows_late_is_an_echo(model, sound, lag):
+    """A force on the wheel like its own acceleration of another time: a rear axle meets the road after the front axle, never before."""
+    one = study.null_study(model, [experiment(m, model) for m in sound])
+    (e,) = one.experiments
+    wheel = next(k for k, p in enumerate(one.places) if p.role == "body" and "wheel" in p.ends)
+    f, n_z = e.frequencies, len(model.sensors)
+    response = one.linear.transfer(f)[:, :n_z, one.linear.n_inputs + wheel]
+    own = np.fft.rfft(e.y[:, [s.name for s in model.sensors].index("a_wheel")])
+    push = np.fft.irfft(0.02 * M_W * (own * np.exp(-2j * np.pi * f * lag))[:, None] * response, len(e.time), axis=0)
+    other = study.null_study(model, [replace(e, y=e.y + push)])
+    assert not echo.echo(one, one.null).heard and echo.echo(other, other.null).heard == (lag > 0.0)
 
 
 @pytest.mark.parametrize("hiss, way", [(0.0, "cubic"), (2e-4, "linear")])

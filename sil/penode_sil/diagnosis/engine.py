@@ -20,7 +20,7 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
-from . import absorb, extension, nameless, naming, noise, plausible, residual, search, steady
+from . import absorb, echo, extension, nameless, naming, noise, plausible, residual, search, steady
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
@@ -119,9 +119,14 @@ def diagnose(
     causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.heard, changed)
     if doubt := plausible.doubt(study, best, verdict):
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
+    behind = best is not None and pitching(best) and verdict != "unexplained" and echo.echo(study, best.fit).heard
+    if behind:
+        causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
     notes: list[str] = []
+    if behind:
+        notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
     if changed and verdict == "unexplained":
         notes.append(f"{change.what} of {change.place} changes while it is measured: a controller, a leak?")
     if verdict == "unexplained" and best is not None:
@@ -355,6 +360,11 @@ def judge(
     causes += [f for f in faults if (f.kind, f.where) not in faulty]
     whole = (share > search.WHOLE or left < 0.15 * rows) and not pure
     return tuple(causes), ("explained" if whole else "partly_explained") if causes else "no_discrepancy", share, evidence
+
+
+def pitching(e: Explanation) -> bool:
+    """Might pitch pass for it? Several causes that lag."""
+    return len(e.groups) > 1 and {kind for kind, _ in e.groups} <= echo.LAGGING
 
 
 def damped(causes: Sequence[Cause]) -> list[str]:
