@@ -117,10 +117,9 @@ def diagnose(
     fades = best is not None and any(kind == "damper_fading" for kind, _ in best.groups)  # which changes by its nature
     changed = change.gain if change.surprise > -np.log(CHANGING) and not fades else 0.0
     causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.heard, changed)
-    if doubt := plausible.doubt(study, best, verdict):
-        causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
-    behind = best is not None and pitching(best) and verdict != "unexplained" and echo.echo(study, best.fit).heard
-    if behind:
+    doubt = plausible.doubt(study, best, verdict)
+    behind = not doubt and verdict != "unexplained" and best is not None and pitching(best) and echo.echo(study, best.fit).heard
+    if doubt or behind:
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
