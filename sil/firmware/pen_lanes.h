@@ -33,12 +33,18 @@
 typedef int64_t integer_t; /* as wide as pen_real_t */
 #define SIGN_BIT INT64_MIN
 #define MANTISSA_BITS 52
+#define TRUNC __builtin_trunc
+#define UNITS 0x1p52 /* a whole number added to it stands in the lowest bits */
+#define UNITS_MASK INT64_C(0xFFFFFFFFFFFFF)
 #define EXPONENT_ZERO 1023
 #define POWER_SPLIT 256 /* 2^k is the product of 2^(k mod 256) and the rest, as in pen_math.c */
 #else
 typedef int32_t integer_t;
 #define SIGN_BIT INT32_MIN
 #define MANTISSA_BITS 23
+#define TRUNC __builtin_truncf
+#define UNITS 0x1p23F
+#define UNITS_MASK INT32_C(0x7FFFFF)
 #define EXPONENT_ZERO 127
 #define POWER_SPLIT 32
 #endif
@@ -139,6 +145,16 @@ LANES_EACH(tanh_tail)
 LANES_EACH(softplus_tail)
 LANES_EACH(log1p_tail)
 
+LANES_INLINE lanes_t lanes_trunc(lanes_t x)
+{
+    lanes_t y = {0};
+
+    for (size_t l = 0U; l < LANES; l++) {
+        y[l] = TRUNC(x[l]);
+    }
+    return y;
+}
+
 /* e^x = (1 + p) * low * high */
 typedef struct {
     lanes_t p;
@@ -151,8 +167,9 @@ LANES_INLINE lanes_power_t lanes_power(lanes_t x, pen_real_t low, pen_real_t hig
     const lanes_t above = lanes_pick(x < low, lanes_wide(low), x);
     const lanes_t c = lanes_pick(above > high, lanes_wide(high), above);
     const lanes_t shifted = (c * LOG2_E) + (bias + HALF);
-    const mask_t k = __builtin_convertvector((lanes_t)((shifted > ZERO) & (mask_t)shifted), mask_t);
-    const lanes_t n = __builtin_convertvector(k, lanes_t) - bias;
+    const lanes_t whole = lanes_trunc((lanes_t)((shifted > ZERO) & (mask_t)shifted));
+    const mask_t k = (mask_t)(whole + UNITS) & UNITS_MASK; /* no register converts wide integers, on many processors */
+    const lanes_t n = whole - bias;
     const lanes_t r = (c - (n * LN2_HIGH)) - (n * LN2_LOW);
     const mask_t rest = k & (POWER_SPLIT - 1);
     const mask_t least = (k < POWER_SPLIT) & 1; /* the bits of 2^-BIAS, which is subnormal */
