@@ -37,6 +37,15 @@ def test_a_burst_is_found(first):
     assert not found[: first - 6, 0].any() and not found[first + 12 :, 0].any()
 
 
+def test_bursts_are_found_though_there_are_many():
+    """In a fiftieth of the time."""
+    y = noisy(3)
+    at = (np.arange(1000, 9000, 400)[:, None] + np.arange(10)).ravel()
+    y[at, 0] = np.random.default_rng(5).uniform(-3.0, 3.0, at.size)
+    (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
+    assert np.mean(found[at, 0]) > 0.95 and np.count_nonzero(found[:, 0]) < 3 * at.size and not found[:, 1].any()
+
+
 def test_a_signal_that_fades_is_found_though_the_motion_turns():
     """Fades from the last value on, to a tenth in 23 samples, while the motion goes through zero."""
     y = noisy(4)

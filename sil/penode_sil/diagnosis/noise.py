@@ -317,6 +317,7 @@ ALIKE = 7.0  # standard deviations by which sensors may share a residual that is
 CHANCE = 1e-3  # that a whole recording has one row of repeated samples as long
 EVEN = 1e-4  # of the square of a fall: falls that differ less are of the same share
 STEADY = 6  # falls in a row, of eight samples: of noise, fewer than one in a hundred is so even
+LESS = 0.5  # of the motion: a sensor that shows more of it is no silent one
 LAST = 8  # samples: so far the end of a spline is felt
 
 
@@ -332,7 +333,7 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
         wild[: max(20, int(0.1 / e.step))] = wild[-LAST:] = False  # where start states and rates of inputs are not well known
         wide = np.stack([np.convolve(w, np.ones(9), "same") > 0 for w in wild.T], axis=1)
         alone = wide & (np.sum(wide, axis=1, keepdims=True) == 1) if wide.shape[1] > 1 else wide
-        few = np.mean(wild & alone, axis=0) < 0.01
+        few = np.mean(wild & alone, axis=0) < 0.03
         many = np.sum(wild & alone, axis=0) >= np.where(np.max(rough, axis=0) > 30.0 * usual, 2, 5)
         often = np.mean(e.good, axis=0) > 0.5  # a sensor slower than the raster has no neighbours to be far beyond
         found.append(((alone & few & many) | _sunken(e, z, r) | _frozen(e, z, r) | _decayed(e.y)) & often & e.good)
@@ -390,9 +391,10 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
             inside = far[a:b]
             y, model = e.y[a:b, j][inside], z[a:b, j][inside]
             sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2) | (np.abs(y) < 0.05 * np.max(np.abs(model)))
+            less = y @ model < LESS * (model @ model)  # a model that is a little wrong is followed, though by less
             fades = _discharges(y)  # from where it was, which may be of the other sign
             deep = np.min(np.abs(y)) < 0.25 * np.max(np.abs(model))
-            if a > int(0.1 / e.step) and b - a < longest and (fades or np.mean(sinks) > 0.95) and deep and np.count_nonzero(inside) > 4:
+            if a > int(0.1 / e.step) and b - a < longest and (fades or less and np.mean(sinks) > 0.95) and deep and np.count_nonzero(inside) > 4:
                 found[a:b, j] = True
                 empty.append(fades)
         if np.mean(found[:, j]) > (0.06 if np.mean(empty or [False]) > 0.5 else 0.02):  # that often, only what discharges
