@@ -200,13 +200,16 @@ def test_a_mass_that_is_too_small_may_have_one_on_a_spring(value, masses):
     assert sprung(SimpleNamespace(model=model), fitted, r, ("sensor_scale", "a_body")) == []
 
 
-@pytest.mark.parametrize("frequency, tolerance, masses", [(190.0, 0.01, ["m_b"]), (190.0, 0.0, []), (30.0, 0.01, [])])
-def test_a_mass_that_moves_with_its_body_is_a_part_of_it(frequency, tolerance, masses):
-    """Not one on a spring that gives way where hidden masses are, nor where the body's own mass is exact."""
+@pytest.mark.parametrize(
+    "frequency, damping, tolerance, masses",
+    [(190.0, 0.1, 0.01, ["m_b"]), (190.0, 0.1, 0.0, []), (30.0, 0.1, 0.01, []), (4.3, 12.5, 0.01, ["m_b"]), (4.3, 1.0, 0.01, [])],
+)
+def test_a_mass_that_moves_with_its_body_is_a_part_of_it(frequency, damping, tolerance, masses):
+    """Not one on a spring or a damper that gives way where hidden masses are, nor where the body's own mass is exact."""
     model = SimpleNamespace(bodies=[SimpleNamespace(name="body", mass="m_b")], parameters={"m_b": SimpleNamespace(tolerance=tolerance)})
-    hidden = Term(Candidate("hidden_resonance", "body", 1, False, ("absorber", 0, frequency, 0.1)), 300.0)
-    found = SimpleNamespace(terms=(hidden,), groups=(hidden.group,))
-    assert [t.candidate.what for t in rigid(SimpleNamespace(model=model), found)] == masses
+    hidden = Term(Candidate("hidden_resonance", "body", 1, False, ("absorber", 0, frequency, damping)), 300.0)
+    assert [t.candidate.what for t in rigid(SimpleNamespace(model=model), [hidden])] == masses
+    assert rigid(SimpleNamespace(model=model), [hidden, hidden]) == []
 
 
 def law(kind: str, gain: float, companion: bool = False) -> Term:

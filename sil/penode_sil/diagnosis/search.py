@@ -250,7 +250,7 @@ def singles(study: Study, r: Regression, few: int = 3) -> list[Explanation]:
             kept = study.null.cost - found[-1].fit.cost
             if k < len(taken) and kept < KEPT * r.gain(choices[k])[0] and (other := terms_of(r, elsewhere(r, taken[k][1], choices[k]))):
                 found.append(explain(study, other))
-    found += [explain(study, [needed], start=e.fit) for e in found for needed in (*sufficient(study, e), *rigid(study, e))]
+    found += [explain(study, [needed], start=e.fit) for e in found for needed in (*sufficient(study, e), *(rigid(study, e.terms) if len(e.terms) == 1 else []))]
     found += [explain(study, poled) for e in found if (poled := through_a_pole(r, e))]
     return distinct([softened(study, e) for e in found if e.groups])
 
@@ -276,11 +276,13 @@ def sufficient(study: Study, e: Explanation) -> list[Term]:
     return found
 
 
-def rigid(study: Study, e: Explanation) -> list[Term]:
-    """The parameter of a body in place of a hidden mass on a spring that does not give way: together they are a heavier body."""
-    if len(e.terms) != 1 or e.groups[0][0] != "hidden_resonance" or e.terms[0].candidate.what[2] < STIFF * RESONANCES[-1]:
+def rigid(study: Study, terms: Sequence[Term]) -> list[Term]:
+    """The parameter of a body in place of a hidden mass, if that is the only one of some terms, whose spring or damper does not give
+    way: together they are a heavier body."""
+    masses = [t.candidate for t in terms if t.candidate.kind == "hidden_resonance"]
+    if len(masses) != 1 or max(1.0, 2.0 * masses[0].what[3]) * masses[0].what[2] < STIFF * RESONANCES[-1]:
         return []
-    mass = next(b.mass for b in study.model.bodies if b.name == e.groups[0][1])
+    mass = next(b.mass for b in study.model.bodies if b.name == masses[0].where)
     return [Term(Candidate("wrong_parameter", mass, 0, False, mass), 0.0)] if study.model.parameters[mass].tolerance > 0.0 else []
 
 
@@ -415,7 +417,11 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     if beam[0].score < max(idle + NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW):
         return rest, []
     quiet = requieted(rest, beam[0].fit)
-    quiet, found = grow(quiet, [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]], log, 1)  # the rest was found in motion
+    again = [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]]
+    if told and set(beam[0].groups) == set(told[0].groups):  # which has been looked at from all sides, in motion
+        found = ranked(quiet, settled(quiet, again[0]), again[1:], log)
+    else:
+        quiet, found = grow(quiet, again, log, 1)
     return quiet, [e for e in found if loaded(e) < weight(rest.model)]
 
 
@@ -592,9 +598,14 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
     first = level([done[0], *equal[:1]])
     plainer = list(zip(first, level([plain(study, e, parameters, log) for e in first])))
     best = settled(study, owned(study, max(plainer, key=lambda both: max(e.score for e in both))[1], log))
-    alike = equals(study, best, parameters, log)
+    return study, ranked(study, best, done[1:], log)
+
+
+def ranked(study: Study, best: Explanation, others: Sequence[Explanation], log) -> list[Explanation]:
+    """Explanations from best to worst, with those that differ from the best one by the like of a load or a bias."""
+    alike = equals(study, best, log)
     swapped = max([best, *alike], key=lambda e: e.score)
-    return study, [swapped if swapped is best else settled(study, swapped), *([] if swapped is best else [best]), *done[1:], *alike]
+    return [best, *others, *alike] if swapped is best else [settled(study, swapped), best, *others, *alike]
 
 
 def spared(found: Sequence[Explanation]) -> list[Explanation]:
@@ -885,7 +896,8 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
                     ranked.append((gain - sum(cost(r.candidates[c]) for c in chosen), chosen))
         best = sorted(ranked, key=lambda x: -x[0])[: 1 if heavy(e) else 2]
         ways = [terms_of(without, chosen) for _, chosen in best]
-        for new in [*filter(None, ways), *sprung(study, e, r, group)]:
+        heavier = rigid(study, [t for t in e.terms if t.group == group])
+        for new in [*filter(None, ways), *sprung(study, e, r, group), *([heavier] if heavier else [])]:
             found.append(explain(study, [*kept, *new], start=e.fit, formulas=e.formulas))
             log(f"  {group} for {found[-1].groups[-1]}: {found[-1].gain:.0f}")
     close = [x for x in found if set(x.groups) != set(e.groups) and x.gain > (1.0 - CLOSE) * e.gain]
@@ -916,13 +928,13 @@ def lightened(study: Study, e: Explanation, log) -> list[Explanation]:
     return found
 
 
-def equals(study: Study, e: Explanation, parameters: Sequence[str], log) -> list[Explanation]:
+def equals(study: Study, e: Explanation, log) -> list[Explanation]:
     """The explanation with a load or a bias exchanged for the one of its like that does about as well, however it grows."""
     loads = [g for g in e.groups if g[0] in LOADS]
     if not loads:
         return []
     e = e.whole()
-    r = regression(study, e.fit, parameters, LOADS)
+    r = regression(study, e.fit, [f.target for f in study.null.free if isinstance(f.target, str)], LOADS)
     found = []
     for group in loads:
         without = r.without(missing(e, group))
