@@ -14,7 +14,7 @@ from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import HALVES, Basis
 from penode_sil.diagnosis.score import Candidate, Regression
 from penode_sil.diagnosis.search import (
-    NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, pursue, rigid, spared, sprung, strongest, sufficient, terms_of,
+    COST, NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, pursue, rigid, spared, sprung, strongest, sufficient, terms_of,
     weak, whole,
 )  # fmt: skip
 
@@ -64,6 +64,12 @@ def test_the_best_of_each_choice_comes_first():
     """An explanation that was found twice stands where its better form belongs, not where it was first seen."""
     found = [explanation("cubic_spring", gain=g) for g in (100.0, 900.0)] + [explanation("bump_stop", gain=500.0)]
     assert [e.gain for e in distinct(found)] == [900.0, 500.0]
+
+
+def test_a_load_pays_for_looking_like_a_bias_only_once():
+    """Beside a curve that gains much, where each number that only mends its form must gain 96."""
+    load, bias = (explanation("stribeck_friction", kind, gain=137_000.0) for kind in ("constant_force", "sensor_bias"))
+    assert bias.score - load.score == pytest.approx(COST)
 
 
 def test_form_is_a_part_of_what_formulas_leave():

@@ -122,7 +122,8 @@ class Explanation:
         filtering = sum(t.candidate.kind == "hidden_resonance" for t in self.terms) > 1  # a second mass may be any form of the first
         if not plain and not slow or filtering:
             bent = self.gain - (0.0 if filtering else self.formulas)
-            form = (FORM * self.freedom / COST + LEAST * (len(self.groups) - 1)) * bent
+            numbers = self.freedom / COST - sum(t.candidate.kind == "constant_force" for t in self.terms)  # see cost
+            form = (FORM * numbers + LEAST * (len(self.groups) - 1)) * bent
         return self.gain - self.price - max(form, 0.0)
 
 
@@ -404,14 +405,14 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     for e in [e for e in told if LOADS & {g[0] for g in e.groups} == {"sensor_bias"}][:1]:
         bias = [t for t in e.terms if t.candidate.kind == "sensor_bias"]
         ways.append((bias, [t for t in e.terms if t not in bias]))
-    there = told[0].fit if told else None
+    there, formulas = (told[0].fit, told[0].formulas) if told else (None, 0.0)
     beam = []
     for first, more in ways:
         beam.append(explain(rest, first))
-        beam += [explain(rest, [*first, *more], start=there, formulas=max(beam[-1].gain, 0.0))] if more else []
+        beam += [explain(rest, [*first, *more], start=there, formulas=max(beam[-1].gain, formulas))] if more else []
     beam.sort(key=lambda e: -e.score)
     tried = [set(first + more) for first, more in ways]
-    idle = explain(rest, unloaded, start=there).score if unloaded and set(unloaded) not in tried else 0.0
+    idle = explain(rest, unloaded, start=there, formulas=formulas).score if unloaded and set(unloaded) not in tried else 0.0
     moving = rest.nothing - free.nothing + (told[0].score if told else 0.0)
     log(f"at rest {idle:.0f}, with {beam[0].groups} {beam[0].score:.0f}, moving {moving:.0f}")
     if beam[0].score < max(idle + NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW):
