@@ -251,7 +251,7 @@ def singles(study: Study, r: Regression, few: int = 3) -> list[Explanation]:
             kept = study.null.cost - found[-1].fit.cost
             if k < len(taken) and kept < KEPT * r.gain(choices[k])[0] and (other := terms_of(r, elsewhere(r, taken[k][1], choices[k]))):
                 found.append(explain(study, other))
-    found += [explain(study, [needed], start=e.fit) for e in found for needed in (*sufficient(study, e), *(rigid(study, e.terms) if len(e.terms) == 1 else []))]
+    found += [explain(study, [needed], start=e.fit) for e in found for needed in (*sufficient(study, e), *rigid(study, e.terms))]
     found += [explain(study, poled) for e in found if (poled := through_a_pole(r, e))]
     return distinct([softened(study, e) for e in found if e.groups])
 
@@ -278,12 +278,14 @@ def sufficient(study: Study, e: Explanation) -> list[Term]:
 
 
 def rigid(study: Study, terms: Sequence[Term]) -> list[Term]:
-    """The parameter of a body in place of a hidden mass, if that is the only one of some terms, whose spring or damper does not give
-    way: together they are a heavier body."""
-    masses = [t.candidate for t in terms if t.candidate.kind == "hidden_resonance"]
-    if len(masses) != 1 or max(1.0, 2.0 * masses[0].what[3]) * masses[0].what[2] < STIFF * RESONANCES[-1]:
+    """The parameter of a body in place of a hidden mass alone, whose spring or damper does not give way: together they are a heavier
+    body."""
+    if len(terms) != 1 or terms[0].candidate.kind != "hidden_resonance":
         return []
-    mass = next(b.mass for b in study.model.bodies if b.name == masses[0].where)
+    _, _, frequency, damping = terms[0].candidate.what
+    if max(1.0, 2.0 * damping) * frequency < STIFF * RESONANCES[-1]:
+        return []
+    mass = next(b.mass for b in study.model.bodies if b.name == terms[0].candidate.where)
     return [Term(Candidate("wrong_parameter", mass, 0, False, mass), 0.0)] if study.model.parameters[mass].tolerance > 0.0 else []
 
 
@@ -897,8 +899,8 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
                     ranked.append((gain - sum(cost(r.candidates[c]) for c in chosen), chosen))
         best = sorted(ranked, key=lambda x: -x[0])[: 1 if heavy(e) else 2]
         ways = [terms_of(without, chosen) for _, chosen in best]
-        heavier = rigid(study, [t for t in e.terms if t.group == group])
-        for new in [*filter(None, ways), *sprung(study, e, r, group), *([heavier] if heavier else [])]:
+        ways.append(rigid(study, [t for t in e.terms if t.group == group]))
+        for new in [*filter(None, ways), *sprung(study, e, r, group)]:
             found.append(explain(study, [*kept, *new], start=e.fit, formulas=e.formulas))
             log(f"  {group} for {found[-1].groups[-1]}: {found[-1].gain:.0f}")
     close = [x for x in found if set(x.groups) != set(e.groups) and x.gain > (1.0 - CLOSE) * e.gain]
