@@ -60,6 +60,7 @@ STIFF = 1.5  # of the highest frequency of hidden masses: one that a fit has tak
 SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
 WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
 HEAVY = 2e6  # steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause
+LABOUR = 1.5e6  # the same: where it takes more, one law is enough to mend the form of what is named
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
     "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
@@ -414,10 +415,13 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
         beam += [explain(rest, [*first, *more], start=there, formulas=max(beam[-1].gain, formulas))] if more else []
     beam.sort(key=lambda e: -e.score)
     tried = [set(first + more) for first, more in ways]
-    idle = explain(rest, unloaded, start=there, formulas=formulas).score if unloaded and set(unloaded) not in tried else 0.0
+    idle = [explain(rest, unloaded, start=there, formulas=formulas)] if unloaded and set(unloaded) not in tried else []
+    bar = max((e.score + NEW for e in idle), default=NEW)
     moving = rest.nothing - free.nothing + (told[0].score if told else 0.0)
-    log(f"at rest {idle:.0f}, with {beam[0].groups} {beam[0].score:.0f}, moving {moving:.0f}")
-    if beam[0].score < max(idle + NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW):
+    log(f"at rest {bar:.0f}, with {beam[0].groups} {beam[0].score:.0f}, moving {moving:.0f}")
+    if idle and beam[0].score < bar and loaded(told[0]):  # which then was but a start in motion that is none
+        beam, bar = idle, 0.0
+    if beam[0].score < max(bar, moving - min(NEAR * moving, REST * rows(rest)) - NEW):
         return rest, []
     quiet = requieted(rest, beam[0].fit)
     again = [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]]
@@ -519,9 +523,9 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
     return grow(quiet, distinct(again), log)
 
 
-def heavy(e: Explanation) -> bool:
+def heavy(e: Explanation, most: float = HEAVY) -> bool:
     """Do its derivatives take so many steps that the search has to be narrow to end in time?"""
-    return len(e.fit.free) * sum(len(u) for u in e.problem.inputs) * e.problem.batch.model.substeps > HEAVY
+    return len(e.fit.free) * sum(len(u) for u in e.problem.inputs) * e.problem.batch.model.substeps > most
 
 
 def hopeful(study: Study, e: Explanation) -> bool:
@@ -827,9 +831,9 @@ def mended(study: Study, e: Explanation, log) -> tuple[Explanation, Explanation]
     """The explanation with as many more laws of its causes as are worth their numbers, under the same names: with laws of the sign of
     their kinds, from which its causes have their sizes; and then of any sign. A name is what a curve does in the large; what the
     extended model foretells depends on all of the curve, and may need less of a law as well as more."""
-    most = len(e.terms) + MENDS
+    most = len(e.terms) + (1 if heavy(e, LABOUR) else MENDS)
     study, sized, r = formed(study, e, None, most, log)
-    more = r is not None and not heavy(sized)
+    more = r is not None and not heavy(sized, LABOUR)
     return sized, formed(study, sized, r.unsigned(), most, log)[1] if more else sized
 
 
