@@ -394,6 +394,29 @@ def test_every_second_of_close_samples_says_the_same(tmp_path, tyre):
     assert longest(short) < 1e-3
 
 
+@pytest.mark.parametrize("friction, whole", [("", True), ('rubs = { between = ["body", "wheel"], law = "dahl_friction", force = "40 N", presliding = "1 mm" }', False)])
+def test_fits_begin_with_longer_steps_than_laws_allow(tmp_path, friction, whole):
+    """Friction that yields over a millimetre moves on by 0.3 of that in a step of 1 ms at 0.3 m/s, and is followed in steps of 0.25 ms: a
+    quarter of the work leads to where at most chi2 of the numbers that are fitted is left to gain."""
+    (tmp_path / "car.toml").write_text(MODEL.replace('"2 ms"', '"0.5 ms"').replace("[outputs]", f"{friction}\n[outputs]"))
+    model = penode_gen.load(tmp_path / "car.toml")
+    n, rng = 12000, np.random.default_rng(3)
+    t = 5e-4 * np.arange(n)
+    z = sum(0.02 / f * np.sin(2.0 * np.pi * f * t + f) for f in (0.7, 2.3, 6.1, 12.9)) * np.minimum(t / 0.5, 1.0) ** 2
+    raw = noise.prepare("", t, z[:, None], np.zeros((n, 3)), np.ones((n, 3), bool), np.zeros(1), [None] * 3)
+    clean = Problem(model, [raw], []).simulate(0, (), np.zeros((1, 0)))[0][0]
+    e = replace(raw, y=clean + rng.standard_normal(clean.shape) * [NOISE[s.name] for s in model.sensors])
+    levels = np.tile(np.square([NOISE[s.name] for s in model.sensors]), (e.band, 1))
+    problem = Problem(model, [e], [noise.metric(e, levels, np.zeros((e.band, 3, 1)))])
+    if whole:
+        assert problem.rough is None and problem.halved is not None
+        return
+    assert problem.halved is None and 4 * problem.rough.steps == problem.steps
+    free = [replace(f, value=1.02 * f.value) for f in study.nuisances(model, [e]) if isinstance(f.target, str)]
+    best = problem.solve(free)
+    assert problem.at(problem.rough.solve(free).free).cost < best.cost + len(free)
+
+
 def test_laws_that_do_the_same_are_one(tmp_path, model):
     """Two stops fitted to the recording of one share it in any way; the one that is left knows its gap."""
     z = road(5)

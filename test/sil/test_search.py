@@ -14,7 +14,7 @@ from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import HALVES, Basis
 from penode_sil.diagnosis.score import Candidate, Regression
 from penode_sil.diagnosis.search import (
-    COST, NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, pursue, rigid, spared, sprung, strongest, sufficient, terms_of,
+    COST, NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, only_noise, pursue, rigid, spared, sprung, strongest, sufficient, terms_of,
     weak, whole,
 )  # fmt: skip
 
@@ -187,10 +187,17 @@ def test_a_cause_that_takes_most_is_not_given_up(null, left, so):
     assert hopeful(study, SimpleNamespace(fit=SimpleNamespace(cost=left))) == so
 
 
-@pytest.mark.parametrize("seconds, substeps, so", [((30.0, 30.0), 1, False), ((30.0, 30.0), 3, True), ((30.0, 30.0, 60.0), 2, True)])
-def test_long_recordings_in_small_steps_are_searched_narrowly(seconds, substeps, so):
-    """With 20 values and steps of a millisecond: 1.2 million, and three and four times that."""
-    problem = SimpleNamespace(inputs=[np.zeros((int(1e3 * t), 1)) for t in seconds], batch=SimpleNamespace(model=SimpleNamespace(substeps=substeps)))
+@pytest.mark.parametrize("chi2, so", [(10_400.0, True), (10_500.0, False)])
+def test_noise_alone_has_a_chi2_of_its_own(chi2, so):
+    """10 000 samples: 10 000 +- 141."""
+    study = SimpleNamespace(null=SimpleNamespace(residual=np.zeros(10_000)), experiments=[SimpleNamespace(good=np.ones(10_000, bool))])
+    assert only_noise(study, SimpleNamespace(fit=SimpleNamespace(chi2=chi2))) == so
+
+
+@pytest.mark.parametrize("steps, so", [(60_000, False), (180_000, True)])
+def test_long_recordings_in_small_steps_are_searched_narrowly(steps, so):
+    """With 20 values: 1.2 million steps, and three times that."""
+    problem = SimpleNamespace(steps=steps)
     assert heavy(SimpleNamespace(problem=problem, fit=SimpleNamespace(free=[None] * 20))) == so
 
 

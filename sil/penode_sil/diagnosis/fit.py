@@ -121,7 +121,7 @@ class Problem:
 
     def __init__(
         self, model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], set_name: str = "default",
-        fastest: float = 0.0, faults: Sequence[Fault] = (),
+        fastest: float = 0.0, faults: Sequence[Fault] = (), rough: bool = False,
     ):  # fmt: skip
         self.model, self.experiments, self.metrics, self.set_name = model, experiments, metrics, set_name
         self.faults, self.fastest = faults, fastest
@@ -129,7 +129,7 @@ class Problem:
         close = model.sample_time <= CLOSE
         self.fine = 1 if close else 3 if self.moving else 2  # see _drive
         step = model.sample_time / self.fine
-        least = longest(model)
+        least = np.inf if rough else longest(model)
         substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / least - 1e-6)), -(-model.substeps // self.fine))
         way = ("cubic" if self.moving else "parabola") if close else "linear"
         exact = replace(_folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
@@ -140,14 +140,29 @@ class Problem:
     def halved(self) -> Problem | None:
         """The same with every second sample, where that is close enough for whatever moves and all samples are good: the same residuals
         in half of the time."""
+        return self._half() if 2.0 * self.model.sample_time <= longest(self.model) else None
+
+    @cached_property
+    def rough(self) -> Problem | None:
+        """The same in longer steps than its laws allow: they lead near to the best values in less than half of the time, or there are none."""
+        exact = self.halved or self
+        found = self._half(True) or Problem(self.model, self.experiments, self.metrics, self.set_name, self.fastest, self.faults, True)
+        return found if 2 * found.steps <= exact.steps else None
+
+    @property
+    def steps(self) -> int:
+        """Steps of one simulation of all recordings."""
+        return sum(len(u) for u in self.inputs) * self.batch.model.substeps
+
+    def _half(self, rough: bool = False) -> Problem | None:
         twice = 2.0 * self.model.sample_time
         even = all(e.good.all() and len(e.time) % 2 == 0 for e in self.experiments)
-        if not even or twice > CLOSE * (1.0 + 1e-9) or twice > longest(self.model):
+        if not even or twice > CLOSE * (1.0 + 1e-9):
             return None
         faults = [replace(f, series=tuple(x[::2] for x in f.series)) for f in self.faults]
         halves = [_halved(e) for e in self.experiments]
         metrics = [replace(m, n=m.n // 2, root=2.0 * m.root) for m in self.metrics]
-        return Problem(replace(self.model, sample_time=twice), halves, metrics, self.set_name, self.fastest, faults)
+        return Problem(replace(self.model, sample_time=twice), halves, metrics, self.set_name, self.fastest, faults, rough)
 
     def _doubled(self, fit: Fit) -> Fit:
         """A fit of every second sample as one of all."""

@@ -29,6 +29,7 @@ SHARP = 3.0  # of a sensor's limits, to begin with
 BENT = 0.1  # more of a signal at its largest, to begin with
 TERMS = 3  # elementary laws of one kind
 WANDERING = 5  # and of a bias, which may go any slow way
+CHANCE = 3.0  # deviations of chi2
 COST = 10.0  # chi2 that an elementary law must gain for each of its numbers, and the choice among many
 NEW = 50.0  # chi2 that a further kind must gain beyond that
 FORM = 7e-4  # of what has been gained: a number more must gain that, or it only mends the form
@@ -60,6 +61,7 @@ STIFF = 1.5  # of the highest frequency of hidden masses: one that a fit has tak
 SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
 WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
 HEAVY = 2e6  # steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause
+ROUGH = 5e5  # the same: where it takes more, fits begin with longer steps
 LABOUR = 1.5e6  # the same: where it takes more, one law is enough to mend the form of what is named
 SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
@@ -131,6 +133,11 @@ class Explanation:
 def rows(study: Study) -> float:
     """Chi2 that noise leaves."""
     return len(study.null.residual) * float(np.mean([np.mean(e.good) for e in study.experiments]))
+
+
+def only_noise(study: Study, e: Explanation) -> bool:
+    """Is what an explanation leaves no more than noise? Of few chi2 it is, what a wrong form leaves is hundreds of deviations more."""
+    return e.fit.chi2 < rows(study) + CHANCE * np.sqrt(2.0 * rows(study))
 
 
 def exact(groups: Sequence[Group]) -> bool:
@@ -209,7 +216,12 @@ def explain(
     ]
     near = {i: study.null.jacobian[:, i] for i, f in enumerate(study.null.free) if f.target not in built.loosened}
     most = rows(study) * np.log(max(study.null.cost / rows(study), 1.0))  # that noise of one level could gain by being as quiet as it may
-    fit = problem.solve(problem.eased(free), iterations, max(CLOSED * most, 0.5), near)
+    close = max(CLOSED * most, 0.5)
+    if len(free) * problem.steps > ROUGH and problem.rough is not None:
+        free = problem.rough.solve(problem.rough.eased(free), iterations, close, near).free
+    else:
+        free = problem.eased(free)
+    fit = problem.solve(free, iterations, close, near)
     gain = study.nothing - loss(study, fit) if np.isfinite(fit.cost) else -np.inf
     found = fitted(terms, built, fit)
     if len(acting(found)) < len(found):
@@ -509,7 +521,7 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
     bare = replace(bare, nothing=min(study.nothing, loss(bare, bare.null)))
     first = singles(bare, regression(bare, bare.null, parameters), 2)
     white = bool(first) and first[0].score > 0.0 and requieted(bare, first[0].fit) is bare
-    if bare.metrics is not study.metrics and not white:
+    if bare.metrics is not study.metrics and not white and not any(only_noise(bare, e) for e in first):
         slow = replace(study, nothing=bare.nothing)
         first = sorted([*first, *singles(slow, regression(slow, slow.null, parameters), 1)], key=lambda e: -e.score)
     for e in first:
@@ -525,7 +537,7 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
 
 def heavy(e: Explanation, most: float = HEAVY) -> bool:
     """Do its derivatives take so many steps that the search has to be narrow to end in time?"""
-    return len(e.fit.free) * sum(len(u) for u in e.problem.inputs) * e.problem.batch.model.substeps > most
+    return len(e.fit.free) * e.problem.steps > most
 
 
 def hopeful(study: Study, e: Explanation) -> bool:
@@ -549,6 +561,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
     for e in beam:
         log(f"{e.groups} {e.gain:.0f}")
     done = list(beam)
+    ended: list[Explanation] = []
     for _ in (2, 3):
         grown: list[Explanation] = []
         enough = beam[0].gain - LESS * abs(beam[0].gain)
@@ -556,6 +569,8 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
             alike = {curve(t.candidate) for t in e.terms} == {curve(t.candidate) for t in beam[0].terms}
             if e.gain < (max(enough, (1.0 - NEAR) * beam[0].gain) if alike else enough):
                 break  # of one curve, the worse form of it will not become the better one
+            if any(len(e.terms) >= len(o.terms) and e.gain < o.gain - NEW for o in ended):
+                continue  # it would need more laws to become as good
             akin, _ = kinship(study.experiments, study.metrics, e.fit.simulated)
             here = requieted(study, e.fit, coloured=akin < ALIKE)  # what sensors share is no noise
             if here is not study:
@@ -581,6 +596,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
             ways = [*filter(None, (terms_of(r, chosen) for chosen in choices))]
             if not ways and e.fit.chi2 - rows(here) < (1.0 - WHOLE) * e.gain:
                 enough = (1.0 - NEAR) * e.gain  # it is whole: only what is about as good may take its place
+                ended = [e] if only_noise(here, e) else []
             for new in ways:
                 wider = explain(here, [*e.terms, *new], start=e.fit, formulas=e.gain if exact(e.groups) else e.formulas)
                 log(f"  + {wider.groups[-1]} -> {wider.gain:.0f}")
