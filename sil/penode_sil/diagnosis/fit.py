@@ -129,7 +129,7 @@ class Problem:
         close = model.sample_time <= CLOSE
         self.fine = 1 if close else 3 if self.moving else 2  # see _drive
         step = model.sample_time / self.fine
-        least = np.inf if rough else longest(model)
+        least = max(longest(model), CLOSE if rough else 0.0)
         substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / least - 1e-6)), -(-model.substeps // self.fine))
         way = ("cubic" if self.moving else "parabola") if close else "linear"
         exact = replace(_folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)

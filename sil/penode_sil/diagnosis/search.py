@@ -421,19 +421,24 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
         bias = [t for t in e.terms if t.candidate.kind == "sensor_bias"]
         ways.append((bias, [t for t in e.terms if t not in bias]))
     there, formulas = (told[0].fit, told[0].formulas) if told else (None, 0.0)
+    moving = rest.nothing - free.nothing + (told[0].score if told else 0.0)
+    idle = None
+    if unloaded and set(unloaded) not in [set(first + more) for first, more in ways]:
+        idle = explain(rest, unloaded, start=there, formulas=formulas)
+        log(f"at rest without a load {idle.score:.0f}, moving {moving:.0f}")
+        if idle.score > moving - NEW and not loaded(told[0]):
+            return rest, []  # nothing moved that a load could have stood for
     beam = []
     for first, more in ways:
         beam.append(explain(rest, first))
         beam += [explain(rest, [*first, *more], start=there, formulas=max(beam[-1].gain, formulas))] if more else []
     beam.sort(key=lambda e: -e.score)
-    tried = [set(first + more) for first, more in ways]
-    idle = [explain(rest, unloaded, start=there, formulas=formulas)] if unloaded and set(unloaded) not in tried else []
-    bar = max((e.score + NEW for e in idle), default=NEW)
-    moving = rest.nothing - free.nothing + (told[0].score if told else 0.0)
-    log(f"at rest {bar:.0f}, with {beam[0].groups} {beam[0].score:.0f}, moving {moving:.0f}")
-    if idle and beam[0].score < bar and loaded(told[0]):  # which then was but a start in motion that is none
-        beam, bar = idle, 0.0
-    if beam[0].score < max(bar, moving - min(NEAR * moving, REST * rows(rest)) - NEW):
+    log(f"at rest with {beam[0].groups} {beam[0].score:.0f}, moving {moving:.0f}")
+    if idle is not None and beam[0].score < idle.score + NEW:
+        if not loaded(told[0]):
+            return rest, []
+        beam = [idle]  # the load was but a start in motion that is none
+    if beam[0].score < max(NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW):
         return rest, []
     quiet = requieted(rest, beam[0].fit)
     again = [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]]
