@@ -100,6 +100,16 @@ def run(seed: int, index: int, commands: dict[str, str], simulate: str, timeout:
     return rows
 
 
+def alone(case: str, command: str, timeout: float, out: Path) -> float:
+    """Seconds that a case of the draw takes by itself, compilers left out: with a second one beside it, two share caches and units of a core."""
+    seed, index = map(int, case.split(":"))
+    folder = out / "cases" / f"{seed}-{index}"
+    shutil.rmtree(folder, ignore_errors=True)
+    found, seconds, _ = diagnose(command, folder, cases.make(seed, index).write(folder), timeout)
+    shutil.rmtree(folder)
+    return round(seconds - (found or {}).get("compile_seconds", 0.0), 2)
+
+
 def generate(seed: int, index: int, out: Path) -> str:
     """The files of one case, and its truth in a line."""
     case = cases.make(seed, index)
@@ -154,11 +164,17 @@ def begun(file: Path, asked: argparse.Namespace, commands: Mapping[str, str]) ->
         if first != head or asked.seed not in (None, seed):
             print(f"{file}: another draw, by {first['code']}, with seed {seed}; remove it, or leave --resume out", file=sys.stderr)
             raise SystemExit(2)
-        return seed, rows
+        return seed, list({(r["command"], r["case"]): r for r in rows}.values())  # of a case that was timed again, the later row
     seed = secrets.randbelow(10**9) if asked.seed is None else asked.seed
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(json.dumps({"seed": seed, **head}) + "\n")
     return seed, []
+
+
+def note(out: Path, rows: list[dict]) -> None:
+    """Adds rows to those of the draw, for one that is stopped to go on with."""
+    with (out / "rows.jsonl").open("a") as file:
+        file.write("".join(json.dumps(row) + "\n" for row in rows))
 
 
 def arguments() -> argparse.ArgumentParser:
@@ -177,6 +193,8 @@ def arguments() -> argparse.ArgumentParser:
         help="measure the gain by COMMAND model_extended.toml --input REC -o OUT.csv, not by what the diagnosis says")
     add("--timeout", type=float, default=240, help="seconds for one case, by the clock (240)")
     add("--jobs", type=int, default=1, help="cases at the same time (1)")
+    add("--alone", type=float, default=float("inf"), metavar="SECONDS",
+        help="when all are through, run those that took the first command longer once more by themselves, for their time")
     add("--out", type=Path, default=Path("build/campaign"), help="folder (build/campaign)")
     add("--page", type=Path, help="write the tables there too")
     add("--keep", action="store_true", help="keep recordings, diagnoses and truths")
@@ -214,14 +232,16 @@ def main() -> int:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:
             for done, job in enumerate(jobs, 1 + len(chosen) - len(left)):
-                with (asked.out / "rows.jsonl").open("a") as file:
-                    file.write("".join(json.dumps(row) + "\n" for row in job.result()))
+                note(asked.out, job.result())
                 for row in job.result():
                     rows[row["command"]].append(row)
                     if not row["right"] or asked.only:
                         print(line(row), flush=True)
                 if sys.stderr.isatty():
                     print(f"{done} of {len(chosen)}", end="\r", file=sys.stderr)
+            for row in [r for r in next(iter(rows.values())) if asked.alone < r["seconds"] - r["compiling"] and "alone" not in r]:
+                row["alone"] = alone(row["case"], next(iter(commands.values())), asked.timeout, asked.out)
+                note(asked.out, [row])
         except KeyboardInterrupt:  # its tables are of the cases so far
             pool.shutdown(wait=False, cancel_futures=True)
     done = len(next(iter(rows.values())))
@@ -234,6 +254,8 @@ def main() -> int:
     paces.append(pace())
     said = (f"Code of {commit()}. Seconds are of the processor for a whole command, imports and files included, compilers not; "
             f"to count to ten million took it {paces[0]:.2f} s before and {paces[1]:.2f} s after.")
+    if again := sum("alone" in r for r in next(iter(rows.values()))):
+        said += f" Of the {again} cases of more than {asked.alone:g} s beside {asked.jobs - 1} others, the time is that of a second run by themselves."
     page = [f"# Campaign of {count}, seed {seed}\n\n{said}\n\n{side}\n", *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items())]
     for path in filter(None, (asked.out / "campaign.md", asked.page)):
         path.write_text("".join(page))

@@ -180,7 +180,7 @@ def summary(rows: Sequence[Mapping]) -> dict:
         for r in rows
         if r["stratum"] == "outside" and r["answer"] and any(g[1] > 1.05 * g[0] for g in r["gain"].values())
     ]
-    seconds = [round(r["seconds"] - r.get("compiling", 0.0), 2) for r in rows]
+    seconds = [r.get("alone", round(r["seconds"] - r.get("compiling", 0.0), 2)) for r in rows]
     out["outcomes"] = dict(Counter(r["outcome"] for r in rows))
     out["no_answer"] = sum(r["verdict"] is None for r in rows)
     for name, own in (("parameters", errors), ("parameters_above_noise", loud)):

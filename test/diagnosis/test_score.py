@@ -288,6 +288,12 @@ def test_the_floor_is_asked_of_rightly_named_cases():
     assert (found["n"], found["within_5_percent_of_floor"]) == (1, 1.0)
 
 
+def test_a_time_by_itself_counts_where_there_is_one():
+    rows = [score.score(truth(FRICTION), said(cause("coulomb_friction", "damper")), seconds) for seconds in (12.0, 7.0)]
+    rows[0]["alone"] = 9.0
+    assert score.summary(rows)["time"]["longest"] == 9.0
+
+
 def test_a_draw_that_was_stopped_goes_on(tmp_path):
     """With its own seed, and only the cases that are left; not by another command."""
     call = [sys.executable, campaign.__file__, "--brief", "--out", tmp_path]
@@ -303,5 +309,12 @@ def test_a_draw_that_was_stopped_goes_on(tmp_path):
     assert again.stdout.startswith(f"2 cases, seed {seed}\n1 of them are through\n")
     assert [json.loads(r)["case"] for r in rows] == [f"{seed}:0", f"{seed}:1"]
     assert "# Campaign of 2 cases" in (tmp_path / "campaign.md").read_text()
+    timed = run("--cases", "2", "--command", "false", "--resume", "--alone", "-1")
+    _, *rows = map(json.loads, (tmp_path / "rows.jsonl").read_text().splitlines())
+    assert timed.returncode == 0 and [r["case"] for r in rows] == [f"{seed}:{i}" for i in (0, 1, 0, 1)]
+    assert ["alone" in r for r in rows] == [False, False, True, True]
+    assert run("--cases", "2", "--command", "false", "--resume", "--alone", "-1").stdout.count("through") == 1
+    assert "# Campaign of 2 cases" in (page := (tmp_path / "campaign.md").read_text()) and "Of the 2 cases" in page
+    assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 5  # none is timed a third time
     other = run("--cases", "2", "--command", "true", "--resume")
     assert other.returncode == 2 and f"seed {seed}; remove it, or leave --resume out" in other.stderr

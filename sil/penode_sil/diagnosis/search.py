@@ -56,6 +56,7 @@ REST = 0.5  # of the noise: a load at rest that leaves so much more than a start
 CLOSE = 0.02  # of the gain: an exchanged cause that is nearly as good gets more laws
 MOST = 0.5  # of what is more than noise
 DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a colour
+HOPELESS = 0.3  # of what is more than noise: causes that take less have no name, whatever is exchanged among them
 MENDS = 4  # laws, at most, that only mend the form of what is named
 STIFF = 1.5  # of the highest frequency of hidden masses: one that a fit has taken beyond it moves with its body
 SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
@@ -414,8 +415,8 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
         return rest, []
     rest = replace(rest, nothing=loss(rest, rest.null))
     loads = {r.candidates[k].where: terms_of(r, [k]) for k in sorted(gains, key=gains.__getitem__)}.values()  # the best of each place
-    unloaded = [t for e in told[:1] for t in e.terms if t.candidate.kind != "constant_force"]
-    others = [t for t in unloaded if t.candidate.kind != "sensor_bias"]  # in motion, a load looks like one
+    lighter = [t for e in told[:1] for t in e.terms if t.candidate.kind != "constant_force"]
+    others = [t for t in lighter if t.candidate.kind != "sensor_bias"]  # in motion, a load looks like one
     ways = [(load, others) for load in loads]
     for e in [e for e in told if LOADS & {g[0] for g in e.groups} == {"sensor_bias"}][:1]:
         bias = [t for t in e.terms if t.candidate.kind == "sensor_bias"]
@@ -423,8 +424,8 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     there, formulas = (told[0].fit, told[0].formulas) if told else (None, 0.0)
     moving = rest.nothing - free.nothing + (told[0].score if told else 0.0)
     idle = None
-    if unloaded and set(unloaded) not in [set(first + more) for first, more in ways]:
-        idle = explain(rest, unloaded, start=there, formulas=formulas)
+    if lighter and set(lighter) not in [set(first + more) for first, more in ways]:
+        idle = explain(rest, lighter, start=there, formulas=formulas)
         log(f"at rest without a load {idle.score:.0f}, moving {moving:.0f}")
         if idle.score > moving - NEW and not loaded(told[0]):
             return rest, []  # nothing moved that a load could have stood for
@@ -438,7 +439,7 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
         if not loaded(told[0]):
             return rest, []
         beam = [idle]  # the load was but a start in motion that is none
-    if beam[0].score < max(NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW):
+    if beam[0].score < max(NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW) or taken(rest, beam[0]) < HOPELESS:
         return rest, []
     quiet = requieted(rest, beam[0].fit)
     again = [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]]
@@ -447,6 +448,11 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
     else:
         quiet, found = grow(quiet, again, log, 1)
     return quiet, [e for e in found if loaded(e) < weight(rest.model)]
+
+
+def taken(study: Study, e: Explanation) -> float:
+    """The share of what is more than noise that an explanation takes, in the noise it was fitted in."""
+    return (study.null.cost - e.fit.cost) / max(study.null.cost - rows(study), 1.0)
 
 
 def loaded(e: Explanation) -> float:
@@ -567,6 +573,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
         log(f"{e.groups} {e.gain:.0f}")
     done = list(beam)
     ended: list[Explanation] = []
+    share = 0.0
     for _ in (2, 3):
         grown: list[Explanation] = []
         enough = beam[0].gain - LESS * abs(beam[0].gain)
@@ -593,6 +600,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
                     soft = soft.whole()
                     e, r = refine(here, soft, regression(here, soft.fit, parameters), parameters)
             done.append(e)
+            share = max(share, taken(here, e))
             log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f} {[_law(t.candidate) for t in e.terms]}")
             if second := filtered(here, e, r):
                 done.append(second)
@@ -605,6 +613,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
             for new in ways:
                 wider = explain(here, [*e.terms, *new], start=e.fit, formulas=e.gain if exact(e.groups) else e.formulas)
                 log(f"  + {wider.groups[-1]} -> {wider.gain:.0f}")
+                share = max(share, taken(here, wider))
                 if wider.score > e.score:
                     grown.append(wider)
         done += grown
@@ -614,14 +623,14 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
     done = sorted((e for e in spared(done) if e.score > 0.0), key=lambda e: -e.score)
     if done:
         study = requieted(study, done[0].fit)
-    if done and len(done[0].groups) > 1:
+    if done and len(done[0].groups) > 1 and share > HOPELESS:
         found = exchanged(study, done[0], parameters, log)
         if found and max(e.score for e in found) > done[0].score:
             found += lightened(study, max(found, key=lambda e: e.score), log)
         done = sorted(done + found, key=lambda e: -e.score)
     if not done:
         return study, []
-    others = [e for e in done[1:] if set(e.groups) != set(done[0].groups) and len(e.groups) <= len(done[0].groups)]
+    others = [e for e in done[1:] if unloaded(e) != unloaded(done[0]) and len(e.groups) <= len(done[0].groups)]  # for loads, see ranked
     equal = [e for e in others if e.gain > done[0].gain - SLACK]  # and may be the plainer one
     first = level([done[0], *equal[:1]])
     plainer = list(zip(first, level([plain(study, e, parameters, log) for e in first])))
@@ -643,10 +652,15 @@ def spared(found: Sequence[Explanation]) -> list[Explanation]:
     return [replace(e, formulas=most[frozenset(e.groups)]) for e in found]
 
 
+def unloaded(e: Explanation) -> frozenset[Group]:
+    """Its causes but for a load or a bias."""
+    return frozenset(g for g in e.groups if g[0] not in LOADS)
+
+
 def level(found: Sequence[Explanation]) -> list[Explanation]:
     """Explanations with the same gain by formulas where all but a load or a bias is the same: one of these is no more a formula
     than the other."""
-    beside = [frozenset(g for g in e.groups if g[0] not in LOADS) for e in found]
+    beside = [unloaded(e) for e in found]
     most = {rest: max(e.formulas for e, own in zip(found, beside) if own == rest) for rest in beside}
     return [replace(e, formulas=most[rest]) for e, rest in zip(found, beside)]
 
@@ -739,7 +753,9 @@ def leaner(study: Study, e: Explanation, log) -> Explanation:
     """The explanation without laws that the others of their kind do as well without: they only blur its parameters, or its name."""
     kept: list[Term] = []
     while spare := [t for t in weak(e) if t not in kept]:
-        simple = explain(study, [t for t in e.terms if t is not spare[0]], start=e.fit, formulas=e.formulas)
+        simple = explain(study, [t for t in e.terms if t is not spare[0]], 4, e.fit, e.formulas)
+        if simple.gain > (1.0 - CLOSE) * e.gain:  # else more steps will not make it as good
+            simple = explain(study, simple.terms, start=simple.fit, formulas=e.formulas)
         log(f"  lean {spare[0].group}: {simple.gain:.0f} for {e.gain:.0f}")
         if len(simple.groups) == len(e.groups) and simple.score > e.score:
             e, kept = simple, []
