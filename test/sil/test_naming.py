@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -106,6 +107,28 @@ def test_a_stop_leaves_room(gaps, kind):
     sides = ("bump_stop", "rebound_stop")
     laws = [("bump_stop", law, "stiffness", {"stiffness": 1e4, "gap": g * REACH}) for law, g in zip(sides, gaps)]
     assert named(naming._spring, *laws) == kind
+
+
+@pytest.mark.parametrize("stiffness, gap, kind", [(500.0, 0.33, "cubic_spring"), (3e3, 0.33, "cubic_spring"), (1e5, 0.33, "bump_stop")])
+def test_a_law_that_mends_the_form_of_a_stop_does_not_say_where_it_begins(stiffness, gap, kind):
+    """Squares from a fifteenth of the reach on, 174 N at its end on either side; a stop beside one of them has 7, 40 and 1340 N."""
+    square = {"k": 5e5, "gap": REACH / 15.0}
+    laws = [("bump_stop", law, "k", square) for law in ("k*max(s - gap, 0)^2", "-k*min(s + gap, 0)^2")]
+    assert named(naming._spring, *laws, ("bump_stop", "bump_stop", "stiffness", {"stiffness": stiffness, "gap": gap * REACH})) == kind
+
+
+@pytest.mark.parametrize("quadratic, name", [(1e-9, "c_t"), (2e5, "")])
+def test_a_tyres_curve_that_is_a_straight_line_is_its_stiffness(quadratic, name):
+    """Beside a line of 2 kN at the reach, nothing of a square is left, or 3 %."""
+    laws = [("quadratic_spring", "quadratic", quadratic), ("linear_spring", "stiffness", 1e5)]
+    terms = [term("tyre_nonlinear", law, gain) for law, gain, _ in laws]
+    s = np.linspace(-REACH, REACH, 401)
+    terms = [replace(t, candidate=replace(t.candidate, what=replace(t.candidate.what, series=(f,)))) for t, f in zip(terms, (s * s, s))]
+    tyre = SimpleNamespace(name="tyre", law="linear_spring", arguments={"stiffness": "c_t"})
+    model = SimpleNamespace(elements=[tyre], parameters={"c_t": SimpleNamespace(tolerance=0.1)})
+    places = [SimpleNamespace(elements=(("tyre", 1),))]
+    values = {f"x{i}_{gain}": x for i, (_, gain, x) in enumerate(laws)}
+    assert naming.straight(model, places, terms, ["x0", "x1"], terms[0].group, values) == name
 
 
 @pytest.mark.parametrize("static, kind", [(0.4, "tyre_liftoff"), (1e-4, "tyre_nonlinear")])

@@ -298,11 +298,14 @@ def broken_sensors(
             again = noise.repeats(y, simulated[k][:, j], ~flagged, channel.quantum, sigma) & ~burst
             more += int(np.count_nonzero(again))
             holes += int(np.count_nonzero(np.diff((wrong | burst | again).astype(np.int8), prepend=0) > 0))
+            met = np.zeros(n, bool)
             for side, name, rail in ((-1.0, "low", np.min(y)), (1.0, "high", np.max(y))):  # a rail that was met once or twice
                 at = burst & (y == rail) & (side * (simulated[k][:, j] - rail) > 0.0)
                 if np.count_nonzero(at) >= FEW:
-                    clipped, dropped = clipped + np.count_nonzero(at), dropped - np.count_nonzero(at)
+                    met |= at
                     rails[name] = float(rail)
+            clipped += int(np.count_nonzero(met))
+            dropped -= int(np.count_nonzero(burst & (met | ~off))) if met.any() else 0  # between two rails it went on
         dropped += 0 if clipped >= FEW else railed
         if clipped >= FEW:
             sizes = {"limit": max(map(abs, rails.values())), **rails}

@@ -37,6 +37,7 @@ TYRES = ("tyre_nonlinear", "tyre_liftoff")
 QUIET = 0.25  # of the largest force that an element is wrong by: less where its network was trained, and it is not the element
 UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that makes it asymmetric
 EDGE = 0.15  # of the reach: a stop or a loss of contact that begins nearer than that to the middle is an element that bends there
+MENDING = 0.2  # of the largest force of a stop on one side at the reach: with less, another only mends its form
 STRAIGHT = 0.02  # of the straight part of a curve: less than that beside it, and it is a straight line
 FLAT = 0.015  # of what a tyre lacks when stretched: bent by less than that when pressed in, it only loses contact
 SLIDING = 0.1  # of the rates: friction there slides; its line, gone on to no rate, is the same however a damper beside it is parted from it
@@ -115,14 +116,23 @@ def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: 
     s = np.linspace(-reach, reach, 401)
     odd, even = _parts(s, Curve(terms, names)(s, np.zeros_like(s), values))
     found = {t.candidate.kind for t in terms}
-    gaps = [abs(values.get(f"{n}_gap", reach)) for t, n in zip(terms, names) if t.candidate.kind == "bump_stop"]
-    if gaps and max(gaps) < EDGE * reach:
+    if _contact(terms, names, values, reach) < EDGE * reach:
         return "asymmetric_spring" if _size(even) > UNEVEN * _size(odd) else "cubic_spring"
     if found & {"bump_stop", "network_extrapolation"}:
         return terms[0].candidate.kind
     if found == {"asymmetric_spring"} and _size(even) < UNEVEN * _size(odd):
         return "cubic_spring"
     return "asymmetric_spring" if found == {"cubic_spring"} and _size(even) > UNEVEN * _size(odd) else terms[0].candidate.kind
+
+
+def _contact(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float) -> float:
+    """Deflection where stops come into contact, on the side where they do later; `reach` without any. Laws with a smaller part of
+    the force there mend the form of others."""
+    stops = [(t, n) for t, n in zip(terms, names) if t.candidate.kind == "bump_stop"]
+    ends = np.array([-reach, reach])
+    forces = np.array([np.abs(Curve([t], [n])(ends, np.zeros(2), values)) for t, n in stops]).reshape(-1, 2)
+    gaps = np.array([abs(values.get(f"{n}_gap", reach)) for _, n in stops])
+    return max((float(np.min(gaps[f > MENDING * np.max(f)])) for f in forces.T if np.any(f > 0.0)), default=reach)
 
 
 def _tyre(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
@@ -142,7 +152,7 @@ def straight(
 ) -> str:
     """The parameter of the linear element that a curve beside it only changes; empty if it is a curve, or there is none."""
     own = [(t, n) for t, n in zip(terms, names) if t.group == group]
-    if group[0] not in (*DAMPERS, "cubic_spring", "asymmetric_spring"):
+    if group[0] not in (*DAMPERS, "cubic_spring", "asymmetric_spring", "tyre_nonlinear"):
         return ""
     law, argument = ("linear_damper", "damping") if group[0] in DAMPERS else ("linear_spring", "stiffness")
     size = {True: 0.0, False: 0.0}  # of what is straight, and of what is not
