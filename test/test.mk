@@ -3,9 +3,9 @@
 #
 # The suites of `make test`, each also a target of its own. What a suite prints is what test/tally.py counts.
 
-# Each takes one core there; the longest begins.
-SUITES   := python-sil warnings symbols misra gen-check unit board cmock accuracy python-gen python-tools \
-            python-diagnosis hidden-fixed hidden-fresh figures-check
+# Each takes one core there; the longest begin, so that none runs on alone.
+SUITES   := python-sil hidden-fixed hidden-fresh figures-check python-gen unit warnings misra accuracy python-tools \
+            python-diagnosis symbols board gen-check cmock
 PYTHONS  := $(filter python-%,$(SUITES))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
 RUNTIME  := $(wildcard src/*.c)

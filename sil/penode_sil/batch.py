@@ -25,7 +25,7 @@ from penode_gen.emit_batch import BatchCode, render_batch
 
 from .errors import UserError
 from .output import whole
-from .targets import FLAGS, ROOT, _digest, _files, build_directory, compile_program
+from .targets import FLAGS, ROOT, _digest, _files, _kept, build_directory, compile_program
 
 Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
@@ -213,14 +213,16 @@ def _build(name: str, code: BatchCode, dtype: type, per_run: bool, exact: bool) 
         *OPTIMISE,
         *FLAGS,
         *(() if exact else QUICK),
-        "-shared",
         "-fPIC",
         *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []),
         *(["-DWEIGHTS_PER_RUN"] if per_run else []),
         *(f"-I{ROOT}/{folder}" for folder in ("sil/firmware", "src", "inc", "port/gnu")),
     ]
-    folding = [ROOT / "src" / name for name in ("pen_fold.c", "pen_net.c")] if "LANES_PIECES" in code.text else []
     parts = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes.h"), ("src", "pen_math.c"))
+    folding = []
+    if "LANES_PIECES" in code.text:
+        own = [ROOT / "src" / name for name in ("pen_fold.c", "pen_net.c")]
+        folding = [_kept("folding", ".o", [*command, "-r", "-nostdlib", *map(str, own)], [_processor(), *parts, *own])]  # for every model
     stem = build_directory() / f"{name}-batch-{_digest([*command, _processor(), code.text, *folding, *parts])}"
     library = stem.with_suffix(".so")
     if not library.exists():
@@ -228,5 +230,5 @@ def _build(name: str, code: BatchCode, dtype: type, per_run: bool, exact: bool) 
         source = stem.with_suffix(".c")
         with whole(source) as part:  # other processes may be about to compile the same
             part.write_text(code.text)
-        compile_program([*command, str(source), *map(str, folding)], library)
+        compile_program([*command, "-shared", str(source), *map(str, folding)], library)
     return library
