@@ -462,6 +462,31 @@ def test_a_bushing_without_memory_is_a_spring(tmp_path, model):
     assert spring.terms[0].gain == pytest.approx(2e7, rel=0.02)
 
 
+def test_a_bushing_that_hardens_is_refined_by_one(tmp_path, model):
+    """A spring behind a dashpot that is half as stiff again at 5 mm; by SciPy, with what it holds as a state. Another cause would else come
+    in for that."""
+    z, relaxation = road(5), 0.08
+    t, spline = np.arange(SAMPLES) * STEP, CubicSpline(np.arange(SAMPLES) * STEP, z)
+
+    def rates(time: float, x: np.ndarray) -> list[float]:
+        s, v, held = x[0] - x[1], x[2] - x[3], x[4]
+        pull = C * s + D * v + 4e3 * held * (1.0 + 0.5 * (held / 5e-3) ** 2)
+        return [x[2], x[3], -pull / M_B, (pull - C_T * (x[1] - spline(time))) / M_W, v - held / relaxation]
+
+    x = solve_ivp(rates, (0.0, t[-1]), np.zeros(5), method="RK45", rtol=1e-7, atol=1e-10, max_step=STEP, t_eval=t).y
+    a = np.array([rates(time, state)[2:4] for time, state in zip(t, x.T)])
+    path = record(tmp_path / "hardens.csv", z, {"a_body": a[:, 0], "a_wheel": a[:, 1], "deflection": x[0] - x[1]}, 15)
+    one = studied(path, model)
+    r = study.regression(one, one.null, [])
+    kind = ("maxwell_bushing", "spring")
+    _, chosen = search.pursue(r, [k for k in search.pools(r)[kind] if search._law(r.candidates[k]) == "maxwell_bushing"], terms=1)
+    linear = search.explain(one, search.terms_of(r, chosen)).whole()
+    wider, _ = search.refine(one, linear, study.regression(one, linear.fit, []), [])
+    assert wider.groups == linear.groups == (kind,)
+    assert "hardening_bushing" in {search._law(t.candidate) for t in wider.terms}
+    assert wider.score > linear.score + search.NEW
+
+
 def test_friction_that_falls_for_nothing_is_coulomb(tmp_path, model):
     """Friction that is constant, told as one that falls by a third: without the fall it does as well, and costs less."""
     z = road(5)

@@ -342,7 +342,7 @@ def refine(
                 own = {_fault(t.candidate) for t in e.terms if t.group == group} - {None}
                 laws = family(study, r, [group]) if group[0] in SHAPED else pools(r).get(group, [])
                 pool = [k for k in laws if r.candidates[k].kind in {group[0], *SHAPED} and _fault(r.candidates[k]) not in own]
-                gain, chosen = pursue(r, pool, terms=1, alone=group[0] not in ("sensor_bias", "sensor_delay"))
+                gain, chosen = pursue(r, pool, terms=1, alone=group[0] not in ("sensor_bias", "sensor_delay", "maxwell_bushing"))
                 if chosen and gain > max(cost(r.candidates[chosen[0]]), 2e-3 * e.gain) and (best is None or gain > best[0]):
                     best = gain, chosen[0], r.gain(chosen)[1][0]
         if best is None:
