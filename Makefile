@@ -46,7 +46,7 @@ bench: setup ## The same with the steps of other tools (ten minutes, downloads t
 campaign: campaign-diagnosis campaign-proofs ## Both campaigns, hours
 
 campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings and let the diagnosis and its rivals look for them; RESUME=1 goes on with a draw that was stopped
-	$(Q)$(PYTHON) test/diagnosis/campaign.py --cases $(CASES) $(LEAST:%=--least %) $(RESUME:%=--resume) --jobs $$(nproc) --alone 8 --gate \
+	$(Q)$(PYTHON) test/diagnosis/campaign.py --cases $(CASES) $(LEAST:%=--least %) $(RESUME:%=--resume) --jobs $$(nproc) --alone 10 --gate \
 	    --page test/diagnosis/CAMPAIGN.md --command "$(PENODE) diagnose" \
 	    --command "PySINDy=build/rivals/bin/python test/diagnosis/rivals/sindy.py" \
 	    --command "neural=build/rivals/bin/python test/diagnosis/rivals/neural.py"
