@@ -255,7 +255,7 @@ def main() -> int:
     said = (f"Code of {commit()}. Seconds are of the processor for a whole command, imports and files included, compilers not; "
             f"to count to ten million took it {paces[0]:.2f} s before and {paces[1]:.2f} s after.")
     if again := sum("alone" in r for r in next(iter(rows.values()))):
-        said += f" Of the {again} cases of more than {asked.alone:g} s beside {asked.jobs - 1} others, the time is that of a second run by themselves."
+        said += f" Of the {again} cases of more than {asked.alone:g} s with {asked.jobs} at a time, the time is that of a second run by themselves."
     page = [f"# Campaign of {count}, seed {seed}\n\n{said}\n\n{side}\n", *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items())]
     for path in filter(None, (asked.out / "campaign.md", asked.page)):
         path.write_text("".join(page))
