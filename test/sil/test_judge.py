@@ -224,8 +224,10 @@ def test_a_rail_may_be_met_once(high, model, kinds):
         assert found[0].parameters["high"].value == found[0].parameters["limit"].value == 2.5
 
 
-def test_between_two_rails_a_sensor_goes_on():
-    """Six samples on either rail are one burst with the eight between them, which the model agrees with."""
+@pytest.mark.parametrize("lost", [0, 30])
+def test_between_two_rails_a_sensor_goes_on(lost):
+    """Six samples on either rail are one burst with the eight between them, which the model agrees with. Of a hole elsewhere all count,
+    near the model or not."""
     y = np.zeros(ROWS)
     y[5000:5020] = np.clip(np.linspace(-7.0, 7.0, 20), -2.5, 2.5)
     quality = SimpleNamespace(rows=ROWS, low=None, high=None, quantum=0.0, held=0, missing=0, spikes=0)
@@ -234,8 +236,10 @@ def test_between_two_rails_a_sensor_goes_on():
     sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
     simulated, burst = y.copy(), np.zeros((ROWS, 1), bool)
     simulated[5000:5020], burst[5000:5020] = np.linspace(-7.0, 7.0, 20), True
-    (cause,) = engine.broken_sensors(sensors, [measured], study, [simulated[:, None]], [burst])
+    simulated[7000 : 7000 + lost], burst[7000 : 7000 + lost] = np.linspace(-1.0, 1.0, lost + 1)[:lost], True
+    cause, *others = engine.broken_sensors(sensors, [measured], study, [simulated[:, None]], [burst])
     assert cause.kind == "sensor_clipping" and {k: v.value for k, v in cause.parameters.items()} == {"limit": 2.5, "low": -2.5, "high": 2.5}
+    assert [(c.kind, c.parameters["share"].value) for c in others] == [("sensor_dropout", lost / ROWS)] * bool(lost)
 
 
 def test_a_drift_of_clocks_has_no_name(values, monkeypatch):

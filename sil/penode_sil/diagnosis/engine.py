@@ -305,7 +305,9 @@ def broken_sensors(
                     met |= at
                     rails[name] = float(rail)
             clipped += int(np.count_nonzero(met))
-            dropped -= int(np.count_nonzero(burst & (met | ~off))) if met.any() else 0  # between two rails it went on
+            runs = np.cumsum(np.diff(burst.astype(np.int8), prepend=0) > 0)
+            went_on = burst & ~off & np.isin(runs, runs[met])  # between two rails
+            dropped -= int(np.count_nonzero(met | went_on))
         dropped += 0 if clipped >= FEW else railed
         if clipped >= FEW:
             sizes = {"limit": max(map(abs, rails.values())), **rails}
