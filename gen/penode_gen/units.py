@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from pathlib import Path
 from pickle import PickleError
 from typing import Callable
 
@@ -15,9 +16,10 @@ from . import expressions as ex
 
 
 def _known() -> pint.UnitRegistry:
-    """All units, as pint keeps them in the user's cache; read anew where it cannot, or another process is about to write there."""
+    """All units, as pint keeps them beside its own bytecode (the user's cache would name the files of one installation for all); read
+    anew where it cannot, or another process is about to write there."""
     try:
-        return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, cache_folder=":auto:")
+        return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, cache_folder=Path(pint.__file__).with_name("__pycache__"))
     except (OSError, EOFError, PickleError):
         return pint.UnitRegistry(autoconvert_offset_to_baseunit=False)
 

@@ -580,3 +580,10 @@ def test_any_text_as_an_expression(text):
         expressions.parse(text, {"q", "w", "z"}, {"n": 1}, {"q"})
     except expressions.ExpressionError as error:
         assert str(error)
+
+
+def test_units_are_kept_with_their_installation(tmp_path, monkeypatch):
+    """Not in the user's cache, whose entries name the files of one installation, which may be gone."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert units._known().Quantity(1.0, "inch").to("mm").magnitude == pytest.approx(25.4)
+    assert not any(tmp_path.iterdir())
