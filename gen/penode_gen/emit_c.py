@@ -25,7 +25,7 @@ from .networks import Affine, Dense, Layer, Network
 VERSION = "0.1.0"
 
 
-def _compiled() -> jinja2.BytecodeCache | None:
+def compiled_templates() -> jinja2.BytecodeCache | None:
     """What Jinja has made of the templates, in a folder of the user's own among the temporary files; None where there is none that is
     safe."""
     try:
@@ -35,7 +35,7 @@ def _compiled() -> jinja2.BytecodeCache | None:
 
 
 _TEMPLATES = jinja2.Environment(
-    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"), bytecode_cache=_compiled(),
+    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"), bytecode_cache=compiled_templates(),
     undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
 )  # fmt: skip
 

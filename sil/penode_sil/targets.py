@@ -427,6 +427,14 @@ def build_firmware(model: Any, machine: str, source: Path | None = None, optimis
     return _kept(f"{model.name}-{machine}", ".elf", command, read)
 
 
+def build_object(model: Any, machine: str, name: str) -> Path:
+    """One file of a model's C as it is for one of MACHINES, by itself."""
+    source = generated(model)
+    command = [str(PORT / "cc"), MACHINES[machine], "-std=c99", "-O2", f"-I{source}", f"-I{ROOT}/src", "-c", str(source / name)]
+    read = _files(("inc", "*.h"), ("src", "*.h"), ("port/cortex-m", "cc"))
+    return _kept(f"{Path(name).stem}-{machine}", ".o", command, [*read, *sorted(source.glob("*.[ch]"))])
+
+
 class Pil:
     """A model's C in float on an emulated Cortex-M, or in a process of its own ("host")."""
 

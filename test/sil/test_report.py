@@ -15,8 +15,9 @@ from click.testing import CliRunner
 from test_diagnosis import MODEL, SAMPLES, STEP, drive, record, road
 
 import penode_gen
+from penode_sil import targets
 from penode_sil.cli import cli
-from penode_sil.diagnosis import noise, report, report_figure as fig, residual, result
+from penode_sil.diagnosis import files, noise, report, report_figure as fig, residual, result
 from penode_sil.diagnosis.report_figure import Axis
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
@@ -367,3 +368,25 @@ def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path):
         and written["residual"]["signals"][0]["after_rms"] <= written["residual"]["signals"][0]["before_rms"]
     )
     assert SAMPLES * STEP == pytest.approx(written["data"][0]["seconds"], abs=2 * STEP)
+
+
+def test_price_is_compiled_once(model, monkeypatch, extended):
+    first = report.price(model, extended)
+
+    def refuse(*_):
+        raise AssertionError("compiled again")
+
+    monkeypatch.setattr(targets, "compile_program", refuse)
+    assert first and report.price(model, extended) == first
+
+
+def test_what_compilers_take_for_the_report_counts_as_well(model, found, monkeypatch, tmp_path):
+    took = iter((2.0, 5.5))
+    done = []
+    monkeypatch.setattr(files, "load_model", lambda job: model)
+    monkeypatch.setattr(files, "load", lambda *_: [])
+    monkeypatch.setattr(files, "diagnose", lambda *_: found)
+    monkeypatch.setattr(files.report, "write", lambda *_: done.append("report"))
+    monkeypatch.setattr(files, "compilers", lambda: next(took))
+    files.run(files.Job(model.path, (), (), tmp_path))
+    assert done and json.loads((tmp_path / "diagnosis.json").read_text())["compile_seconds"] == 3.5

@@ -69,7 +69,7 @@ def diagnose(
 ) -> Diagnosis:  # fmt: skip
     """Name what the model gets wrong in `train`, and measure on `holdout` what knowing it gains; with `output`, write
     model_extended.toml there. `log` hears what is tried, `tell` which share of the work is done and what comes next."""
-    started, compiled = time.perf_counter(), compilers()
+    started = time.perf_counter()
     log = advancing(log, tell)
     tell(0.0, "fitting the model as it is")
     both = told_of_rails([*train, *holdout])
@@ -196,7 +196,7 @@ def diagnose(
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(
         verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), data,
-        shown.numbers(), absorbed, time.perf_counter() - started, compilers() - compiled, shown,
+        shown.numbers(), absorbed, time.perf_counter() - started, shown=shown,
     )  # fmt: skip
 
 
@@ -205,12 +205,6 @@ def rested(losses: Sequence[float], costs: Sequence[float], told: bool, starts: 
     how many start states are free in motion, and how many numbers are of loads that take their place at rest, two of which any load has.
     Where the start states gain no more than noise gives them nothing moved, though it costs a load."""
     return losses[1] < losses[0] + IDLE * (starts - max(loads - 2, 0)) or not told and costs[1] < costs[0] + MOVING * starts
-
-
-def compilers() -> float:
-    """Processor time [s] of all programs that this one has run so far: compilers."""
-    used = os.times()
-    return used.children_user + used.children_system
 
 
 def absorbing(

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import penode_gen
@@ -45,13 +46,21 @@ def run(
     tell: Callable[[float, str], None] = lambda share, doing: None,
 ) -> tuple[penode_gen.Model, Diagnosis]:
     """Diagnose and write diagnosis.json, model_extended.toml and report.html; all or none. UserError for bad input."""
+    compiled = compilers()
     model = load_model(job)
     train, held = load(job.data, model, job.channels), load(job.holdout, model, job.channels)
     with all_or_none(job.output):
         found = diagnose(model, train, held, job.output, job.set_name, log, tell)
-        (job.output / "diagnosis.json").write_text(json.dumps(found.as_json(), indent=2) + "\n", encoding="utf-8")
         report.write(job.output / "report.html", model, found, job.output / "model_extended.toml")
+        found = replace(found, compile_seconds=compilers() - compiled)
+        (job.output / "diagnosis.json").write_text(json.dumps(found.as_json(), indent=2) + "\n", encoding="utf-8")
     return model, found
+
+
+def compilers() -> float:
+    """Processor time [s] of all programs that this one has run so far: compilers."""
+    used = os.times()
+    return used.children_user + used.children_system
 
 
 def check_folder(folder: Path) -> None:

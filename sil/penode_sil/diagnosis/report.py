@@ -17,7 +17,6 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,11 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
+from penode_gen.emit_c import compiled_templates
 from penode_gen.model import Model
 
 from ..errors import UserError
 from ..output import whole
-from ..targets import MACHINES, PORT, ROOT, compile_program, generated
+from ..targets import build_object
 from . import report_figure as fig
 from .report_figure import Axis, Figure, pretty, readable
 from .residual import LEAST, Channel, Residual, Shown, Surface, averages, cells, rms
@@ -86,8 +86,9 @@ def render(model: Model, d: Diagnosis, extended: Path) -> str:
     """The same as text."""
     folder = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
     environment = jinja2.Environment(
-        loader=folder, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
+        loader=folder, bytecode_cache=compiled_templates(), autoescape=True, trim_blocks=True, lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )  # fmt: skip
     environment.filters |= {"plain": plain, "pretty": pretty, "percent": percent, "value": value, "sure": sure}
     shown: Shown = d.shown
     train, held = (ordered(channels) for channels in (shown.train, shown.holdout))
@@ -435,20 +436,15 @@ def price(model: Model, extended: Path) -> list[tuple[str, int, int]]:
     if not shutil.which("arm-none-eabi-gcc") or not shutil.which("arm-none-eabi-size"):
         return []
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            sizes = [_sizes(m, Path(folder)) for m in (model, penode_gen.load(extended))]
+        sizes = [_sizes(m) for m in (model, penode_gen.load(extended))]
     except (UserError, penode_gen.ModelError, OSError, subprocess.CalledProcessError):
         return []
     return [(what, sizes[0][k], sizes[1][k]) for k, what in enumerate(("code and constants", "parameter sets"))]
 
 
-def _sizes(model: Model, folder: Path) -> tuple[int, int]:
+def _sizes(model: Model) -> tuple[int, int]:
     """Bytes of NAME.c and of NAME_params.c."""
-    source, found = generated(model), []
-    for name in (f"{model.name}.c", f"{model.name}_params.c"):
-        out = folder / f"{name}.o"
-        include = [f"-I{source}", f"-I{ROOT}/src"]
-        compile_program([str(PORT / "cc"), MACHINES[CORE], "-std=c99", "-O2", *include, "-c", str(source / name)], out)
-        size = subprocess.run(["arm-none-eabi-size", str(out)], capture_output=True, text=True, check=True)
-        found.append(int(size.stdout.splitlines()[1].split()[0]))
-    return found[0], found[1]
+    out = build_object(model, CORE, f"{model.name}.c"), build_object(model, CORE, f"{model.name}_params.c")
+    size = subprocess.run(["arm-none-eabi-size", *map(str, out)], capture_output=True, text=True, check=True)
+    code, sets = (int(line.split()[0]) for line in size.stdout.splitlines()[1:])
+    return code, sets
