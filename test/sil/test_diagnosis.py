@@ -224,6 +224,24 @@ def test_a_way_that_cannot_be_simulated_is_not_gone(model, sound, monkeypatch):
     assert problem.solve(free, 2).cost <= one.null.cost + 1.0
 
 
+def test_a_short_step_is_found_where_all_longer_ones_fail(model, sound, monkeypatch):
+    """Dampings far from that of the step before are tried where none near it gains."""
+    one = study.null_study(model, [experiment(m, model) for m in sound])
+    problem = Problem(model, one.experiments, one.metrics)
+    afar = [replace(f, value=1.1 * f.value) if f.target == "d" else f for f in one.nuisances]
+    wild, sensors = next(i for i, f in enumerate(afar) if f.target == "d"), problem.sensors
+    steps = np.abs(problem.at(tuple(afar)).steps()[0][:, wild])
+    assert steps[-1] < 0.5 * steps[-2]
+
+    def bounded(e, free, shifts, *more):
+        z, *rest = sensors(e, free, shifts, *more)
+        return np.where(np.abs(shifts[:, wild]) > 2.0 * steps[-1], 1e300, z), *rest
+
+    before = problem.at(tuple(afar)).cost
+    monkeypatch.setattr(problem, "sensors", bounded)
+    assert problem.solve(afar, 1).cost < before - 1.0
+
+
 def test_what_ends_without_force_is_no_cause(tmp_path, model):
     """Friction and a spring that gets softer hide; a fit that begins with friction and a stop ends with the friction alone."""
     z = road(5)

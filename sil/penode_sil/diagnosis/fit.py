@@ -35,7 +35,7 @@ BLUNT = 0.3  # sharpness of a rail: with less it is about the same tanh, as a sm
 FAR = 1e20  # residual of a run that cannot be simulated
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
 PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, derivatives are about what they were
-DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of trial steps, relative to the curvature
+DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Free:
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Where a fit ended: chi2 with and without priors, whitened residual, and its derivatives [rows, free] in the units of
-    `free`; `whole`: all of these are as they are there."""
+    `free`; `whole`: all of these are as they are there; `metrics`: by which residual and derivatives are white."""
 
     model: Model
     free: tuple[Free, ...]
@@ -78,6 +78,7 @@ class Fit:
     simulated: tuple[Array, ...]
     faults: tuple[Fault, ...] = ()
     whole: bool = False
+    metrics: Sequence[Metric] = ()
 
     def value(self, target: object) -> float:
         return next(f.value for f in self.free if f.target == target)
@@ -168,7 +169,7 @@ class Problem:
         """A fit of every second sample as one of all."""
         signals = zip(self.experiments, fit.simulated)
         whole = tuple(CubicSpline(e.time[::2], z)(e.time) for e, z in signals)
-        return replace(fit, model=self.model, faults=tuple(self.faults), simulated=whole)
+        return replace(fit, model=self.model, faults=tuple(self.faults), simulated=whole, metrics=self.metrics)
 
     def simulate(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array]:
         """Sensors [runs, n, n_z] and named states of recording e for shifts [runs, free]."""
@@ -244,45 +245,54 @@ class Problem:
         """The best free values from those given on, by damped Gauss-Newton; stops where a step gains less than `close`, or promises to.
         `known` derivatives (by number) are near enough and are not simulated: see `complete`.
 
-        Steps of all dampings are tried at once. After a full one that kept its promise, derivatives are not simulated but go on from
-        those of before (see `secant`); a fit does not end with such.
+        The full step and three of the dampings around that of the step before are tried at once, then the others if none of these gains.
+        After a full step that kept its promise, derivatives are not simulated but go on from those of before (see `secant`); a fit does
+        not end with such.
         """
         if self.halved is not None:
             return self._doubled(self.halved.solve(free, iterations, close, known))
-        known, fresh = dict(known), True
+        known, fresh, damping = dict(known), True, len(DAMPING) // 2
         fit = self.at(tuple(free), known)
         for k in range(1, iterations + 1):
             trials, promised = fit.steps()
             ended = not np.isfinite(fit.cost) or promised < close
-            if not ended:
-                parts = [self.residuals(e, *self.sensors(e, fit.free, trials)[:2]) for e in range(len(self.experiments))]
-                residuals = np.concatenate(parts, axis=1)
-                moved = np.stack([f.at(t) for f, t in zip(fit.free, trials.T)])
-                away = (moved - np.array([[f.origin] for f in fit.free])) / np.array([[f.sigma] for f in fit.free])
-                costs = np.einsum("ij,ij->i", residuals, residuals) + np.sum(away**2, axis=0)
-                best = int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))
-                gained = fit.cost - costs[best]
+            near = min(max(damping - 1, 1), len(DAMPING) - 3)
+            some = [0, near, near + 1, near + 2]
+            for tried in (some, [d for d in range(len(DAMPING)) if d not in some]) if not ended else ():
+                residuals, moved, costs = self._tried(fit.free, trials[tried])
+                best = int(np.argmin(costs))
+                damping, gained = tried[best], fit.cost - costs[best]
                 ended = not gained >= close
+                if gained > 0.0:
+                    break
             if ended and fresh:
                 break
             if ended:
                 fit, fresh = self.at(fit.free, known), True
                 continue
             there = _put(fit.free, moved[:, best])
-            fresh = best > 0 or gained < PROMISE * promised or k == REFRESHED
+            fresh = damping > 0 or gained < PROMISE * promised or k == REFRESHED
             if fresh:
                 fit = self.at(there, {} if k == REFRESHED else known)
                 known = {i: fit.jacobian[:, i] for i in known}
             else:
-                fit = fit.secant(there, residuals[0])
+                fit = fit.secant(there, residuals[best])
         return fit if fresh else self.at(fit.free, known)
+
+    def _tried(self, free: Sequence[Free], steps: Array) -> tuple[Array, Array, Array]:
+        """Residuals [steps, rows], values [free, steps] and costs after steps [steps, free]."""
+        residuals = np.concatenate([self.residuals(e, *self.sensors(e, free, steps)[:2]) for e in range(len(self.experiments))], axis=1)
+        moved = np.stack([f.at(t) for f, t in zip(free, steps.T)])
+        away = (moved - np.array([[f.origin] for f in free])) / np.array([[f.sigma] for f in free])
+        costs = np.einsum("ij,ij->i", residuals, residuals) + np.sum(away**2, axis=0)
+        return residuals, moved, np.where(np.isfinite(costs), costs, np.inf)
 
     def at(self, free: tuple[Free, ...], known: Mapping[int, Array] = {}) -> Fit:
         """The fit that ends at these free values."""
         residual, jacobian, simulated = self.linear(free, known)
         chi2 = float(residual @ residual)
         cost = chi2 + float(sum(f.offset**2 for f in free))
-        return Fit(self.model, free, chi2, cost, residual, jacobian, simulated, tuple(self.faults), not known)
+        return Fit(self.model, free, chi2, cost, residual, jacobian, simulated, tuple(self.faults), not known, self.metrics)
 
     def eased(self, free: Sequence[Free]) -> tuple[Free, ...]:
         """The free values with all gains of laws scaled down as far as the simulation starts best: a regression that

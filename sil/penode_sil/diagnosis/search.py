@@ -215,7 +215,9 @@ def explain(
         replace(f, value=values.get(f.target, f.value)) if i < len(study.null.free) else f
         for i, f in enumerate(all_free(study.null.free, built))
     ]
-    near = {i: study.null.jacobian[:, i] for i, f in enumerate(study.null.free) if f.target not in built.loosened}
+    known = start if start is not None and start.whole and start.metrics is study.metrics else study.null
+    columns = {f.target: column for f, column in zip(known.free, known.jacobian.T)}
+    near = {i: columns[f.target] for i, f in enumerate(study.null.free) if f.target in columns and f.target not in built.loosened}
     most = rows(study) * np.log(max(study.null.cost / rows(study), 1.0))  # that noise of one level could gain by being as quiet as it may
     close = max(CLOSED * most, 0.5)
     if len(free) * problem.steps > ROUGH and problem.rough is not None:
