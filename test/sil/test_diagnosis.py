@@ -224,6 +224,21 @@ def test_a_way_that_cannot_be_simulated_is_not_gone(model, sound, monkeypatch):
     assert problem.solve(free, 2).cost <= one.null.cost + 1.0
 
 
+def test_a_fit_that_cannot_be_simulated_ends(model, sound, monkeypatch):
+    """Where a simulation grows without bounds, but not to infinity, it is a fit of no use, and no error: rates of its sensors are finite."""
+    one = study.null_study(model, [experiment(m, model) for m in sound])
+    problem = Problem(model, one.experiments, one.metrics)
+    sensors = problem.sensors
+
+    def wild(*given):
+        z, *rest = sensors(*given)
+        return np.where(np.arange(len(z))[:, None, None] % 3 > 0, 1e307, -1e307) + z, *rest
+
+    monkeypatch.setattr(problem, "sensors", wild)
+    fit = problem.solve(one.null.free, 1)
+    assert fit.cost > 1e30 and all(np.isfinite(z).all() for z in fit.simulated)
+
+
 def test_a_short_step_is_found_where_all_longer_ones_fail(model, sound, monkeypatch):
     """Dampings far from that of the step before are tried where none near it gains."""
     one = study.null_study(model, [experiment(m, model) for m in sound])

@@ -32,7 +32,7 @@ LONGEST = {"loose_damper": 2.5e-4, "presliding": 2.5e-4, "friction": 5e-4, "tanh
 KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
 BLUNT = 0.3  # sharpness of a rail: with less it is about the same tanh, as a small difference of large numbers
-FAR = 1e20  # residual of a run that cannot be simulated
+FAR = 1e20  # residual of a run that cannot be simulated, and the most that it shows
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
 PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, derivatives are about what they were
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
@@ -337,7 +337,8 @@ class Problem:
                 block[i] = (r[0] - r[k + 1]) / shifts[k + 1, i]
             blocks.append(block)
             rows.append(r[0])
-            simulated.append(z[:, :, 0] - self.rates(e, z)[:, :, 0] * skews[:, 0])
+            bounded = np.clip(z[:, :, :1], -FAR, FAR)
+            simulated.append(bounded[:, :, 0] - self.rates(e, bounded)[:, :, 0] * skews[:, 0])
         jacobian = np.concatenate(blocks, axis=1).T
         for i, column in known.items():
             jacobian[:, i] = column
