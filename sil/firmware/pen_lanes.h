@@ -5,7 +5,7 @@
  * The runtime on lanes: one vector register holds the same quantity of several runs. For the host's batch library only.
  *
  * Each lane does what inc/penode/ does with one number, in the same order, so it gives the same bits; only selections
- * differ: masks, where a single run picks from a pair. Vectors are those that GCC has on any processor; constants and
+ * differ: masks, where a single run picks from a pair. Vectors are those that GCC and clang have on any processor; constants and
  * polynomials of exp, tanh, sigmoid and softplus are those of src/pen_math.c. (A loop over the lanes in place of the
  * vector operators costs two to five times the run time and the compile time: measured with gcc 12.)
  */

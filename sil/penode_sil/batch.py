@@ -29,7 +29,6 @@ from .output import whole
 from .targets import FLAGS, ROOT, _digest, _files, _kept, build_directory, compile_program
 
 Array = NDArray[Any]
-COMPILERS = "clang-19", "clang"  # the first that is installed, or gcc: see _build
 OPTIMISE = ("-O3", "-march=native")
 # Not -ffast-math, which takes nothing for NaN. But gcc drops 0*x, by which lanes_max and its like pass NaN on: states, inputs and outputs
 # that are not finite are told by their bits all the same.
@@ -192,7 +191,7 @@ class Batch:
 
     def _library(self, per_run: bool) -> ctypes.CDLL:
         if per_run not in self._libraries:
-            library = ctypes.CDLL(str(_build(self.model.name, self._code, self.dtype, per_run, self.exact)))
+            library = ctypes.CDLL(str(_build(self.model, self._code, self.dtype, per_run, self.exact)))
             library.batch_run.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t)
             library.batch_run.restype = ctypes.c_bool
             self._libraries[per_run] = library
@@ -208,11 +207,15 @@ def _processor(compiler: str) -> bytes:
         raise UserError(f"{compiler}: this compiler is not installed; install it (make test does)") from exc
 
 
-def _build(name: str, code: BatchCode, dtype: type, per_run: bool, exact: bool) -> Path:
-    """The shared library of a batch code, compiled once; keyed by sources, compiler and processor. clang takes two thirds of gcc's time,
-    and its code six sevenths, but for the pieces of folded networks: gcc alone has lanes that pick among lanes."""
-    folded = "LANES_PIECES" in code.text
-    compiler = next(filter(shutil.which, () if folded else COMPILERS), "gcc")
+def _compiler(model: penode_gen.Model) -> str:
+    """clang where it is installed, for a model without networks: it takes two thirds of gcc's time, and its code six sevenths. That of
+    layers takes a tenth more, and gcc alone picks among the pieces of folded networks in registers."""
+    return next(filter(shutil.which, () if model.networks else ("clang-19", "clang")), "gcc")
+
+
+def _build(model: penode_gen.Model, code: BatchCode, dtype: type, per_run: bool, exact: bool) -> Path:
+    """The shared library of a batch code, compiled once; keyed by sources, compiler and processor."""
+    compiler = _compiler(model)
     command = [
         compiler,
         *OPTIMISE,
@@ -225,10 +228,10 @@ def _build(name: str, code: BatchCode, dtype: type, per_run: bool, exact: bool) 
     ]
     parts = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes.h"), ("src", "pen_math.c"))
     folding = []
-    if folded:
+    if "LANES_PIECES" in code.text:
         own = [ROOT / "src" / name for name in ("pen_fold.c", "pen_net.c")]
         folding = [_kept("folding", ".o", [*command, "-r", "-nostdlib", *map(str, own)], [_processor(compiler), *parts, *own])]  # for every model
-    stem = build_directory() / f"{name}-batch-{_digest([*command, _processor(compiler), code.text, *folding, *parts])}"
+    stem = build_directory() / f"{model.name}-batch-{_digest([*command, _processor(compiler), code.text, *folding, *parts])}"
     library = stem.with_suffix(".so")
     if not library.exists():
         stem.parent.mkdir(parents=True, exist_ok=True)

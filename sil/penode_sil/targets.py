@@ -15,6 +15,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -144,6 +145,12 @@ def _kept(name: str, suffix: str, command: Sequence[str], read: Iterable[str | b
     return output
 
 
+@cache
+def _version(compiler: str) -> bytes:
+    """What a compiler says of itself, nothing if it is not installed."""
+    return subprocess.run([compiler, "--version"], capture_output=True).stdout if shutil.which(compiler) else b""
+
+
 def build_library(
     model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None
 ) -> Path:
@@ -159,10 +166,7 @@ def build_library(
         f"-I{ROOT}/inc",
         f"-I{ROOT}/port/gnu",
     ]
-    version = (
-        subprocess.run([compiler[0], "--version"], capture_output=True).stdout if shutil.which(compiler[0]) else b""
-    )
-    read = [version, *_files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
+    read = [_version(compiler[0]), *_files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
     same = _kept("runtime", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     own = ["-shared", *model_options(model), f"-I{source}", *map(str, [shim, *code, same])]
     return _kept(model.name, ".so", [*options, *own], [*read, shim, *code, source / f"{model.name}.h", same])
@@ -422,17 +426,21 @@ def build_firmware(model: Any, machine: str, source: Path | None = None, optimis
     compiler = "arm-none-eabi-gcc" if board else "gcc"
     if shutil.which(compiler) is None:
         raise UserError(f"{compiler}: this compiler is not installed; install it (make test does)")
-    parts = _files(("inc", "*.h"), ("port", "*"), ("sil/firmware", "*.h"))
-    read = [program, *code, source / f"{model.name}.h", *runtime, *(p for p in parts if p.is_file())]
+    read = [_version(compiler), program, *code, source / f"{model.name}.h", *runtime, *_included()]
     return _kept(f"{model.name}-{machine}", ".elf", command, read)
 
 
 def build_object(model: Any, machine: str, name: str) -> Path:
-    """One file of a model's C as it is for one of MACHINES, by itself."""
+    """One file of a model's C as it is for an emulated one of MACHINES, by itself."""
     source = generated(model)
-    command = [str(PORT / "cc"), MACHINES[machine], "-std=c99", "-O2", f"-I{source}", f"-I{ROOT}/src", "-c", str(source / name)]
-    read = _files(("inc", "*.h"), ("src", "*.h"), ("port/cortex-m", "cc"))
-    return _kept(f"{Path(name).stem}-{machine}", ".o", command, [*read, *sorted(source.glob("*.[ch]"))])
+    command = [str(PORT / "cc"), MACHINES[machine], *FLAGS, "-O2", f"-I{source}", f"-I{ROOT}/src", "-c", str(source / name)]
+    read = [_version("arm-none-eabi-gcc"), source / name, source / f"{model.name}.h", *_files(("src", "*.h")), *_included()]
+    return _kept(f"{Path(name).stem}-{machine}", ".o", command, read)
+
+
+def _included() -> list[Path]:
+    """What any program for one of MACHINES may include, and how its compiler is called."""
+    return [path for path in _files(("inc", "*.h"), ("port", "*"), ("sil/firmware", "*.h")) if path.is_file()]
 
 
 class Pil:

@@ -12,6 +12,7 @@ import pytest
 from conftest import HERE
 
 import penode_gen
+from penode_sil import batch as library
 from penode_sil.batch import Batch
 from penode_sil.errors import UserError
 from penode_sil.status import FLAGS
@@ -171,8 +172,26 @@ def test_each_lane_has_the_bits_of_the_step(tmp_path, choices, dtype):
         same(run, lane, single)
 
 
+@pytest.mark.parametrize("compiler", ["gcc", "clang-19"])
 @pytest.mark.parametrize("dtype", TYPES)
-def test_functions_have_the_bits_of_pen_math(tmp_path, dtype):
+def test_any_compiler_gives_the_same_bits(tmp_path, monkeypatch, dtype, compiler):
+    monkeypatch.setattr(library, "_compiler", lambda model: compiler)
+    model, u = rich(tmp_path, "ros2", "cubic", "clamp", 2, "sigmoid"), drive(600)
+    run = Batch(model, dtype).run(u, x0=np.array([model.start] * 3), **everything(model))
+    same(run, 2, Sil(model, dtype).run(u))
+
+
+def test_clang_compiles_what_it_does_sooner(tmp_path, oscillator, monkeypatch):
+    """Models without networks; without it gcc compiles all."""
+    assert library._compiler(oscillator) == "clang-19" and library._compiler(rich(tmp_path)) == "gcc"
+    monkeypatch.setattr(library.shutil, "which", lambda name: None)
+    assert library._compiler(oscillator) == "gcc"
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang-19"])
+@pytest.mark.parametrize("dtype", TYPES)
+def test_functions_have_the_bits_of_pen_math(tmp_path, monkeypatch, dtype, compiler):
+    monkeypatch.setattr(library, "_compiler", lambda model: compiler)
     (tmp_path / "bare.toml").write_text(BARE)
     model = penode_gen.load(tmp_path / "bare.toml")
     draw = np.random.default_rng(3)
