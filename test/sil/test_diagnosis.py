@@ -270,6 +270,30 @@ def test_what_ends_without_force_is_no_cause(tmp_path, model):
     assert len(found.built.names) == 1 and not any("gap" in name for name in found.fit.model.parameters)
 
 
+def test_a_fit_goes_on_with_the_derivatives_of_the_fit_that_it_starts_from(tmp_path, model, monkeypatch):
+    """Where all of them are as they are there, and white by the same noise; else with those of the null fit."""
+    z = road(5)
+    path = record(tmp_path / "rubs.csv", z, drive(z, lambda s, v: 60.0 * np.tanh(v / 4e-3)), 15)
+    one = studied(path, model)
+    rubs = next(c for c in study.regression(one, one.null, []).candidates if c.kind == "coulomb_friction")
+    first = search.explain(one, [Term(rubs, 40.0)])
+    whole = first.whole().fit
+    other = replace(whole, metrics=list(whole.metrics))
+    d = next(i for i, f in enumerate(one.null.free) if f.target == "d")
+    assert np.linalg.norm(whole.jacobian[:, d] - one.null.jacobian[:, d]) > 1e-3 * np.linalg.norm(one.null.jacobian[:, d])
+    taken, solve = [], Problem.solve
+
+    def spied(self, free, iterations=12, close=0.05, known={}):
+        taken.append(dict(known))
+        return solve(self, free, iterations, close, known)
+
+    monkeypatch.setattr(Problem, "solve", spied)
+    for start, expected in ((whole, whole), (None, one.null), (replace(whole, whole=False), one.null), (other, one.null)):
+        taken.clear()
+        search.explain(one, first.terms, 1, start)
+        assert taken and all(np.array_equal(known[d], expected.jacobian[:, d]) for known in taken)
+
+
 def test_transfer_of_a_place_is_that_of_the_equations(model):
     """Response of the sensors to a force in the suspension, against the 4 x 4 equations solved here."""
     found = plant.places(model)
