@@ -283,8 +283,8 @@ def test_a_fit_goes_on_with_the_derivatives_of_the_fit_that_it_starts_from(tmp_p
     assert np.linalg.norm(whole.jacobian[:, d] - one.null.jacobian[:, d]) > 1e-3 * np.linalg.norm(one.null.jacobian[:, d])
     taken, solve = [], Problem.solve
 
-    def spied(self, free, iterations=12, close=0.05, known={}):
-        taken.append(dict(known))
+    def spied(self, free, iterations, close, known):
+        taken.append(known)
         return solve(self, free, iterations, close, known)
 
     monkeypatch.setattr(Problem, "solve", spied)
