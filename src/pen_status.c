@@ -7,6 +7,16 @@
 
 #include "penode/pen_port.h"
 
+uint32_t pen_status_times(const pen_status_report_t *report, pen_status_t flag)
+{
+    uint32_t times = 0U;
+
+    for (size_t i = 0U; i < PEN_STATUS_FLAGS; i++) {
+        times += (flag == (UINT32_C(1) << i)) ? report->times[i] : 0U;
+    }
+    return times;
+}
+
 void pen_status_clear(pen_status_log_t *log)
 {
     for (size_t i = 0U; i < PEN_STATUS_FLAGS; i++) {
