@@ -58,10 +58,10 @@ _FILES = {"model.h.j2": "{name}.h", "model.c.j2": "{name}.c", "sets.h.j2": "{own
 def render(model: Model) -> dict[str, str]:
     """File name -> text of the C of a model. Pure: no clock, no path beyond the model file's name."""
     context = _Emitter(model).context()
-    texts = {f"{model.owner}_layout.json": layout.to_json(model)}
+    texts = {}
     for template, name in _FILES.items():
         texts[name.format(name=model.name, owner=model.owner)] = fold(_TEMPLATES.get_template(template).render(context))
-    return texts
+    return texts | {f"{model.owner}_layout.json": layout.to_json(model)}
 
 
 def generate(model: Model, directory: str | Path) -> list[Path]:

@@ -216,7 +216,7 @@ class Sil:
 
     def flash_set(self, name: str) -> Set:
         """The committed set of that name, as it lies in the library."""
-        return Set.in_dll(self._library, f"{self.model.name}_set_{name}")
+        return Set.in_dll(self._library, f"{self.model.owner}_set_{name}")
 
     def instance(self, set_name: str = "default", banks: bool = True) -> SilInstance:
         """A fresh, initialised instance."""
