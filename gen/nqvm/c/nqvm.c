@@ -383,7 +383,7 @@ static const pen_instance_t *nqvm_const_head(const nqvm_t *self)
     return (self != NULL) ? &self->head : NULL;
 }
 
-static bool nqvm_usable(const nqvm_t *self)
+PEN_PORT_INLINE bool nqvm_usable(const nqvm_t *self)
 {
     return (self != NULL) && (self->head.ready == NQVM_LAYOUT);
 }
@@ -411,9 +411,14 @@ static pen_status_t nqvm_finish(nqvm_t *self, pen_status_t status)
 
 pen_status_t nqvm_step(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (nqvm_usable(self) && (u != NULL) && (y != NULL)) {
+    if (!nqvm_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
         pen_real_t *const now = self->row[PEN_ROW_NOW];
         uint32_t slot;
         status = nqvm_begin(self, u, &slot);
@@ -424,10 +429,6 @@ pen_status_t nqvm_step(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y)
         status = nqvm_finish(self, status);
         y->z_b = self->row[PEN_ROW_LAST][4];
         y->z_w = self->row[PEN_ROW_LAST][5];
-    } else if (nqvm_usable(self)) {
-        pen_status_note_step(&self->head.log, status);
-    } else {
-        /* no instance to count in */
     }
     return status;
 }
@@ -444,9 +445,14 @@ static void nqvm_spread_x(nqvm_jacobian_t *j, pen_real_t d[NQVM_N_X][NQVM_N_COLU
 
 pen_status_t nqvm_step_jacobian(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y, nqvm_jacobian_t *j)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (nqvm_usable(self) && (u != NULL) && (y != NULL) && (j != NULL)) {
+    if (!nqvm_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL) || (j == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
         pen_real_t d[NQVM_N_X][NQVM_N_COLUMNS];
         pen_real_t yx[NQVM_N_Y][NQVM_N_X];
         pen_real_t yu[NQVM_N_Y][NQVM_N_DRIVE];
@@ -470,10 +476,6 @@ pen_status_t nqvm_step_jacobian(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y, nq
                 pen_step_copy(NQVM_N_U, yu[n], j->y_u[n]);
             }
         }
-    } else if (nqvm_usable(self)) {
-        pen_status_note_step(&self->head.log, status);
-    } else {
-        /* no instance to count in */
     }
     return status;
 }

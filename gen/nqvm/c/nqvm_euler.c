@@ -338,7 +338,7 @@ static const pen_instance_t *nqvm_euler_const_head(const nqvm_euler_t *self)
     return (self != NULL) ? &self->head : NULL;
 }
 
-static bool nqvm_euler_usable(const nqvm_euler_t *self)
+PEN_PORT_INLINE bool nqvm_euler_usable(const nqvm_euler_t *self)
 {
     return (self != NULL) && (self->head.ready == NQVM_EULER_LAYOUT);
 }
@@ -366,9 +366,14 @@ static pen_status_t nqvm_euler_finish(nqvm_euler_t *self, pen_status_t status)
 
 pen_status_t nqvm_euler_step(nqvm_euler_t *self, const nqvm_euler_u_t *u, nqvm_euler_y_t *y)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (nqvm_euler_usable(self) && (u != NULL) && (y != NULL)) {
+    if (!nqvm_euler_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
         pen_real_t *const now = self->row[PEN_ROW_NOW];
         uint32_t slot;
         status = nqvm_euler_begin(self, u, &slot);
@@ -379,10 +384,6 @@ pen_status_t nqvm_euler_step(nqvm_euler_t *self, const nqvm_euler_u_t *u, nqvm_e
         status = nqvm_euler_finish(self, status);
         y->z_b = self->row[PEN_ROW_LAST][4];
         y->z_w = self->row[PEN_ROW_LAST][5];
-    } else if (nqvm_euler_usable(self)) {
-        pen_status_note_step(&self->head.log, status);
-    } else {
-        /* no instance to count in */
     }
     return status;
 }
@@ -400,9 +401,14 @@ static void nqvm_euler_spread_x(nqvm_euler_jacobian_t *j, pen_real_t d[NQVM_EULE
 pen_status_t nqvm_euler_step_jacobian(nqvm_euler_t *self, const nqvm_euler_u_t *u, nqvm_euler_y_t *y,
     nqvm_euler_jacobian_t *j)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (nqvm_euler_usable(self) && (u != NULL) && (y != NULL) && (j != NULL)) {
+    if (!nqvm_euler_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL) || (j == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
         pen_real_t d[NQVM_EULER_N_X][NQVM_EULER_N_COLUMNS];
         pen_real_t yx[NQVM_EULER_N_Y][NQVM_EULER_N_X];
         pen_real_t yu[NQVM_EULER_N_Y][NQVM_EULER_N_DRIVE];
@@ -426,10 +432,6 @@ pen_status_t nqvm_euler_step_jacobian(nqvm_euler_t *self, const nqvm_euler_u_t *
                 pen_step_copy(NQVM_EULER_N_U, yu[n], j->y_u[n]);
             }
         }
-    } else if (nqvm_euler_usable(self)) {
-        pen_status_note_step(&self->head.log, status);
-    } else {
-        /* no instance to count in */
     }
     return status;
 }

@@ -367,7 +367,7 @@ static const pen_instance_t *nqvm_folded_const_head(const nqvm_folded_t *self)
     return (self != NULL) ? &self->head : NULL;
 }
 
-static bool nqvm_folded_usable(const nqvm_folded_t *self)
+PEN_PORT_INLINE bool nqvm_folded_usable(const nqvm_folded_t *self)
 {
     return (self != NULL) && (self->head.ready == NQVM_FOLDED_LAYOUT);
 }
@@ -395,9 +395,14 @@ static pen_status_t nqvm_folded_finish(nqvm_folded_t *self, pen_status_t status)
 
 pen_status_t nqvm_folded_step(nqvm_folded_t *self, const nqvm_folded_u_t *u, nqvm_folded_y_t *y)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (nqvm_folded_usable(self) && (u != NULL) && (y != NULL)) {
+    if (!nqvm_folded_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
         pen_real_t *const now = self->row[PEN_ROW_NOW];
         uint32_t slot;
         status = nqvm_folded_begin(self, u, &slot);
@@ -409,10 +414,6 @@ pen_status_t nqvm_folded_step(nqvm_folded_t *self, const nqvm_folded_u_t *u, nqv
         status = nqvm_folded_finish(self, status);
         y->z_b = self->row[PEN_ROW_LAST][4];
         y->z_w = self->row[PEN_ROW_LAST][5];
-    } else if (nqvm_folded_usable(self)) {
-        pen_status_note_step(&self->head.log, status);
-    } else {
-        /* no instance to count in */
     }
     return status;
 }
@@ -430,9 +431,14 @@ static void nqvm_folded_spread_x(nqvm_folded_jacobian_t *j, pen_real_t d[NQVM_FO
 pen_status_t nqvm_folded_step_jacobian(nqvm_folded_t *self, const nqvm_folded_u_t *u, nqvm_folded_y_t *y,
     nqvm_folded_jacobian_t *j)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (nqvm_folded_usable(self) && (u != NULL) && (y != NULL) && (j != NULL)) {
+    if (!nqvm_folded_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL) || (j == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
         pen_real_t d[NQVM_FOLDED_N_X][NQVM_FOLDED_N_COLUMNS];
         pen_real_t yx[NQVM_FOLDED_N_Y][NQVM_FOLDED_N_X];
         pen_real_t yu[NQVM_FOLDED_N_Y][NQVM_FOLDED_N_DRIVE];
@@ -456,10 +462,6 @@ pen_status_t nqvm_folded_step_jacobian(nqvm_folded_t *self, const nqvm_folded_u_
                 pen_step_copy(NQVM_FOLDED_N_U, yu[n], j->y_u[n]);
             }
         }
-    } else if (nqvm_folded_usable(self)) {
-        pen_status_note_step(&self->head.log, status);
-    } else {
-        /* no instance to count in */
     }
     return status;
 }
