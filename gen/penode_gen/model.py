@@ -111,6 +111,7 @@ class Signal:
     unit: str
     noise: float = 0.0
     description: str = ""
+    trial_bound: float | None = None  # how far a new set may lead it from the running one in its trial, SI
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ _SECTIONS: dict[str, dict[str, type | tuple[type, ...]]] = {
     "states": {"unit": str, "start": (int, float), "description": str},
     "variables": {"unit": str},
     "networks": {"inputs": list, "output": str, "description": str},
-    "outputs": {"value": str, "unit": str, "description": str},
+    "outputs": {"value": str, "unit": str, "trial_bound": (int, float), "description": str},
     "sensors": {"value": str, "unit": str, "noise": (int, float), "description": str},
 }
 _REQUIRED = {
@@ -63,7 +63,7 @@ _REQUIRED = {
 }
 _MACROS = (  # that each generated model defines, behind its name
     "N_X N_U N_Y N_SENSORS N_LAST N_DRIVE N_COLUMNS N_KEPT N_Q N_W SAMPLE_TIME SUBSTEPS STEP IMPLICIT_STEP AT_FIRST AT_SECOND AT_THIRD "
-    "LAYOUT SET_LENGTH SCRUB VERIFY SAVED PIECES H SETS_H".split()
+    "LAYOUT SET_LENGTH SCRUB VERIFY SAVED PIECES TRIAL TRIAL_ROOM H SETS_H".split()
 )
 ROOM = 4096  # pieces of a folded network, at most
 _MODEL = {
@@ -536,7 +536,10 @@ class _Reader:
         for name, entry in self.section(section).items():
             scale = self.unit((section, name), entry.get("unit"))
             noise = self.noise((section, name), entry, scale)
-            yield m.Signal(name, entry.get("value", ""), entry.get("unit", _UNKNOWN), noise, entry.get("description", ""))
+            bound = self.number((section, name, "trial_bound"), entry["trial_bound"], scale) if "trial_bound" in entry else None
+            if bound is not None and not bound > 0.0:
+                self.problem((section, name, "trial_bound"), f"{_show(entry['trial_bound'])} is no distance", "give how far a new set may lead from the running one, above 0")
+            yield m.Signal(name, entry.get("value", ""), entry.get("unit", _UNKNOWN), noise, entry.get("description", ""), bound)
 
     def folds(self, head: dict[str, Any], sets: dict[str, m.ParameterSet]) -> None:
         """Check that there is something to fold, and room for it."""

@@ -396,8 +396,8 @@ static pen_status_t nqvm_begin(nqvm_t *self, const nqvm_u_t *u, uint32_t *slot)
 
     u1[0] = u->z_road;
     status |= pen_step_range(u1[0], (pen_real_t)-0.3, (pen_real_t)0.3, PEN_INPUT_RANGE);
-    status |= pen_step_scrub(&self->head, NQVM_SCRUB, NQVM_SET_LENGTH, self->head.tuning.slot[*slot].value,
-                             0U, 1U, NULL);
+    status |= pen_step_scrub(&self->head, NQVM_SCRUB, NQVM_SET_LENGTH, self->head.tuning.slot[*slot].value, 0U, 1U,
+        NULL);
     status |= pen_step_check(NQVM_N_U, u1, PEN_INPUT_NONFINITE);
     status |= pen_step_check(NQVM_N_LAST, self->row[PEN_ROW_LAST], PEN_STATE_NONFINITE);
     return status;
@@ -406,7 +406,7 @@ static pen_status_t nqvm_begin(nqvm_t *self, const nqvm_u_t *u, uint32_t *slot)
 static pen_status_t nqvm_finish(nqvm_t *self, pen_status_t status)
 {
     return pen_step_finish(&self->head, NQVM_N_LAST, &self->row[0][0], NQVM_N_DRIVE, &self->u[0][0], 1U,
-                           PEN_INPUT_NONFINITE, status);
+        PEN_INPUT_NONFINITE, status);
 }
 
 pen_status_t nqvm_step(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y)
@@ -592,8 +592,8 @@ static pen_status_t nqvm_publish(nqvm_t *self, const pen_set_t *ready, pen_statu
 
 pen_status_t nqvm_init(nqvm_t *self, const pen_set_t *set, nqvm_banks_t *banks)
 {
-    pen_status_t status = pen_init(&nqvm_model, (self == NULL) ? NULL : &self->head, set,
-                                   (banks == NULL) ? NULL : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
+    pen_status_t status = pen_init(&nqvm_model, nqvm_head(self), set, (banks == NULL) ? NULL : banks->value[0],
+        (banks == NULL) ? NULL : banks->value[1]);
 
     if (status == PEN_OK) {
         static const pen_real_t start[NQVM_N_LAST] = { 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F };

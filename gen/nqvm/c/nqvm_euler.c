@@ -352,7 +352,7 @@ static pen_status_t nqvm_euler_begin(nqvm_euler_t *self, const nqvm_euler_u_t *u
     u1[0] = u->z_road;
     status |= pen_step_range(u1[0], (pen_real_t)-0.3, (pen_real_t)0.3, PEN_INPUT_RANGE);
     status |= pen_step_scrub(&self->head, NQVM_EULER_SCRUB, NQVM_EULER_SET_LENGTH, self->head.tuning.slot[*slot].value,
-                             0U, 1U, NULL);
+        0U, 1U, NULL);
     status |= pen_step_check(NQVM_EULER_N_U, u1, PEN_INPUT_NONFINITE);
     status |= pen_step_check(NQVM_EULER_N_LAST, self->row[PEN_ROW_LAST], PEN_STATE_NONFINITE);
     return status;
@@ -361,7 +361,7 @@ static pen_status_t nqvm_euler_begin(nqvm_euler_t *self, const nqvm_euler_u_t *u
 static pen_status_t nqvm_euler_finish(nqvm_euler_t *self, pen_status_t status)
 {
     return pen_step_finish(&self->head, NQVM_EULER_N_LAST, &self->row[0][0], NQVM_EULER_N_DRIVE, &self->u[0][0], 1U,
-                           PEN_INPUT_NONFINITE, status);
+        PEN_INPUT_NONFINITE, status);
 }
 
 pen_status_t nqvm_euler_step(nqvm_euler_t *self, const nqvm_euler_u_t *u, nqvm_euler_y_t *y)
@@ -548,8 +548,8 @@ static pen_status_t nqvm_euler_publish(nqvm_euler_t *self, const pen_set_t *read
 
 pen_status_t nqvm_euler_init(nqvm_euler_t *self, const pen_set_t *set, nqvm_euler_banks_t *banks)
 {
-    pen_status_t status = pen_init(&nqvm_euler_model, (self == NULL) ? NULL : &self->head, set,
-                                   (banks == NULL) ? NULL : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
+    pen_status_t status = pen_init(&nqvm_euler_model, nqvm_euler_head(self), set, (banks == NULL) ? NULL
+        : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
 
     if (status == PEN_OK) {
         static const pen_real_t start[NQVM_EULER_N_LAST] = { 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F };

@@ -380,8 +380,7 @@ static pen_status_t nqvm_folded_begin(nqvm_folded_t *self, const nqvm_folded_u_t
 
     u1[0] = u->z_road;
     status |= pen_step_range(u1[0], (pen_real_t)-0.3, (pen_real_t)0.3, PEN_INPUT_RANGE);
-    status |= pen_step_scrub(&self->head, NQVM_FOLDED_SCRUB, 0U, NULL,
-                             2U, NQVM_FOLDED_PIECES, self->piece[*slot]);
+    status |= pen_step_scrub(&self->head, NQVM_FOLDED_SCRUB, 0U, NULL, 2U, NQVM_FOLDED_PIECES, self->piece[*slot]);
     status |= pen_step_check(NQVM_FOLDED_N_U, u1, PEN_INPUT_NONFINITE);
     status |= pen_step_check(NQVM_FOLDED_N_LAST, self->row[PEN_ROW_LAST], PEN_STATE_NONFINITE);
     return status;
@@ -390,7 +389,7 @@ static pen_status_t nqvm_folded_begin(nqvm_folded_t *self, const nqvm_folded_u_t
 static pen_status_t nqvm_folded_finish(nqvm_folded_t *self, pen_status_t status)
 {
     return pen_step_finish(&self->head, NQVM_FOLDED_N_LAST, &self->row[0][0], NQVM_FOLDED_N_DRIVE, &self->u[0][0], 1U,
-                           PEN_INPUT_NONFINITE, status);
+        PEN_INPUT_NONFINITE, status);
 }
 
 pen_status_t nqvm_folded_step(nqvm_folded_t *self, const nqvm_folded_u_t *u, nqvm_folded_y_t *y)
@@ -591,8 +590,8 @@ static pen_status_t nqvm_folded_publish(nqvm_folded_t *self, const pen_set_t *re
 
 pen_status_t nqvm_folded_init(nqvm_folded_t *self, const pen_set_t *set, nqvm_folded_banks_t *banks)
 {
-    pen_status_t status = pen_init(&nqvm_folded_model, (self == NULL) ? NULL : &self->head, set,
-                                   (banks == NULL) ? NULL : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
+    pen_status_t status = pen_init(&nqvm_folded_model, nqvm_folded_head(self), set, (banks == NULL) ? NULL
+        : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
 
     if (status == PEN_OK) {
         status = nqvm_folded_fold(set->value, self->piece[0]);
