@@ -216,13 +216,14 @@ static cell_t look(const network_t *network, pen_real_t x, pen_real_t way)
     return cell;
 }
 
-/* Where the cell ends: before its length, rounding included; at the edge; at the largest number if nothing ends it. */
+/* Where the cell ends: before its length, rounding included; at the edge if nothing ends it before. */
 static pen_real_t end_of(const cell_t *cell, pen_real_t edge)
 {
     const pen_real_t step = (cell->length * DOWN) - (PEN_REAL_EPSILON * pen_port_abs(cell->x));
     const pen_real_t next = cell->x + (cell->way * step);
+    const bool ends = (cell->length < PEN_REAL_MAX) && ((cell->way * next) < (cell->way * edge));
 
-    return ((cell->way * next) < (cell->way * edge)) ? next : edge;
+    return ends ? next : edge;
 }
 
 /* Which promises about slopes may be broken on the cell. */
@@ -238,31 +239,44 @@ static uint32_t steep(const pen_promise_t *promise, const cell_t *cell)
     return broken;
 }
 
-/* May the force be above its limit on the cell? The far end of a straight one is the start of the next. */
-static uint32_t strong(const pen_promise_t *promise, const cell_t *cell, pen_real_t distance, bool endless)
+/*
+ * How far the network may be from the straight line between the ends of a cell, rounded up: its slopes are within spread of
+ * their middle, so it is off the line by 2 spread times the distance to the nearer end at most.
+ */
+static pen_real_t bulge_of(const cell_t *cell, pen_real_t distance)
 {
-    const pen_real_t most = pen_port_abs(cell->slope) + cell->spread;
-    const pen_real_t more = cell->straight ? ZERO : (most * distance);
-    const bool bounded = (((pen_port_abs(cell->value) + cell->error + more) * UP) <= promise->max_force);
-    const bool ends = !endless || (most <= ZERO);
-
-    return (bounded && ends) ? 0U : PEN_PROMISE_MAX_FORCE;
+    return cell->straight ? ZERO : (UP * (cell->spread * distance));
 }
 
-/* May the force push along? *low: below way * F(x); below that of the end of the cell afterwards. */
-static uint32_t driving(const pen_promise_t *promise, const cell_t *cell, pen_real_t distance, bool endless, pen_real_t *low)
+/* Is a force within its limit at x, and on the cells before and behind? An error is 0 or above EPS |value|, so twice the
+ * error covers the rounding of adding it, too. */
+static bool weak(const pen_promise_t *promise, const cell_t *cell, pen_real_t bulge)
 {
-    const pen_real_t size = pen_port_abs(cell->value) + cell->error;
-    const pen_real_t least = ((cell->way * cell->value) - cell->error) - ((TWO * PEN_REAL_EPSILON) * size);
+    const pen_real_t most = pen_port_abs(cell->value) + (TWO * cell->error) + bulge;
+
+    return (((bulge > ZERO) ? (UP * most) : most) <= promise->max_force);
+}
+
+/* May the force push along at x or behind? *low: below way * F(x); below that of the end of the cell afterwards; *bulge that
+ * of the cell before, then of this one, where it counts. */
+static uint32_t driving(const pen_promise_t *promise, const cell_t *cell, pen_real_t distance, bool endless, pen_real_t *low,
+                        pen_real_t *bulge)
+{
+    const pen_real_t least = (cell->way * cell->value) - (TWO * cell->error);
     const pen_real_t here = (least > *low) ? least : *low;
     const pen_real_t rate = (cell->slope - cell->spread) - ((TWO * PEN_REAL_EPSILON) * (pen_port_abs(cell->slope) + cell->spread));
     const pen_real_t product = rate * distance;
     const pen_real_t gain = (product - ((FOUR * PEN_REAL_EPSILON) * pen_port_abs(product))) - ((rate < ZERO) ? TINY : ZERO);
     const pen_real_t there = (here + gain) - ((TWO * PEN_REAL_EPSILON) * (pen_port_abs(here) + pen_port_abs(gain)));
-    const bool ends = endless ? (rate >= ZERO) : (cell->straight || (there >= -promise->band));
+    const bool above = (rate >= ZERO) || (!endless && (there >= -promise->band)); /* all along the cell */
+    const pen_real_t ahead = above ? ZERO : bulge_of(cell, distance);
+    const pen_real_t largest = (ahead > *bulge) ? ahead : *bulge;
+    const pen_real_t reserve = (largest > ZERO) ? (UP * (largest + (PEN_REAL_EPSILON * pen_port_abs(here)))) : ZERO;
+    const bool kept = ((here - reserve) >= -promise->band) && ((rate >= ZERO) || !endless);
 
     *low = there;
-    return (ends && (here >= -promise->band)) ? 0U : PEN_PROMISE_DISSIPATIVE;
+    *bulge = ahead;
+    return kept ? 0U : PEN_PROMISE_DISSIPATIVE;
 }
 
 /* One side of the start, cell by cell. *looks counts down. Which promises may be broken, and *at which place? */
@@ -271,6 +285,8 @@ static uint32_t travel(const network_t *network, const pen_promise_t *promise, p
 {
     pen_real_t x = start;
     pen_real_t low = -PEN_REAL_MAX;
+    pen_real_t pushing = ZERO; /* bulge of the cell before, for each of two promises */
+    pen_real_t before = ZERO;
     uint32_t broken = 0U;
     bool more = true;
 
@@ -280,11 +296,16 @@ static uint32_t travel(const network_t *network, const pen_promise_t *promise, p
         const pen_real_t distance = pen_port_abs(next - x);
         const bool endless = (pen_port_abs(next) >= PEN_REAL_MAX);
         const bool at_edge = !(distance > ZERO); /* from here on constant */
-        const uint32_t slopes = at_edge ? 0U : steep(promise, &cell);
+        const bool flat = ((pen_port_abs(cell.slope) + cell.spread) <= ZERO);
+        const pen_real_t ahead = bulge_of(&cell, endless ? ZERO : distance);
+        const bool bounded = weak(promise, &cell, (ahead > before) ? ahead : before) && (flat || !endless);
 
-        broken = slopes | strong(promise, &cell, distance, endless) | driving(promise, &cell, distance, endless, &low);
+        broken = bounded ? 0U : PEN_PROMISE_MAX_FORCE;
+        broken |= driving(promise, &cell, distance, endless, &low, &pushing);
+        broken |= at_edge ? 0U : steep(promise, &cell);
         broken &= promise->kinds;
         *at = x;
+        before = ahead;
         more = !endless && !at_edge;
         (*looks)--;
         x = next;
