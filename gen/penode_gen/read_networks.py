@@ -12,7 +12,7 @@ import numpy as np
 
 from . import expressions as ex
 from . import model as m
-from . import units
+from . import promises, units
 from .fold import foldable, pieces, room
 from .networks import Network, NetworkError, read_network
 from .read_places import show
@@ -43,7 +43,9 @@ class NetworkTables(Tables):
             for unit in (*inputs, entry.get("output")):
                 if self.unit(where, unit) != 1.0:
                     self.problem(where, f"a network in {unit}: networks take and give SI values", f"declare {units.si(unit)}, and scale in the network")
-            yield name, m.NetworkPort(name, tuple(inputs), entry.get("output", UNKNOWN), entry.get("description", ""))
+            output = entry.get("output", UNKNOWN)
+            made = m.Promises() if name in self.unsure or output == UNKNOWN else promises.read(where, entry, inputs, output, self.problem)
+            yield name, m.NetworkPort(name, tuple(inputs), output, entry.get("description", ""), made)
 
     def folds(self, head: dict[str, Any], sets: dict[str, m.ParameterSet]) -> None:
         """Check that there is something to fold, and room for it."""

@@ -13,7 +13,7 @@ from typing import Any, Iterable
 
 from . import expressions as ex
 from . import model as m
-from . import units
+from . import promises, units
 from .read_places import Lines, merge, one_line, parse, show
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -34,7 +34,7 @@ SECTIONS: dict[str, dict[str, type | tuple[type, ...]]] = {
     "bodies": {"mass": str, "position": str, "velocity": str, "start_position": str, "start_velocity": str},
     "states": {"unit": str, "start": (int, float), "description": str},
     "variables": {"unit": str},
-    "networks": {"inputs": list, "output": str, "description": str},
+    "networks": {"inputs": list, "output": str, "description": str} | promises.KEYS,
     "outputs": {"value": str, "unit": str, "description": str},
     "sensors": {"value": str, "unit": str, "noise": (int, float), "description": str},
 }
@@ -91,7 +91,7 @@ class Tables:
             if key not in allowed:
                 near = difflib.get_close_matches(key, allowed, 1)
                 self.problem((*where, key), "unknown key", f"did you mean '{near[0]}'?" if near else f"known are {', '.join(allowed)}")
-            elif not isinstance(value, allowed[key]) or (isinstance(value, bool) and allowed[key] is not bool):
+            elif not isinstance(value, allowed[key]) or (isinstance(value, bool) and allowed[key] not in (bool, (bool, str))):
                 self.problem((*where, key), f"{show(value)} has the wrong type", f"give {_type_name(allowed[key])}")
             else:
                 good[key] = value
@@ -186,6 +186,6 @@ def same(a: str, b: str) -> bool:
 
 def _type_name(kind: Any) -> str:
     names = {str: "a text", bool: "true or false", list: "a list", dict: "a table", int: "a whole number"}
-    if kind == (int, float):
-        return "a number"
+    if kind in ((int, float), (bool, str)):
+        return "a number" if kind == (int, float) else "true, false or a text"
     return names.get(kind, "a text or a table")

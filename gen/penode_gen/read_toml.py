@@ -12,6 +12,7 @@ from typing import Any, Iterable
 
 from . import expressions as ex
 from . import model as m
+from . import promises
 from .causalise import check
 from .fold import room
 from .laws import LAWS
@@ -88,6 +89,7 @@ class _Reader(NetworkTables):
         sensors = tuple(self.signals("sensors"))
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
         self.folds(head, sets)
+        promises.check(networks, sets, head["outside"], self.problem)
         self.unique(parameters, inputs, bodies, elements, states, variables, networks)
         moving = {*(s.name for s in states), *(b.position for b in bodies), *(b.velocity for b in bodies)}
         self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs))

@@ -71,10 +71,11 @@ typedef struct {
  * @param capacity  of piece[]
  * @param piece     the pieces that the step uses, NULL if it evaluates the layers: for PEN_PROMISE_ZERO_AT_ZERO
  * @param work      [8 * chain->width]
+ * @param active    [chain->neurons]
  * @param breach    kind and at are written when the result is false
  * @return true if every promise is kept
  */
 bool pen_promise_kept(const pen_promise_t *promise, const pen_chain_t *chain, const pen_real_t p[], bool clamp, size_t capacity,
-                      const pen_piece_t piece[], pen_real_t work[], pen_breach_t *breach);
+                      const pen_piece_t piece[], pen_real_t work[], bool active[], pen_breach_t *breach);
 
 #endif

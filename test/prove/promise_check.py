@@ -21,30 +21,36 @@ import promise_nets
 from promise_reference import ZERO_AT_ZERO, Line, Margins, Net, Promise, zero_bits
 
 WORK = gate.BUILD / "promise"
-SOURCE = gate.ROOT / "src" / "pen_promise.c"
+SOURCES = ("pen_promise", "pen_cell", "pen_net", "pen_math")
 KINDS = {0x1: "increasing", 0x2: "decreasing", 0x4: "dissipative", 0x8: "max_slope", 0x10: "max_force", 0x20: "zero_at_zero"}
 LOOKS = 2000
 LAYERS = {"dense": 0, "relu": 1, "centre": 2, "rescale": 3}
 
-# Faults of pen_promise.c: see gate.faulty.
+# Faults: file, and the change of gate.faulty.
 FAULTS = {
-    "no rounding errors": ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "ZERO"),
-    "a promise is not looked at": ("broken |= bounded ? 0U : PEN_PROMISE_MAX_SLOPE;", 0, ""),
-    "the outer pieces count as inner ones": ("const bool endless = (pen_port_abs(next) >= PEN_REAL_MAX);", 0, "const bool endless = (pen_port_abs(next) >= PEN_REAL_MAX);\n        if (endless) {\n            break;\n        }"),
-    "undecided neurons are off": ("const pen_real_t most = (high > ZERO) ? high : ZERO;", 0, "const pen_real_t most = ZERO;"),
-    "one side only": ("broken = travel(&network, promise, start, -ONE, lowest, &looks, &at);", 0, "broken = 0U;"),
-    "a cell goes on past the kink": ("reach = (closing > ZERO) ? ((size - error) / closing)", 0, "reach = (closing > ZERO) ? (FOUR * ((size - error) / closing))"),
-    "the margin is doubled": ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "(FOUR * PEN_REAL_EPSILON)"),
+    "no rounding errors": ("pen_cell", ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "ZERO")),
+    "the margin is eight times as wide": ("pen_cell", ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "(FOUR * PEN_REAL_EPSILON)")),
+    "a promise is not looked at": ("pen_promise", ("broken |= bounded ? 0U : PEN_PROMISE_MAX_SLOPE;", 0, "(void)bounded;")),
+    "the outer pieces are not looked at": ("pen_promise", ("broken |= at_edge ? 0U :", 0, "broken |= (at_edge || endless) ? 0U :")),
+    "one side only": ("pen_promise", ("broken = travel(&line, promise, start, -ONE, lowest, &looks, &at);", 0, "broken = 0U;")),
+    "undecided neurons are off": ("pen_cell", ("(((pattern >> i) & 1U) != 0U)", 0, "false")),
+    "undecided neurons are on or off at once": ("pen_cell", ("pattern < ((uint32_t)1U << cell->open)", 0, "pattern < 1U")),
+    "many undecided neurons are off": ("pen_cell", ("const pen_real_t most = (high > ZERO) ? high : ZERO;", 0, "const pen_real_t most = ZERO;")),
+    "a cell goes on past the kink": ("pen_cell", ("? ((size - error) / closing)", 0, "? (FOUR * ((size - error) / closing))")),
 }  # fmt: skip
 
 
-def library(real: type, source: Path = SOURCE) -> Path:
-    """The promise check with the kernels it calls, as a shared library."""
-    target = WORK / f"{source.stem}-{real.__name__}.so"
-    target.parent.mkdir(parents=True, exist_ok=True)
-    others = [gate.ROOT / "src" / f"{name}.c" for name in ("pen_net", "pen_math", "pen_fold")]
-    double = ["-DPEN_REAL_DOUBLE"] if real is np.float64 else []
-    gate.make(["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", *double, f"-I{gate.ROOT}/inc", f"-I{gate.ROOT}/port/gnu", "-o", target, source, *others])
+def library(real: type, name: str = "right", fault: str = "", changed: tuple[str, int, str] = ("", 0, "")) -> Path:
+    """The promise check with the kernels it calls, as a shared library; with a change in one file."""
+    WORK.mkdir(parents=True, exist_ok=True)
+    sources = [gate.ROOT / "src" / f"{source}.c" for source in SOURCES]
+    if fault:
+        copy = WORK / f"{name}.c"
+        copy.write_text(gate.faulty((gate.ROOT / "src" / f"{fault}.c").read_text(), changed))
+        sources = [copy if source.stem == fault else source for source in sources]
+    target = WORK / f"{name}-{real.__name__}.so"
+    options = ["-DPEN_REAL_DOUBLE"] if real is np.float64 else []
+    gate.make(["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", *options, f"-I{gate.ROOT}/inc", f"-I{gate.ROOT}/port/gnu", "-o", target, *sources])
     return target
 
 
@@ -78,6 +84,7 @@ class Checker:
         self.chain = Chain(ctypes.addressof(self.layers), len(net.layers), width, neurons)
         self.values = np.concatenate([np.array([net.low, net.high]), *(_stream(layer) for layer in net.layers)]).astype(self.real)
         self.work = np.full(8 * width, np.nan, self.real)
+        self.active = np.zeros(max(1, neurons), np.uint8)
         self.clamp = net.clamp
 
     def keeps(self, promise: Promise) -> tuple[bool, int, float]:
@@ -85,7 +92,7 @@ class Checker:
         made = self.made(promise.kind, LOOKS, *(3 * [promise.limit]))
         kept = self.function(
             ctypes.byref(made), ctypes.byref(self.chain), ctypes.c_void_p(self.values.ctypes.data), ctypes.c_bool(self.clamp), ctypes.c_size_t(0), None,
-            ctypes.c_void_p(self.work.ctypes.data), ctypes.byref(breach)
+            ctypes.c_void_p(self.work.ctypes.data), ctypes.c_void_p(self.active.ctypes.data), ctypes.byref(breach)
         )  # fmt: skip
         return kept, breach.kind, breach.at
 
@@ -150,6 +157,7 @@ def main() -> int:
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     options.add_argument("--as", dest="key", default="promise", help="key in figures.json; none: not kept")
+    options.add_argument("--no-faults", action="store_true", help="only the networks, no faults in the C")
     given = options.parse_args()
     paths = {real: library(real) for real in (np.float32, np.float64)}
     parts = max(given.jobs, given.bad // 1000)
@@ -161,11 +169,11 @@ def main() -> int:
             total.wrong += done.wrong
     good = gate.report(f"promise: 0 of {total.bad} sets that break a promise accepted, 0 of {total.good} that keep it by more than the margin refused", total.wrong[:10])
     print("    " + ", ".join(f"{n} {what}" for what, n in sorted(total.kinds.items())) + f"; between, accepted {total.between[True]}, refused {total.between[False]}")
+    if given.no_faults:
+        return int(not good)
     missed = []
-    for k, (fault, change) in enumerate(FAULTS.items()):
-        copy = WORK / f"fault{k}.c"
-        copy.write_text(gate.faulty(SOURCE.read_text(), change))
-        wrong = trial(given.seed, 3000, 600, {real: library(real, copy) for real in paths}, first=True).wrong
+    for k, (fault, (file, change)) in enumerate(FAULTS.items()):
+        wrong = trial(given.seed, 6000, 1200, {real: library(real, f"fault{k}", file, change) for real in paths}, first=True).wrong
         missed += [] if wrong else [f"not found: {fault}"]
     good &= gate.report(f"promise: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults found", missed)
     if given.key != "none":

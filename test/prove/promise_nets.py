@@ -56,7 +56,7 @@ def net(draw: np.random.Generator) -> Net:
     low, high = np.sort(draw.uniform(-3.0, 3.0, 2)) if draw.random() < 0.7 else (-draw.uniform(0.1, 3.0), draw.uniform(0.1, 3.0))
     sizes = [1, *draw.integers(1, 6, draw.integers(1, 3)), 1]
     layers = _plain(draw, sizes)
-    kind, scaled = draw.integers(0, 11), False
+    kind, scaled = draw.integers(0, 12), False
     if kind == 1:  # scaled input and output
         scaled = True
     elif kind == 2:  # kinks a few numbers apart, large slopes that cancel; a whole bundle of them sometimes
@@ -99,6 +99,12 @@ def net(draw: np.random.Generator) -> Net:
     elif kind == 10:  # far from 1: subnormal results, and values next to what overflows
         power = draw.integers(-60, 40)
         layers = [(w * 2.0**power, b * 2.0**power) for w, b in layers]
+    elif kind == 11:  # more kinks next to each other than patterns are gone through, up and down against a slope
+        n, steep = draw.integers(5, 9), 10.0 ** draw.uniform(-1.0, 2.0)
+        at = 1.0 + eps * np.cumsum(draw.integers(0, 5, n)) * draw.choice([1.0, 4.0, 1e3])
+        up = steep * (-1.0) ** np.arange(n) * (1.0 + 1e-3 * draw.random(n))
+        back = 0.3 * steep * draw.choice([-1.0, 1.0])
+        layers = [(np.append(np.ones(n), [1.0, -1.0])[:, None], np.append(-at, [0.0, 0.0])), (np.append(up, [back, -back])[None, :], np.zeros(1))]
     return _net(draw, layers, scaled, real, clamp, low, high)
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 
@@ -156,23 +157,27 @@ class Hull:
     At x: value, its margin `error`, the least and the most slope that must keep a promise there, as the header has it.
 
     C = (inputs + 10) EPS for each layer. A neuron counts as one that may switch if its value is below 6 of its errors, or
-    it switches within 8 EPS |x|. `number` is float where that is exact enough beside the margins, or Fraction.
+    it switches within 8 EPS |x|; up to OPEN of them are put on and off in every combination. `number` is float where that is exact enough beside the margins, or Fraction. What is
+    exactly 0 at x has no error; with `around` only if it is so next to x, too.
     """
 
-    def __init__(self, net: Net, x, number: type = Fraction):
+    OPEN = 4
+
+    def __init__(self, net: Net, x, number: type = Fraction, around: bool = True):
         eps, zero = number(float(np.finfo(net.real).eps)), number(0)
         tiny = number(float(np.finfo(net.real).smallest_subnormal)) * 64  # where results are subnormal, they have no relative error
         near = 8 * eps * abs(number(x)) + 4 * number(float(np.finfo(net.real).tiny))
         h, e, t, r = [number(x)], [zero], [number(1)], [zero]
+        states: list[list[bool | None]] = []  # None: may switch
         for layer in net.layers:
             if layer.kind in ("centre", "rescale"):
                 c = 12 * eps
                 for i, (p, q) in enumerate(zip(map(number, layer.weights[0]), map(number, layer.bias))):
                     if layer.kind == "centre":
-                        still, size, factor = h[i] == p and e[i] == 0, abs((h[i] - p) * q), q
+                        still, size, factor = h[i] == p and e[i] == 0 and not (around and t[i]), abs((h[i] - p) * q), q
                         h[i] = (h[i] - p) * q
                     else:
-                        still, size, factor = h[i] == 0 and e[i] == 0, abs(h[i] * p) + abs(q), p
+                        still, size, factor = h[i] == 0 and e[i] == 0 and not (around and t[i]), abs(h[i] * p) + abs(q), p
                         h[i] = h[i] * p + q
                     flat = t[i] == 0 and r[i] == 0
                     e[i] = zero if still else abs(factor) * e[i] + c * size + tiny
@@ -180,7 +185,8 @@ class Hull:
                     r[i] = zero if flat else abs(factor) * r[i] + c * abs(t[i]) + tiny
                 continue
             c = (layer.n_in + 10) * eps
-            still, flat = not any(h) and not any(e), not any(t) and not any(r)
+            flat = not any(t) and not any(r)
+            still = not any(h) and not any(e) and (flat or not around)
             burden = [ej + c * abs(hj) + tiny for ej, hj in zip(e, h)]
             sway = [rj + c * abs(tj) + tiny for rj, tj in zip(r, t)]
             W = [[number(w) for w in row] for row in layer.weights]
@@ -191,14 +197,42 @@ class Hull:
             r = [zero if flat else sum(abs(w) * g for w, g in zip(row, sway)) + tiny for row in W]
             h, t = y, s
             if layer.kind == "relu":
+                states.append([])
                 for i, (v, slope) in enumerate(zip(y, s)):
-                    if abs(v) <= max(6 * e[i], near * (abs(slope) + r[i])) and (e[i] > 0 or v != 0 or slope != 0 or r[i] != 0):
+                    open_ = abs(v) <= max(6 * e[i], near * (abs(slope) + r[i])) and (e[i] > 0 or v != 0 or slope != 0 or r[i] != 0)
+                    states[-1].append(None if open_ else v > 0)
+                    if open_:
                         low, high = min(zero, slope - r[i]), max(zero, slope + r[i])
                         t[i], r[i] = (low + high) / 2, (high - low) / 2
                         h[i] = max(v, zero)
                     elif v <= 0:
                         h[i] = e[i] = t[i] = r[i] = zero
         self.value, self.error, self.least, self.most = h[0], e[0], t[0] - r[0], t[0] + r[0]
+        count = sum(state is None for row in states for state in row)
+        if 0 < count <= self.OPEN:
+            ways = [self._along(net, states, choice, number, eps, tiny) for choice in product((False, True), repeat=count)]
+            self.least, self.most = min(t - r for t, r in ways), max(t + r for t, r in ways)
+
+    @staticmethod
+    def _along(net: Net, states, choice, number, eps, tiny):
+        """Slope and its margin with the neurons that may switch on or off as chosen."""
+        chosen, rows, zero = iter(choice), iter(states), number(0)
+        t, r = [number(1)], [zero]
+        for layer in net.layers:
+            if layer.kind in ("centre", "rescale"):
+                factors = [number(v) for v in (layer.bias if layer.kind == "centre" else layer.weights[0])]
+                r = [zero if ti == 0 and ri == 0 else abs(f) * ri + 12 * eps * abs(ti * f) + tiny for f, ti, ri in zip(factors, t, r)]
+                t = [f * ti for f, ti in zip(factors, t)]
+                continue
+            flat, c = not any(t) and not any(r), (layer.n_in + 10) * eps
+            sway = [rj + c * abs(tj) + tiny for rj, tj in zip(r, t)]
+            W = [[number(w) for w in row] for row in layer.weights]
+            r = [zero if flat else sum(abs(w) * g for w, g in zip(row, sway)) + tiny for row in W]
+            t = [sum(w * tj for w, tj in zip(row, t)) for row in W]
+            if layer.kind == "relu":
+                on = [next(chosen) if state is None else state for state in next(rows)]
+                t, r = [ti if o else zero for ti, o in zip(t, on)], [ri if o else zero for ri, o in zip(r, on)]
+        return t[0], r[0]
 
 
 class Margins:
@@ -209,6 +243,7 @@ class Margins:
     def __init__(self, net: Net, line: Line, number: type):
         places, clamp = line.places, net.clamp
         self.start = min(places, key=abs)
+        self.error = Hull(net, self.start, number, around=False).error
         middle = [(a + b) / 2 for a, b in zip(places, places[1:])]
         size = abs(places[0]) + abs(places[-1]) + 1
         self.outer = () if clamp else (Hull(net, places[0] - size, number), Hull(net, places[-1] + size, number))
@@ -233,7 +268,7 @@ class Margins:
             for x, h in self.seen[::way]:
                 if way * (x - self.start) < 0:
                     continue
-                if x == self.start and abs(h.value) + self.FORCE * h.error > limit:
+                if x == self.start and abs(h.value) + self.FORCE * self.error > limit:
                     return False
                 rising = rising and h.least >= 0
                 if not rising and way * h.value - self.FORCE * h.error < -limit:
