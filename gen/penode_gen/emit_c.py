@@ -9,7 +9,7 @@ import jinja2
 import sympy as sp
 
 from . import expressions as ex
-from . import layout, sets, units
+from . import layout, promises, sets, units
 from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
 from .emit_networks import NetworkCode, by_value, hidden16, network_code, network_lines, second_lines, slope_lines
@@ -126,7 +126,7 @@ class _Emitter:
             "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
             "uses_net16": any(hidden16(list(c.network.layers[i:])) for c in self.networks for i in range(len(c.network.layers))),
-            "folded": folded,
+            "folded": folded, "prepared": self._prepared(), "promised": any(port.promises for port in model.networks.values()),
             "uses_p": uses_p, "uses_f": uses_f, "reads_set": reads_set,
             "sample_time": real(model.sample_time), "real": real, "si": units.si,
             "columns": len(model.states) + (2 + self.curved + self.cubic) * len(model.inputs),
@@ -301,6 +301,17 @@ class _Emitter:
         return lines
 
     # -- guard ----------------------------------------------------------------------------------------------------
+
+    def _prepared(self) -> list[dict[str, Any]]:
+        """The networks that are folded, or of which something is promised, as initialisers of a pen_network_t want them."""
+        found = []
+        for code in self.networks:
+            for name in code.users:
+                port = self.model.networks[name]
+                promise = promises.initialiser(port, code.neurons) if port.promises else ""
+                if code.folded or promise:
+                    found.append({"name": name, "code": code.name, "layers": len(code.chain()), "width": code.width, "neurons": code.neurons, "promise": promise})
+        return found
 
     def _ranges(self) -> list[dict[str, Any]]:
         """The inputs that have a declared range, and its edges."""

@@ -346,14 +346,14 @@ static const pen_layer_t nqvm_folded_network_layer[6] = {
     { PEN_LAYER_DENSE, 16U, 1U },
     { PEN_LAYER_RESCALE, 1U, 1U },
 };
-static const pen_network_t nqvm_folded_folded[2] = {
-    { { nqvm_folded_network_layer, 6U, 16U, 48U }, NQVM_FOLDED_AT_SPRING_NET }, /* spring_net */
-    { { nqvm_folded_network_layer, 6U, 16U, 48U }, NQVM_FOLDED_AT_DAMPER_NET }, /* damper_net */
+static const pen_network_t nqvm_folded_prepared[2] = {
+    { { nqvm_folded_network_layer, 6U, 16U, 48U }, NQVM_FOLDED_AT_SPRING_NET, NULL }, /* spring_net */
+    { { nqvm_folded_network_layer, 6U, 16U, 48U }, NQVM_FOLDED_AT_DAMPER_NET, NULL }, /* damper_net */
 };
 static const pen_set_t *const nqvm_folded_sets[2] = { &nqvm_folded_set_default, &nqvm_folded_set_altered_friction };
 static const pen_model_t nqvm_folded_model = {
     NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, PEN_DAMAGE_REPORT,
-    false, false, NQVM_FOLDED_PIECES, 2U, nqvm_folded_folded,
+    false, false, NQVM_FOLDED_PIECES, 2U, nqvm_folded_prepared,
     2U, nqvm_folded_sets
 };
 
@@ -567,22 +567,22 @@ pen_status_t nqvm_folded_status(nqvm_folded_t *self, pen_status_report_t *report
     return pen_instance_status(&nqvm_folded_model, nqvm_folded_head(self), report);
 }
 
-/* find the straight pieces of a set's networks, for a slot that no step reads */
-static pen_status_t nqvm_folded_fold(const pen_real_t value[], pen_piece_t piece[])
+/* what is made of a set before it runs, for a slot that no step reads: its networks folded */
+static pen_status_t nqvm_folded_prepare(nqvm_folded_t *self, const pen_real_t value[], uint32_t slot)
 {
-    pen_real_t line[4U * 16U];
+    pen_real_t work[4U * 16U];
     bool active[48];
 
-    return pen_prepare(&nqvm_folded_model, value, line, active, piece);
+    return pen_prepare(&nqvm_folded_model, value, work, active, self->piece[slot], &self->head.breach);
 }
 
-/* let the next step take a set that was found good, and its networks folded */
+/* let the next step take a set that was found good, and prepared */
 static pen_status_t nqvm_folded_publish(nqvm_folded_t *self, const pen_set_t *ready, pen_status_t found)
 {
     pen_status_t status = found;
 
     if (status == PEN_OK) {
-        status = nqvm_folded_fold(ready->value, self->piece[pen_tuning_inactive(&self->head.tuning)]);
+        status = nqvm_folded_prepare(self, ready->value, pen_tuning_inactive(&self->head.tuning));
     }
     return pen_tune_publish(&nqvm_folded_model, nqvm_folded_head(self), (status == PEN_OK)
         ? self->piece[pen_tuning_inactive(&self->head.tuning)] : NULL, ready, status);
@@ -594,7 +594,7 @@ pen_status_t nqvm_folded_init(nqvm_folded_t *self, const pen_set_t *set, nqvm_fo
         : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
 
     if (status == PEN_OK) {
-        status = nqvm_folded_fold(set->value, self->piece[0]);
+        status = nqvm_folded_prepare(self, set->value, 0U);
     }
     if (status == PEN_OK) {
         static const pen_real_t start[NQVM_FOLDED_N_LAST] = { 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F };
@@ -710,7 +710,7 @@ pen_status_t nqvm_folded_restore(nqvm_folded_t *self, const uint8_t byte[NQVM_FO
         if (status == PEN_OK) {
             for (uint32_t i = 0U; i < 2U; i++) {
                 if ((self->head.tuning.open == 0U) || (i == (self->head.tuning.active & 1U))) {
-                    (void)nqvm_folded_fold(self->head.tuning.slot[i].value, self->piece[i]);
+                    (void)nqvm_folded_prepare(self, self->head.tuning.slot[i].value, i);
                 }
             }
             pen_restored(&nqvm_folded_model, &self->head, self->piece[0]);
