@@ -11,7 +11,15 @@
 #define YES 1U
 #define NO  0U
 
-/* CRC-32 of the values' bytes, four bits at a time. */
+/* What takes the index of a byte in little-endian order to its place in memory, by exclusive or: 0 on a little-endian core. */
+static size_t byte_swap(void)
+{
+    const uint32_t one = 1U;
+
+    return (*(const uint8_t *)&one == 1U) ? 0U : (sizeof(pen_real_t) - 1U);
+}
+
+/* CRC-32 of the values' bytes in little-endian order, on every core, four bits at a time. */
 uint32_t pen_set_checksum(const pen_real_t value[], uint32_t n)
 {
     static const uint32_t table[16] = {
@@ -22,10 +30,11 @@ uint32_t pen_set_checksum(const pen_real_t value[], uint32_t n)
     };
     const uint8_t *const byte = (const uint8_t *)value;
     const size_t length = (size_t)n * sizeof(pen_real_t);
+    const size_t swap = byte_swap();
     uint32_t crc = UINT32_MAX;
 
     for (size_t i = 0U; i < length; i++) {
-        crc ^= byte[i];
+        crc ^= byte[i ^ swap];
         crc = (crc >> 4U) ^ table[crc & 0x0fU];
         crc = (crc >> 4U) ^ table[crc & 0x0fU];
     }
