@@ -11,6 +11,8 @@ METHODS = ("euler", "heun", "rk4", "ros1", "ros2")
 INTERPOLATIONS = ("held", "linear", "parabola", "cubic")
 OUTSIDE = ("extrapolate", "clamp", "fade")
 MORE_PIECES = ("refuse", "layers")
+OUT_OF_RANGE = ("report", "clamp", "hold")
+ON_DAMAGE = ("report", "hold", "rollback")
 GROUND = "ground"
 
 
@@ -132,6 +134,15 @@ class ParameterSet:
 
 
 @dataclass(frozen=True)
+class Guard:
+    """What the C does about inputs and sets that are not as they should be; `trial`: samples that a new set is tried on, 0: none."""
+
+    out_of_range: str = "report"
+    on_damage: str = "report"
+    trial: int = 0
+
+
+@dataclass(frozen=True)
 class Model:
     """A checked model. All values are SI; `digest` identifies the files it was read from."""
 
@@ -158,6 +169,13 @@ class Model:
     sets: dict[str, ParameterSet]
     path: Path
     digest: str
+    guard: Guard = Guard()
+    set_owner: str = ""  # the model whose sets these are, if it is another
+
+    @property
+    def owner(self) -> str:
+        """The model that the sets are named after: several methods of one model share them."""
+        return self.set_owner or self.name
 
     @property
     def states(self) -> tuple[str, ...]:

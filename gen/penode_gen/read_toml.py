@@ -32,7 +32,7 @@ _C_WORDS = set(
 )
 _C_PATTERN = re.compile(r"u?int\w*_t|U?INT\w*_(MAX|MIN|C)|(SIZE|PTRDIFF|WCHAR|SIG_ATOMIC|WINT)_(MAX|MIN)")
 _RESERVED = {*ex.FUNCTIONS, "der", "where", m.GROUND}
-_PREFIXES = ("pen_", "PEN_", "slope_", "bend_", "inputs_of_", "slopes_of_", "bends_of_", "piece_of_", "der_", "network_")  # of names that the generated code makes
+_PREFIXES = ("pen_", "PEN_", "slope_", "second_", "inputs_of_", "slopes_of_", "seconds_of_", "piece_of_", "der_", "network_")  # of names that the generated code makes
 # A model of that name would have a header or a type that others have already.
 _MODEL_WORDS = set(
     "assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdarg stdbool stddef stdint "
@@ -61,10 +61,14 @@ _REQUIRED = {
     "outputs": ("value", "unit"),
     "sensors": ("value", "unit"),
 }
+_MACROS = (  # that each generated model defines, behind its name
+    "N_X N_U N_Y N_SENSORS N_LAST N_DRIVE N_COLUMNS N_KEPT N_Q N_W SAMPLE_TIME SUBSTEPS STEP IMPLICIT_STEP AT_FIRST AT_SECOND AT_THIRD "
+    "LAYOUT SET_LENGTH SCRUB VERIFY SAVED PIECES H SETS_H".split()
+)
 ROOM = 4096  # pieces of a folded network, at most
 _MODEL = {
     "extends": str, "name": str, "description": str, "sample_time": str, "method": str, "substeps": int, "input": str, "outside": str,
-    "fade_width": (int, float), "pieces": int, "more_pieces": str,
+    "fade_width": (int, float), "pieces": int, "more_pieces": str, "out_of_range": str, "on_damage": str, "trial": int,
 }  # fmt: skip
 
 
@@ -166,6 +170,7 @@ class _Reader:
         self.data, raw, lines = _parse(path)
         self.digest = hashlib.sha256(raw)
         self.places = [(path, lines)]
+        self.set_owner = ""  # the model that this one shares its sets with
         self.unsure: set[str] = set()  # networks whose declaration is at fault
         self.made: dict[str, tuple[str, ...]] = {}  # parameters made from quantities, and where
         head = self.data.get("model")
@@ -175,6 +180,8 @@ class _Reader:
             tables, raw, lines = _parse(base, place)
             if isinstance(tables.get("model"), dict) and "extends" in tables["model"]:
                 raise m.ModelError([_line(f"{place}: {base} itself extends a file; extend that one")])
+            if not {"parameters", "networks", "sets"} & set(self.data) and isinstance(tables.get("model"), dict):
+                self.set_owner = str(tables["model"].get("name", ""))
             self.data = _merge(tables, self.data)
             self.digest.update(raw)
             self.places.append((base, lines))
@@ -294,6 +301,7 @@ class _Reader:
         for key, default, choices in (
             ("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS),
             ("outside", "extrapolate", m.OUTSIDE), ("more_pieces", "refuse", m.MORE_PIECES),
+            ("out_of_range", "report", m.OUT_OF_RANGE), ("on_damage", "report", m.ON_DAMAGE),
         ):  # fmt: skip
             if head.setdefault(key, default) not in choices:
                 self.problem(("model", key), f"'{head[key]}' is unknown", f"choose one of {', '.join(choices)}")
@@ -303,6 +311,9 @@ class _Reader:
             self.problem(("model", "fade_width"), "is out of range", "give the fading distance in widths of the envelope, 1e-6 to 100")
         if head.setdefault("pieces", 0) != 0 and not 4 <= head["pieces"] <= ROOM:
             self.problem(("model", "pieces"), f"{head['pieces']} is out of range", f"give room for 4 to {ROOM} pieces, or 0 to evaluate layer by layer")
+
+        if not 0 <= head.setdefault("trial", 0) <= 10000:
+            self.problem(("model", "trial"), f"{head['trial']} is out of range", "give the samples that a new set is tried on, up to 10000, or 0 for none")
 
         parameters = self.parameters()
         inputs = tuple(self.inputs())
@@ -331,7 +342,7 @@ class _Reader:
             substeps=head["substeps"], interpolation=head["input"], outside=head["outside"], fade_width=float(head["fade_width"]),
             pieces=room(head["pieces"]), more_pieces=head["more_pieces"], parameters=parameters, inputs=inputs, bodies=bodies, elements=elements, extra_states=states, variables=variables,
             equations=equations, networks=networks, outputs=outputs, sensors=sensors, sets=sets, path=self.path,
-            digest=self.digest.hexdigest(),
+            digest=self.digest.hexdigest(), guard=m.Guard(head["out_of_range"], head["on_damage"], head["trial"]), set_owner=self.set_owner,
         )  # fmt: skip
 
     def parameters(self) -> dict[str, m.Parameter]:
@@ -667,7 +678,7 @@ class _Reader:
 
     def macros(self, parameters: dict[str, m.Parameter], networks: dict[str, m.NetworkPort], model: str) -> None:
         """Constants of the generated C are in capitals: names that differ in case only would meet."""
-        seen = {n: "" for n in ("N_X", "N_U", "N_Y", "N_SENSORS", "SAMPLE_TIME", "LAYOUT", "SET_LENGTH", "PATROL", "PIECES", "H")}
+        seen = {n: "" for n in _MACROS}
         for n in (*parameters, *networks):
             changes = n in networks or parameters[n].tunable
             for name in (f"AT_{n}",) if changes else (n, f"{n}_INVERSE"):

@@ -58,11 +58,11 @@ void pen_slope_sigmoid(size_t n, const pen_real_t h[], pen_real_t t[]);
 void pen_slope_softplus(size_t n, const pen_real_t h[], pen_real_t t[]);
 void pen_slope_step(size_t n, const pen_real_t h[], pen_real_t t[]); /* 0 */
 
-/* ---- their bends: c[i] = act'(.) c[i] + act''(.) a[i] b[i], from the value h[i] after the activation ---- */
+/* ---- their second derivatives: c[i] = act'(.) c[i] + act''(.) a[i] b[i], from the value h[i] after the activation ---- */
 
-void pen_bend_tanh(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
-void pen_bend_sigmoid(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
-void pen_bend_softplus(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
+void pen_second_tanh(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
+void pen_second_sigmoid(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
+void pen_second_softplus(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
 
 /* ---- element-wise layers. Standardising and min-max scaling are pen_centre, their inverses pen_rescale; a PCA is
  *      pen_centre and then pen_dense with the components as rows. ---- */

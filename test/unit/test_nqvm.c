@@ -86,7 +86,7 @@ void test_init_refuses_other_sets(void)
 
 void test_null_and_uninitialised_are_refused_and_nothing_is_written(void)
 {
-    nqvm_t                    raw = { .ready = 0U };
+    nqvm_t                    raw = { .head.ready = 0U };
     nqvm_x_t                  x = { (pen_real_t)1, (pen_real_t)2, (pen_real_t)3, (pen_real_t)4 };
     nqvm_z_t                  z;
     nqvm_jacobian_t           j;
@@ -109,15 +109,15 @@ void test_null_and_uninitialised_are_refused_and_nothing_is_written(void)
     TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_sensors(&model, NULL));
     TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_status(&raw, &report));
     TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_status(&model, NULL));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_tune_begin(&raw, &nqvm_set_default.head));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_tune_write(NULL, 0U, nqvm_set_default.value, 1U));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_tune_commit(&raw));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_tune_abort(&raw));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_tune_select(&raw, &nqvm_set_default));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_tune_rollback(NULL));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_tune_hold(&raw, true));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_tune_running(&raw, &head));
-    TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_tune_running(&model, NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, nqvm_tune_begin(&raw, &nqvm_set_default.head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, nqvm_tune_write(NULL, 0U, nqvm_set_default.value, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, nqvm_tune_commit(&raw));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, nqvm_tune_abort(&raw));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, nqvm_tune_select(&raw, &nqvm_set_default));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, nqvm_tune_rollback(NULL));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, nqvm_tune_hold(&raw, true));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, nqvm_tune_running(&raw, &head));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, nqvm_tune_running(&model, NULL));
     TEST_ASSERT_EQUAL_MEMORY(&before, &y, sizeof(y));
     x = state();
     expect_same_state(&kept, &x);
@@ -194,7 +194,7 @@ void test_damaged_state_comes_back_from_its_copy(void)
     }
 }
 
-/* Every weight of the running set, one after the other: none may be NaN or Inf without a flag, at once or from the patrol. */
+/* Every weight of the running set, one after the other: none may be NaN or Inf without a flag, at once or from the scrub. */
 void test_damaged_weight_holds_until_it_is_mended(void)
 {
     for (uint32_t i = 0U; i < NQVM_SET_LENGTH; i++) {
@@ -217,7 +217,7 @@ void test_damaged_weight_holds_until_it_is_mended(void)
         status = nqvm_step(&model, &u, &y);
         if (envelope) {
             /* a bound of the envelope is compared, never computed with: NaN reads as outside, -Inf below as no bound */
-            for (uint32_t k = 1U; (k < NQVM_PATROL) && ((status & PEN_WEIGHT_NONFINITE) == PEN_OK); k++) {
+            for (uint32_t k = 1U; (k < NQVM_SCRUB) && ((status & PEN_WEIGHT_NONFINITE) == PEN_OK); k++) {
                 TEST_ASSERT_TRUE(pen_advanced(status));
                 status = nqvm_step(&model, &u, &y);
             }
@@ -234,15 +234,15 @@ void test_damaged_weight_holds_until_it_is_mended(void)
     }
 }
 
-/* Whatever became of the place it has come to: the patrol stays within the set, and goes on. */
-void test_damaged_place_of_the_patrol(void)
+/* Whatever became of the place it has come to: the scrub stays within the set, and goes on. */
+void test_damaged_place_of_the_scrub(void)
 {
-    static const uint32_t places[] = { NQVM_PATROL - 1U, NQVM_PATROL, 0x80000000U, UINT32_MAX };
+    static const uint32_t places[] = { NQVM_SCRUB - 1U, NQVM_SCRUB, 0x80000000U, UINT32_MAX };
 
     for (size_t i = 0U; i < (sizeof(places) / sizeof(places[0])); i++) {
-        model.patrol = places[i];
+        model.head.scrub = places[i];
         drive(WARM, 1U);
-        TEST_ASSERT_EQUAL_UINT32((places[i] % NQVM_PATROL) + 1U, model.patrol);
+        TEST_ASSERT_EQUAL_UINT32((places[i] % NQVM_SCRUB) + 1U, model.head.scrub);
     }
 }
 
@@ -314,12 +314,12 @@ void test_status_is_sticky_counted_and_cleared_by_reading(void)
     (void)nqvm_tune_commit(&model);
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_status(&model, &report));
     TEST_ASSERT_EQUAL_HEX32(PEN_INPUT_NONFINITE | PEN_SET_CLOSED, report.flags & (PEN_INPUT_NONFINITE | PEN_SET_CLOSED | PEN_HELD));
-    TEST_ASSERT_EQUAL_UINT32(2U, report.times[0]);
+    TEST_ASSERT_EQUAL_UINT32(2U, pen_status_times(&report, PEN_INPUT_NONFINITE));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_status(&model, &report));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, report.flags);
 }
 
-void test_far_outside_of_training_is_said(void)
+void test_far_outside_of_training_is_reported(void)
 {
     const nqvm_x_t far = { (pen_real_t)0.2, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0 };
 

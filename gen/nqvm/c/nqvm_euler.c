@@ -8,6 +8,7 @@
 #include "penode/pen_net.h"
 #include "penode/pen_net16.h"
 #include "penode/pen_port.h"
+#include "penode/pen_step.h"
 
 #define NQVM_EULER_M_B_INVERSE ((pen_real_t)(1.0 / 350.0)) /* 1 / m_b */
 #define NQVM_EULER_M_W_INVERSE ((pen_real_t)(1.0 / 90.0)) /* 1 / m_w */
@@ -15,15 +16,14 @@
 #define NQVM_EULER_D ((pen_real_t)800.0) /* N*s/m, suspension damper */
 #define NQVM_EULER_C_T ((pen_real_t)300000.0) /* N/m, tyre spring */
 
-#define N_LAST 6U /* states and outputs */
-#define N_DRIVE 1U /* inputs */
-#define N_X NQVM_EULER_N_X
-#define N_COLUMNS 6U /* of derivatives: state, input before, input now */
-#define SUBSTEPS 1U
-#define H (NQVM_EULER_SAMPLE_TIME)
+#define NQVM_EULER_N_LAST 6U /* states and outputs */
+#define NQVM_EULER_N_DRIVE 1U /* inputs */
+#define NQVM_EULER_N_COLUMNS 6U /* of derivatives: state, input before, input now */
+#define NQVM_EULER_SUBSTEPS 1U
+#define NQVM_EULER_STEP (NQVM_EULER_SAMPLE_TIME)
 
 /* 1 -> 16 -> 16 -> 16 -> 1: spring_net, damper_net */
-static pen_real_t network(const pen_real_t p[], const pen_real_t in, pen_status_t *status)
+static pen_real_t nqvm_euler_network(const pen_real_t p[], const pen_real_t in, pen_status_t *status)
 {
     pen_real_t h[16];
 
@@ -36,7 +36,7 @@ static pen_real_t network(const pen_real_t p[], const pen_real_t in, pen_status_
 }
 
 /* the same, and its derivative along each input: h is the value, t[i] its change with input i */
-static pen_real_t network_slope(const pen_real_t p[], const pen_real_t in, pen_real_t slope[1],
+static pen_real_t nqvm_euler_network_slope(const pen_real_t p[], const pen_real_t in, pen_real_t slope[1],
     pen_status_t *status)
 {
     pen_real_t h[16];
@@ -59,7 +59,7 @@ static pen_real_t network_slope(const pen_real_t p[], const pen_real_t in, pen_r
 }
 
 /* time derivatives of the states */
-static pen_status_t rates(const pen_real_t p[], const pen_real_t x[], const pen_real_t u[], pen_real_t dx[])
+static pen_status_t nqvm_euler_rates(const pen_real_t p[], const pen_real_t x[], const pen_real_t u[], pen_real_t dx[])
 {
     pen_status_t status = PEN_OK;
     const pen_real_t z_b = x[0];
@@ -74,9 +74,9 @@ static pen_status_t rates(const pen_real_t p[], const pen_real_t x[], const pen_
     const pen_real_t F_spring = NQVM_EULER_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_EULER_D * v_spring; /* force of damper */
     /* force of spring_nn: network spring_net */
-    const pen_real_t F_spring_nn = network(&p[NQVM_EULER_AT_SPRING_NET], s_spring, &status);
+    const pen_real_t F_spring_nn = nqvm_euler_network(&p[NQVM_EULER_AT_SPRING_NET], s_spring, &status);
     /* force of damper_nn: network damper_net */
-    const pen_real_t F_damper_nn = network(&p[NQVM_EULER_AT_DAMPER_NET], v_spring, &status);
+    const pen_real_t F_damper_nn = nqvm_euler_network(&p[NQVM_EULER_AT_DAMPER_NET], v_spring, &status);
     const pen_real_t F_tyre = NQVM_EULER_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
     const pen_real_t der_v_b = NQVM_EULER_M_B_INVERSE * (-(F_damper + F_damper_nn + F_spring + F_spring_nn));
@@ -91,7 +91,8 @@ static pen_status_t rates(const pen_real_t p[], const pen_real_t x[], const pen_
 }
 
 /* the same, with their derivatives along the states, fx, and along the drive, fu */
-static pen_status_t rates_jacobian(const pen_real_t p[], const pen_real_t x[], const pen_real_t u[], pen_real_t dx[],
+static pen_status_t nqvm_euler_rates_jacobian(const pen_real_t p[], const pen_real_t x[], const pen_real_t u[],
+    pen_real_t dx[],
     pen_real_t fx[4][4], pen_real_t fu[4][1])
 {
     pen_status_t status = PEN_OK;
@@ -108,13 +109,13 @@ static pen_status_t rates_jacobian(const pen_real_t p[], const pen_real_t x[], c
     const pen_real_t F_damper = NQVM_EULER_D * v_spring; /* force of damper */
     pen_real_t slopes_of_F_spring_nn[1];
     /* force of spring_nn: network spring_net */
-    const pen_real_t F_spring_nn = network_slope(&p[NQVM_EULER_AT_SPRING_NET], s_spring, slopes_of_F_spring_nn,
-        &status);
+    const pen_real_t F_spring_nn = nqvm_euler_network_slope(&p[NQVM_EULER_AT_SPRING_NET], s_spring,
+        slopes_of_F_spring_nn, &status);
     const pen_real_t slope_F_spring_nn = slopes_of_F_spring_nn[0];
     pen_real_t slopes_of_F_damper_nn[1];
     /* force of damper_nn: network damper_net */
-    const pen_real_t F_damper_nn = network_slope(&p[NQVM_EULER_AT_DAMPER_NET], v_spring, slopes_of_F_damper_nn,
-        &status);
+    const pen_real_t F_damper_nn = nqvm_euler_network_slope(&p[NQVM_EULER_AT_DAMPER_NET], v_spring,
+        slopes_of_F_damper_nn, &status);
     const pen_real_t slope_F_damper_nn = slopes_of_F_damper_nn[0];
     const pen_real_t F_tyre = NQVM_EULER_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
@@ -154,7 +155,7 @@ static pen_status_t rates_jacobian(const pen_real_t p[], const pen_real_t x[], c
     return status;
 }
 
-static void outputs(const pen_real_t x[], pen_real_t y[])
+static void nqvm_euler_outputs(const pen_real_t x[], pen_real_t y[])
 {
     const pen_real_t z_b = x[0];
     const pen_real_t z_w = x[1];
@@ -163,7 +164,7 @@ static void outputs(const pen_real_t x[], pen_real_t y[])
     y[1] = z_w;
 }
 
-static void outputs_jacobian(pen_real_t yx[2][4], pen_real_t yu[2][1])
+static void nqvm_euler_outputs_jacobian(pen_real_t yx[2][4], pen_real_t yu[2][1])
 {
     yx[0][0] = (pen_real_t)1.0;
     yx[0][1] = (pen_real_t)0.0;
@@ -177,7 +178,7 @@ static void outputs_jacobian(pen_real_t yx[2][4], pen_real_t yu[2][1])
     yu[1][0] = (pen_real_t)0.0;
 }
 
-static pen_status_t sensors(const pen_real_t p[], const pen_real_t x[], const pen_real_t u[], pen_real_t z[])
+static pen_status_t nqvm_euler_sense(const pen_real_t p[], const pen_real_t x[], const pen_real_t u[], pen_real_t z[])
 {
     pen_status_t status = PEN_OK;
     const pen_real_t z_b = x[0];
@@ -192,9 +193,9 @@ static pen_status_t sensors(const pen_real_t p[], const pen_real_t x[], const pe
     const pen_real_t F_spring = NQVM_EULER_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_EULER_D * v_spring; /* force of damper */
     /* force of spring_nn: network spring_net */
-    const pen_real_t F_spring_nn = network(&p[NQVM_EULER_AT_SPRING_NET], s_spring, &status);
+    const pen_real_t F_spring_nn = nqvm_euler_network(&p[NQVM_EULER_AT_SPRING_NET], s_spring, &status);
     /* force of damper_nn: network damper_net */
-    const pen_real_t F_damper_nn = network(&p[NQVM_EULER_AT_DAMPER_NET], v_spring, &status);
+    const pen_real_t F_damper_nn = nqvm_euler_network(&p[NQVM_EULER_AT_DAMPER_NET], v_spring, &status);
     const pen_real_t F_tyre = NQVM_EULER_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
     const pen_real_t der_v_b = NQVM_EULER_M_B_INVERSE * (-(F_damper + F_damper_nn + F_spring + F_spring_nn));
@@ -207,245 +208,230 @@ static pen_status_t sensors(const pen_real_t p[], const pen_real_t x[], const pe
     return status;
 }
 
-static pen_real_t inner(size_t n, const pen_real_t a[], const pen_real_t b[])
+static pen_status_t nqvm_euler_sense_jacobian(const pen_real_t p[], const pen_real_t x[], pen_real_t zx[3][4],
+    pen_real_t zu[3][1])
 {
-    pen_real_t sum = (pen_real_t)0;
+    pen_status_t status = PEN_OK;
+    const pen_real_t z_b = x[0];
+    const pen_real_t z_w = x[1];
+    const pen_real_t v_b = x[2];
+    const pen_real_t v_w = x[3];
 
-    for (size_t i = 0U; i < n; i++) {
-        sum += a[i] * b[i];
-    }
-    return sum;
+    const pen_real_t s_spring = z_b - z_w; /* deflection between body and wheel */
+    const pen_real_t v_spring = v_b - v_w; /* rate between body and wheel */
+    pen_real_t slopes_of_F_spring_nn[1];
+    /* force of spring_nn: network spring_net */
+    (void)nqvm_euler_network_slope(&p[NQVM_EULER_AT_SPRING_NET], s_spring, slopes_of_F_spring_nn, &status);
+    const pen_real_t slope_F_spring_nn = slopes_of_F_spring_nn[0];
+    pen_real_t slopes_of_F_damper_nn[1];
+    /* force of damper_nn: network damper_net */
+    (void)nqvm_euler_network_slope(&p[NQVM_EULER_AT_DAMPER_NET], v_spring, slopes_of_F_damper_nn, &status);
+    const pen_real_t slope_F_damper_nn = slopes_of_F_damper_nn[0];
+    const pen_real_t t1 = NQVM_EULER_C + slope_F_spring_nn;
+    const pen_real_t t2 = NQVM_EULER_M_B_INVERSE * t1;
+    const pen_real_t t3 = NQVM_EULER_D + slope_F_damper_nn;
+    const pen_real_t t4 = NQVM_EULER_M_B_INVERSE * t3;
+    const pen_real_t t5 = NQVM_EULER_M_W_INVERSE * t3;
+
+    zx[0][0] = -t2;
+    zx[0][1] = t2;
+    zx[0][2] = -t4;
+    zx[0][3] = t4;
+    zx[1][0] = NQVM_EULER_M_W_INVERSE * t1;
+    zx[1][1] = -(NQVM_EULER_M_W_INVERSE * (NQVM_EULER_C_T + t1));
+    zx[1][2] = t5;
+    zx[1][3] = -t5;
+    zx[2][0] = (pen_real_t)1.0;
+    zx[2][1] = (pen_real_t)-1.0;
+    zx[2][2] = (pen_real_t)0.0;
+    zx[2][3] = (pen_real_t)0.0;
+    zu[0][0] = (pen_real_t)0.0;
+    zu[1][0] = NQVM_EULER_M_W_INVERSE * NQVM_EULER_C_T;
+    zu[2][0] = (pen_real_t)0.0;
+    return status;
 }
 
 /* derivative of the drive along column c, at a share of the sample */
-static void drive_along(pen_real_t share, size_t c, pen_real_t du[N_DRIVE])
+static void nqvm_euler_drive_along(pen_real_t share, size_t c, pen_real_t du[NQVM_EULER_N_DRIVE])
 {
     for (size_t n = 0U; n < NQVM_EULER_N_U; n++) {
-        const pen_real_t before = (c == (N_X + n)) ? (pen_real_t)1 : (pen_real_t)0;
+        const pen_real_t before = (c == (NQVM_EULER_N_X + n)) ? (pen_real_t)1 : (pen_real_t)0;
         du[n] = before;
     }
     (void)share;
 }
 
 /* derivative of a rate along column c, from its derivatives along states and drive */
-static pen_real_t along(const pen_real_t fx[], const pen_real_t fu[], pen_real_t d[N_X][N_COLUMNS],
+static pen_real_t nqvm_euler_along(const pen_real_t fx[], const pen_real_t fu[],
+    pen_real_t d[NQVM_EULER_N_X][NQVM_EULER_N_COLUMNS],
     pen_real_t share, size_t c)
 {
-    pen_real_t du[N_DRIVE];
+    pen_real_t du[NQVM_EULER_N_DRIVE];
     pen_real_t sum;
 
-    drive_along(share, c, du);
-    sum = inner(N_DRIVE, fu, du);
-    for (size_t n = 0U; n < N_X; n++) {
+    nqvm_euler_drive_along(share, c, du);
+    sum = pen_step_inner(NQVM_EULER_N_DRIVE, fu, du);
+    for (size_t n = 0U; n < NQVM_EULER_N_X; n++) {
         sum += fx[n] * d[n][c];
     }
     return sum;
 }
 
 /* from t(k-1) to t(k): explicit Euler; advance is 1, or 0 for a sample that stays where it is */
-static pen_status_t integrate(const pen_real_t p[], const pen_real_t u0[], pen_real_t advance,
+static pen_status_t nqvm_euler_integrate(const pen_real_t p[], const pen_real_t u0[], pen_real_t advance,
     const pen_real_t x0[], pen_real_t x[])
 {
     pen_status_t status = PEN_OK;
 
-    for (size_t i = 0U; i < SUBSTEPS; i++) {
-        pen_real_t k[N_X];
-        status |= rates(p, x0, u0, k);
+    for (size_t i = 0U; i < NQVM_EULER_SUBSTEPS; i++) {
+        pen_real_t k[NQVM_EULER_N_X];
+        status |= nqvm_euler_rates(p, x0, u0, k);
         PEN_PORT_UNROLL
-        for (size_t n = 0U; n < N_X; n++) {
-            x[n] = x0[n] + ((advance * H) * k[n]);
+        for (size_t n = 0U; n < NQVM_EULER_N_X; n++) {
+            x[n] = x0[n] + ((advance * NQVM_EULER_STEP) * k[n]);
         }
     }
     return status;
 }
 
 /* the same, to the bit, with the derivative d of x along each column: x(k-1), u(k-1), u(k) */
-static pen_status_t integrate_jacobian(const pen_real_t p[], const pen_real_t u0[], pen_real_t advance,
-    const pen_real_t x0[], pen_real_t x[], pen_real_t d[N_X][N_COLUMNS])
+static pen_status_t nqvm_euler_integrate_jacobian(const pen_real_t p[], const pen_real_t u0[], pen_real_t advance,
+    const pen_real_t x0[], pen_real_t x[], pen_real_t d[NQVM_EULER_N_X][NQVM_EULER_N_COLUMNS])
 {
     pen_status_t status = PEN_OK;
 
-    for (size_t i = 0U; i < SUBSTEPS; i++) {
-        pen_real_t k[N_X];
-        pen_real_t fx[N_X][N_X];
-        pen_real_t fu[N_X][N_DRIVE];
+    for (size_t i = 0U; i < NQVM_EULER_SUBSTEPS; i++) {
+        pen_real_t k[NQVM_EULER_N_X];
+        pen_real_t fx[NQVM_EULER_N_X][NQVM_EULER_N_X];
+        pen_real_t fu[NQVM_EULER_N_X][NQVM_EULER_N_DRIVE];
         const pen_real_t share = (pen_real_t)0;
-        status |= rates_jacobian(p, x0, u0, k, fx, fu);
-        for (size_t c = 0U; c < N_COLUMNS; c++) {
-            pen_real_t dk[N_X];
-            for (size_t n = 0U; n < N_X; n++) {
-                dk[n] = along(fx[n], fu[n], d, share, c);
+        status |= nqvm_euler_rates_jacobian(p, x0, u0, k, fx, fu);
+        for (size_t c = 0U; c < NQVM_EULER_N_COLUMNS; c++) {
+            pen_real_t dk[NQVM_EULER_N_X];
+            for (size_t n = 0U; n < NQVM_EULER_N_X; n++) {
+                dk[n] = nqvm_euler_along(fx[n], fu[n], d, share, c);
             }
-            for (size_t n = 0U; n < N_X; n++) {
-                d[n][c] += (advance * H) * dk[n];
+            for (size_t n = 0U; n < NQVM_EULER_N_X; n++) {
+                d[n][c] += (advance * NQVM_EULER_STEP) * dk[n];
             }
         }
         PEN_PORT_UNROLL
-        for (size_t n = 0U; n < N_X; n++) {
-            x[n] = x0[n] + ((advance * H) * k[n]);
+        for (size_t n = 0U; n < NQVM_EULER_N_X; n++) {
+            x[n] = x0[n] + ((advance * NQVM_EULER_STEP) * k[n]);
         }
     }
     return status;
 }
 
-#define KEPT 0U /* rows of the instance */
-#define LAST 1U
-#define NOW  2U
+static const pen_set_t *const nqvm_euler_sets[2] = { &nqvm_euler_set_default, &nqvm_euler_set_altered_friction };
+static const pen_model_t nqvm_euler_model = {
+    NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, PEN_DAMAGE_REPORT,
+    false, false, 0U, 0U, NULL,
+    2U, nqvm_euler_sets
+};
 
-static bool usable(const nqvm_euler_t *self)
+static pen_instance_t *nqvm_euler_head(nqvm_euler_t *self)
 {
-    return (self != NULL) && (self->ready == NQVM_EULER_LAYOUT);
+    return (self != NULL) ? &self->head : NULL;
 }
 
-/* derivatives at the start: x follows itself */
-static void unit(pen_real_t d[N_X][N_COLUMNS])
+static const pen_instance_t *nqvm_euler_const_head(const nqvm_euler_t *self)
 {
-    for (size_t n = 0U; n < N_X; n++) {
-        for (size_t c = 0U; c < N_COLUMNS; c++) {
-            d[n][c] = (n == c) ? (pen_real_t)1 : (pen_real_t)0;
-        }
-    }
+    return (self != NULL) ? &self->head : NULL;
 }
 
-static void copy(size_t n, const pen_real_t from[], pen_real_t to[])
+PEN_PORT_INLINE bool nqvm_euler_usable(const nqvm_euler_t *self)
 {
-    PEN_PORT_UNROLL
-    for (size_t i = 0U; i < n; i++) {
-        to[i] = from[i];
-    }
+    return (self != NULL) && (self->head.ready == NQVM_EULER_LAYOUT);
 }
 
-static pen_status_t check(size_t n, const pen_real_t value[], pen_status_t flag)
+/* take over what is pending and the input, and see what there is to start from */
+static pen_status_t nqvm_euler_begin(nqvm_euler_t *self, const nqvm_euler_u_t *u, uint32_t *slot)
 {
-    return pen_finite(n, value) ? PEN_OK : flag;
-}
+    pen_status_t status = pen_tuning_adopt(&self->head.tuning, slot);
+    pen_real_t *const u1 = self->u[1];
 
-/* the input that the step starts from: for the first sample its own */
-static const pen_real_t *before(const nqvm_euler_t *self)
-{
-    return self->u[1U - (self->running & 1U)];
-}
-
-/* how much of a sample to integrate: all of it, but nothing for the first one, which only gives outputs */
-static pen_real_t advance(const nqvm_euler_t *self)
-{
-    const uint32_t running = self->running & 1U;
-
-    return (pen_real_t)running;
-}
-
-/* Look at one number of the set in force; the next step looks at the next. */
-static pen_status_t patrol(nqvm_euler_t *self, uint32_t slot)
-{
-    /* whatever its memory has become; no branch, as a comparison may be */
-    const uint32_t at = self->patrol % NQVM_EULER_PATROL;
-    const pen_real_t value = self->tuning.slot[slot].value[at];
-    pen_real_t doubt = value - value; /* 0, or NaN once a number is not finite */
-
-    self->patrol = at + 1U;
-    return (doubt >= (pen_real_t)0) ? PEN_OK : PEN_WEIGHT_NONFINITE;
-}
-
-/* take over what is pending, and see what there is to start from */
-static pen_status_t begin(nqvm_euler_t *self, uint32_t *slot)
-{
-    pen_status_t status = pen_tuning_adopt(&self->tuning, slot);
-
-    status |= patrol(self, *slot);
-    status |= check(NQVM_EULER_N_U, self->u[1], PEN_INPUT_NONFINITE);
-    status |= check(N_LAST, self->row[LAST], PEN_STATE_NONFINITE);
+    u1[0] = u->z_road;
+    status |= pen_step_range(u1[0], (pen_real_t)-0.3, (pen_real_t)0.3, PEN_INPUT_RANGE);
+    status |= pen_step_scrub(&self->head, NQVM_EULER_SCRUB, NQVM_EULER_SET_LENGTH, self->head.tuning.slot[*slot].value,
+                             0U, 1U, NULL);
+    status |= pen_step_check(NQVM_EULER_N_U, u1, PEN_INPUT_NONFINITE);
+    status |= pen_step_check(NQVM_EULER_N_LAST, self->row[PEN_ROW_LAST], PEN_STATE_NONFINITE);
     return status;
 }
 
-/* keep what is new if it is good, else what was there, else the second copy: picked by number, the same work each
-   way */
-static pen_status_t finish(nqvm_euler_t *self, pen_status_t status)
+static pen_status_t nqvm_euler_finish(nqvm_euler_t *self, pen_status_t status)
 {
-    const pen_status_t follows = (status << 2U) | (status << 1U); /* from a bad input or state: not said twice */
-    const pen_status_t result = status | (check(N_LAST, self->row[NOW], PEN_STEP_NONFINITE) & ~follows);
-    const uint32_t good = pen_advanced(result) ? 1U : 0U;
-    const uint32_t whole = ((result & PEN_STATE_NONFINITE) == PEN_OK) ? 1U : 0U;
-    const uint32_t received = ((result & PEN_INPUT_NONFINITE) == PEN_OK) ? 1U : 0U;
-
-    copy(N_LAST, self->row[good + whole], self->row[LAST]);
-    copy(N_LAST, self->row[LAST], self->row[KEPT]);
-    copy(N_DRIVE, self->u[received], self->u[0]);
-    self->running |= good;
-    pen_status_note_step(&self->log, result);
-    return result;
-}
-
-pen_status_t nqvm_euler_init(nqvm_euler_t *self, const pen_set_t *set, nqvm_euler_banks_t *banks)
-{
-    pen_status_t status = PEN_BADARG;
-
-    if (self != NULL) {
-        self->ready = 0U;
-        status = pen_tuning_init(&self->tuning, NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, set,
-                                 (banks == NULL) ? NULL : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
-    }
-    if (status == PEN_OK) {
-        static const pen_real_t start[N_LAST] = { 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F };
-        copy(N_LAST, start, self->row[LAST]);
-        copy(N_LAST, start, self->row[KEPT]);
-        for (size_t i = 0U; i < N_DRIVE; i++) {
-            self->u[0][i] = (pen_real_t)0;
-        }
-        self->running = 0U;
-        self->patrol = 0U;
-        pen_status_clear(&self->log);
-        self->ready = NQVM_EULER_LAYOUT;
-    }
-    return status;
+    return pen_step_finish(&self->head, NQVM_EULER_N_LAST, &self->row[0][0], NQVM_EULER_N_DRIVE, &self->u[0][0], 1U,
+                           PEN_INPUT_NONFINITE, status);
 }
 
 pen_status_t nqvm_euler_step(nqvm_euler_t *self, const nqvm_euler_u_t *u, nqvm_euler_y_t *y)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (usable(self) && (u != NULL) && (y != NULL)) {
+    if (!nqvm_euler_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
+        pen_real_t *const now = self->row[PEN_ROW_NOW];
         uint32_t slot;
-        self->u[1][0] = u->z_road;
-        status = begin(self, &slot);
-        const pen_real_t *const p = self->tuning.slot[slot].value;
-        status |= integrate(p, before(self), advance(self), self->row[LAST], self->row[NOW]);
-        outputs(self->row[NOW], &self->row[NOW][N_X]);
-        status = finish(self, status);
-        y->z_b = self->row[LAST][4];
-        y->z_w = self->row[LAST][5];
+        status = nqvm_euler_begin(self, u, &slot);
+        const pen_real_t *const p = self->head.tuning.slot[slot].value;
+        const pen_real_t *const u0 = self->u[1U - (self->head.running & 1U)]; /* for the first sample its own */
+        status |= nqvm_euler_integrate(p, u0, pen_step_history(&self->head, 0U), self->row[PEN_ROW_LAST], now);
+        nqvm_euler_outputs(now, &now[NQVM_EULER_N_X]);
+        status = nqvm_euler_finish(self, status);
+        y->z_b = self->row[PEN_ROW_LAST][4];
+        y->z_w = self->row[PEN_ROW_LAST][5];
     }
     return status;
+}
+
+/* derivatives by column, d, as those by name */
+static void nqvm_euler_spread_x(nqvm_euler_jacobian_t *j, pen_real_t d[NQVM_EULER_N_X][NQVM_EULER_N_COLUMNS])
+{
+    for (size_t n = 0U; n < NQVM_EULER_N_X; n++) {
+        pen_step_copy(NQVM_EULER_N_X, d[n], j->x_x[n]);
+        pen_step_copy(NQVM_EULER_N_U, &d[n][NQVM_EULER_N_X], j->x_u_before[n]);
+        pen_step_copy(NQVM_EULER_N_U, &d[n][NQVM_EULER_N_X + NQVM_EULER_N_U], j->x_u[n]);
+    }
 }
 
 pen_status_t nqvm_euler_step_jacobian(nqvm_euler_t *self, const nqvm_euler_u_t *u, nqvm_euler_y_t *y,
     nqvm_euler_jacobian_t *j)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (usable(self) && (u != NULL) && (y != NULL) && (j != NULL)) {
+    if (!nqvm_euler_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL) || (j == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
+        pen_real_t d[NQVM_EULER_N_X][NQVM_EULER_N_COLUMNS];
+        pen_real_t yx[NQVM_EULER_N_Y][NQVM_EULER_N_X];
+        pen_real_t yu[NQVM_EULER_N_Y][NQVM_EULER_N_DRIVE];
+        pen_real_t *const now = self->row[PEN_ROW_NOW];
         uint32_t slot;
-        self->u[1][0] = u->z_road;
-        status = begin(self, &slot);
-        const pen_real_t *const p = self->tuning.slot[slot].value;
-        pen_real_t d[N_X][N_COLUMNS];
-        pen_real_t yx[NQVM_EULER_N_Y][N_X];
-        pen_real_t yu[NQVM_EULER_N_Y][N_DRIVE];
-        unit(d);
-        status |= integrate_jacobian(p, before(self), advance(self), self->row[LAST], self->row[NOW], d);
-        outputs(self->row[NOW], &self->row[NOW][N_X]);
-        outputs_jacobian(yx, yu);
-        status = finish(self, status);
-        y->z_b = self->row[LAST][4];
-        y->z_w = self->row[LAST][5];
+        status = nqvm_euler_begin(self, u, &slot);
+        const pen_real_t *const p = self->head.tuning.slot[slot].value;
+        const pen_real_t *const u0 = self->u[1U - (self->head.running & 1U)]; /* for the first sample its own */
+        pen_step_unit(NQVM_EULER_N_X, NQVM_EULER_N_COLUMNS, &d[0][0]);
+        status |= nqvm_euler_integrate_jacobian(p, u0, pen_step_history(&self->head, 0U), self->row[PEN_ROW_LAST], now,
+            d);
+        nqvm_euler_outputs(now, &now[NQVM_EULER_N_X]);
+        nqvm_euler_outputs_jacobian(yx, yu);
+        status = nqvm_euler_finish(self, status);
+        y->z_b = self->row[PEN_ROW_LAST][4];
+        y->z_w = self->row[PEN_ROW_LAST][5];
         if (pen_advanced(status)) {
-            for (size_t n = 0U; n < N_X; n++) {
-                copy(N_X, d[n], j->x_x[n]);
-                copy(NQVM_EULER_N_U, &d[n][N_X], j->x_u_before[n]);
-                copy(NQVM_EULER_N_U, &d[n][N_X + NQVM_EULER_N_U], j->x_u[n]);
-            }
+            nqvm_euler_spread_x(j, d);
             for (size_t n = 0U; n < NQVM_EULER_N_Y; n++) {
-                copy(N_X, yx[n], j->y_x[n]);
-                copy(NQVM_EULER_N_U, yu[n], j->y_u[n]);
+                pen_step_copy(NQVM_EULER_N_X, yx[n], j->y_x[n]);
+                pen_step_copy(NQVM_EULER_N_U, yu[n], j->y_u[n]);
             }
         }
     }
@@ -454,13 +440,13 @@ pen_status_t nqvm_euler_step_jacobian(nqvm_euler_t *self, const nqvm_euler_u_t *
 
 pen_status_t nqvm_euler_get_state(const nqvm_euler_t *self, nqvm_euler_x_t *x)
 {
-    const bool good = usable(self) && (x != NULL);
+    const bool good = nqvm_euler_usable(self) && (x != NULL);
 
     if (good) {
-        x->z_b = self->row[LAST][0];
-        x->z_w = self->row[LAST][1];
-        x->v_b = self->row[LAST][2];
-        x->v_w = self->row[LAST][3];
+        x->z_b = self->row[PEN_ROW_LAST][0];
+        x->z_w = self->row[PEN_ROW_LAST][1];
+        x->v_b = self->row[PEN_ROW_LAST][2];
+        x->v_w = self->row[PEN_ROW_LAST][3];
     }
     return good ? PEN_OK : PEN_BADARG;
 }
@@ -469,13 +455,42 @@ pen_status_t nqvm_euler_set_state(nqvm_euler_t *self, const nqvm_euler_x_t *x)
 {
     pen_status_t status = PEN_BADARG;
 
-    if (usable(self) && (x != NULL)) {
-        const pen_real_t state[N_X] = { x->z_b, x->z_w, x->v_b, x->v_w };
-        const bool finite = pen_finite(N_X, state);
-        status = finite ? PEN_OK : PEN_STATE_NONFINITE;
-        copy(N_X, finite ? state : self->row[LAST], self->row[LAST]);
-        copy(N_X, self->row[LAST], self->row[KEPT]);
-        pen_status_note_step(&self->log, status);
+    if (nqvm_euler_usable(self)) {
+        if (x != NULL) {
+            const pen_real_t state[NQVM_EULER_N_X] = { x->z_b, x->z_w, x->v_b, x->v_w };
+            const bool finite = pen_finite(NQVM_EULER_N_X, state);
+            status = finite ? PEN_OK : PEN_STATE_NONFINITE;
+            pen_step_copy(NQVM_EULER_N_X, finite ? state : self->row[PEN_ROW_LAST], self->row[PEN_ROW_LAST]);
+            pen_step_copy(NQVM_EULER_N_X, self->row[PEN_ROW_LAST], self->row[PEN_ROW_KEPT]);
+        }
+        pen_status_note_step(&self->head.log, status);
+    }
+    return status;
+}
+
+pen_status_t nqvm_euler_get_input(const nqvm_euler_t *self, nqvm_euler_u_t *u)
+{
+    const bool good = nqvm_euler_usable(self) && (u != NULL);
+
+    if (good) {
+        u->z_road = self->u[0][0];
+    }
+    return good ? PEN_OK : PEN_BADARG;
+}
+
+pen_status_t nqvm_euler_set_input(nqvm_euler_t *self, const nqvm_euler_u_t *u)
+{
+    pen_status_t status = PEN_BADARG;
+
+    if (nqvm_euler_usable(self)) {
+        if (u != NULL) {
+            const pen_real_t input[NQVM_EULER_N_DRIVE] = { u->z_road }; /* no rate, no difference */
+            const bool finite = pen_finite(NQVM_EULER_N_U, input);
+            status = finite ? PEN_OK : PEN_INPUT_NONFINITE;
+            pen_step_copy(NQVM_EULER_N_DRIVE, finite ? input : self->u[0], self->u[0]);
+            self->head.running = finite ? 1U : self->head.running;
+        }
+        pen_status_note_step(&self->head.log, status);
     }
     return status;
 }
@@ -484,11 +499,11 @@ pen_status_t nqvm_euler_sensors(const nqvm_euler_t *self, nqvm_euler_z_t *z)
 {
     pen_status_t status = PEN_BADARG;
 
-    if (usable(self) && (z != NULL)) {
-        const pen_real_t *const p = self->tuning.slot[self->tuning.active & 1U].value;
+    if (nqvm_euler_usable(self) && (z != NULL)) {
+        const pen_real_t *const p = self->head.tuning.slot[self->head.tuning.active & 1U].value;
         pen_real_t value[NQVM_EULER_N_SENSORS];
         status = PEN_OK;
-        status |= sensors(p, self->row[LAST], self->u[0], value);
+        status |= nqvm_euler_sense(p, self->row[PEN_ROW_LAST], self->u[0], value);
         if (pen_finite(NQVM_EULER_N_SENSORS, value)) {
             z->a_body = value[0];
             z->a_wheel = value[1];
@@ -500,113 +515,158 @@ pen_status_t nqvm_euler_sensors(const nqvm_euler_t *self, nqvm_euler_z_t *z)
     return status;
 }
 
+pen_status_t nqvm_euler_sensors_jacobian(const nqvm_euler_t *self, nqvm_euler_sensors_jacobian_t *j)
+{
+    pen_status_t status = PEN_BADARG;
+
+    if (nqvm_euler_usable(self) && (j != NULL)) {
+        const pen_real_t *const p = self->head.tuning.slot[self->head.tuning.active & 1U].value;
+        pen_real_t zx[NQVM_EULER_N_SENSORS][NQVM_EULER_N_X];
+        pen_real_t zu[NQVM_EULER_N_SENSORS][NQVM_EULER_N_DRIVE];
+        status = PEN_OK;
+        status |= nqvm_euler_sense_jacobian(p, self->row[PEN_ROW_LAST], zx, zu);
+        for (size_t n = 0U; n < NQVM_EULER_N_SENSORS; n++) {
+            status |= pen_step_check(NQVM_EULER_N_X, zx[n], PEN_STEP_NONFINITE);
+            pen_step_copy(NQVM_EULER_N_X, zx[n], j->z_x[n]);
+            status |= pen_step_check(NQVM_EULER_N_DRIVE, zu[n], PEN_STEP_NONFINITE);
+            pen_step_copy(NQVM_EULER_N_U, zu[n], j->z_u[n]);
+        }
+    }
+    return status;
+}
+
 pen_status_t nqvm_euler_status(nqvm_euler_t *self, pen_status_report_t *report)
 {
-    const bool good = usable(self) && (report != NULL);
+    return pen_instance_status(&nqvm_euler_model, nqvm_euler_head(self), report);
+}
 
-    if (good) {
-        pen_status_read(&self->log, report);
+/* let the next step take a set that was found good */
+static pen_status_t nqvm_euler_publish(nqvm_euler_t *self, const pen_set_t *ready, pen_status_t found)
+{
+    pen_status_t status = found;
+
+    return pen_tune_publish(&nqvm_euler_model, nqvm_euler_head(self), NULL, ready, status);
+}
+
+pen_status_t nqvm_euler_init(nqvm_euler_t *self, const pen_set_t *set, nqvm_euler_banks_t *banks)
+{
+    pen_status_t status = pen_init(&nqvm_euler_model, (self == NULL) ? NULL : &self->head, set,
+                                   (banks == NULL) ? NULL : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
+
+    if (status == PEN_OK) {
+        static const pen_real_t start[NQVM_EULER_N_LAST] = { 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F };
+        pen_step_copy(NQVM_EULER_N_LAST, start, self->row[PEN_ROW_LAST]);
+        pen_step_copy(NQVM_EULER_N_LAST, start, self->row[PEN_ROW_KEPT]);
+        for (size_t i = 0U; i < NQVM_EULER_N_DRIVE; i++) {
+            self->u[0][i] = (pen_real_t)0;
+        }
+        status = pen_ready(&nqvm_euler_model, &self->head, NULL, status);
     }
-    return good ? PEN_OK : PEN_BADARG;
+    return status;
 }
 
 pen_status_t nqvm_euler_tune_begin(nqvm_euler_t *self, const pen_set_head_t *head)
 {
-    pen_status_t status = PEN_BADARG;
+    return pen_tune_begin(&nqvm_euler_model, nqvm_euler_head(self), head);
+}
 
-    if (usable(self)) {
-        status = pen_tuning_begin(&self->tuning, NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, head);
-        pen_status_note_tune(&self->log, status);
-    }
-    return status;
+pen_status_t nqvm_euler_tune_begin_copy(nqvm_euler_t *self, uint32_t id)
+{
+    return pen_tune_begin_copy(&nqvm_euler_model, nqvm_euler_head(self), id);
 }
 
 pen_status_t nqvm_euler_tune_write(nqvm_euler_t *self, uint32_t offset, const pen_real_t value[], uint32_t n)
 {
-    pen_status_t status = PEN_BADARG;
+    return pen_tune_write(&nqvm_euler_model, nqvm_euler_head(self), offset, value, n);
+}
 
-    if (usable(self)) {
-        status = pen_tuning_write(&self->tuning, NQVM_EULER_SET_LENGTH, offset, value, n);
-        pen_status_note_tune(&self->log, status);
-    }
-    return status;
+pen_status_t nqvm_euler_tune_write_bytes(nqvm_euler_t *self, uint32_t offset, const uint8_t byte[], uint32_t n)
+{
+    return pen_tune_write_bytes(&nqvm_euler_model, nqvm_euler_head(self), offset, byte, n);
+}
+
+pen_status_t nqvm_euler_tune_expect(nqvm_euler_t *self, uint32_t checksum)
+{
+    return pen_tune_expect(&nqvm_euler_model, nqvm_euler_head(self), checksum);
 }
 
 pen_status_t nqvm_euler_tune_abort(nqvm_euler_t *self)
 {
-    pen_status_t status = PEN_BADARG;
-
-    if (usable(self)) {
-        status = pen_tuning_abort(&self->tuning);
-        pen_status_note_tune(&self->log, status);
-    }
-    return status;
+    return pen_tune_abort(&nqvm_euler_model, nqvm_euler_head(self));
 }
 
-/* let the next step take a set that was found good */
-static pen_status_t announce(nqvm_euler_t *self, const pen_set_t *ready, pen_status_t found)
+pen_status_t nqvm_euler_tune_withdraw(nqvm_euler_t *self)
 {
-    pen_status_t status = found;
-
-    if (status == PEN_OK) {
-        pen_tuning_announce(&self->tuning, ready);
-    }
-    pen_status_note_tune(&self->log, status);
-    return status;
-}
-
-pen_status_t nqvm_euler_tune_commit(nqvm_euler_t *self)
-{
-    pen_status_t status = PEN_BADARG;
-
-    if (usable(self)) {
-        pen_set_t ready;
-        status = pen_tuning_commit(&self->tuning, NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, &ready);
-        status = announce(self, &ready, status);
-    }
-    return status;
-}
-
-pen_status_t nqvm_euler_tune_select(nqvm_euler_t *self, const pen_set_t *set)
-{
-    pen_status_t status = PEN_BADARG;
-
-    if (usable(self)) {
-        pen_set_t ready;
-        status = pen_tuning_select(&self->tuning, NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, set, &ready);
-        status = announce(self, &ready, status);
-    }
-    return status;
-}
-
-pen_status_t nqvm_euler_tune_rollback(nqvm_euler_t *self)
-{
-    pen_status_t status = PEN_BADARG;
-
-    if (usable(self)) {
-        pen_set_t ready;
-        status = pen_tuning_rollback(&self->tuning, NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, &ready);
-        status = announce(self, &ready, status);
-    }
-    return status;
+    return pen_tune_withdraw(&nqvm_euler_model, nqvm_euler_head(self));
 }
 
 pen_status_t nqvm_euler_tune_hold(nqvm_euler_t *self, bool hold)
 {
-    const bool good = usable(self);
+    return pen_tune_hold(&nqvm_euler_model, nqvm_euler_head(self), hold);
+}
 
-    if (good) {
-        pen_tuning_hold(&self->tuning, hold);
-    }
-    return good ? PEN_OK : PEN_BADARG;
+pen_status_t nqvm_euler_tune_pending(const nqvm_euler_t *self, bool *pending)
+{
+    return pen_tune_pending(&nqvm_euler_model, nqvm_euler_const_head(self), pending);
 }
 
 pen_status_t nqvm_euler_tune_running(const nqvm_euler_t *self, pen_set_head_t *head)
 {
-    const bool good = usable(self) && (head != NULL);
+    return pen_tune_running(&nqvm_euler_model, nqvm_euler_const_head(self), head);
+}
 
-    if (good) {
-        *head = pen_tuning_running(&self->tuning);
+pen_status_t nqvm_euler_tune_commit(nqvm_euler_t *self)
+{
+    pen_set_t ready;
+    const pen_status_t status = pen_tune_commit(&nqvm_euler_model, nqvm_euler_head(self), &ready);
+
+    return nqvm_euler_publish(self, &ready, status);
+}
+
+pen_status_t nqvm_euler_tune_select(nqvm_euler_t *self, const pen_set_t *set)
+{
+    pen_set_t ready;
+    const pen_status_t status = pen_tune_select(&nqvm_euler_model, nqvm_euler_head(self), set, &ready);
+
+    return nqvm_euler_publish(self, &ready, status);
+}
+
+pen_status_t nqvm_euler_tune_rollback(nqvm_euler_t *self)
+{
+    pen_set_t ready;
+    const pen_status_t status = pen_tune_rollback(&nqvm_euler_model, nqvm_euler_head(self), &ready);
+
+    return nqvm_euler_publish(self, &ready, status);
+}
+
+pen_status_t nqvm_euler_verify(nqvm_euler_t *self, uint32_t n)
+{
+    return pen_verify(&nqvm_euler_model, nqvm_euler_head(self), NULL, n);
+}
+
+pen_status_t nqvm_euler_save(const nqvm_euler_t *self, uint8_t byte[NQVM_EULER_SAVED])
+{
+    pen_status_t status = PEN_SET_BADARG;
+
+    if (nqvm_euler_usable(self)) {
+        status = pen_save(&nqvm_euler_model, &self->head, 3U * NQVM_EULER_N_LAST, &self->row[0][0], 2U
+            * NQVM_EULER_N_DRIVE, &self->u[0][0],
+                          byte, NQVM_EULER_SAVED);
     }
-    return good ? PEN_OK : PEN_BADARG;
+    return status;
+}
+
+pen_status_t nqvm_euler_restore(nqvm_euler_t *self, const uint8_t byte[NQVM_EULER_SAVED])
+{
+    pen_status_t status = PEN_SET_BADARG;
+
+    if (nqvm_euler_usable(self)) {
+        status = pen_restore(&nqvm_euler_model, &self->head, 3U * NQVM_EULER_N_LAST, &self->row[0][0], 2U
+            * NQVM_EULER_N_DRIVE, &self->u[0][0],
+                             byte, NQVM_EULER_SAVED);
+        if (status == PEN_OK) {
+            pen_restored(&nqvm_euler_model, &self->head, NULL);
+        }
+    }
+    return status;
 }

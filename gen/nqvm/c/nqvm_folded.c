@@ -7,6 +7,7 @@
 #include "penode/pen_math.h"
 #include "penode/pen_net16.h"
 #include "penode/pen_port.h"
+#include "penode/pen_step.h"
 
 #define NQVM_FOLDED_M_B_INVERSE ((pen_real_t)(1.0 / 350.0)) /* 1 / m_b */
 #define NQVM_FOLDED_M_W_INVERSE ((pen_real_t)(1.0 / 90.0)) /* 1 / m_w */
@@ -14,15 +15,15 @@
 #define NQVM_FOLDED_D ((pen_real_t)800.0) /* N*s/m, suspension damper */
 #define NQVM_FOLDED_C_T ((pen_real_t)300000.0) /* N/m, tyre spring */
 
-#define N_LAST 6U /* states and outputs */
-#define N_DRIVE 1U /* inputs */
-#define N_X NQVM_FOLDED_N_X
-#define N_COLUMNS 6U /* of derivatives: state, input before, input now */
-#define SUBSTEPS 1U
-#define H (NQVM_FOLDED_SAMPLE_TIME)
+#define NQVM_FOLDED_N_LAST 6U /* states and outputs */
+#define NQVM_FOLDED_N_DRIVE 1U /* inputs */
+#define NQVM_FOLDED_N_COLUMNS 6U /* of derivatives: state, input before, input now */
+#define NQVM_FOLDED_SUBSTEPS 1U
+#define NQVM_FOLDED_STEP (NQVM_FOLDED_SAMPLE_TIME)
 
 /* time derivatives of the states */
-static pen_status_t rates(const nqvm_folded_pieces_t *f, const pen_real_t x[], const pen_real_t u[], pen_real_t dx[])
+static pen_status_t nqvm_folded_rates(const pen_piece_t f[], const pen_real_t x[], const pen_real_t u[],
+    pen_real_t dx[])
 {
     pen_status_t status = PEN_OK;
     const pen_real_t z_b = x[0];
@@ -36,12 +37,13 @@ static pen_status_t rates(const nqvm_folded_pieces_t *f, const pen_real_t x[], c
     const pen_real_t s_tyre = z_w - z_road; /* deflection between wheel and z_road */
     const pen_real_t F_spring = NQVM_FOLDED_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_FOLDED_D * v_spring; /* force of damper */
-    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->spring_net, s_spring);
+    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, &f[0U], s_spring);
     /* force of spring_nn: network spring_net */
-    const pen_real_t F_spring_nn = pen_fold_value(f->spring_net, piece_of_F_spring_nn, s_spring, &status);
-    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->damper_net, v_spring);
+    const pen_real_t F_spring_nn = pen_fold_value(&f[0U], piece_of_F_spring_nn, s_spring, &status);
+    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, &f[1U * NQVM_FOLDED_PIECES],
+        v_spring);
     /* force of damper_nn: network damper_net */
-    const pen_real_t F_damper_nn = pen_fold_value(f->damper_net, piece_of_F_damper_nn, v_spring, &status);
+    const pen_real_t F_damper_nn = pen_fold_value(&f[1U * NQVM_FOLDED_PIECES], piece_of_F_damper_nn, v_spring, &status);
     const pen_real_t F_tyre = NQVM_FOLDED_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
     const pen_real_t der_v_b = NQVM_FOLDED_M_B_INVERSE * (-(F_damper + F_damper_nn + F_spring + F_spring_nn));
@@ -56,7 +58,7 @@ static pen_status_t rates(const nqvm_folded_pieces_t *f, const pen_real_t x[], c
 }
 
 /* the same, with their derivatives along the states, fx, and along the drive, fu */
-static pen_status_t rates_jacobian(const nqvm_folded_pieces_t *f, const pen_real_t x[], const pen_real_t u[],
+static pen_status_t nqvm_folded_rates_jacobian(const pen_piece_t f[], const pen_real_t x[], const pen_real_t u[],
     pen_real_t dx[],
     pen_real_t fx[4][4], pen_real_t fu[4][1])
 {
@@ -72,13 +74,14 @@ static pen_status_t rates_jacobian(const nqvm_folded_pieces_t *f, const pen_real
     const pen_real_t s_tyre = z_w - z_road; /* deflection between wheel and z_road */
     const pen_real_t F_spring = NQVM_FOLDED_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_FOLDED_D * v_spring; /* force of damper */
-    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->spring_net, s_spring);
+    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, &f[0U], s_spring);
     /* force of spring_nn: network spring_net */
-    const pen_real_t F_spring_nn = pen_fold_value(f->spring_net, piece_of_F_spring_nn, s_spring, &status);
+    const pen_real_t F_spring_nn = pen_fold_value(&f[0U], piece_of_F_spring_nn, s_spring, &status);
     const pen_real_t slope_F_spring_nn = piece_of_F_spring_nn->slope;
-    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->damper_net, v_spring);
+    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, &f[1U * NQVM_FOLDED_PIECES],
+        v_spring);
     /* force of damper_nn: network damper_net */
-    const pen_real_t F_damper_nn = pen_fold_value(f->damper_net, piece_of_F_damper_nn, v_spring, &status);
+    const pen_real_t F_damper_nn = pen_fold_value(&f[1U * NQVM_FOLDED_PIECES], piece_of_F_damper_nn, v_spring, &status);
     const pen_real_t slope_F_damper_nn = piece_of_F_damper_nn->slope;
     const pen_real_t F_tyre = NQVM_FOLDED_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
@@ -118,7 +121,7 @@ static pen_status_t rates_jacobian(const nqvm_folded_pieces_t *f, const pen_real
     return status;
 }
 
-static void outputs(const pen_real_t x[], pen_real_t y[])
+static void nqvm_folded_outputs(const pen_real_t x[], pen_real_t y[])
 {
     const pen_real_t z_b = x[0];
     const pen_real_t z_w = x[1];
@@ -127,7 +130,7 @@ static void outputs(const pen_real_t x[], pen_real_t y[])
     y[1] = z_w;
 }
 
-static void outputs_jacobian(pen_real_t yx[2][4], pen_real_t yu[2][1])
+static void nqvm_folded_outputs_jacobian(pen_real_t yx[2][4], pen_real_t yu[2][1])
 {
     yx[0][0] = (pen_real_t)1.0;
     yx[0][1] = (pen_real_t)0.0;
@@ -141,7 +144,7 @@ static void outputs_jacobian(pen_real_t yx[2][4], pen_real_t yu[2][1])
     yu[1][0] = (pen_real_t)0.0;
 }
 
-static pen_status_t sensors(const nqvm_folded_pieces_t *f, const pen_real_t x[], const pen_real_t u[], pen_real_t z[])
+static pen_status_t nqvm_folded_sense(const pen_piece_t f[], const pen_real_t x[], const pen_real_t u[], pen_real_t z[])
 {
     pen_status_t status = PEN_OK;
     const pen_real_t z_b = x[0];
@@ -155,12 +158,13 @@ static pen_status_t sensors(const nqvm_folded_pieces_t *f, const pen_real_t x[],
     const pen_real_t s_tyre = z_w - z_road; /* deflection between wheel and z_road */
     const pen_real_t F_spring = NQVM_FOLDED_C * s_spring; /* force of spring */
     const pen_real_t F_damper = NQVM_FOLDED_D * v_spring; /* force of damper */
-    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->spring_net, s_spring);
+    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, &f[0U], s_spring);
     /* force of spring_nn: network spring_net */
-    const pen_real_t F_spring_nn = pen_fold_value(f->spring_net, piece_of_F_spring_nn, s_spring, &status);
-    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, f->damper_net, v_spring);
+    const pen_real_t F_spring_nn = pen_fold_value(&f[0U], piece_of_F_spring_nn, s_spring, &status);
+    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, &f[1U * NQVM_FOLDED_PIECES],
+        v_spring);
     /* force of damper_nn: network damper_net */
-    const pen_real_t F_damper_nn = pen_fold_value(f->damper_net, piece_of_F_damper_nn, v_spring, &status);
+    const pen_real_t F_damper_nn = pen_fold_value(&f[1U * NQVM_FOLDED_PIECES], piece_of_F_damper_nn, v_spring, &status);
     const pen_real_t F_tyre = NQVM_FOLDED_C_T * s_tyre; /* force of tyre */
     /* acceleration of body */
     const pen_real_t der_v_b = NQVM_FOLDED_M_B_INVERSE * (-(F_damper + F_damper_nn + F_spring + F_spring_nn));
@@ -173,128 +177,162 @@ static pen_status_t sensors(const nqvm_folded_pieces_t *f, const pen_real_t x[],
     return status;
 }
 
+static pen_status_t nqvm_folded_sense_jacobian(const pen_piece_t f[], const pen_real_t x[], pen_real_t zx[3][4],
+    pen_real_t zu[3][1])
+{
+    pen_status_t status = PEN_OK;
+    const pen_real_t z_b = x[0];
+    const pen_real_t z_w = x[1];
+    const pen_real_t v_b = x[2];
+    const pen_real_t v_w = x[3];
+
+    const pen_real_t s_spring = z_b - z_w; /* deflection between body and wheel */
+    const pen_real_t v_spring = v_b - v_w; /* rate between body and wheel */
+    const pen_piece_t *const piece_of_F_spring_nn = pen_fold_find(NQVM_FOLDED_PIECES, &f[0U], s_spring);
+    status |= piece_of_F_spring_nn->status;
+    const pen_real_t slope_F_spring_nn = piece_of_F_spring_nn->slope;
+    const pen_piece_t *const piece_of_F_damper_nn = pen_fold_find(NQVM_FOLDED_PIECES, &f[1U * NQVM_FOLDED_PIECES],
+        v_spring);
+    status |= piece_of_F_damper_nn->status;
+    const pen_real_t slope_F_damper_nn = piece_of_F_damper_nn->slope;
+    const pen_real_t t1 = NQVM_FOLDED_C + slope_F_spring_nn;
+    const pen_real_t t2 = NQVM_FOLDED_M_B_INVERSE * t1;
+    const pen_real_t t3 = NQVM_FOLDED_D + slope_F_damper_nn;
+    const pen_real_t t4 = NQVM_FOLDED_M_B_INVERSE * t3;
+    const pen_real_t t5 = NQVM_FOLDED_M_W_INVERSE * t3;
+
+    zx[0][0] = -t2;
+    zx[0][1] = t2;
+    zx[0][2] = -t4;
+    zx[0][3] = t4;
+    zx[1][0] = NQVM_FOLDED_M_W_INVERSE * t1;
+    zx[1][1] = -(NQVM_FOLDED_M_W_INVERSE * (NQVM_FOLDED_C_T + t1));
+    zx[1][2] = t5;
+    zx[1][3] = -t5;
+    zx[2][0] = (pen_real_t)1.0;
+    zx[2][1] = (pen_real_t)-1.0;
+    zx[2][2] = (pen_real_t)0.0;
+    zx[2][3] = (pen_real_t)0.0;
+    zu[0][0] = (pen_real_t)0.0;
+    zu[1][0] = NQVM_FOLDED_M_W_INVERSE * NQVM_FOLDED_C_T;
+    zu[2][0] = (pen_real_t)0.0;
+    return status;
+}
+
 /* what drives the model at a share of the sample: the inputs */
-static void drive(pen_real_t share, const pen_real_t u0[], const pen_real_t u1[], pen_real_t us[])
+static void nqvm_folded_drive(pen_real_t share, const pen_real_t u0[], const pen_real_t u1[], pen_real_t us[])
 {
     for (size_t n = 0U; n < NQVM_FOLDED_N_U; n++) {
         us[n] = u0[n] + (share * (u1[n] - u0[n]));
     }
 }
 
-static pen_real_t inner(size_t n, const pen_real_t a[], const pen_real_t b[])
-{
-    pen_real_t sum = (pen_real_t)0;
-
-    for (size_t i = 0U; i < n; i++) {
-        sum += a[i] * b[i];
-    }
-    return sum;
-}
-
 /* derivative of the drive along column c, at a share of the sample */
-static void drive_along(pen_real_t share, size_t c, pen_real_t du[N_DRIVE])
+static void nqvm_folded_drive_along(pen_real_t share, size_t c, pen_real_t du[NQVM_FOLDED_N_DRIVE])
 {
     for (size_t n = 0U; n < NQVM_FOLDED_N_U; n++) {
-        const pen_real_t before = (c == (N_X + n)) ? (pen_real_t)1 : (pen_real_t)0;
-        const pen_real_t now = (c == (N_X + NQVM_FOLDED_N_U + n)) ? (pen_real_t)1 : (pen_real_t)0;
+        const pen_real_t before = (c == (NQVM_FOLDED_N_X + n)) ? (pen_real_t)1 : (pen_real_t)0;
+        const pen_real_t now = (c == (NQVM_FOLDED_N_X + NQVM_FOLDED_N_U + n)) ? (pen_real_t)1 : (pen_real_t)0;
         du[n] = before + (share * (now - before));
     }
 }
 
 /* derivative of a rate along column c, from its derivatives along states and drive */
-static pen_real_t along(const pen_real_t fx[], const pen_real_t fu[], pen_real_t d[N_X][N_COLUMNS],
+static pen_real_t nqvm_folded_along(const pen_real_t fx[], const pen_real_t fu[],
+    pen_real_t d[NQVM_FOLDED_N_X][NQVM_FOLDED_N_COLUMNS],
     pen_real_t share, size_t c)
 {
-    pen_real_t du[N_DRIVE];
+    pen_real_t du[NQVM_FOLDED_N_DRIVE];
     pen_real_t sum;
 
-    drive_along(share, c, du);
-    sum = inner(N_DRIVE, fu, du);
-    for (size_t n = 0U; n < N_X; n++) {
+    nqvm_folded_drive_along(share, c, du);
+    sum = pen_step_inner(NQVM_FOLDED_N_DRIVE, fu, du);
+    for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
         sum += fx[n] * d[n][c];
     }
     return sum;
 }
 
 /* where in the step each stage stands, as a share of it; a stage starts from the slope of the one before */
-static const pen_real_t node[4] = { (pen_real_t)0.0, (pen_real_t)0.5, (pen_real_t)0.5, (pen_real_t)1.0 };
+static const pen_real_t nqvm_folded_node[4] = { (pen_real_t)0.0, (pen_real_t)0.5, (pen_real_t)0.5, (pen_real_t)1.0 };
 
 /* from t(k-1) to t(k): Runge-Kutta of order 4; advance is 1, or 0 for a sample that stays where it is */
-static pen_status_t integrate(const nqvm_folded_pieces_t *f, const pen_real_t u0[], const pen_real_t u1[],
+static pen_status_t nqvm_folded_integrate(const pen_piece_t f[], const pen_real_t u0[], const pen_real_t u1[],
     pen_real_t advance,
     const pen_real_t x0[], pen_real_t x[])
 {
     static const pen_real_t weight[4] = { (pen_real_t)1.0, (pen_real_t)2.0, (pen_real_t)2.0, (pen_real_t)1.0 };
     pen_status_t status = PEN_OK;
 
-    for (size_t i = 0U; i < SUBSTEPS; i++) {
-        pen_real_t k[N_X];
-        pen_real_t sum[N_X];
+    for (size_t i = 0U; i < NQVM_FOLDED_SUBSTEPS; i++) {
+        pen_real_t k[NQVM_FOLDED_N_X];
+        pen_real_t sum[NQVM_FOLDED_N_X];
         PEN_PORT_UNROLL
-        for (size_t n = 0U; n < N_X; n++) {
+        for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
             k[n] = (pen_real_t)0;
             sum[n] = (pen_real_t)0;
         }
         for (size_t s = 0U; s < 4U; s++) {
-            pen_real_t xs[N_X];
-            pen_real_t us[N_DRIVE];
-            drive(node[s], u0, u1, us);
+            pen_real_t xs[NQVM_FOLDED_N_X];
+            pen_real_t us[NQVM_FOLDED_N_DRIVE];
+            nqvm_folded_drive(nqvm_folded_node[s], u0, u1, us);
             PEN_PORT_UNROLL
-            for (size_t n = 0U; n < N_X; n++) {
-                xs[n] = x0[n] + ((H * node[s]) * k[n]);
+            for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
+                xs[n] = x0[n] + ((NQVM_FOLDED_STEP * nqvm_folded_node[s]) * k[n]);
             }
-            status |= rates(f, xs, us, k);
+            status |= nqvm_folded_rates(f, xs, us, k);
             PEN_PORT_UNROLL
-            for (size_t n = 0U; n < N_X; n++) {
+            for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
                 sum[n] += weight[s] * k[n];
             }
         }
         PEN_PORT_UNROLL
-        for (size_t n = 0U; n < N_X; n++) {
-            x[n] = x0[n] + ((advance * (H / (pen_real_t)6.0)) * sum[n]);
+        for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
+            x[n] = x0[n] + ((advance * (NQVM_FOLDED_STEP / (pen_real_t)6.0)) * sum[n]);
         }
     }
     return status;
 }
 
 /* the same, to the bit, with the derivative d of x along each column: x(k-1), u(k-1), u(k) */
-static pen_status_t integrate_jacobian(const nqvm_folded_pieces_t *f, const pen_real_t u0[], const pen_real_t u1[],
+static pen_status_t nqvm_folded_integrate_jacobian(const pen_piece_t f[], const pen_real_t u0[], const pen_real_t u1[],
     pen_real_t advance,
-    const pen_real_t x0[], pen_real_t x[], pen_real_t d[N_X][N_COLUMNS])
+    const pen_real_t x0[], pen_real_t x[], pen_real_t d[NQVM_FOLDED_N_X][NQVM_FOLDED_N_COLUMNS])
 {
     pen_status_t status = PEN_OK;
 
-    for (size_t i = 0U; i < SUBSTEPS; i++) {
-        pen_real_t k[4][N_X];
-        pen_real_t dk[4][N_X][N_COLUMNS];
+    for (size_t i = 0U; i < NQVM_FOLDED_SUBSTEPS; i++) {
+        pen_real_t k[4][NQVM_FOLDED_N_X];
+        pen_real_t dk[4][NQVM_FOLDED_N_X][NQVM_FOLDED_N_COLUMNS];
         for (size_t s = 0U; s < 4U; s++) {
             const size_t before = (s == 0U) ? 0U : (s - 1U);
             const pen_real_t *const slope = (s == 0U) ? x0 : k[before];
-            pen_real_t xs[N_X];
-            pen_real_t ds[N_X][N_COLUMNS];
-            pen_real_t fx[N_X][N_X];
-            pen_real_t fu[N_X][N_DRIVE];
-            const pen_real_t share = node[s];
-            pen_real_t us[N_DRIVE];
-            drive(share, u0, u1, us);
-            for (size_t n = 0U; n < N_X; n++) {
-                xs[n] = x0[n] + ((H * node[s]) * slope[n]);
-                for (size_t c = 0U; c < N_COLUMNS; c++) {
-                    ds[n][c] = (s == 0U) ? d[n][c] : (d[n][c] + ((H * node[s]) * dk[before][n][c]));
+            pen_real_t xs[NQVM_FOLDED_N_X];
+            pen_real_t ds[NQVM_FOLDED_N_X][NQVM_FOLDED_N_COLUMNS];
+            pen_real_t fx[NQVM_FOLDED_N_X][NQVM_FOLDED_N_X];
+            pen_real_t fu[NQVM_FOLDED_N_X][NQVM_FOLDED_N_DRIVE];
+            const pen_real_t share = nqvm_folded_node[s];
+            pen_real_t us[NQVM_FOLDED_N_DRIVE];
+            nqvm_folded_drive(share, u0, u1, us);
+            for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
+                xs[n] = x0[n] + ((NQVM_FOLDED_STEP * nqvm_folded_node[s]) * slope[n]);
+                for (size_t c = 0U; c < NQVM_FOLDED_N_COLUMNS; c++) {
+                    ds[n][c] = (s == 0U) ? d[n][c]
+                        : (d[n][c] + ((NQVM_FOLDED_STEP * nqvm_folded_node[s]) * dk[before][n][c]));
                 }
             }
-            status |= rates_jacobian(f, xs, us, k[s], fx, fu);
-            for (size_t n = 0U; n < N_X; n++) {
-                for (size_t c = 0U; c < N_COLUMNS; c++) {
-                    dk[s][n][c] = along(fx[n], fu[n], ds, share, c);
+            status |= nqvm_folded_rates_jacobian(f, xs, us, k[s], fx, fu);
+            for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
+                for (size_t c = 0U; c < NQVM_FOLDED_N_COLUMNS; c++) {
+                    dk[s][n][c] = nqvm_folded_along(fx[n], fu[n], ds, share, c);
                 }
             }
         }
-        for (size_t n = 0U; n < N_X; n++) {
-            x[n] = x0[n] + (advance * (H / (pen_real_t)6.0))
+        for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
+            x[n] = x0[n] + (advance * (NQVM_FOLDED_STEP / (pen_real_t)6.0))
                 * (k[0][n] + ((pen_real_t)2.0 * k[1][n]) + ((pen_real_t)2.0 * k[2][n]) + k[3][n]);
-            for (size_t c = 0U; c < N_COLUMNS; c++) {
-                d[n][c] += (advance * (H / (pen_real_t)6.0))
+            for (size_t c = 0U; c < NQVM_FOLDED_N_COLUMNS; c++) {
+                d[n][c] += (advance * (NQVM_FOLDED_STEP / (pen_real_t)6.0))
                     * (dk[0][n][c] + ((pen_real_t)2.0 * dk[1][n][c]) + ((pen_real_t)2.0 * dk[2][n][c]) + dk[3][n][c]);
             }
         }
@@ -302,196 +340,128 @@ static pen_status_t integrate_jacobian(const nqvm_folded_pieces_t *f, const pen_
     return status;
 }
 
-#define KEPT 0U /* rows of the instance */
-#define LAST 1U
-#define NOW  2U
+static const pen_layer_t nqvm_folded_network_layer[6] = {
+    { PEN_LAYER_CENTRE, 1U, 1U },
+    { PEN_LAYER_RELU, 1U, 16U },
+    { PEN_LAYER_RELU, 16U, 16U },
+    { PEN_LAYER_RELU, 16U, 16U },
+    { PEN_LAYER_DENSE, 16U, 1U },
+    { PEN_LAYER_RESCALE, 1U, 1U },
+};
+static const pen_network_t nqvm_folded_folded[2] = {
+    { { nqvm_folded_network_layer, 6U, 16U, 48U }, NQVM_FOLDED_AT_SPRING_NET }, /* spring_net */
+    { { nqvm_folded_network_layer, 6U, 16U, 48U }, NQVM_FOLDED_AT_DAMPER_NET }, /* damper_net */
+};
+static const pen_set_t *const nqvm_folded_sets[2] = { &nqvm_folded_set_default, &nqvm_folded_set_altered_friction };
+static const pen_model_t nqvm_folded_model = {
+    NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, PEN_DAMAGE_REPORT,
+    false, false, NQVM_FOLDED_PIECES, 2U, nqvm_folded_folded,
+    2U, nqvm_folded_sets
+};
 
-static bool usable(const nqvm_folded_t *self)
+static pen_instance_t *nqvm_folded_head(nqvm_folded_t *self)
 {
-    return (self != NULL) && (self->ready == NQVM_FOLDED_LAYOUT);
+    return (self != NULL) ? &self->head : NULL;
 }
 
-/* derivatives at the start: x follows itself */
-static void unit(pen_real_t d[N_X][N_COLUMNS])
+static const pen_instance_t *nqvm_folded_const_head(const nqvm_folded_t *self)
 {
-    for (size_t n = 0U; n < N_X; n++) {
-        for (size_t c = 0U; c < N_COLUMNS; c++) {
-            d[n][c] = (n == c) ? (pen_real_t)1 : (pen_real_t)0;
-        }
-    }
+    return (self != NULL) ? &self->head : NULL;
 }
 
-static void copy(size_t n, const pen_real_t from[], pen_real_t to[])
+PEN_PORT_INLINE bool nqvm_folded_usable(const nqvm_folded_t *self)
 {
-    PEN_PORT_UNROLL
-    for (size_t i = 0U; i < n; i++) {
-        to[i] = from[i];
-    }
+    return (self != NULL) && (self->head.ready == NQVM_FOLDED_LAYOUT);
 }
 
-static pen_status_t check(size_t n, const pen_real_t value[], pen_status_t flag)
+/* take over what is pending and the input, and see what there is to start from */
+static pen_status_t nqvm_folded_begin(nqvm_folded_t *self, const nqvm_folded_u_t *u, uint32_t *slot)
 {
-    return pen_finite(n, value) ? PEN_OK : flag;
-}
+    pen_status_t status = pen_tuning_adopt(&self->head.tuning, slot);
+    pen_real_t *const u1 = self->u[1];
 
-/* the input that the step starts from: for the first sample its own */
-static const pen_real_t *before(const nqvm_folded_t *self)
-{
-    return self->u[1U - (self->running & 1U)];
-}
-
-/* how much of a sample to integrate: all of it, but nothing for the first one, which only gives outputs */
-static pen_real_t advance(const nqvm_folded_t *self)
-{
-    const uint32_t running = self->running & 1U;
-
-    return (pen_real_t)running;
-}
-
-/* Look at one piece of each network; the next step looks at the next. */
-static pen_status_t patrol(nqvm_folded_t *self, uint32_t slot)
-{
-    /* whatever its memory has become; no branch, as a comparison may be */
-    const uint32_t at = self->patrol % NQVM_FOLDED_PATROL;
-    const nqvm_folded_pieces_t *const f = &self->pieces[slot];
-    pen_real_t doubt = (pen_real_t)0; /* 0, or NaN once a number is not finite */
-
-    doubt *= f->spring_net[at].start;
-    doubt *= f->spring_net[at].offset;
-    doubt *= f->spring_net[at].slope;
-    doubt *= f->damper_net[at].start;
-    doubt *= f->damper_net[at].offset;
-    doubt *= f->damper_net[at].slope;
-    self->patrol = at + 1U;
-    return (doubt >= (pen_real_t)0) ? PEN_OK : PEN_WEIGHT_NONFINITE;
-}
-
-/* take over what is pending, and see what there is to start from */
-static pen_status_t begin(nqvm_folded_t *self, uint32_t *slot)
-{
-    pen_status_t status = pen_tuning_adopt(&self->tuning, slot);
-
-    status |= patrol(self, *slot);
-    status |= check(NQVM_FOLDED_N_U, self->u[1], PEN_INPUT_NONFINITE);
-    status |= check(N_LAST, self->row[LAST], PEN_STATE_NONFINITE);
+    u1[0] = u->z_road;
+    status |= pen_step_range(u1[0], (pen_real_t)-0.3, (pen_real_t)0.3, PEN_INPUT_RANGE);
+    status |= pen_step_scrub(&self->head, NQVM_FOLDED_SCRUB, 0U, NULL,
+                             2U, NQVM_FOLDED_PIECES, self->piece[*slot]);
+    status |= pen_step_check(NQVM_FOLDED_N_U, u1, PEN_INPUT_NONFINITE);
+    status |= pen_step_check(NQVM_FOLDED_N_LAST, self->row[PEN_ROW_LAST], PEN_STATE_NONFINITE);
     return status;
 }
 
-/* keep what is new if it is good, else what was there, else the second copy: picked by number, the same work each
-   way */
-static pen_status_t finish(nqvm_folded_t *self, pen_status_t status)
+static pen_status_t nqvm_folded_finish(nqvm_folded_t *self, pen_status_t status)
 {
-    const pen_status_t follows = (status << 2U) | (status << 1U); /* from a bad input or state: not said twice */
-    const pen_status_t result = status | (check(N_LAST, self->row[NOW], PEN_STEP_NONFINITE) & ~follows);
-    const uint32_t good = pen_advanced(result) ? 1U : 0U;
-    const uint32_t whole = ((result & PEN_STATE_NONFINITE) == PEN_OK) ? 1U : 0U;
-    const uint32_t received = ((result & PEN_INPUT_NONFINITE) == PEN_OK) ? 1U : 0U;
-
-    copy(N_LAST, self->row[good + whole], self->row[LAST]);
-    copy(N_LAST, self->row[LAST], self->row[KEPT]);
-    copy(N_DRIVE, self->u[received], self->u[0]);
-    self->running |= good;
-    pen_status_note_step(&self->log, result);
-    return result;
-}
-
-/* find the straight pieces of a set's networks; the tuning context does it, for a slot that no step reads */
-static pen_status_t fold(const pen_real_t p[], nqvm_folded_pieces_t *f)
-{
-    static const pen_layer_t network_layer[6] = {
-        { PEN_LAYER_CENTRE, 1U, 1U },
-        { PEN_LAYER_RELU, 1U, 16U },
-        { PEN_LAYER_RELU, 16U, 16U },
-        { PEN_LAYER_RELU, 16U, 16U },
-        { PEN_LAYER_DENSE, 16U, 1U },
-        { PEN_LAYER_RESCALE, 1U, 1U },
-    };
-    static const pen_chain_t network_chain = { network_layer, 6U, 16U, 48U };
-    pen_real_t line[4U * 16U];
-    bool active[48];
-    pen_status_t status = PEN_OK;
-
-    status |= pen_fold(&network_chain, &p[NQVM_FOLDED_AT_SPRING_NET], false, line, active, NQVM_FOLDED_PIECES,
-        f->spring_net);
-    status |= pen_fold(&network_chain, &p[NQVM_FOLDED_AT_DAMPER_NET], false, line, active, NQVM_FOLDED_PIECES,
-        f->damper_net);
-    return status;
-}
-
-pen_status_t nqvm_folded_init(nqvm_folded_t *self, const pen_set_t *set, nqvm_folded_banks_t *banks)
-{
-    pen_status_t status = PEN_BADARG;
-
-    if (self != NULL) {
-        self->ready = 0U;
-        status = pen_tuning_init(&self->tuning, NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, set,
-                                 (banks == NULL) ? NULL : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
-    }
-    if (status == PEN_OK) {
-        status = fold(set->value, &self->pieces[0]);
-    }
-    if (status == PEN_OK) {
-        static const pen_real_t start[N_LAST] = { 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F };
-        copy(N_LAST, start, self->row[LAST]);
-        copy(N_LAST, start, self->row[KEPT]);
-        for (size_t i = 0U; i < N_DRIVE; i++) {
-            self->u[0][i] = (pen_real_t)0;
-        }
-        self->running = 0U;
-        self->patrol = 0U;
-        pen_status_clear(&self->log);
-        self->ready = NQVM_FOLDED_LAYOUT;
-    }
-    return status;
+    return pen_step_finish(&self->head, NQVM_FOLDED_N_LAST, &self->row[0][0], NQVM_FOLDED_N_DRIVE, &self->u[0][0], 1U,
+                           PEN_INPUT_NONFINITE, status);
 }
 
 pen_status_t nqvm_folded_step(nqvm_folded_t *self, const nqvm_folded_u_t *u, nqvm_folded_y_t *y)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (usable(self) && (u != NULL) && (y != NULL)) {
+    if (!nqvm_folded_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
+        pen_real_t *const now = self->row[PEN_ROW_NOW];
         uint32_t slot;
-        self->u[1][0] = u->z_road;
-        status = begin(self, &slot);
-        const nqvm_folded_pieces_t *const f = &self->pieces[slot];
-        status |= integrate(f, before(self), self->u[1], advance(self), self->row[LAST], self->row[NOW]);
-        outputs(self->row[NOW], &self->row[NOW][N_X]);
-        status = finish(self, status);
-        y->z_b = self->row[LAST][4];
-        y->z_w = self->row[LAST][5];
+        status = nqvm_folded_begin(self, u, &slot);
+        const pen_piece_t *const f = self->piece[slot];
+        const pen_real_t *const u0 = self->u[1U - (self->head.running & 1U)]; /* for the first sample its own */
+        status |= nqvm_folded_integrate(f, u0, self->u[1], pen_step_history(&self->head, 0U), self->row[PEN_ROW_LAST],
+            now);
+        nqvm_folded_outputs(now, &now[NQVM_FOLDED_N_X]);
+        status = nqvm_folded_finish(self, status);
+        y->z_b = self->row[PEN_ROW_LAST][4];
+        y->z_w = self->row[PEN_ROW_LAST][5];
     }
     return status;
+}
+
+/* derivatives by column, d, as those by name */
+static void nqvm_folded_spread_x(nqvm_folded_jacobian_t *j, pen_real_t d[NQVM_FOLDED_N_X][NQVM_FOLDED_N_COLUMNS])
+{
+    for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
+        pen_step_copy(NQVM_FOLDED_N_X, d[n], j->x_x[n]);
+        pen_step_copy(NQVM_FOLDED_N_U, &d[n][NQVM_FOLDED_N_X], j->x_u_before[n]);
+        pen_step_copy(NQVM_FOLDED_N_U, &d[n][NQVM_FOLDED_N_X + NQVM_FOLDED_N_U], j->x_u[n]);
+    }
 }
 
 pen_status_t nqvm_folded_step_jacobian(nqvm_folded_t *self, const nqvm_folded_u_t *u, nqvm_folded_y_t *y,
     nqvm_folded_jacobian_t *j)
 {
-    pen_status_t status = PEN_BADARG;
+    pen_status_t status;
 
-    if (usable(self) && (u != NULL) && (y != NULL) && (j != NULL)) {
+    if (!nqvm_folded_usable(self)) {
+        status = PEN_BADARG; /* and no instance to count it in */
+    } else if ((u == NULL) || (y == NULL) || (j == NULL)) {
+        status = PEN_BADARG;
+        pen_status_note_step(&self->head.log, status);
+    } else {
+        pen_real_t d[NQVM_FOLDED_N_X][NQVM_FOLDED_N_COLUMNS];
+        pen_real_t yx[NQVM_FOLDED_N_Y][NQVM_FOLDED_N_X];
+        pen_real_t yu[NQVM_FOLDED_N_Y][NQVM_FOLDED_N_DRIVE];
+        pen_real_t *const now = self->row[PEN_ROW_NOW];
         uint32_t slot;
-        self->u[1][0] = u->z_road;
-        status = begin(self, &slot);
-        const nqvm_folded_pieces_t *const f = &self->pieces[slot];
-        pen_real_t d[N_X][N_COLUMNS];
-        pen_real_t yx[NQVM_FOLDED_N_Y][N_X];
-        pen_real_t yu[NQVM_FOLDED_N_Y][N_DRIVE];
-        unit(d);
-        status |= integrate_jacobian(f, before(self), self->u[1], advance(self), self->row[LAST], self->row[NOW], d);
-        outputs(self->row[NOW], &self->row[NOW][N_X]);
-        outputs_jacobian(yx, yu);
-        status = finish(self, status);
-        y->z_b = self->row[LAST][4];
-        y->z_w = self->row[LAST][5];
+        status = nqvm_folded_begin(self, u, &slot);
+        const pen_piece_t *const f = self->piece[slot];
+        const pen_real_t *const u0 = self->u[1U - (self->head.running & 1U)]; /* for the first sample its own */
+        pen_step_unit(NQVM_FOLDED_N_X, NQVM_FOLDED_N_COLUMNS, &d[0][0]);
+        status |= nqvm_folded_integrate_jacobian(f, u0, self->u[1], pen_step_history(&self->head, 0U),
+            self->row[PEN_ROW_LAST], now, d);
+        nqvm_folded_outputs(now, &now[NQVM_FOLDED_N_X]);
+        nqvm_folded_outputs_jacobian(yx, yu);
+        status = nqvm_folded_finish(self, status);
+        y->z_b = self->row[PEN_ROW_LAST][4];
+        y->z_w = self->row[PEN_ROW_LAST][5];
         if (pen_advanced(status)) {
-            for (size_t n = 0U; n < N_X; n++) {
-                copy(N_X, d[n], j->x_x[n]);
-                copy(NQVM_FOLDED_N_U, &d[n][N_X], j->x_u_before[n]);
-                copy(NQVM_FOLDED_N_U, &d[n][N_X + NQVM_FOLDED_N_U], j->x_u[n]);
-            }
+            nqvm_folded_spread_x(j, d);
             for (size_t n = 0U; n < NQVM_FOLDED_N_Y; n++) {
-                copy(N_X, yx[n], j->y_x[n]);
-                copy(NQVM_FOLDED_N_U, yu[n], j->y_u[n]);
+                pen_step_copy(NQVM_FOLDED_N_X, yx[n], j->y_x[n]);
+                pen_step_copy(NQVM_FOLDED_N_U, yu[n], j->y_u[n]);
             }
         }
     }
@@ -500,13 +470,13 @@ pen_status_t nqvm_folded_step_jacobian(nqvm_folded_t *self, const nqvm_folded_u_
 
 pen_status_t nqvm_folded_get_state(const nqvm_folded_t *self, nqvm_folded_x_t *x)
 {
-    const bool good = usable(self) && (x != NULL);
+    const bool good = nqvm_folded_usable(self) && (x != NULL);
 
     if (good) {
-        x->z_b = self->row[LAST][0];
-        x->z_w = self->row[LAST][1];
-        x->v_b = self->row[LAST][2];
-        x->v_w = self->row[LAST][3];
+        x->z_b = self->row[PEN_ROW_LAST][0];
+        x->z_w = self->row[PEN_ROW_LAST][1];
+        x->v_b = self->row[PEN_ROW_LAST][2];
+        x->v_w = self->row[PEN_ROW_LAST][3];
     }
     return good ? PEN_OK : PEN_BADARG;
 }
@@ -515,13 +485,42 @@ pen_status_t nqvm_folded_set_state(nqvm_folded_t *self, const nqvm_folded_x_t *x
 {
     pen_status_t status = PEN_BADARG;
 
-    if (usable(self) && (x != NULL)) {
-        const pen_real_t state[N_X] = { x->z_b, x->z_w, x->v_b, x->v_w };
-        const bool finite = pen_finite(N_X, state);
-        status = finite ? PEN_OK : PEN_STATE_NONFINITE;
-        copy(N_X, finite ? state : self->row[LAST], self->row[LAST]);
-        copy(N_X, self->row[LAST], self->row[KEPT]);
-        pen_status_note_step(&self->log, status);
+    if (nqvm_folded_usable(self)) {
+        if (x != NULL) {
+            const pen_real_t state[NQVM_FOLDED_N_X] = { x->z_b, x->z_w, x->v_b, x->v_w };
+            const bool finite = pen_finite(NQVM_FOLDED_N_X, state);
+            status = finite ? PEN_OK : PEN_STATE_NONFINITE;
+            pen_step_copy(NQVM_FOLDED_N_X, finite ? state : self->row[PEN_ROW_LAST], self->row[PEN_ROW_LAST]);
+            pen_step_copy(NQVM_FOLDED_N_X, self->row[PEN_ROW_LAST], self->row[PEN_ROW_KEPT]);
+        }
+        pen_status_note_step(&self->head.log, status);
+    }
+    return status;
+}
+
+pen_status_t nqvm_folded_get_input(const nqvm_folded_t *self, nqvm_folded_u_t *u)
+{
+    const bool good = nqvm_folded_usable(self) && (u != NULL);
+
+    if (good) {
+        u->z_road = self->u[0][0];
+    }
+    return good ? PEN_OK : PEN_BADARG;
+}
+
+pen_status_t nqvm_folded_set_input(nqvm_folded_t *self, const nqvm_folded_u_t *u)
+{
+    pen_status_t status = PEN_BADARG;
+
+    if (nqvm_folded_usable(self)) {
+        if (u != NULL) {
+            const pen_real_t input[NQVM_FOLDED_N_DRIVE] = { u->z_road }; /* no rate, no difference */
+            const bool finite = pen_finite(NQVM_FOLDED_N_U, input);
+            status = finite ? PEN_OK : PEN_INPUT_NONFINITE;
+            pen_step_copy(NQVM_FOLDED_N_DRIVE, finite ? input : self->u[0], self->u[0]);
+            self->head.running = finite ? 1U : self->head.running;
+        }
+        pen_status_note_step(&self->head.log, status);
     }
     return status;
 }
@@ -530,11 +529,11 @@ pen_status_t nqvm_folded_sensors(const nqvm_folded_t *self, nqvm_folded_z_t *z)
 {
     pen_status_t status = PEN_BADARG;
 
-    if (usable(self) && (z != NULL)) {
-        const nqvm_folded_pieces_t *const f = &self->pieces[self->tuning.active & 1U];
+    if (nqvm_folded_usable(self) && (z != NULL)) {
+        const pen_piece_t *const f = self->piece[self->head.tuning.active & 1U];
         pen_real_t value[NQVM_FOLDED_N_SENSORS];
         status = PEN_OK;
-        status |= sensors(f, self->row[LAST], self->u[0], value);
+        status |= nqvm_folded_sense(f, self->row[PEN_ROW_LAST], self->u[0], value);
         if (pen_finite(NQVM_FOLDED_N_SENSORS, value)) {
             z->a_body = value[0];
             z->a_wheel = value[1];
@@ -546,116 +545,179 @@ pen_status_t nqvm_folded_sensors(const nqvm_folded_t *self, nqvm_folded_z_t *z)
     return status;
 }
 
+pen_status_t nqvm_folded_sensors_jacobian(const nqvm_folded_t *self, nqvm_folded_sensors_jacobian_t *j)
+{
+    pen_status_t status = PEN_BADARG;
+
+    if (nqvm_folded_usable(self) && (j != NULL)) {
+        const pen_piece_t *const f = self->piece[self->head.tuning.active & 1U];
+        pen_real_t zx[NQVM_FOLDED_N_SENSORS][NQVM_FOLDED_N_X];
+        pen_real_t zu[NQVM_FOLDED_N_SENSORS][NQVM_FOLDED_N_DRIVE];
+        status = PEN_OK;
+        status |= nqvm_folded_sense_jacobian(f, self->row[PEN_ROW_LAST], zx, zu);
+        for (size_t n = 0U; n < NQVM_FOLDED_N_SENSORS; n++) {
+            status |= pen_step_check(NQVM_FOLDED_N_X, zx[n], PEN_STEP_NONFINITE);
+            pen_step_copy(NQVM_FOLDED_N_X, zx[n], j->z_x[n]);
+            status |= pen_step_check(NQVM_FOLDED_N_DRIVE, zu[n], PEN_STEP_NONFINITE);
+            pen_step_copy(NQVM_FOLDED_N_U, zu[n], j->z_u[n]);
+        }
+    }
+    return status;
+}
+
 pen_status_t nqvm_folded_status(nqvm_folded_t *self, pen_status_report_t *report)
 {
-    const bool good = usable(self) && (report != NULL);
-
-    if (good) {
-        pen_status_read(&self->log, report);
-    }
-    return good ? PEN_OK : PEN_BADARG;
+    return pen_instance_status(&nqvm_folded_model, nqvm_folded_head(self), report);
 }
 
-pen_status_t nqvm_folded_tune_begin(nqvm_folded_t *self, const pen_set_head_t *head)
+/* find the straight pieces of a set's networks, for a slot that no step reads */
+static pen_status_t nqvm_folded_fold(const pen_real_t value[], pen_piece_t piece[])
 {
-    pen_status_t status = PEN_BADARG;
+    pen_real_t line[4U * 16U];
+    bool active[48];
 
-    if (usable(self)) {
-        status = pen_tuning_begin(&self->tuning, NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, head);
-        pen_status_note_tune(&self->log, status);
-    }
-    return status;
-}
-
-pen_status_t nqvm_folded_tune_write(nqvm_folded_t *self, uint32_t offset, const pen_real_t value[], uint32_t n)
-{
-    pen_status_t status = PEN_BADARG;
-
-    if (usable(self)) {
-        status = pen_tuning_write(&self->tuning, NQVM_FOLDED_SET_LENGTH, offset, value, n);
-        pen_status_note_tune(&self->log, status);
-    }
-    return status;
-}
-
-pen_status_t nqvm_folded_tune_abort(nqvm_folded_t *self)
-{
-    pen_status_t status = PEN_BADARG;
-
-    if (usable(self)) {
-        status = pen_tuning_abort(&self->tuning);
-        pen_status_note_tune(&self->log, status);
-    }
-    return status;
+    return pen_prepare(&nqvm_folded_model, value, line, active, piece);
 }
 
 /* let the next step take a set that was found good, and its networks folded */
-static pen_status_t announce(nqvm_folded_t *self, const pen_set_t *ready, pen_status_t found)
+static pen_status_t nqvm_folded_publish(nqvm_folded_t *self, const pen_set_t *ready, pen_status_t found)
 {
     pen_status_t status = found;
 
     if (status == PEN_OK) {
-        status = fold(ready->value, &self->pieces[pen_tuning_spare(&self->tuning)]);
+        status = nqvm_folded_fold(ready->value, self->piece[pen_tuning_inactive(&self->head.tuning)]);
+    }
+    return pen_tune_publish(&nqvm_folded_model, nqvm_folded_head(self), (status == PEN_OK)
+        ? self->piece[pen_tuning_inactive(&self->head.tuning)] : NULL, ready, status);
+}
+
+pen_status_t nqvm_folded_init(nqvm_folded_t *self, const pen_set_t *set, nqvm_folded_banks_t *banks)
+{
+    pen_status_t status = pen_init(&nqvm_folded_model, (self == NULL) ? NULL : &self->head, set,
+                                   (banks == NULL) ? NULL : banks->value[0], (banks == NULL) ? NULL : banks->value[1]);
+
+    if (status == PEN_OK) {
+        status = nqvm_folded_fold(set->value, self->piece[0]);
     }
     if (status == PEN_OK) {
-        pen_tuning_announce(&self->tuning, ready);
-    }
-    pen_status_note_tune(&self->log, status);
-    return status;
-}
-
-pen_status_t nqvm_folded_tune_commit(nqvm_folded_t *self)
-{
-    pen_status_t status = PEN_BADARG;
-
-    if (usable(self)) {
-        pen_set_t ready;
-        status = pen_tuning_commit(&self->tuning, NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, &ready);
-        status = announce(self, &ready, status);
+        static const pen_real_t start[NQVM_FOLDED_N_LAST] = { 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F };
+        pen_step_copy(NQVM_FOLDED_N_LAST, start, self->row[PEN_ROW_LAST]);
+        pen_step_copy(NQVM_FOLDED_N_LAST, start, self->row[PEN_ROW_KEPT]);
+        for (size_t i = 0U; i < NQVM_FOLDED_N_DRIVE; i++) {
+            self->u[0][i] = (pen_real_t)0;
+        }
+        status = pen_ready(&nqvm_folded_model, &self->head, self->piece[0], status);
     }
     return status;
 }
 
-pen_status_t nqvm_folded_tune_select(nqvm_folded_t *self, const pen_set_t *set)
+pen_status_t nqvm_folded_tune_begin(nqvm_folded_t *self, const pen_set_head_t *head)
 {
-    pen_status_t status = PEN_BADARG;
-
-    if (usable(self)) {
-        pen_set_t ready;
-        status = pen_tuning_select(&self->tuning, NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, set, &ready);
-        status = announce(self, &ready, status);
-    }
-    return status;
+    return pen_tune_begin(&nqvm_folded_model, nqvm_folded_head(self), head);
 }
 
-pen_status_t nqvm_folded_tune_rollback(nqvm_folded_t *self)
+pen_status_t nqvm_folded_tune_begin_copy(nqvm_folded_t *self, uint32_t id)
 {
-    pen_status_t status = PEN_BADARG;
+    return pen_tune_begin_copy(&nqvm_folded_model, nqvm_folded_head(self), id);
+}
 
-    if (usable(self)) {
-        pen_set_t ready;
-        status = pen_tuning_rollback(&self->tuning, NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, &ready);
-        status = announce(self, &ready, status);
-    }
-    return status;
+pen_status_t nqvm_folded_tune_write(nqvm_folded_t *self, uint32_t offset, const pen_real_t value[], uint32_t n)
+{
+    return pen_tune_write(&nqvm_folded_model, nqvm_folded_head(self), offset, value, n);
+}
+
+pen_status_t nqvm_folded_tune_write_bytes(nqvm_folded_t *self, uint32_t offset, const uint8_t byte[], uint32_t n)
+{
+    return pen_tune_write_bytes(&nqvm_folded_model, nqvm_folded_head(self), offset, byte, n);
+}
+
+pen_status_t nqvm_folded_tune_expect(nqvm_folded_t *self, uint32_t checksum)
+{
+    return pen_tune_expect(&nqvm_folded_model, nqvm_folded_head(self), checksum);
+}
+
+pen_status_t nqvm_folded_tune_abort(nqvm_folded_t *self)
+{
+    return pen_tune_abort(&nqvm_folded_model, nqvm_folded_head(self));
+}
+
+pen_status_t nqvm_folded_tune_withdraw(nqvm_folded_t *self)
+{
+    return pen_tune_withdraw(&nqvm_folded_model, nqvm_folded_head(self));
 }
 
 pen_status_t nqvm_folded_tune_hold(nqvm_folded_t *self, bool hold)
 {
-    const bool good = usable(self);
+    return pen_tune_hold(&nqvm_folded_model, nqvm_folded_head(self), hold);
+}
 
-    if (good) {
-        pen_tuning_hold(&self->tuning, hold);
-    }
-    return good ? PEN_OK : PEN_BADARG;
+pen_status_t nqvm_folded_tune_pending(const nqvm_folded_t *self, bool *pending)
+{
+    return pen_tune_pending(&nqvm_folded_model, nqvm_folded_const_head(self), pending);
 }
 
 pen_status_t nqvm_folded_tune_running(const nqvm_folded_t *self, pen_set_head_t *head)
 {
-    const bool good = usable(self) && (head != NULL);
+    return pen_tune_running(&nqvm_folded_model, nqvm_folded_const_head(self), head);
+}
 
-    if (good) {
-        *head = pen_tuning_running(&self->tuning);
+pen_status_t nqvm_folded_tune_commit(nqvm_folded_t *self)
+{
+    pen_set_t ready;
+    const pen_status_t status = pen_tune_commit(&nqvm_folded_model, nqvm_folded_head(self), &ready);
+
+    return nqvm_folded_publish(self, &ready, status);
+}
+
+pen_status_t nqvm_folded_tune_select(nqvm_folded_t *self, const pen_set_t *set)
+{
+    pen_set_t ready;
+    const pen_status_t status = pen_tune_select(&nqvm_folded_model, nqvm_folded_head(self), set, &ready);
+
+    return nqvm_folded_publish(self, &ready, status);
+}
+
+pen_status_t nqvm_folded_tune_rollback(nqvm_folded_t *self)
+{
+    pen_set_t ready;
+    const pen_status_t status = pen_tune_rollback(&nqvm_folded_model, nqvm_folded_head(self), &ready);
+
+    return nqvm_folded_publish(self, &ready, status);
+}
+
+pen_status_t nqvm_folded_verify(nqvm_folded_t *self, uint32_t n)
+{
+    return pen_verify(&nqvm_folded_model, nqvm_folded_head(self), (self == NULL) ? NULL : self->piece[0], n);
+}
+
+pen_status_t nqvm_folded_save(const nqvm_folded_t *self, uint8_t byte[NQVM_FOLDED_SAVED])
+{
+    pen_status_t status = PEN_SET_BADARG;
+
+    if (nqvm_folded_usable(self)) {
+        status = pen_save(&nqvm_folded_model, &self->head, 3U * NQVM_FOLDED_N_LAST, &self->row[0][0], 2U
+            * NQVM_FOLDED_N_DRIVE, &self->u[0][0],
+                          byte, NQVM_FOLDED_SAVED);
     }
-    return good ? PEN_OK : PEN_BADARG;
+    return status;
+}
+
+pen_status_t nqvm_folded_restore(nqvm_folded_t *self, const uint8_t byte[NQVM_FOLDED_SAVED])
+{
+    pen_status_t status = PEN_SET_BADARG;
+
+    if (nqvm_folded_usable(self)) {
+        status = pen_restore(&nqvm_folded_model, &self->head, 3U * NQVM_FOLDED_N_LAST, &self->row[0][0], 2U
+            * NQVM_FOLDED_N_DRIVE, &self->u[0][0],
+                             byte, NQVM_FOLDED_SAVED);
+        if (status == PEN_OK) {
+            for (uint32_t i = 0U; i < 2U; i++) {
+                if ((self->head.tuning.open == 0U) || (i == (self->head.tuning.active & 1U))) {
+                    (void)nqvm_folded_fold(self->head.tuning.slot[i].value, self->piece[i]);
+                }
+            }
+            pen_restored(&nqvm_folded_model, &self->head, self->piece[0]);
+        }
+    }
+    return status;
 }
