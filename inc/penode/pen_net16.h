@@ -17,6 +17,10 @@
 #include "penode/pen_port.h"
 #include "penode/pen_real.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /** max(0, x). Two instructions cheaper than a comparison, and -Inf + Inf is NaN: an overflow cannot hide behind the kink. */
 PEN_PORT_INLINE pen_real_t pen_rectified(pen_real_t x)
 {
@@ -361,5 +365,9 @@ PEN_PORT_INLINE pen_real_t pen_net16_slope(size_t hidden, const pen_real_t w[], 
     *slope = change[to][0];
     return (pen_real_t)0.5F * value[to][0];
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
