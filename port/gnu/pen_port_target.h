@@ -62,9 +62,15 @@ PEN_PORT_INLINE pen_real_t pen_port_abs(pen_real_t x)
 #endif
 }
 
-#if defined(__OPTIMIZE_SIZE__) && !defined(PEN_REAL_DOUBLE) && defined(__ARM_FP) && defined(__ARM_ARCH_PROFILE)
+/* Kernels for the FPU of a Cortex-M: for size on any; for speed not where the FPU has double precision: such a core, an
+ * M7 or M55, may load while it computes. An M7 with single precision looks like an M4 and is treated as one. */
+#if !defined(PEN_REAL_DOUBLE) && defined(__ARM_FP) && defined(__ARM_ARCH_PROFILE)
 #if (__ARM_ARCH_PROFILE == 'M') && ((__ARM_FP & 4) != 0)
+#if defined(__OPTIMIZE_SIZE__)
 #include "pen_port_rows.h"
+#elif defined(__OPTIMIZE__) && ((__ARM_FP & 8) == 0)
+#include "pen_port_net16.h"
+#endif
 #endif
 #endif
 
