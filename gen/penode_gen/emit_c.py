@@ -14,7 +14,7 @@ import jinja2
 import sympy as sp
 
 from . import expressions as ex
-from . import sets, units
+from . import selftest, sets, units
 from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
 from .fold import foldable
@@ -56,16 +56,19 @@ _METHOD_NAMES = {
 }  # fmt: skip
 
 
-def render(model: Model) -> dict[str, str]:
-    """File name -> text of the C of a model. Pure: no clock, no path beyond the model file's name."""
+def render(model: Model, self_test: bool = True) -> dict[str, str]:
+    """File name -> text of the C of a model, with or without its self-test. Pure: no clock, no path beyond the model file's name."""
     context = _Emitter(model).context()
     names = {"model.h.j2": f"{model.name}.h", "model.c.j2": f"{model.name}.c", "params.c.j2": f"{model.name}_params.c"}
+    if self_test:
+        context |= selftest.model_context(context)
+        names["selftest.c.j2"] = f"{model.name}_selftest.c"
     return {name: fold(_TEMPLATES.get_template(template).render(context)) for template, name in names.items()}
 
 
-def generate(model: Model, directory: str | Path) -> list[Path]:
+def generate(model: Model, directory: str | Path, self_test: bool = True) -> list[Path]:
     """Write the C of a model into `directory`: all files, or none. Raises OSError."""
-    texts = render(model)
+    texts = render(model, self_test)
     directory = Path(directory)
     directory.mkdir(parents=True, exist_ok=True)
     for path in (directory / name for name in texts):

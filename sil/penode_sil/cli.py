@@ -119,7 +119,7 @@ def generate(model: Path, output: Path) -> None:
     if not output.exists() and not output.absolute().parent.is_dir():
         raise UserError(f"{output}: there is no directory {output.parent}; create it")
     penode_gen.generate(loaded, output)
-    for suffix in (".h", ".c", "_params.c"):
+    for suffix in (".h", ".c", "_params.c", "_selftest.c"):
         click.echo(str(output / f"{loaded.name}{suffix}"))
 
 

@@ -21,6 +21,7 @@
 #include <stdint.h>
 
 #include "penode/pen_real.h"
+#include "penode/pen_selftest.h"
 #include "penode/pen_set.h"
 #include "penode/pen_status.h"
 
@@ -144,5 +145,22 @@ pen_status_t nqvm_tune_select(nqvm_t *self, const pen_set_t *set);
 pen_status_t nqvm_tune_rollback(nqvm_t *self);
 pen_status_t nqvm_tune_hold(nqvm_t *self, bool hold);
 pen_status_t nqvm_tune_running(const nqvm_t *self, pen_set_head_t *head);
+
+/**
+ * Known-answer self-test, for power-on: 200 samples from the initial state with the set `default`, on inputs of the
+ * test. States and outputs must be, to the bit, what the generator evaluated without this code. Calls pen_selftest().
+ * @param lent  an instance of the caller's that nothing else uses; afterwards it has to be initialised (again)
+ * @return 0, or flags of penode/pen_selftest.h, those of pen_selftest() among them. PEN_SELFTEST_ANSWER also if the
+ *         model's answer is missed; PEN_SELFTEST_SET: its set is refused. With PEN_SELFTEST_REAL (the caller's type of
+ *         numbers is not the code's) and PEN_SELFTEST_BADARG (lent is NULL) nothing is written
+ * Thread context: the one that will step (floating-point modes belong to a context), before it does.
+ * Cost: an init, 200 steps and pen_selftest(); for each step some 120 instructions more for the hash.
+ */
+uint32_t nqvm_selftest_of(nqvm_t *lent, uint32_t type);
+
+static inline uint32_t nqvm_selftest(nqvm_t *lent)
+{
+    return nqvm_selftest_of(lent, PEN_SELFTEST_TYPE);
+}
 
 #endif

@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+#include "penode/pen_selftest.h"
+
+#include "penode/pen_math.h"
+#include "penode/pen_net.h"
+#include "penode/pen_solve.h"
+
+#define ZERO ((pen_real_t)0)
+#define HALF ((pen_real_t)0.5F)
+#define ONE  ((pen_real_t)1)
+#define EPS  PEN_REAL_EPSILON
+
+#define WIDE 21U /* rows of a layer: a block of 16, of 4 and of 1 */
+#define ARGUMENTS 16U
+#define ORDER 3U /* of a linear system */
+
+/* Of answer(), by penode_gen/selftest.py. */
+#ifdef PEN_REAL_DOUBLE
+#define ANSWER 0xf902ca5dU
+#else
+#define ANSWER 0xdb1f260fU
+#endif
+
+static bool same(pen_real_t a, pen_real_t b)
+{
+    return (a >= b) && (a <= b);
+}
+
+/* Everything below goes through volatile: else the compiler computes it, on another machine. */
+
+static uint32_t flush(void)
+{
+    const volatile pen_real_t given[4] = { PEN_REAL_MIN, HALF, PEN_REAL_MIN * HALF, ONE / EPS };
+    const volatile pen_real_t result = given[0] * given[1]; /* subnormal */
+    const volatile pen_real_t normal = given[2] * given[3]; /* from a subnormal */
+
+    return ((result > ZERO) && (normal > ZERO)) ? 0U : PEN_SELFTEST_FLUSH;
+}
+
+/* Ties to even, upwards and downwards and on both sides of zero; and a difference that software gets wrong. */
+static uint32_t rounding(void)
+{
+    const volatile pen_real_t given[4] = { ONE, EPS * HALF, ONE + EPS, EPS * (pen_real_t)0.25F };
+    const pen_real_t one = given[0];
+    const pen_real_t tie = given[1];
+    const pen_real_t odd = given[2];
+    const pen_real_t less = given[3];
+    const bool even = same(one + tie, ONE) && same(-one - tie, -ONE);
+    const bool up = same(odd + tie, ONE + (EPS + EPS)) && same(-odd - tie, -ONE - (EPS + EPS));
+    const bool below = same(one - less, ONE) && same((one - less) - tie, ONE - (EPS * HALF));
+
+    return (even && up && below) ? 0U : PEN_SELFTEST_ROUNDING;
+}
+
+/* n numbers from -1/2 on, below 1/2, of 24 bits: their products have to be rounded. */
+static uint32_t fill(uint32_t number, size_t n, pen_real_t value[])
+{
+    uint32_t last = number;
+
+    for (size_t i = 0U; i < n; i++) {
+        last = pen_selftest_next(last);
+        const uint32_t high = last >> 8U;
+        value[i] = ((pen_real_t)high * (pen_real_t)0x1p-24F) - HALF;
+    }
+    return last;
+}
+
+/* Hash over what functions, layers and a linear solve give. */
+static uint32_t answer(void)
+{
+    pen_real_t w[3U * WIDE];
+    pen_real_t x[ARGUMENTS];
+    pen_real_t y[WIDE];
+    pen_real_t a[ORDER * ORDER];
+    volatile uint32_t seed = 1U;
+    uint32_t number = fill(seed, ARGUMENTS, x);
+    uint32_t hash = PEN_SELFTEST_SEED;
+
+    for (size_t i = 0U; i < ARGUMENTS; i++) {
+        const pen_real_t far = x[i] * (pen_real_t)32;
+        const pen_real_t found[4] = { pen_exp(far), pen_tanh(x[i] + x[i]), pen_sigmoid(far), pen_softplus(far) };
+        hash = pen_selftest_hash(hash, 4U, found);
+    }
+    number = fill(number, 3U * WIDE, w);
+    pen_dense(WIDE, 2U, w, x, y);
+    hash = pen_selftest_hash(hash, WIDE, y);
+    pen_dense_relu(2U, WIDE, w, y, x);
+    hash = pen_selftest_hash(hash, 2U, x);
+    (void)fill(number, ORDER * ORDER, a);
+    hash ^= pen_solve(ORDER, a, y);
+    return pen_selftest_hash(hash, ORDER, y);
+}
+
+uint32_t pen_selftest_hash(uint32_t hash, size_t n, const pen_real_t value[])
+{
+    const uint32_t one = 1U;
+    const uint8_t *const low = (const uint8_t *)&one; /* 1: the low byte lies first */
+    const uint8_t *const byte = (const uint8_t *)value;
+    const size_t size = sizeof(pen_real_t);
+    uint32_t result = hash;
+
+    for (size_t i = 0U; i < n; i++) {
+        for (size_t b = 0U; b < size; b++) {
+            const size_t at = (*low == 1U) ? b : ((size - 1U) - b);
+            result = (result ^ byte[(i * size) + at]) * 0x01000193U;
+        }
+    }
+    return result;
+}
+
+uint32_t pen_selftest_of(uint32_t type)
+{
+    uint32_t found = (flush() | rounding()) | pen_selftest_contracted();
+
+    found |= (type == PEN_SELFTEST_TYPE) ? 0U : PEN_SELFTEST_REAL;
+    found |= (answer() == ANSWER) ? 0U : PEN_SELFTEST_ANSWER;
+    return found;
+}
