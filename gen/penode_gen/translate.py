@@ -28,7 +28,7 @@ class Untranslated(Exception):
 
 def function(name: str, parameters: list[str], lines: list[str], environment: dict[str, Any], real: type) -> Any:
     """The lines of a C function's body as a Python function; `environment` has all that they call and name."""
-    body = _Body(real)
+    body = _Body(real, environment)
     text = [f"def {name}({', '.join(parameters)}):", *body.lines(lines), "    return None"]
     scope = environment | body.literals | {"_real": real, "_zeros": lambda *n: np.zeros(n, real), "_row": lambda *v: np.array(v, real)}
     exec(compile("\n".join(text), f"<{name}>", "exec"), scope)  # noqa: S102: text of our own making
@@ -41,8 +41,8 @@ def expression(text: str, environment: dict[str, Any], real: type) -> Any:
 
 
 class _Body:
-    def __init__(self, real: type):
-        self.real = real
+    def __init__(self, real: type, environment: dict[str, Any]):
+        self.real, self.environment = real, environment
         self.literals: dict[str, Any] = {}
 
     def lines(self, lines: list[str]) -> list[str]:
@@ -202,6 +202,8 @@ class _Body:
             arguments.append(self._expression())
         if arguments:
             self._expect(")")
+        if name not in self.environment:
+            raise self._unknown()
         return f"{name}({', '.join(arguments)})"
 
 

@@ -13,10 +13,12 @@
  * (NAME_selftest.c) covers the code of the model too, and calls pen_selftest() itself.
  *
  * The double build: a software double that does not round as IEEE 754 says is reported like any other breach. That of
- * GCC's libgcc for Arm gives PEN_SELFTEST_ROUNDING (penode/pen_math.h).
+ * GCC's libgcc for Arm (cores without an FPU for doubles) gives PEN_SELFTEST_ROUNDING: see penode/pen_math.h.
  *
- * Thread context: any; nothing is kept. Floating-point modes belong to a context: run it in the one that steps.
- * Cost on a Cortex-M4F at -O2: 9999 instructions; code and constants 9999 bytes, stack below 1 KB, no RAM.
+ * Thread context: any, nothing is kept. Floating-point modes belong to a context: run it in the one that steps.
+ * Cost on a Cortex-M4F, -O2 / -Os:
+ *   pen_selftest     10879 / 10397 instructions, 1008 / 808 bytes of code and constants, 0.5 KB of stack, no RAM
+ *   NAME_selftest    376 / 376 bytes for gen/nqvm; instructions: those of an init and 200 steps, and of the hash
  */
 #ifndef PEN_SELFTEST_H
 #define PEN_SELFTEST_H
