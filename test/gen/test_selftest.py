@@ -115,19 +115,17 @@ def test_networks_of_every_shape(tmp_path):
         check(bare(tmp_path / str(i), sizes, activation, outside, more), tmp_path)
 
 
-@pytest.mark.parametrize("name", ["nqvm", "nqvm_euler", "nqvm_folded"])
 @pytest.mark.parametrize("compiler", ["gcc", "clang-19"])
-def test_committed_models(tmp_path, name, compiler, show):
-    """At every optimisation, and their inputs stay where a declared range and the trust envelope want them."""
+def test_committed_models(tmp_path, compiler):
+    """At every optimisation, in float and in double."""
     if shutil.which(compiler) is None:
         pytest.skip(f"{compiler} is not installed")
+    files = [*sorted((ROOT / "src").glob("*.c")), *sorted(NQVM.glob("*.c"))]
     for level, (real, flags) in zip(("-O1", "-O2", "-O3", "-Os"), [*REALS.items()] * 2):
-        files = [*sorted((ROOT / "src").glob("*.c")), *sorted(NQVM.glob(f"{name}*.c"))]
-        files = [f for f in files if f.parent != NQVM or f.stem.removeprefix(name) in ("", "_params", "_selftest")]
-        library = tmp_path / f"{level}.so"
         options = ["-std=c99", level, *flags, "-ffp-contract=off", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{NQVM}", "-shared", "-fPIC"]
-        subprocess.run([compiler, *options, "-o", library, *files], check=True)
-        assert found(ctypes.CDLL(str(library)), name, real) == 0, (level, real)
+        subprocess.run([compiler, *options, "-o", tmp_path / f"{level}.so", *files], check=True)
+        library = ctypes.CDLL(str(tmp_path / f"{level}.so"))
+        assert [found(library, name, real) for name in ("nqvm", "nqvm_euler", "nqvm_folded")] == [0, 0, 0], (level, real)
 
 
 def test_input_stays_in_its_range_and_reaches_the_envelope():
@@ -138,7 +136,9 @@ def test_input_stays_in_its_range_and_reaches_the_envelope():
     low, step = (float(chosen[0][k].removesuffix("F")) for k in ("low", "step"))
     assert -0.3 <= low and low + 255 * step <= 0.3
     machine, number, rates = Evaluator(context, np.float32), 1, []
-    for _ in range(selftest.LEVELS):
+    start = machine.x
+    for level in range(selftest.LEVELS):
+        machine.x = machine.x if level % 2 else start
         number = selftest.next_number(number)
         for _ in range(selftest.HOLD):
             assert machine.step(np.array([low + step * (number >> 24)]))
@@ -188,10 +188,10 @@ FAULTS = {
     "a weight": ("model/nqvm_params.c", "    0.12F", None, SET),
     "a constant of the model": ("model/nqvm.c", "((pen_real_t)10000.0)", "((pen_real_t)10001.0)", ANSWER),
     "the last bit of a constant": ("model/nqvm.c", "(1.0 / 350.0)", "(1.0 / 350.00002)", ANSWER),
-    "the order of a sum of the model": ("model/nqvm.c", "F_damper + F_damper_nn + F_spring + F_spring_nn - F_tyre", "F_spring + F_spring_nn + F_damper + F_damper_nn - F_tyre", ANSWER),
+    "the order of a sum of the model": ("model/nqvm.c", "-(F_damper + F_damper_nn + F_spring + F_spring_nn)", "-(F_damper + F_spring + F_damper_nn + F_spring_nn)", ANSWER),
     "the order of a kernel": ("inc/penode/pen_net16.h", "for (size_t i = 0U; i < 16U; i += 2U)", "for (size_t i = 14U; i < 16U; i -= 2U)", ANSWER),
     "a layer's last row": ("src/pen_net.c", "    pen_real_t a = w[0];\n\n    for (size_t i = 0U; i < n_in; i++) {", "    pen_real_t a = w[0];\n\n    for (size_t i = n_in - 1U; i < n_in; i--) {", ANSWER),
-    "a coefficient": ("src/pen_math.c", "0.16666521F", "0.16666523F", ANSWER),
+    "a coefficient": ("src/pen_math.c", "0.16666521F", "0.1666658F", ANSWER),
     "the order of a linear solve": ("src/pen_solve.c", "sum * inverse[k - 1U]", "sum / a[((k - 1U) * n) + (k - 1U)]", ANSWER),
 }  # fmt: skip
 
