@@ -9,7 +9,7 @@ import jinja2
 import sympy as sp
 
 from . import expressions as ex
-from . import layout, promises, sets, units
+from . import layout, promises, selftest, sets, units
 from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
 from .emit_networks import NetworkCode, by_value, hidden16, network_code, network_lines, second_lines, slope_lines
@@ -55,18 +55,21 @@ _METHOD_NAMES = {
 _FILES = {"model.h.j2": "{name}.h", "model.c.j2": "{name}.c", "sets.h.j2": "{owner}_sets.h", "params.c.j2": "{owner}_params.c"}
 
 
-def render(model: Model) -> dict[str, str]:
-    """File name -> text of the C of a model. Pure: no clock, no path beyond the model file's name."""
+def render(model: Model, self_test: bool = True) -> dict[str, str]:
+    """File name -> text of the C of a model, with or without its self-test. Pure: no clock, no path beyond the model file's name."""
     context = _Emitter(model).context()
-    texts = {}
-    for template, name in _FILES.items():
+    texts, files = {}, dict(_FILES)
+    if self_test:
+        context |= selftest.model_context(context)
+        files["selftest.c.j2"] = "{name}_selftest.c"
+    for template, name in files.items():
         texts[name.format(name=model.name, owner=model.owner)] = fold(_TEMPLATES.get_template(template).render(context))
     return texts | {f"{model.owner}_layout.json": layout.to_json(model)}
 
 
-def generate(model: Model, directory: str | Path) -> list[Path]:
+def generate(model: Model, directory: str | Path, self_test: bool = True) -> list[Path]:
     """Write the C of a model into `directory`: all files, or none. Raises OSError."""
-    return write_all(render(model), directory)
+    return write_all(render(model, self_test), directory)
 
 
 class _Emitter:
