@@ -58,12 +58,9 @@ _METHOD_NAMES = {
 
 def render(model: Model, self_test: bool = True) -> dict[str, str]:
     """File name -> text of the C of a model, with or without its self-test. Pure: no clock, no path beyond the model file's name."""
-    context = _Emitter(model).context()
-    names = {"model.h.j2": f"{model.name}.h", "model.c.j2": f"{model.name}.c", "params.c.j2": f"{model.name}_params.c"}
-    if self_test:
-        context |= selftest.model_context(context)
-        names["selftest.c.j2"] = f"{model.name}_selftest.c"
-    return {name: fold(_TEMPLATES.get_template(template).render(context)) for template, name in names.items()}
+    context = selftest.answered(_Emitter(model).context(), self_test)
+    ends = {"model.h": ".h", "model.c": ".c", "params.c": "_params.c"} | ({"selftest.c": "_selftest.c"} if self_test else {})
+    return {f"{model.name}{end}": fold(_TEMPLATES.get_template(f"{name}.j2").render(context)) for name, end in ends.items()}
 
 
 def generate(model: Model, directory: str | Path, self_test: bool = True) -> list[Path]:

@@ -38,7 +38,7 @@ METHODS, INPUTS, OUTSIDE, SUBSTEPS = ("euler", "heun", "rk4", "ros1", "ros2"), (
 
 def complaints(folder: Path, name: str, reals: tuple[list[str], ...] = REALS) -> list[str]:
     """What the compilers say about the C of a model."""
-    sources = [str(folder / f"{name}.c"), str(folder / f"{name}_params.c")]
+    sources = [str(folder / f"{name}{end}.c") for end in ("", "_params", "_selftest")]
     found = []
     for compiler, real in itertools.product(COMPILERS, reals):
         result = subprocess.run([compiler, *STRICT, *real, f"-I{folder}", *sources], capture_output=True, text=True)
@@ -221,8 +221,8 @@ def test_all_files_or_none(tmp_path, monkeypatch):
 
     with pytest.raises(OSError):
         penode_gen.generate(model, tmp_path / "n2.json" / "below a file")
-    assert [p.name for p in penode_gen.generate(model, out)] == ["rich.h", "rich.c", "rich_params.c"]
-    assert sorted(p.name for p in out.iterdir()) == ["rich.c", "rich.h", "rich_params.c"]
+    assert [p.name for p in penode_gen.generate(model, out)] == ["rich.h", "rich.c", "rich_params.c", "rich_selftest.c"]
+    assert sorted(p.name for p in out.iterdir()) == ["rich.c", "rich.h", "rich_params.c", "rich_selftest.c"]
     assert all(p.stat().st_mode & 0o777 == 0o644 for p in out.iterdir())
 
 
