@@ -14,6 +14,10 @@
 #include "penode/pen_real.h"
 #include "penode/pen_status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PEN_SOLVE_MAX 16U /* largest n */
 
 /**
@@ -47,5 +51,9 @@ static inline pen_status_t pen_solve2(const pen_real_t a[4], pen_real_t b[2])
     b[1] = x1;
     return (doubt < (pen_real_t)1) ? PEN_OK : PEN_SINGULAR;
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
