@@ -201,3 +201,7 @@ hidden-fresh: | $(READY)
 
 figures-check: | $(READY) ## No figure may be 2 % worse than the kept one, or above what is promised
 	@test/check "figures" $(PYTHON) test/bench/bench.py --check
+
+# -- packages for firmware ------------------------------------------------------------------------------------------------
+
+include test/packages/packages.mk
