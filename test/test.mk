@@ -10,7 +10,7 @@ PYTHONS  := $(filter python-%,$(SUITES))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
 RUNTIME  := $(wildcard src/*.c)
 MODEL    := $(wildcard gen/nqvm/c/*.c)
-MODELS   := $(patsubst gen/nqvm/c/%.h,%,$(wildcard gen/nqvm/c/*.h))
+MODELS   := $(filter-out %_sets,$(patsubst gen/nqvm/c/%.h,%,$(wildcard gen/nqvm/c/*.h)))
 LIBRARY  := $(RUNTIME) $(MODEL)
 INCLUDE  := -Igen/nqvm/c
 
