@@ -44,6 +44,12 @@ static pen_real_t lowest(pen_real_t x, pen_real_t error)
     return (x - error) - ((TWO * PEN_REAL_EPSILON) * (pen_port_abs(x) + error));
 }
 
+/* The smaller of two numbers; NaN if one is, or infinite. */
+static pen_real_t smaller(pen_real_t a, pen_real_t b)
+{
+    return ((a < b) ? a : b) + (ZERO * a);
+}
+
 /* What each of n inputs brings in: its own error, and the rounding of its product and of k sums. Are they all exactly 0? */
 static bool burden(size_t n, size_t k, const pen_real_t x[], pen_real_t error[])
 {
@@ -129,17 +135,17 @@ static const row_t *pass(const pen_layer_t *layer, const pen_real_t p[], bool sl
  * kink ends where the value is as small as its error; below twice its error a neuron is undecided, and the cell goes on
  * until it has three times its error on the other side.
  */
-static void rectify(pen_cell_t *cell, bool active[], size_t neuron, const row_t *y, const row_t *s, size_t i)
+static void rectify(pen_cell_t *part, bool active[], size_t neuron, const row_t *y, const row_t *s, size_t i)
 {
     const pen_real_t value = y->x[i];
     const pen_real_t error = y->error[i];
     const pen_real_t spread = s->error[i];
-    const pen_real_t rate = cell->way * s->x[i];
+    const pen_real_t rate = part->way * s->x[i];
     const pen_real_t size = pen_port_abs(value);
     const bool positive = (value > ZERO) || (!(value < ZERO) && (rate > ZERO));
     const pen_real_t closing = positive ? (spread - rate) : (spread + rate); /* how fast it comes to zero, at most */
     const bool leaves = (closing <= ZERO) && (size >= error);
-    const bool stays = (size > (TWO * error)) && ((size - error) > (closing * cell->guard));
+    const bool stays = (size > (TWO * error)) && ((size - error) > (closing * part->guard));
     pen_real_t reach = PEN_REAL_MAX;
 
     if ((leaves || stays) && (size <= PEN_REAL_MAX)) {
@@ -156,20 +162,20 @@ static void rectify(pen_cell_t *cell, bool active[], size_t neuron, const row_t 
         const pen_real_t leaving = pen_port_abs(rate) - spread;
         const pen_real_t to_go = (THREE * error) - ((rate > ZERO) ? value : -value);
         const pen_real_t end = to_go / leaving;
-        const pen_real_t later = (end > cell->guard) ? end : cell->guard;
+        const pen_real_t later = (end > part->guard) ? end : part->guard;
         reach = (leaving > ZERO) ? later : PEN_REAL_MAX;
         y->x[i] = (value > ZERO) ? value : ZERO;
         s->x[i] = HALF * (least + most);
         s->error[i] = safe(false, HALF * (most - least), 4U);
-        cell->neuron[(cell->open < PEN_CELL_OPEN) ? cell->open : 0U] = neuron;
-        cell->open++;
+        part->neuron[(part->open < PEN_CELL_OPEN) ? part->open : 0U] = neuron;
+        part->open++;
     }
     active[neuron] = positive;
-    cell->length = (reach < cell->length) ? reach : cell->length;
+    part->length = (reach < part->length) ? reach : part->length;
 }
 
-/* The slopes of the network along a pattern, and their bounds. */
-static void slope_along(const pen_line_t *line, const row_t *a, const row_t *b, pen_real_t *slope, pen_real_t *spread)
+/* The slope of the network along the pattern, with its bound. */
+static const row_t *slope_along(const pen_line_t *line, const row_t *a, const row_t *b)
 {
     const pen_real_t *p = line->p;
     const row_t *h = a;
@@ -187,38 +193,30 @@ static void slope_along(const pen_line_t *line, const row_t *a, const row_t *b, 
             first++;
         }
     }
-    *slope = h->x[0];
-    *spread = h->error[0];
+    return h;
 }
 
 /* All slopes that the undecided neurons of a cell, each on or off, let the network have. */
-static void go_through(const pen_line_t *line, const row_t *a, const row_t *b, pen_cell_t *cell)
+static void go_through(const pen_line_t *line, const row_t *a, const row_t *b, pen_cell_t *part)
 {
     pen_real_t least = PEN_REAL_MAX;
     pen_real_t most = -PEN_REAL_MAX;
-    pen_real_t doubt = ZERO;
-    pen_real_t low;
-    pen_real_t high;
-    pen_real_t slope;
-    pen_real_t spread;
 
-    for (uint32_t pattern = 0U; pattern < ((uint32_t)1U << cell->open); pattern++) {
-        for (size_t i = 0U; i < cell->open; i++) {
-            line->active[cell->neuron[i]] = (((pattern >> i) & 1U) != 0U);
+    for (uint32_t pattern = 0U; pattern < ((uint32_t)1U << part->open); pattern++) {
+        const row_t *slope;
+        for (size_t i = 0U; i < part->open; i++) {
+            line->active[part->neuron[i]] = (((pattern >> i) & 1U) != 0U);
         }
-        slope_along(line, a, b, &slope, &spread);
-        low = lowest(slope, spread);
-        high = -lowest(-slope, spread);
-        least = (low < least) ? low : least;
-        most = (high > most) ? high : most;
-        doubt += ZERO * (low + high); /* NaN after an overflow */
+        slope = slope_along(line, a, b);
+        least = smaller(lowest(slope->x[0], slope->error[0]), least);
+        most = -smaller(lowest(-slope->x[0], slope->error[0]), -most);
     }
-    cell->least = least + doubt;
-    cell->most = most + doubt;
+    part->least = least;
+    part->most = most;
 }
 
 /* The cell that starts at x. */
-void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *cell)
+void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *part)
 {
     const size_t width = line->chain->width;
     pen_real_t *const work = line->work;
@@ -229,11 +227,11 @@ void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *
     const row_t *t = &slope[0];
     size_t first = 0U; /* neuron of the layer */
 
-    cell->x = x;
-    cell->way = way;
-    cell->guard = (FOUR * (PEN_REAL_EPSILON * pen_port_abs(x))) + PEN_REAL_MIN;
-    cell->length = PEN_REAL_MAX;
-    cell->open = 0U;
+    part->x = x;
+    part->way = way;
+    part->guard = (FOUR * (PEN_REAL_EPSILON * pen_port_abs(x))) + PEN_REAL_MIN;
+    part->length = PEN_REAL_MAX;
+    part->open = 0U;
     h->x[0] = x;
     h->error[0] = ZERO;
     t->x[0] = ONE;
@@ -244,15 +242,15 @@ void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *
         t = pass(layer, p, true, t, (t == &slope[0]) ? &slope[1] : &slope[0]);
         p = &p[values_of(layer)];
         for (size_t n = 0U; (layer->kind == PEN_LAYER_RELU) && (n < layer->n_out); n++) {
-            rectify(cell, line->active, first, h, t, n);
+            rectify(part, line->active, first, h, t, n);
             first++;
         }
     }
-    cell->value = h->x[0];
-    cell->error = h->error[0];
-    cell->least = lowest(t->x[0], t->error[0]);
-    cell->most = -lowest(-t->x[0], t->error[0]);
-    if ((cell->open > 0U) && (cell->open <= PEN_CELL_OPEN)) {
-        go_through(line, &slope[0], &slope[1], cell);
+    part->value = h->x[0];
+    part->error = h->error[0];
+    part->least = lowest(t->x[0], t->error[0]);
+    part->most = -lowest(-t->x[0], t->error[0]);
+    if ((part->open > 0U) && (part->open <= PEN_CELL_OPEN)) {
+        go_through(line, &slope[0], &slope[1], part);
     }
 }

@@ -20,22 +20,22 @@
 #define DOWN  (ONE - (EIGHT * PEN_REAL_EPSILON))
 
 /* Where the cell ends: before its length, rounding included; at the edge if nothing ends it before. */
-static pen_real_t end_of(const pen_cell_t *cell, pen_real_t edge)
+static pen_real_t end_of(const pen_cell_t *part, pen_real_t edge)
 {
-    const pen_real_t step = (cell->length * DOWN) - (PEN_REAL_EPSILON * pen_port_abs(cell->x));
-    const pen_real_t next = cell->x + (cell->way * step);
-    const bool ends = (cell->length < PEN_REAL_MAX) && ((cell->way * next) < (cell->way * edge));
+    const pen_real_t step = (part->length * DOWN) - (PEN_REAL_EPSILON * pen_port_abs(part->x));
+    const pen_real_t next = part->x + (part->way * step);
+    const bool ends = (part->length < PEN_REAL_MAX) && ((part->way * next) < (part->way * edge));
 
     return ends ? next : edge;
 }
 
 /* Which promises about slopes may be broken on the cell. */
-static uint32_t steep(const pen_promise_t *promise, const pen_cell_t *cell)
+static uint32_t steep(const pen_promise_t *promise, const pen_cell_t *part)
 {
-    const bool bounded = (cell->most <= promise->max_slope) && (-cell->least <= promise->max_slope);
-    uint32_t broken = (cell->least >= ZERO) ? 0U : PEN_PROMISE_INCREASING;
+    const bool bounded = (part->most <= promise->max_slope) && (-part->least <= promise->max_slope);
+    uint32_t broken = (part->least >= ZERO) ? 0U : PEN_PROMISE_INCREASING;
 
-    broken |= (cell->most <= ZERO) ? 0U : PEN_PROMISE_DECREASING;
+    broken |= (part->most <= ZERO) ? 0U : PEN_PROMISE_DECREASING;
     broken |= bounded ? 0U : PEN_PROMISE_MAX_SLOPE;
     return broken;
 }
@@ -44,36 +44,36 @@ static uint32_t steep(const pen_promise_t *promise, const pen_cell_t *cell)
  * How far the network may be from the straight line between the ends of a cell, rounded up: its slopes lie apart by
  * most - least, so it is off the line by that times the distance to the nearer end at most.
  */
-static pen_real_t bulge_of(const pen_cell_t *cell, pen_real_t distance)
+static pen_real_t bulge_of(const pen_cell_t *part, pen_real_t distance)
 {
-    return (cell->open == 0U) ? ZERO : (UP * ((HALF * (cell->most - cell->least)) * distance));
+    return (part->open == 0U) ? ZERO : (UP * ((HALF * (part->most - part->least)) * distance));
 }
 
 /* Is a force within its limit at x, and on the cells before and behind? An error is 0 or above EPS |value|, so twice the
  * error covers the rounding of adding it, too. */
-static bool weak(const pen_promise_t *promise, const pen_cell_t *cell, pen_real_t bulge)
+static bool weak(const pen_promise_t *promise, const pen_cell_t *part, pen_real_t bulge)
 {
-    const pen_real_t most = pen_port_abs(cell->value) + (TWO * cell->error) + bulge;
+    const pen_real_t most = pen_port_abs(part->value) + (TWO * part->error) + bulge;
 
     return (((bulge > ZERO) ? (UP * most) : most) <= promise->max_force);
 }
 
 /* May the force push along at x or behind? *low: below way * F(x); below that of the end of the cell afterwards; *bulge that
  * of the cell before, then of this one, where it counts. */
-static uint32_t driving(const pen_promise_t *promise, const pen_cell_t *cell, pen_real_t distance, bool endless, pen_real_t *low,
+static uint32_t driving(const pen_promise_t *promise, const pen_cell_t *part, pen_real_t distance, bool endless, pen_real_t *low,
                         pen_real_t *bulge)
 {
-    const pen_real_t least = (cell->way * cell->value) - (TWO * cell->error);
+    const pen_real_t least = (part->way * part->value) - (TWO * part->error);
     const pen_real_t here = (least > *low) ? least : *low;
-    const pen_real_t product = cell->least * distance;
-    const pen_real_t gain = (product - ((FOUR * PEN_REAL_EPSILON) * pen_port_abs(product))) - ((cell->least < ZERO) ? TINY : ZERO);
+    const pen_real_t product = part->least * distance;
+    const pen_real_t gain = (product - ((FOUR * PEN_REAL_EPSILON) * pen_port_abs(product))) - ((part->least < ZERO) ? TINY : ZERO);
     const pen_real_t sum = (here + gain) - ((TWO * PEN_REAL_EPSILON) * (pen_port_abs(here) + pen_port_abs(gain)));
     const pen_real_t there = ((gain >= ZERO) && (sum < here)) ? here : sum;
-    const bool above = (cell->least >= ZERO) || (!endless && (there >= -promise->band)); /* all along the cell */
-    const pen_real_t ahead = above ? ZERO : bulge_of(cell, distance);
+    const bool above = (part->least >= ZERO) || (!endless && (there >= -promise->band)); /* all along the cell */
+    const pen_real_t ahead = above ? ZERO : bulge_of(part, distance);
     const pen_real_t largest = (ahead > *bulge) ? ahead : *bulge;
     const pen_real_t reserve = (largest > ZERO) ? (UP * (largest + (PEN_REAL_EPSILON * pen_port_abs(here)))) : ZERO;
-    const bool kept = ((here - reserve) >= -promise->band) && ((cell->least >= ZERO) || !endless);
+    const bool kept = ((here - reserve) >= -promise->band) && ((part->least >= ZERO) || !endless);
 
     *low = there;
     *bulge = ahead;
@@ -88,18 +88,18 @@ typedef struct {
 } past_t;
 
 /* Which promises may be broken on a cell that ends at `next`? */
-static uint32_t judge(const pen_promise_t *promise, const pen_cell_t *cell, pen_real_t next, past_t *past)
+static uint32_t judge(const pen_promise_t *promise, const pen_cell_t *part, pen_real_t next, past_t *past)
 {
-    const pen_real_t distance = pen_port_abs(next - cell->x);
+    const pen_real_t distance = pen_port_abs(next - part->x);
     const bool endless = (pen_port_abs(next) >= PEN_REAL_MAX);
     const bool at_edge = !(distance > ZERO); /* from here on constant */
-    const bool flat = (cell->least >= ZERO) && (cell->most <= ZERO);
-    const pen_real_t bulge = bulge_of(cell, endless ? ZERO : distance);
-    const bool bounded = weak(promise, cell, (bulge > past->bulge) ? bulge : past->bulge) && (flat || !endless);
+    const bool flat = (part->least >= ZERO) && (part->most <= ZERO);
+    const pen_real_t bulge = bulge_of(part, endless ? ZERO : distance);
+    const bool bounded = weak(promise, part, (bulge > past->bulge) ? bulge : past->bulge) && (flat || !endless);
     uint32_t broken = bounded ? 0U : PEN_PROMISE_MAX_FORCE;
 
-    broken |= driving(promise, cell, distance, endless, &past->low, &past->pushing);
-    broken |= at_edge ? 0U : steep(promise, cell);
+    broken |= driving(promise, part, distance, endless, &past->low, &past->pushing);
+    broken |= at_edge ? 0U : steep(promise, part);
     past->bulge = bulge;
     return broken & promise->kinds;
 }
@@ -114,14 +114,16 @@ static uint32_t travel(const pen_line_t *line, const pen_promise_t *promise, pen
     bool more = true;
 
     while (more && (broken == 0U) && (*looks > 0U)) {
-        pen_cell_t cell;
+        pen_cell_t part;
         pen_real_t next;
-        pen_cell(line, x, way, &cell);
-        next = end_of(&cell, edge);
-        broken = judge(promise, &cell, next, &past);
+        uint32_t taken;
+        pen_cell(line, x, way, &part);
+        taken = ((part.open > 0U) && (part.open <= PEN_CELL_OPEN)) ? (1U + (((uint32_t)1U << part.open) / 2U)) : 1U;
+        next = end_of(&part, edge);
+        broken = judge(promise, &part, next, &past);
         *at = x;
         more = (pen_port_abs(next) < PEN_REAL_MAX) && (pen_port_abs(next - x) > ZERO);
-        (*looks)--;
+        *looks -= (*looks < taken) ? *looks : taken;
         x = next;
     }
     return (more && (broken == 0U)) ? (promise->kinds & ALONG) : broken;

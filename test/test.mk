@@ -10,7 +10,7 @@ PYTHONS  := $(filter python-%,$(SUITES))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
 RUNTIME  := $(wildcard src/*.c)
 MODEL    := $(wildcard gen/nqvm/c/*.c)
-MODELS   := $(patsubst gen/nqvm/c/%.h,%,$(wildcard gen/nqvm/c/*.h))
+MODELS   := $(filter-out %_sets,$(patsubst gen/nqvm/c/%.h,%,$(wildcard gen/nqvm/c/*.h)))
 LIBRARY  := $(RUNTIME) $(MODEL)
 INCLUDE  := -Igen/nqvm/c
 
@@ -85,7 +85,7 @@ build/misra/%.c: gen/nqvm/c/%.h $(HEADERS) test/misra/every_entry
 	@mkdir -p $(@D)
 	$(Q)test/misra/every_entry $(filter %.h,$^) >$@
 
-sources_of = build/misra/$(1).c $(RUNTIME) gen/nqvm/c/$(1).c gen/nqvm/c/$(1)_params.c gen/nqvm/c/$(1)_selftest.c $(PROGRAM.$(1))
+sources_of = build/misra/$(1).c $(RUNTIME) gen/nqvm/c/$(1).c $(filter-out %_selftest.c,$(wildcard gen/nqvm/c/*_params.c)) gen/nqvm/c/$(1)_selftest.c $(PROGRAM.$(1))
 misra-plain-%: build/misra/%.c | $(READY)
 	@test/check "misra $*" test/misra/check clean $(call sources_of,$*)
 misra-gnuc-%: build/misra/%.c | $(READY) # the branches that only GCC and clang see
@@ -201,3 +201,7 @@ hidden-fresh: | $(READY)
 
 figures-check: | $(READY) ## No figure may be 2 % worse than the kept one, or above what is promised
 	@test/check "figures" $(PYTHON) test/bench/bench.py --check
+
+# -- packages for firmware ------------------------------------------------------------------------------------------------
+
+include test/packages/packages.mk

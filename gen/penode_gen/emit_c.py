@@ -57,12 +57,8 @@ _FILES = {"model.h.j2": "{name}.h", "model.c.j2": "{name}.c", "sets.h.j2": "{own
 
 def render(model: Model, self_test: bool = True) -> dict[str, str]:
     """File name -> text of the C of a model, with or without its self-test. Pure: no clock, no path beyond the model file's name."""
-    context = _Emitter(model).context()
-    texts, files = {}, dict(_FILES)
-    if self_test:
-        context |= selftest.model_context(context)
-        files["selftest.c.j2"] = "{name}_selftest.c"
-    for template, name in files.items():
+    context, texts = selftest.answered(_Emitter(model).context(), self_test), {}
+    for template, name in (_FILES | ({"selftest.c.j2": "{name}_selftest.c"} if self_test else {})).items():
         texts[name.format(name=model.name, owner=model.owner)] = fold(_TEMPLATES.get_template(template).render(context))
     return texts | {f"{model.owner}_layout.json": layout.to_json(model)}
 

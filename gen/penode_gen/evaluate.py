@@ -18,9 +18,7 @@ from .fold_walk import Walk, find, value
 from .kernels import Array, Kernels
 from .translate import expression, function
 
-_RESULTS = {
-    "rates": ["dx"], "rates_jacobian": ["dx", "fx", "fu"], "outputs": ["y"],
-}  # fmt: skip
+_RESULTS = {"rates": ["dx"], "rates_jacobian": ["dx", "fx", "fu"], "outputs": ["y"]}
 
 
 class _Folded:
@@ -51,6 +49,7 @@ class Evaluator:
         }
         self.sample_time = real(self.model.sample_time)
         self.h = self.sample_time / real(self.model.substeps) if self.model.substeps > 1 else self.sample_time
+        self.stages = [(expression(n, {}, real), expression(w, {}, real)) for n, w in zip(context["nodes"], context["weights"])]
         self.x = np.array(self.model.start, real)
         self.y = np.zeros(self.n_y, real)
         self.running = 0
@@ -101,7 +100,7 @@ class Evaluator:
         }
 
     def _fold(self, name: str, code: Any) -> Any:
-        at = self.context["model"] and sets.offsets(self.model)[name]
+        at = sets.offsets(self.model)[name]
         return Walk(self.k, code.network, self.p[at:], self.model.outside == "clamp").pieces(self.model.pieces)
 
     def _find(self, pieces: Any, x: Any) -> Any:
@@ -185,16 +184,12 @@ class Evaluator:
         return (i + node) / self.real(self.model.substeps) if self.model.substeps > 1 else node
 
     def _runge_kutta(self, x: Array, i: Any, now: dict[str, Array], advance: Any) -> tuple[Array, bool]:
-        from .emit_c import _RUNGE_KUTTA
-
-        r = self.real
-        nodes, weights, divisor = _RUNGE_KUTTA[self.model.method]
         k, total = np.zeros_like(x), np.zeros_like(x)
-        for node, weight in zip(map(r, nodes), map(r, weights)):
+        for node, weight in self.stages:
             at = x + ((self.h * node) * k)
             (k,) = self._call("rates", at, self._drive(self._share(i, node), now))
             total = total + weight * k
-        return x + ((advance * (self.h / r(divisor))) * total), True
+        return x + ((advance * (self.h / self.real(self.context["divisor"]))) * total), True
 
     def _solve(self, gh: Any, fx: Array, k: Array) -> bool:
         """(I - gh fx) k = k; False if singular."""

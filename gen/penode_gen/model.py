@@ -26,7 +26,7 @@ class ModelError(Exception):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known), 0 if nothing is said."""
+    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known), 0 if none is stated."""
 
     name: str
     value: float

@@ -44,6 +44,6 @@ typedef struct {
  * on and off in every combination; if there are more, each counts as every slope from 0 to that of its line.
  * Cost on a Cortex-M4F: 21 instructions a weight, and 10 for each combination.
  */
-void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *cell);
+void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *part);
 
 #endif

@@ -370,9 +370,14 @@ static pen_status_t nqvm_integrate_jacobian(const pen_real_t p[], const pen_real
 
 static const pen_set_t *const nqvm_sets[2] = { &nqvm_set_default, &nqvm_set_altered_friction };
 static const pen_model_t nqvm_model = {
-    NQVM_LAYOUT, NQVM_SET_LENGTH, PEN_DAMAGE_REPORT,
-    false, false, 0U, 0U, NULL,
-    2U, nqvm_sets
+    NQVM_LAYOUT,
+    NQVM_SET_LENGTH,
+    PEN_DAMAGE_REPORT,
+    false, /* clamp */
+    false, /* layers */
+    0U, /* nothing is folded */
+    0U, NULL,
+    2U, nqvm_sets,
 };
 
 static pen_instance_t *nqvm_head(nqvm_t *self)
@@ -584,14 +589,6 @@ pen_status_t nqvm_status(nqvm_t *self, pen_status_report_t *report)
     return pen_instance_status(&nqvm_model, nqvm_head(self), report);
 }
 
-/* let the next step take a set that was found good */
-static pen_status_t nqvm_publish(nqvm_t *self, const pen_set_t *ready, pen_status_t found)
-{
-    pen_status_t status = found;
-
-    return pen_tune_publish(&nqvm_model, nqvm_head(self), NULL, ready, status);
-}
-
 pen_status_t nqvm_init(nqvm_t *self, const pen_set_t *set, nqvm_banks_t *banks)
 {
     pen_status_t status = pen_init(&nqvm_model, nqvm_head(self), set, (banks == NULL) ? NULL : banks->value[0],
@@ -664,7 +661,7 @@ pen_status_t nqvm_tune_commit(nqvm_t *self)
     pen_set_t ready;
     const pen_status_t status = pen_tune_commit(&nqvm_model, nqvm_head(self), &ready);
 
-    return nqvm_publish(self, &ready, status);
+    return pen_tune_publish(&nqvm_model, nqvm_head(self), NULL, &ready, status);
 }
 
 pen_status_t nqvm_tune_select(nqvm_t *self, const pen_set_t *set)
@@ -672,7 +669,7 @@ pen_status_t nqvm_tune_select(nqvm_t *self, const pen_set_t *set)
     pen_set_t ready;
     const pen_status_t status = pen_tune_select(&nqvm_model, nqvm_head(self), set, &ready);
 
-    return nqvm_publish(self, &ready, status);
+    return pen_tune_publish(&nqvm_model, nqvm_head(self), NULL, &ready, status);
 }
 
 pen_status_t nqvm_tune_rollback(nqvm_t *self)
@@ -680,7 +677,7 @@ pen_status_t nqvm_tune_rollback(nqvm_t *self)
     pen_set_t ready;
     const pen_status_t status = pen_tune_rollback(&nqvm_model, nqvm_head(self), &ready);
 
-    return nqvm_publish(self, &ready, status);
+    return pen_tune_publish(&nqvm_model, nqvm_head(self), NULL, &ready, status);
 }
 
 pen_status_t nqvm_verify(nqvm_t *self, uint32_t n)
@@ -694,8 +691,7 @@ pen_status_t nqvm_save(const nqvm_t *self, uint8_t byte[NQVM_SAVED])
 
     if (nqvm_usable(self)) {
         status = pen_save(&nqvm_model, &self->head, 3U * NQVM_N_LAST, &self->row[0][0], 2U * NQVM_N_DRIVE,
-            &self->u[0][0],
-                          byte, NQVM_SAVED);
+            &self->u[0][0], byte, NQVM_SAVED);
     }
     return status;
 }
@@ -706,8 +702,7 @@ pen_status_t nqvm_restore(nqvm_t *self, const uint8_t byte[NQVM_SAVED])
 
     if (nqvm_usable(self)) {
         status = pen_restore(&nqvm_model, &self->head, 3U * NQVM_N_LAST, &self->row[0][0], 2U * NQVM_N_DRIVE,
-            &self->u[0][0],
-                             byte, NQVM_SAVED);
+            &self->u[0][0], byte, NQVM_SAVED);
         if (status == PEN_OK) {
             pen_restored(&nqvm_model, &self->head, NULL);
         }

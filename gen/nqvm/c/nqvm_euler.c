@@ -325,9 +325,14 @@ static pen_status_t nqvm_euler_integrate_jacobian(const pen_real_t p[], const pe
 
 static const pen_set_t *const nqvm_euler_sets[2] = { &nqvm_euler_set_default, &nqvm_euler_set_altered_friction };
 static const pen_model_t nqvm_euler_model = {
-    NQVM_EULER_LAYOUT, NQVM_EULER_SET_LENGTH, PEN_DAMAGE_REPORT,
-    false, false, 0U, 0U, NULL,
-    2U, nqvm_euler_sets
+    NQVM_EULER_LAYOUT,
+    NQVM_EULER_SET_LENGTH,
+    PEN_DAMAGE_REPORT,
+    false, /* clamp */
+    false, /* layers */
+    0U, /* nothing is folded */
+    0U, NULL,
+    2U, nqvm_euler_sets,
 };
 
 static pen_instance_t *nqvm_euler_head(nqvm_euler_t *self)
@@ -540,14 +545,6 @@ pen_status_t nqvm_euler_status(nqvm_euler_t *self, pen_status_report_t *report)
     return pen_instance_status(&nqvm_euler_model, nqvm_euler_head(self), report);
 }
 
-/* let the next step take a set that was found good */
-static pen_status_t nqvm_euler_publish(nqvm_euler_t *self, const pen_set_t *ready, pen_status_t found)
-{
-    pen_status_t status = found;
-
-    return pen_tune_publish(&nqvm_euler_model, nqvm_euler_head(self), NULL, ready, status);
-}
-
 pen_status_t nqvm_euler_init(nqvm_euler_t *self, const pen_set_t *set, nqvm_euler_banks_t *banks)
 {
     pen_status_t status = pen_init(&nqvm_euler_model, nqvm_euler_head(self), set, (banks == NULL) ? NULL
@@ -620,7 +617,7 @@ pen_status_t nqvm_euler_tune_commit(nqvm_euler_t *self)
     pen_set_t ready;
     const pen_status_t status = pen_tune_commit(&nqvm_euler_model, nqvm_euler_head(self), &ready);
 
-    return nqvm_euler_publish(self, &ready, status);
+    return pen_tune_publish(&nqvm_euler_model, nqvm_euler_head(self), NULL, &ready, status);
 }
 
 pen_status_t nqvm_euler_tune_select(nqvm_euler_t *self, const pen_set_t *set)
@@ -628,7 +625,7 @@ pen_status_t nqvm_euler_tune_select(nqvm_euler_t *self, const pen_set_t *set)
     pen_set_t ready;
     const pen_status_t status = pen_tune_select(&nqvm_euler_model, nqvm_euler_head(self), set, &ready);
 
-    return nqvm_euler_publish(self, &ready, status);
+    return pen_tune_publish(&nqvm_euler_model, nqvm_euler_head(self), NULL, &ready, status);
 }
 
 pen_status_t nqvm_euler_tune_rollback(nqvm_euler_t *self)
@@ -636,7 +633,7 @@ pen_status_t nqvm_euler_tune_rollback(nqvm_euler_t *self)
     pen_set_t ready;
     const pen_status_t status = pen_tune_rollback(&nqvm_euler_model, nqvm_euler_head(self), &ready);
 
-    return nqvm_euler_publish(self, &ready, status);
+    return pen_tune_publish(&nqvm_euler_model, nqvm_euler_head(self), NULL, &ready, status);
 }
 
 pen_status_t nqvm_euler_verify(nqvm_euler_t *self, uint32_t n)
@@ -650,8 +647,7 @@ pen_status_t nqvm_euler_save(const nqvm_euler_t *self, uint8_t byte[NQVM_EULER_S
 
     if (nqvm_euler_usable(self)) {
         status = pen_save(&nqvm_euler_model, &self->head, 3U * NQVM_EULER_N_LAST, &self->row[0][0], 2U
-            * NQVM_EULER_N_DRIVE, &self->u[0][0],
-                          byte, NQVM_EULER_SAVED);
+            * NQVM_EULER_N_DRIVE, &self->u[0][0], byte, NQVM_EULER_SAVED);
     }
     return status;
 }
@@ -662,8 +658,7 @@ pen_status_t nqvm_euler_restore(nqvm_euler_t *self, const uint8_t byte[NQVM_EULE
 
     if (nqvm_euler_usable(self)) {
         status = pen_restore(&nqvm_euler_model, &self->head, 3U * NQVM_EULER_N_LAST, &self->row[0][0], 2U
-            * NQVM_EULER_N_DRIVE, &self->u[0][0],
-                             byte, NQVM_EULER_SAVED);
+            * NQVM_EULER_N_DRIVE, &self->u[0][0], byte, NQVM_EULER_SAVED);
         if (status == PEN_OK) {
             pen_restored(&nqvm_euler_model, &self->head, NULL);
         }

@@ -354,9 +354,14 @@ static const pen_network_t nqvm_folded_prepared[2] = {
 };
 static const pen_set_t *const nqvm_folded_sets[2] = { &nqvm_folded_set_default, &nqvm_folded_set_altered_friction };
 static const pen_model_t nqvm_folded_model = {
-    NQVM_FOLDED_LAYOUT, NQVM_FOLDED_SET_LENGTH, PEN_DAMAGE_REPORT,
-    false, false, NQVM_FOLDED_PIECES, 2U, nqvm_folded_prepared,
-    2U, nqvm_folded_sets
+    NQVM_FOLDED_LAYOUT,
+    NQVM_FOLDED_SET_LENGTH,
+    PEN_DAMAGE_REPORT,
+    false, /* clamp */
+    false, /* layers */
+    NQVM_FOLDED_PIECES,
+    2U, nqvm_folded_prepared,
+    2U, nqvm_folded_sets,
 };
 
 static pen_instance_t *nqvm_folded_head(nqvm_folded_t *self)
@@ -695,8 +700,7 @@ pen_status_t nqvm_folded_save(const nqvm_folded_t *self, uint8_t byte[NQVM_FOLDE
 
     if (nqvm_folded_usable(self)) {
         status = pen_save(&nqvm_folded_model, &self->head, 3U * NQVM_FOLDED_N_LAST, &self->row[0][0], 2U
-            * NQVM_FOLDED_N_DRIVE, &self->u[0][0],
-                          byte, NQVM_FOLDED_SAVED);
+            * NQVM_FOLDED_N_DRIVE, &self->u[0][0], byte, NQVM_FOLDED_SAVED);
     }
     return status;
 }
@@ -707,8 +711,7 @@ pen_status_t nqvm_folded_restore(nqvm_folded_t *self, const uint8_t byte[NQVM_FO
 
     if (nqvm_folded_usable(self)) {
         status = pen_restore(&nqvm_folded_model, &self->head, 3U * NQVM_FOLDED_N_LAST, &self->row[0][0], 2U
-            * NQVM_FOLDED_N_DRIVE, &self->u[0][0],
-                             byte, NQVM_FOLDED_SAVED);
+            * NQVM_FOLDED_N_DRIVE, &self->u[0][0], byte, NQVM_FOLDED_SAVED);
         if (status == PEN_OK) {
             for (uint32_t i = 0U; i < 2U; i++) {
                 if ((self->head.tuning.open == 0U) || (i == (self->head.tuning.active & 1U))) {
