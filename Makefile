@@ -18,7 +18,7 @@ unexport PYTHONDONTWRITEBYTECODE # else every command translates all of its modu
 help: ## Show this text
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-setup: $(addprefix build/setup/,tools python unity cmock) ## Install what is missing; every other target that needs it calls it
+setup: $(addprefix build/setup/,tools python unity cmock packages) ## Install what is missing; every other target that needs it calls it
 
 run: setup ## The main job: recalibration while it runs, on the host and a Cortex-M4F; then a diagnosis; with pictures
 	$(Q)mkdir -p build/run
@@ -51,15 +51,19 @@ campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings
 	    --command "PySINDy=build/rivals/bin/python test/diagnosis/rivals/sindy.py" \
 	    --command "neural=build/rivals/bin/python test/diagnosis/rivals/neural.py"
 
+dist: ## Packages for firmware, into build/dist: CMake, pkg-config, PlatformIO, Zephyr, CMSIS-Pack, one .c and one .h; no Python
+	$(Q)port/packages/dist.sh build/dist
+
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test prove figures bench campaign campaign-diagnosis clean
+.PHONY: help setup run test prove figures bench campaign campaign-diagnosis dist clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools
 build/setup/unity build/setup/cmock build/setup/proof: build/setup/tools
 build/setup/rivals: test/diagnosis/rivals/requirements.txt build/setup/tools
+build/setup/packages: test/packages/requirements.txt build/setup/tools
 build/setup/%:
 	$(Q)test/setup.sh $*
 

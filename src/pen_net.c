@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_net.h"
 
 #include <stdbool.h>
@@ -210,7 +212,7 @@ void pen_slope_softplus(size_t n, const pen_real_t h[], pen_real_t t[])
     }
 }
 
-void pen_bend_tanh(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[])
+void pen_second_tanh(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[])
 {
     for (size_t i = 0U; i < n; i++) {
         const pen_real_t slope = ONE - (h[i] * h[i]);
@@ -218,7 +220,7 @@ void pen_bend_tanh(size_t n, const pen_real_t h[], const pen_real_t a[], const p
     }
 }
 
-void pen_bend_sigmoid(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[])
+void pen_second_sigmoid(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[])
 {
     for (size_t i = 0U; i < n; i++) {
         const pen_real_t slope = h[i] * (ONE - h[i]);
@@ -226,7 +228,7 @@ void pen_bend_sigmoid(size_t n, const pen_real_t h[], const pen_real_t a[], cons
     }
 }
 
-void pen_bend_softplus(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[])
+void pen_second_softplus(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[])
 {
     for (size_t i = 0U; i < n; i++) {
         const pen_real_t rest = pen_exp(-h[i]); /* the slope is 1 - rest */

@@ -1,59 +1,98 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_set.h"
 
 #include "penode/pen_math.h"
 #include "penode/pen_port.h"
+#include "penode/pen_serial.h"
 
-#define YES 1U
-#define NO  0U
+#define YES      1U
+#define NO       0U
+#define ADOPT    0x5a3c9600U /* pending = ADOPT + slot: no single bit that flips makes a command of nothing */
+#define WITHDRAW 0xa5c36900U
+#define SIZE     ((uint32_t)sizeof(pen_real_t))
 
-/* CRC-32 of the values' bytes, four bits at a time. */
 uint32_t pen_set_checksum(const pen_real_t value[], uint32_t n)
 {
-    static const uint32_t table[16] = {
-        0x00000000U, 0x1db71064U, 0x3b6e20c8U, 0x26d930acU,
-        0x76dc4190U, 0x6b6b51f4U, 0x4db26158U, 0x5005713cU,
-        0xedb88320U, 0xf00f9344U, 0xd6d6a3e8U, 0xcb61b38cU,
-        0x9b64c2b0U, 0x86d3d2d4U, 0xa00ae278U, 0xbdbdf21cU,
-    };
-    const uint8_t *const byte = (const uint8_t *)value;
-    const size_t length = (size_t)n * sizeof(pen_real_t);
-    uint32_t crc = UINT32_MAX;
-
-    for (size_t i = 0U; i < length; i++) {
-        crc ^= byte[i];
-        crc = (crc >> 4U) ^ table[crc & 0x0fU];
-        crc = (crc >> 4U) ^ table[crc & 0x0fU];
-    }
-    return crc ^ UINT32_MAX;
+    return ~pen_crc_values(PEN_CRC_START, n, value);
 }
 
-uint32_t pen_tuning_spare(const pen_tuning_t *tuning)
+static void copy_head(pen_set_head_t *to, const pen_set_head_t *from)
+{
+    to->layout = from->layout;
+    to->length = from->length;
+    to->id = from->id;
+    to->checksum = from->checksum;
+}
+
+void pen_set_copy(pen_set_t *to, const pen_set_t *from)
+{
+    copy_head(&to->head, &from->head);
+    to->value = from->value;
+}
+
+bool pen_set_same(const pen_set_t *a, const pen_set_t *b)
+{
+    const uint32_t differences = (a->head.layout ^ b->head.layout) | (a->head.length ^ b->head.length) |
+                                 (a->head.id ^ b->head.id) | (a->head.checksum ^ b->head.checksum);
+
+    return (differences == 0U) && (a->value == b->value);
+}
+
+uint32_t pen_tuning_inactive(const pen_tuning_t *tuning)
 {
     return (pen_port_load(&tuning->active) & 1U) ^ 1U;
 }
 
-/* Is the step done with what was last announced? Then its view of `active` is ours. */
-static bool settled(const pen_tuning_t *tuning)
+bool pen_tuning_pending(const pen_tuning_t *tuning)
 {
-    const bool done = (pen_port_load(&tuning->pending) == NO);
+    return pen_port_load(&tuning->pending) != 0U;
+}
 
-    pen_port_barrier();
+bool pen_tuning_settle(pen_tuning_t *tuning)
+{
+    const bool done = !pen_tuning_pending(tuning);
+
+    pen_port_barrier(); /* if so, the step's view of `active` is ours */
+    if (done && (tuning->published != 0U)) {
+        const uint32_t active = pen_port_load(&tuning->active) & 1U;
+        if (active != ((tuning->published - 1U) & 1U)) {
+            pen_set_copy(&tuning->previous, &tuning->replaced); /* withdrawn */
+        }
+        tuning->settled = active;
+        tuning->published = 0U;
+    }
     return done;
 }
 
-/* What runs now becomes the way back. */
-void pen_tuning_announce(pen_tuning_t *tuning, const pen_set_t *ready)
+void pen_tuning_publish(pen_tuning_t *tuning, const pen_set_t *ready)
 {
-    const uint32_t spare = pen_tuning_spare(tuning);
+    const uint32_t slot = pen_tuning_inactive(tuning);
 
-    tuning->slot[spare] = *ready;
-    tuning->previous = tuning->slot[spare ^ 1U];
+    pen_set_copy(&tuning->slot[slot], ready);
+    pen_set_copy(&tuning->slot_check[slot], ready);
+    pen_set_copy(&tuning->replaced, &tuning->previous);
+    pen_set_copy(&tuning->previous, &tuning->slot[slot ^ 1U]);
     tuning->open = NO;
+    tuning->published = 1U + slot;
     pen_port_barrier();
-    pen_port_store(&tuning->pending, YES);
+    pen_port_store(&tuning->pending, ADOPT + slot);
+}
+
+pen_status_t pen_tuning_withdraw(pen_tuning_t *tuning)
+{
+    const uint32_t slot = (tuning->published - 1U) & 1U;
+    pen_status_t status = PEN_OK;
+
+    if (pen_tuning_settle(tuning)) {
+        status = PEN_SET_IDLE;
+    } else {
+        pen_port_store(&tuning->pending, WITHDRAW + slot); /* too late if the step has just adopted it: it will see so */
+    }
+    return status;
 }
 
 /* Layout and length come from the code: what lies in RAM may have lost a bit. */
@@ -62,7 +101,7 @@ static bool fits(const pen_set_head_t *head, uint32_t layout, uint32_t length)
     return (head->layout == layout) && (head->length == length);
 }
 
-static pen_status_t check_set(const pen_set_t *set, uint32_t layout, uint32_t length)
+pen_status_t pen_set_check(const pen_set_t *set, uint32_t layout, uint32_t length)
 {
     pen_status_t status;
 
@@ -81,7 +120,7 @@ static pen_status_t check_set(const pen_set_t *set, uint32_t layout, uint32_t le
 /* The bank of the open set; NULL if none is open, or if the pointers to it have come apart: nothing is written there. */
 static pen_real_t *open_bank(const pen_tuning_t *tuning)
 {
-    const pen_real_t *const value = tuning->slot[pen_tuning_spare(tuning)].value;
+    const pen_real_t *const value = tuning->slot[pen_tuning_inactive(tuning)].value;
     pen_real_t *const bank = (tuning->bank[0] == value) ? tuning->bank[0] : tuning->bank[1];
 
     return ((tuning->open == YES) && (bank == value)) ? bank : NULL;
@@ -95,21 +134,27 @@ pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t len
     if ((tuning == NULL) || (set == NULL) || (set->value == NULL) || ((bank0 == NULL) != (bank1 == NULL))) {
         status = PEN_BADARG;
     } else {
-        status = check_set(set, layout, length);
+        status = pen_set_check(set, layout, length);
     }
     if (status == PEN_OK) {
-        tuning->slot[0] = *set;
-        tuning->slot[1] = *set;
-        tuning->previous = *set;
+        for (uint32_t i = 0U; i < 2U; i++) {
+            pen_set_copy(&tuning->slot[i], set);
+            pen_set_copy(&tuning->slot_check[i], set);
+        }
+        pen_set_copy(&tuning->initial, set);
+        pen_set_copy(&tuning->previous, set);
         tuning->previous.value = NULL;
+        pen_set_copy(&tuning->replaced, &tuning->previous);
         tuning->bank[0] = bank0;
         tuning->bank[1] = bank1;
-        tuning->bank_again[0] = bank0;
-        tuning->bank_again[1] = bank1;
+        tuning->bank_check[0] = bank0;
+        tuning->bank_check[1] = bank1;
         tuning->open = NO;
         tuning->fill = 0U;
+        tuning->published = 0U;
+        tuning->settled = 0U;
         tuning->active = 0U;
-        tuning->pending = NO;
+        tuning->pending = 0U;
         tuning->hold = PEN_OK;
     }
     return status;
@@ -117,8 +162,8 @@ pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t len
 
 static bool has_banks(const pen_tuning_t *tuning)
 {
-    return (tuning->bank[0] != NULL) && (tuning->bank[0] == tuning->bank_again[0]) &&
-           (tuning->bank[1] == tuning->bank_again[1]);
+    return (tuning->bank[0] != NULL) && (tuning->bank[0] == tuning->bank_check[0]) &&
+           (tuning->bank[1] == tuning->bank_check[1]);
 }
 
 pen_status_t pen_tuning_begin(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_head_t *head)
@@ -126,28 +171,64 @@ pen_status_t pen_tuning_begin(pen_tuning_t *tuning, uint32_t layout, uint32_t le
     pen_status_t status;
 
     if ((head == NULL) || !has_banks(tuning)) {
-        status = PEN_BADARG;
-    } else if (!settled(tuning)) {
+        status = PEN_SET_BADARG;
+    } else if (!pen_tuning_settle(tuning)) {
         status = PEN_SET_BUSY;
     } else {
         status = fits(head, layout, length) ? PEN_OK : PEN_SET_LAYOUT;
     }
     if (status == PEN_OK) {
-        const uint32_t free_slot = pen_tuning_spare(tuning);
-        const pen_real_t *const running = tuning->slot[free_slot ^ 1U].value;
-        /* the bank that is neither running nor the way back; the way back is given up if it must be */
+        const uint32_t slot = pen_tuning_inactive(tuning);
+        const pen_real_t *const running = tuning->slot[slot ^ 1U].value;
+        /* the bank that holds neither the running nor the rollback set; the latter is given up if it must be */
         const bool first = (tuning->bank[0] != running) &&
                            ((tuning->bank[0] != tuning->previous.value) || (tuning->bank[1] == running));
         const uint32_t bank = first ? 0U : 1U;
         if (tuning->previous.value == tuning->bank[bank]) {
             tuning->previous.value = NULL;
         }
-        tuning->slot[free_slot].head = *head;
-        tuning->slot[free_slot].value = tuning->bank[bank];
+        copy_head(&tuning->slot[slot].head, head);
+        tuning->slot[slot].value = tuning->bank[bank];
         tuning->fill = 0U;
         tuning->open = YES;
     }
     return status;
+}
+
+pen_status_t pen_tuning_begin_copy(pen_tuning_t *tuning, uint32_t layout, uint32_t length, uint32_t id)
+{
+    const pen_set_t *const running = &tuning->slot[pen_tuning_inactive(tuning) ^ 1U];
+    pen_set_head_t head = { layout, length, id, 0U };
+    pen_status_t status;
+
+    head.checksum = running->head.checksum;
+    status = pen_tuning_begin(tuning, layout, length, &head);
+    if (status == PEN_OK) {
+        status = pen_tuning_write(tuning, length, 0U, running->value, length);
+    }
+    return status;
+}
+
+pen_status_t pen_tuning_expect(pen_tuning_t *tuning, uint32_t checksum)
+{
+    pen_status_t status = PEN_SET_CLOSED;
+
+    if (open_bank(tuning) != NULL) {
+        tuning->slot[pen_tuning_inactive(tuning)].head.checksum = checksum;
+        status = PEN_OK;
+    }
+    return status;
+}
+
+/* May bytes [offset, offset + n) of a set of `size` bytes be written now? */
+static pen_status_t check_chunk(const pen_tuning_t *tuning, uint32_t size, uint32_t offset, uint32_t n)
+{
+    return ((offset > tuning->fill) || (offset > size) || (n > (size - offset))) ? PEN_SET_RANGE : PEN_OK;
+}
+
+static void note_fill(pen_tuning_t *tuning, uint32_t end)
+{
+    tuning->fill = (end > tuning->fill) ? end : tuning->fill;
 }
 
 pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t length, uint32_t offset, const pen_real_t value[], uint32_t n)
@@ -158,33 +239,54 @@ pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t length, uint32_t of
     if (bank == NULL) {
         status = PEN_SET_CLOSED;
     } else if (value == NULL) {
-        status = PEN_BADARG;
-    } else if ((offset > tuning->fill) || (offset > length) || (n > (length - offset))) {
+        status = PEN_SET_BADARG;
+    } else if ((offset > length) || (n > length)) {
         status = PEN_SET_RANGE;
     } else {
+        status = check_chunk(tuning, SIZE * length, SIZE * offset, SIZE * n);
+    }
+    if (status == PEN_OK) {
         for (uint32_t i = 0U; i < n; i++) {
             bank[offset + i] = value[i];
         }
-        tuning->fill = ((offset + n) > tuning->fill) ? (offset + n) : tuning->fill;
-        status = PEN_OK;
+        note_fill(tuning, SIZE * (offset + n));
+    }
+    return status;
+}
+
+pen_status_t pen_tuning_write_bytes(pen_tuning_t *tuning, uint32_t length, uint32_t offset, const uint8_t byte[], uint32_t n)
+{
+    pen_real_t *const bank = open_bank(tuning);
+    pen_status_t status;
+
+    if (bank == NULL) {
+        status = PEN_SET_CLOSED;
+    } else if (byte == NULL) {
+        status = PEN_SET_BADARG;
+    } else {
+        status = check_chunk(tuning, SIZE * length, offset, n);
+    }
+    if (status == PEN_OK) {
+        pen_serial_get_bytes(bank, offset, n, byte);
+        note_fill(tuning, offset + n);
     }
     return status;
 }
 
 pen_status_t pen_tuning_commit(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, pen_set_t *ready)
 {
-    const pen_set_t *const set = &tuning->slot[pen_tuning_spare(tuning)];
+    const pen_set_t *const set = &tuning->slot[pen_tuning_inactive(tuning)];
     pen_status_t status;
 
     if (open_bank(tuning) == NULL) {
         status = PEN_SET_CLOSED;
-    } else if (tuning->fill != length) {
+    } else if (tuning->fill != (SIZE * length)) {
         status = PEN_SET_SHORT;
     } else {
-        status = check_set(set, layout, length);
+        status = pen_set_check(set, layout, length);
     }
     if (status == PEN_OK) {
-        *ready = *set;
+        pen_set_copy(ready, set);
     }
     return status;
 }
@@ -197,37 +299,36 @@ pen_status_t pen_tuning_abort(pen_tuning_t *tuning)
     return status;
 }
 
-pen_status_t pen_tuning_select(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set,
-                               pen_set_t *ready)
+pen_status_t pen_tuning_select(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set, pen_set_t *ready)
 {
     pen_status_t status;
 
     if ((set == NULL) || (set->value == NULL)) {
-        status = PEN_BADARG;
-    } else if (!settled(tuning)) {
+        status = PEN_SET_BADARG;
+    } else if (!pen_tuning_settle(tuning)) {
         status = PEN_SET_BUSY;
     } else {
-        status = check_set(set, layout, length);
+        status = pen_set_check(set, layout, length);
     }
     if (status == PEN_OK) {
-        *ready = *set;
+        pen_set_copy(ready, set);
     }
     return status;
 }
 
-pen_status_t pen_tuning_rollback(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, pen_set_t *ready)
+pen_status_t pen_tuning_rollback(pen_tuning_t *tuning, uint32_t layout, uint32_t length, pen_set_t *ready)
 {
     pen_status_t status;
 
-    if (!settled(tuning)) {
+    if (!pen_tuning_settle(tuning)) {
         status = PEN_SET_BUSY;
     } else if (tuning->previous.value == NULL) {
         status = PEN_SET_NO_PREVIOUS;
     } else {
-        status = check_set(&tuning->previous, layout, length);
+        status = pen_set_check(&tuning->previous, layout, length);
     }
     if (status == PEN_OK) {
-        *ready = tuning->previous;
+        pen_set_copy(ready, &tuning->previous);
     }
     return status;
 }
@@ -237,23 +338,31 @@ void pen_tuning_hold(pen_tuning_t *tuning, bool hold)
     pen_port_store(&tuning->hold, hold ? PEN_HELD : PEN_OK);
 }
 
-pen_set_head_t pen_tuning_running(const pen_tuning_t *tuning)
+void pen_tuning_running(const pen_tuning_t *tuning, pen_set_head_t *head)
 {
-    return tuning->slot[pen_port_load(&tuning->active) & 1U].head;
+    copy_head(head, &tuning->slot[pen_port_load(&tuning->active) & 1U].head);
 }
 
 pen_status_t pen_tuning_adopt(pen_tuning_t *tuning, uint32_t *slot)
 {
     uint32_t active = pen_port_load(&tuning->active) & 1U; /* ours alone to write */
     pen_status_t status = pen_port_load(&tuning->hold) & PEN_HELD;
+    const uint32_t pending = pen_port_load(&tuning->pending);
 
-    if (pen_port_load(&tuning->pending) == YES) {
-        pen_port_barrier(); /* what was announced is now seen whole ...                         */
-        active ^= 1U;
-        pen_port_store(&tuning->active, active);
-        pen_port_barrier(); /* ... and the flip is out before the tuning context may act on it */
-        pen_port_store(&tuning->pending, NO);
-        status |= PEN_ADOPTED;
+    if (pending != 0U) {
+        const uint32_t other = active ^ 1U;
+        pen_port_barrier(); /* what was published is now seen whole ...                           */
+        if (pending == (ADOPT + other)) {
+            active = other;
+            pen_port_store(&tuning->active, active);
+            status |= PEN_ADOPTED;
+        } else if (pending == (WITHDRAW + other)) {
+            status |= PEN_WITHDRAWN;
+        } else {
+            /* a withdrawal that came too late, or damage */
+        }
+        pen_port_barrier(); /* ... and the flip is out before the tuning context may act on it   */
+        pen_port_store(&tuning->pending, 0U);
     }
     *slot = active;
     return status;

@@ -1,11 +1,23 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_status.h"
 
 #include <stddef.h>
 
 #include "penode/pen_port.h"
+
+uint32_t pen_status_times(const pen_status_report_t *report, pen_status_t flag)
+{
+    uint32_t times = 0U;
+
+    for (size_t i = 0U; i < PEN_STATUS_FLAGS; i++) {
+        times += (flag == (UINT32_C(1) << i)) ? report->times[i] : 0U;
+    }
+    return times;
+}
 
 void pen_status_clear(pen_status_log_t *log)
 {
@@ -16,11 +28,14 @@ void pen_status_clear(pen_status_log_t *log)
 }
 
 /* The counters of `flags` flags from the one at `first` on. */
-static inline void note(volatile uint32_t first[], uint32_t flags, pen_status_t status)
+PEN_PORT_INLINE void note(volatile uint32_t first[], uint32_t flags, pen_status_t status)
 {
+    pen_status_t left = status;
+
     PEN_PORT_UNROLL
     for (uint32_t i = 0U; i < flags; i++) {
-        pen_port_store(&first[i], pen_port_load(&first[i]) + ((status >> i) & 1U));
+        pen_port_store(&first[i], pen_port_load(&first[i]) + (left & 1U));
+        left >>= 1U;
     }
 }
 

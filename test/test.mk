@@ -85,7 +85,7 @@ build/misra/%.c: gen/nqvm/c/%.h $(HEADERS) test/misra/every_entry
 	@mkdir -p $(@D)
 	$(Q)test/misra/every_entry $(filter %.h,$^) >$@
 
-sources_of = build/misra/$(1).c $(RUNTIME) gen/nqvm/c/$(1).c gen/nqvm/c/$(1)_params.c $(PROGRAM.$(1))
+sources_of = build/misra/$(1).c $(RUNTIME) gen/nqvm/c/$(1).c $(filter-out %_selftest.c,$(wildcard gen/nqvm/c/*_params.c)) gen/nqvm/c/$(1)_selftest.c $(PROGRAM.$(1))
 misra-plain-%: build/misra/%.c | $(READY)
 	@test/check "misra $*" test/misra/check clean $(call sources_of,$*)
 misra-gnuc-%: build/misra/%.c | $(READY) # the branches that only GCC and clang see
@@ -117,12 +117,13 @@ $(foreach m,$(MACHINES),$(eval RUN.$m := port/cortex-m/run $m))
 $(foreach m,$(MACHINES),$(eval LIBS.$m := -lc)) # Unity's setjmp
 $(foreach m,$(FPUS),$(foreach k,CC RUN LIBS,$(eval $k.small-$m := $($k.$m)))$(eval LEVEL.small-$m := -Os))
 
+KERNELS := test_pen_net test_pen_net16
 UNITS   := $(patsubst test/unit/%.c,%,$(wildcard test/unit/test_*.c))
 needs    = $(shell sed -n 's|.*needs: \(.*\) \*/.*|\1|p' test/unit/$(1).c)
 objects  = $(patsubst %.c,build/unit/$(1)/%.o,$(2))
 UNIT_CFLAGS := -std=c99 -g -Wall -Wextra $(INCLUDE) -Itest/unit -Ibuild/unity/src -include unity_config.h
 
-unit: $(foreach v,$(VARIANTS),$(UNITS:%=unit-$v-%)) $(FPUS:%=unit-small-%-test_pen_net) ## The C unit tests, on this machine and on the emulated ones
+unit: $(foreach v,$(VARIANTS),$(UNITS:%=unit-$v-%)) $(foreach t,$(KERNELS),$(FPUS:%=unit-small-%-$t)) ## The C unit tests, on this machine and on the emulated ones
 
 build/unit/runner/%.c: test/unit/%.c build/setup/unity
 	@mkdir -p $(@D)
@@ -147,7 +148,7 @@ endef
 
 $(foreach v,$(VARIANTS) $(FPUS:%=small-%),$(eval $(call objects_of_variant,$v)))
 $(foreach v,$(VARIANTS),$(foreach t,$(UNITS),$(eval $(call unit,$v,$t))))
-$(foreach m,$(FPUS),$(eval $(call unit,small-$m,test_pen_net)))
+$(foreach m,$(FPUS),$(foreach t,$(KERNELS),$(eval $(call unit,small-$m,$t))))
 -include $(shell find build/unit -name '*.d' 2>/dev/null)
 
 # -- the ports themselves ---------------------------------------------------------------------------------------------
@@ -200,3 +201,7 @@ hidden-fresh: | $(READY)
 
 figures-check: | $(READY) ## No figure may be 2 % worse than the kept one, or above what is promised
 	@test/check "figures" $(PYTHON) test/bench/bench.py --check
+
+# -- packages for firmware ------------------------------------------------------------------------------------------------
+
+include test/packages/packages.mk

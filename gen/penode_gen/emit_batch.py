@@ -13,7 +13,8 @@ from . import expressions as ex
 from . import sets
 from .c_text import Printer, fold, real
 from .causalise import Causal, Step
-from .emit_c import _RUNGE_KUTTA, _TEMPLATES, VERSION, _Emitter, _NetworkCode
+from .emit_c import _RUNGE_KUTTA, _TEMPLATES, VERSION, _Emitter
+from .emit_networks import NetworkCode
 from .model import Model
 from .networks import Affine, Dense, Layer
 
@@ -98,7 +99,7 @@ class _LaneEmitter(_Emitter):
     def _print(self, expr: sp.Expr) -> str:
         return _LanePrinter(self._c_name)(self._inverses(expr))
 
-    def _call(self, step: Step, value: bool, slope: bool, bend: bool, used: set[sp.Symbol]) -> list[str]:
+    def _call(self, step: Step, value: bool, slope: bool, second: bool, used: set[sp.Symbol]) -> list[str]:
         name, code = self._c_name(step.target), self.code_of[step.network]
         function, weights, n = code.name, f"&w[{self.weights_at[step.network]}]", len(step.arguments)
         if code.folded:
@@ -110,7 +111,7 @@ class _LaneEmitter(_Emitter):
         lines += [f"lanes_t slopes_of_{name}[{n}];", f"*outside |= {function}_slope({weights}, inputs_of_{name}, &{name}, slopes_of_{name});"]
         return lines + [f"const lanes_t {s.name} = slopes_of_{name}[{i}];" for i, s in enumerate(self.derivatives.slopes[step.target]) if s in used]
 
-    def _value_lines(self, code: _NetworkCode) -> list[str]:
+    def _value_lines(self, code: NetworkCode) -> list[str]:
         """Statements that take a network from `in` to `*out`; h holds the values of a layer, g those of the next."""
         lines = [_start(code, self.model)]
         here, there, relu = "h", "g", False
@@ -128,7 +129,7 @@ class _LaneEmitter(_Emitter):
             lines.append(f"*out *= lanes_fade({code.n}U, w, {real(self.model.fade_width)}, in);")
         return lines
 
-    def _lane_slope_lines(self, code: _NetworkCode) -> list[str]:
+    def _lane_slope_lines(self, code: NetworkCode) -> list[str]:
         """The same with derivatives: t[i] is the change of h with input i, s[i] that of g."""
         n, fade = code.n, real(self.model.fade_width)
         one = "lanes_clamp_slope({n}U, w, in, {i}U)" if self.model.outside == "clamp" else "lanes_wide(ONE)"
@@ -157,12 +158,12 @@ class _LaneEmitter(_Emitter):
         return lines
 
 
-def _layers(code: _NetworkCode) -> list[tuple[Layer, str]]:
+def _layers(code: NetworkCode) -> list[tuple[Layer, str]]:
     """Each layer with the C text of where its weights begin."""
     return [(layer, f"&w[{piece.offset}]") for layer, piece in zip(code.network.layers, sets.network_pieces(code.network)[1:])]
 
 
-def _start(code: _NetworkCode, model: Model) -> str:
+def _start(code: NetworkCode, model: Model) -> str:
     if model.outside == "clamp":
         return f"lanes_clamp({code.n}U, w, in, h);"
     return " ".join(f"h[{i}] = in[{i}];" for i in range(code.n))

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import os
-import re
-import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +9,14 @@ import jinja2
 import sympy as sp
 
 from . import expressions as ex
-from . import sets, units
+from . import layout, promises, selftest, sets, units
 from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
-from .fold import foldable
+from .emit_networks import NetworkCode, by_value, hidden16, network_code, network_lines, second_lines, slope_lines
 from .jacobian import Derivatives
 from .model import Model
-from .networks import Affine, Dense, Layer, Network
+from .networks import Dense
+from .write import write_all
 
 VERSION = "0.1.0"
 
@@ -46,99 +42,30 @@ _RUNGE_KUTTA = {
 }
 # Names of the templates inside functions that also hold names of the model; the model's get a _ there.
 _TAKEN = frozenset(
-    "p x u y z dx fx fu yx yu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
-    "inner along drive bent patrol layer_by_layer before advance fold f x0 copy begin finish usable unit solve integrate node".split()
+    "p x u y z dx fx fu yx yu zx zu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
+    "inner along drive layer_by_layer before advance fold f x0 copy begin finish usable unit solve integrate node".split()
 )
-_AFFINE = {"centre": "pen_centre", "rescale": "pen_rescale"}
 _METHOD_NAMES = {
     "euler": "explicit Euler", "heun": "Heun (order 2)", "rk4": "Runge-Kutta of order 4",
     "ros1": "Rosenbrock of order 1 (linearly implicit Euler)", "ros2": "Rosenbrock of order 2 (ROS2, L-stable)",
 }  # fmt: skip
 
 
-def render(model: Model) -> dict[str, str]:
-    """File name -> text of the C of a model. Pure: no clock, no path beyond the model file's name."""
-    context = _Emitter(model).context()
-    names = {"model.h.j2": f"{model.name}.h", "model.c.j2": f"{model.name}.c", "params.c.j2": f"{model.name}_params.c"}
-    return {name: fold(_TEMPLATES.get_template(template).render(context)) for template, name in names.items()}
+# Template -> file. Sets are named after the model that owns them, so several methods of one model write the same.
+_FILES = {"model.h.j2": "{name}.h", "model.c.j2": "{name}.c", "sets.h.j2": "{owner}_sets.h", "params.c.j2": "{owner}_params.c"}
 
 
-def generate(model: Model, directory: str | Path) -> list[Path]:
+def render(model: Model, self_test: bool = True) -> dict[str, str]:
+    """File name -> text of the C of a model, with or without its self-test. Pure: no clock, no path beyond the model file's name."""
+    context, texts = selftest.answered(_Emitter(model).context(), self_test), {}
+    for template, name in (_FILES | ({"selftest.c.j2": "{name}_selftest.c"} if self_test else {})).items():
+        texts[name.format(name=model.name, owner=model.owner)] = fold(_TEMPLATES.get_template(template).render(context))
+    return texts | {f"{model.owner}_layout.json": layout.to_json(model)}
+
+
+def generate(model: Model, directory: str | Path, self_test: bool = True) -> list[Path]:
     """Write the C of a model into `directory`: all files, or none. Raises OSError."""
-    texts = render(model)
-    directory = Path(directory)
-    directory.mkdir(parents=True, exist_ok=True)
-    for path in (directory / name for name in texts):
-        if path.is_dir():
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    written: list[tuple[str, Path]] = []
-    try:
-        for name, text in texts.items():
-            handle, temporary = tempfile.mkstemp(dir=directory, prefix=f".{name}.")
-            written.append((temporary, directory / name))
-            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-            os.chmod(temporary, 0o644)
-        _replace_all(written)
-    finally:
-        for temporary, _ in written:
-            Path(temporary).unlink(missing_ok=True)
-    return [path for _, path in written]
-
-
-def _replace_all(written: list[tuple[str, Path]]) -> None:
-    """Put every file in its place; if one cannot be, all places are as they were. Raises OSError."""
-    before = {path: path.read_bytes() if path.exists() else None for _, path in written}
-    done: list[Path] = []
-    try:
-        for temporary, path in written:
-            os.replace(temporary, path)
-            done.append(path)
-    except OSError:
-        for path in done:
-            if before[path] is None:
-                path.unlink()
-            else:
-                path.write_bytes(before[path])
-        raise
-
-
-@dataclass(frozen=True)
-class _NetworkCode:
-    """One function for all networks of the same architecture."""
-
-    name: str
-    shape: str
-    users: tuple[str, ...]
-    network: Network
-    folded: bool
-
-    @property
-    def n(self) -> int:
-        """Number of inputs."""
-        return self.network.n_inputs
-
-    @property
-    def width(self) -> int:
-        """Values of the widest layer."""
-        return max(self.n, *(layer.n_out for layer in self.network.layers))
-
-    def chain(self) -> list[str]:
-        """The layers, as pen_fold() wants them."""
-        kinds = {"identity": "DENSE", "relu": "RELU"}
-        return [
-            f"{{ PEN_LAYER_{layer.form.upper() if isinstance(layer, Affine) else kinds[layer.activation]}, {layer.n_in}U, {layer.n_out}U }}"
-            for layer in self.network.layers
-        ]
-
-    @property
-    def neurons(self) -> int:
-        """Of all ReLU layers."""
-        return sum(layer.n_out for layer in self.network.layers if _relu(layer))
-
-    def layers(self) -> list[tuple[Layer, str]]:
-        """Each layer with the C text of where its values begin."""
-        return [(la, f"&p[{piece.offset}]") for la, piece in zip(self.network.layers, sets.network_pieces(self.network)[1:])]
+    return write_all(render(model, self_test), directory)
 
 
 class _Emitter:
@@ -156,7 +83,7 @@ class _Emitter:
         self.cubic = self.curved and model.interpolation == "cubic"
         self.drive = self.causal.inputs + (self.causal.input_rates if self.uses_input_rate else ())
         self.kept = len(self.drive) + (2 * self.curved + self.cubic) * len(model.inputs)  # and differences of the inputs
-        self.networks = self._network_code()
+        self.networks = network_code(model)
         self.code_of = {user: code for code in self.networks for user in code.users}
         self.constants: dict[str, sp.Symbol] = {}
 
@@ -175,6 +102,7 @@ class _Emitter:
             "outputs_jacobian": self._function(causal.outputs, "y", ("yx", "yu"), values=False),
             "sensors": self._function(causal.sensors, "z"),
             "curvature": self._curvature() if rosenbrock else None,
+            "sensors_jacobian": self._function(causal.sensors, "z", ("zx", "zu"), values=False),
         }
         uses_p, uses_f = (any(f[uses] for f in functions.values() if f) for uses in ("uses_p", "uses_f"))
         reads_set = uses_p or not uses_f  # else its pieces are all that it has
@@ -186,26 +114,28 @@ class _Emitter:
             "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
             "curved": self.curved, "cubic": self.cubic, "kept": self.kept,
             "functions": functions, "constants": self._constants(), "networks": self.networks,
-            "network_lines": {c.name: self._network_lines(c) for c in self.networks},
-            "bend_lines": {c.name: _by_value(c, self._bend_lines(c)) for c in self.networks if self._bent(c, functions)},
+            "network_lines": {c.name: network_lines(model, c) for c in self.networks},
+            "second_lines": {c.name: by_value(c, second_lines(model, c)) for c in self.networks if self._needs_second(c, functions)},
             "called": {f"{c.name}{part}" for c in self.networks for part in ("", "_slope", "_or_pieces", "_or_pieces_slope") if self._mentions(functions, (f" {c.name}{part}(", f"){c.name}{part}("))},
-            "slope_lines": {c.name: _by_value(c, self._slope_lines(c)) for c in self.networks},
+            "slope_lines": {c.name: by_value(c, slope_lines(model, c)) for c in self.networks},
             "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),
-            "set_length": set_length, "patrol": max(set_length if reads_set else 0, model.pieces if uses_f else 0), "offsets": self._offset_lines(),
+            "set_length": set_length, "scrub": max(set_length if reads_set else 0, model.pieces if uses_f else 0), "offsets": self._offset_lines(),
+            "verify": set_length + (model.pieces * len(folded) if uses_f else 0), "saved": self._saved(set_length), "ranges": self._ranges(), "trial_room": 1 << model.guard.trial.bit_length(), "bounds": [real(0.0 if o.trial_bound is None else o.trial_bound) for o in model.outputs],
+            "owner": model.owner, "sets_digest": sets.digest(model)[:16], "map_lines": layout.map_lines(model),
             "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
-            "uses_net16": any(_hidden16(list(c.network.layers[i:])) for c in self.networks for i in range(len(c.network.layers))),
-            "folded": folded,
+            "uses_net16": any(hidden16(list(c.network.layers[i:])) for c in self.networks for i in range(len(c.network.layers))),
+            "folded": folded, "prepared": self._prepared(), "promised": any(port.promises for port in model.networks.values()),
             "uses_p": uses_p, "uses_f": uses_f, "reads_set": reads_set,
             "sample_time": real(model.sample_time), "real": real, "si": units.si,
             "columns": len(model.states) + (2 + self.curved + self.cubic) * len(model.inputs),
         }  # fmt: skip
 
     @staticmethod
-    def _bent(code: _NetworkCode, functions: dict[str, dict[str, Any] | None]) -> bool:
+    def _needs_second(code: NetworkCode, functions: dict[str, dict[str, Any] | None]) -> bool:
         """Does the curvature of the model need this network's second derivatives?"""
         curvature = functions["curvature"]
-        return bool(curvature) and any(line.startswith(f"{code.name}_bend(") for line in curvature["lines"])
+        return bool(curvature) and any(line.startswith(f"{code.name}_second(") for line in curvature["lines"])
 
     @staticmethod
     def _mentions(functions: dict[str, dict[str, Any] | None], names: tuple[str, ...]) -> bool:
@@ -281,8 +211,8 @@ class _Emitter:
         wanted = plain + [(name, e) for (name, _), e in zip(derived, reduced)]
         used = set().union(*(e.free_symbols for _, e in wanted), *(e.free_symbols for _, e in temporaries))
         needs_slope = {t for t, group in self.derivatives.slopes.items() if used & set(group)}
-        needs_bend = {t for t, rows in self.derivatives.bends.items() if used & set().union(*rows)}
-        steps = causal.needed([*(e for _, e in wanted), *(e for _, e in temporaries), *needs_slope, *needs_bend])
+        needs_second = {t for t, rows in self.derivatives.seconds.items() if used & set().union(*rows)}
+        steps = causal.needed([*(e for _, e in wanted), *(e for _, e in temporaries), *needs_slope, *needs_second])
         used |= set().union(*(s.reads for s in steps)) if steps else set()
         lines: list[str] = []
         for i, s in enumerate(causal.states):
@@ -299,10 +229,10 @@ class _Emitter:
         calls = uses_p = uses_f = False
         for step in steps:
             if step.network:
-                bend = step.target in needs_bend
+                second = step.target in needs_second
                 slope = step.target in needs_slope
-                value = slope or step.target in used or not bend
-                lines += self._call(step, value, slope, bend, used)
+                value = slope or step.target in used or not second
+                lines += self._call(step, value, slope, second, used)
                 calls = calls or value
                 folded = self.code_of[step.network].folded
                 uses_f |= folded
@@ -318,7 +248,7 @@ class _Emitter:
             "uses_x": any(s in used for s in causal.states), "uses_u": any(s in used for s in self.drive),
         }  # fmt: skip
 
-    def _call(self, step: Step, value: bool, slope: bool, bend: bool, used: set[sp.Symbol]) -> list[str]:
+    def _call(self, step: Step, value: bool, slope: bool, second: bool, used: set[sp.Symbol]) -> list[str]:
         name = self._c_name(step.target)
         code = self.code_of[step.network]
         function, values = code.name, f"&p[{self.prefix}_AT_{step.network.upper()}]"
@@ -330,7 +260,7 @@ class _Emitter:
             parts = ", ".join(self._print(a) for a in step.arguments)
             lines.append(f"const pen_real_t {argument}[{len(step.arguments)}] = {{ {parts} }};")
         if code.folded and self.model.more_pieces == "layers":
-            function, values = f"{code.name}_or_pieces", f"{values}, f->{step.network}"
+            function, values = f"{code.name}_or_pieces", f"{values}, &f[{self._folded_at(step.network)}]"
         elif code.folded:
             return [*lines, *self._lookup(step, name, argument, slope, used)]
         if slope:
@@ -341,17 +271,22 @@ class _Emitter:
                 lines += [f"const pen_real_t {s.name} = slopes_of_{name}[{i}];"] if s in used else []
         elif value:
             lines += _remarked(f"const pen_real_t {name} = {function}({values}, {argument}, &status);", step)
-        if bend:
+        if second:
             n = len(step.arguments)
-            lines.append(f"pen_real_t bends_of_{name}[{n}][{n}];")
-            lines.append(f"{function}_bend({values}, {argument}, bends_of_{name});")
-            for i, row in enumerate(self.derivatives.bends[step.target]):
-                lines += [f"const pen_real_t {s.name} = bends_of_{name}[{i}][{j}];" for j, s in enumerate(row) if j >= i and s in used]
+            lines.append(f"pen_real_t seconds_of_{name}[{n}][{n}];")
+            lines.append(f"{function}_second({values}, {argument}, seconds_of_{name});")
+            for i, row in enumerate(self.derivatives.seconds[step.target]):
+                lines += [f"const pen_real_t {s.name} = seconds_of_{name}[{i}][{j}];" for j, s in enumerate(row) if j >= i and s in used]
         return lines
+
+    def _folded_at(self, network: str) -> str:
+        """Where the pieces of a folded network begin among those of a slot."""
+        at = [name for code in self.networks if code.folded for name in code.users].index(network)
+        return f"{at}U * {self.prefix}_PIECES" if at else "0U"
 
     def _lookup(self, step: Step, name: str, argument: str, slope: bool, used: set[sp.Symbol]) -> list[str]:
         """A folded network: find the piece, then a line."""
-        pieces, lines = f"f->{step.network}", []
+        pieces, lines = f"&f[{self._folded_at(step.network)}]", []
         if not argument.isidentifier():
             lines.append(f"const pen_real_t inputs_of_{name} = {argument};")
             argument = f"inputs_of_{name}"
@@ -364,146 +299,30 @@ class _Emitter:
             lines.append(f"const pen_real_t {self.derivatives.slopes[step.target][0].name} = piece_of_{name}->slope;")
         return lines
 
-    # -- networks -------------------------------------------------------------------------------------------------
+    # -- guard ----------------------------------------------------------------------------------------------------
 
-    def _network_code(self) -> list[_NetworkCode]:
-        first = self.model.sets.get("default")
-        groups: dict[object, list[tuple[str, Network]]] = {}
-        for name, network in (first.networks if first else {}).items():
-            groups.setdefault(network.architecture, []).append((name, network))
+    def _prepared(self) -> list[dict[str, Any]]:
+        """The networks that are folded, or of which something is promised, as initialisers of a pen_network_t want them."""
         found = []
-        for i, users in enumerate(groups.values()):
-            name = f"network_{chr(ord('a') + i)}" if len(groups) > 1 else "network"
-            sizes = [users[0][1].n_inputs] + [la.n_out for la in users[0][1].layers if isinstance(la, Dense)]
-            found.append(_NetworkCode(name, " -> ".join(map(str, sizes)), tuple(n for n, _ in users), users[0][1], self.model.pieces > 0 and foldable(users[0][1])))
+        for code in self.networks:
+            for name in code.users:
+                port = self.model.networks[name]
+                promise = promises.initialiser(port, code.neurons) if port.promises else ""
+                if code.folded or promise:
+                    found.append({"name": name, "code": code.name, "layers": len(code.chain()), "width": code.width, "neurons": code.neurons, "promise": promise})
         return found
 
-    def _network_lines(self, code: _NetworkCode) -> dict[str, Any]:
-        """Statements that take a network from `in` to its output, and the buffers they need."""
-        lines, here, relu = [], "in", ""  # relu: the activation of the layer before is still to be applied
-        if self.model.outside == "clamp":
-            lines.append(f"pen_clamp({code.n}U, &p[0], in, h);")
-            here = "h"
-        layers = code.layers()
-        while layers:
-            (layer, at), *layers = layers
-            fresh = "h" if here == "in" else here  # where a layer that reads all before it writes may put its result
-            hidden = 0 if relu else _hidden16([layer, *(la for la, _ in layers)])
-            if hidden:
-                lines.append(f"{fresh}[0] = pen_net16({hidden}U, {at}, {here}[0]);")
-                layer, layers = layers[hidden][0], layers[hidden + 1 :]
-            elif isinstance(layer, Affine):
-                lines += [f"pen_act_relu({layer.n_out}U, {here});"] if relu else []
-                lines.append(_affine(layer, at, here, fresh))
-            elif layer.n_out == 1:
-                lines.append(f"{fresh}[0] = pen_dense1{relu}({layer.n_in}U, {at}, {here});")
-            else:
-                fresh = "g" if here == "h" else "h"
-                lines.append(f"pen_dense{relu}({layer.n_out}U, {layer.n_in}U, {at}, {here}, {fresh});")
-            lines += _activation(layer, fresh)
-            here, relu = fresh, _relu(layer)
-        lines += [f"pen_act_relu(1U, {here});"] if relu else []
-        if self.model.outside == "fade":
-            lines.append(f"return {here}[0] * pen_fade({code.n}U, &p[0], {real(self.model.fade_width)}, in);")
-        else:
-            lines.append(f"return {here}[0];")
-        lines = _by_value(code, lines)
-        return {"lines": lines, "buffers": [b for b in "hg" if any(f"{b}[" in t or f" {b})" in t or f" {b}," in t for t in lines)]}
+    def _ranges(self) -> list[dict[str, Any]]:
+        """The inputs that have a declared range, and its edges."""
+        limit = "PEN_REAL_MAX"
+        return [
+            {"at": n, "least": f"-{limit}" if i.minimum is None else real(i.minimum), "most": limit if i.maximum is None else real(i.maximum)}
+            for n, i in enumerate(self.model.inputs) if i.minimum is not None or i.maximum is not None
+        ]  # fmt: skip
 
-    def _slope_lines(self, code: _NetworkCode) -> list[str]:
-        """Statements for value and derivatives: h is the value, t[i] the change of h with input i; g and s the next ones."""
-        n, fade = code.n, real(self.model.fade_width)
-        lines: list[str] = []
-
-        def each(statement: str) -> None:
-            lines.extend(_loops(statement, n))
-
-        if self.model.outside == "clamp":
-            lines.append(f"pen_clamp({n}U, &p[0], in, h);")
-            start = f"pen_clamp_slope({n}U, &p[0], in, @U)"
-        else:
-            each("h[@] = in[@];")
-            start = "(pen_real_t)1"
-        each(f"t[@][%] = {start};" if n == 1 else f"t[@][%] = (@ == %) ? {start} : (pen_real_t)0;")
-        h, g, t, s, relu = "h", "g", "t", "s", ""
-        layers = code.layers()
-        while layers:
-            (layer, at), *layers = layers
-            hidden = 0 if relu else _hidden16([layer, *(la for la, _ in layers)])
-            if hidden:
-                layer, layers = layers[hidden][0], layers[hidden + 1 :]
-                lines += [f"{g}[0] = pen_net16_slope({hidden}U, {at}, {h}[0], {s}[0]);", f"{s}[0][0] *= {t}[0][0];"]
-                lines += _activation(layer, g)
-                if layer.activation != "identity":
-                    lines.append(f"pen_slope_{layer.activation}(1U, {g}, {s}[0]);")
-                h, g, t, s, relu = g, h, s, t, _relu(layer)
-                continue
-            if isinstance(layer, Affine):
-                lines += [f"pen_act_relu({layer.n_out}U, {h});"] if relu else []
-                lines.append(_affine(layer, at, h, h))
-                each(f"{_AFFINE[layer.form]}_tangent({layer.n_out}U, {at}, {t}[@]);")
-                relu = ""
-                continue
-            lines.append(f"pen_dense{relu}({layer.n_out}U, {layer.n_in}U, {at}, {h}, {g});")
-            lines += _activation(layer, g)
-            each(f"pen_dense_tangent({layer.n_out}U, {layer.n_in}U, {at}, {t}[@], {s}[@]);")
-            if layer.activation != "identity":
-                each(f"pen_slope_{layer.activation}({layer.n_out}U, {g}, {s}[@]);")
-            h, g, t, s, relu = g, h, s, t, _relu(layer)
-        lines += [f"pen_act_relu(1U, {h});"] if relu else []
-        each(f"slope[@] = {t}[@][0];")
-        if self.model.outside == "fade":
-            lines.append(f"const pen_real_t trust = pen_fade({n}U, &p[0], {fade}, in);")
-            each(f"slope[@] = (trust * slope[@]) + ({h}[0] * pen_fade_slope({n}U, &p[0], {fade}, in, @U));")
-            lines.append(f"return {h}[0] * trust;")
-        else:
-            lines.append(f"return {h}[0];")
-        return lines
-
-    def _bend_lines(self, code: _NetworkCode) -> list[str]:
-        """Statements for second derivatives: t[i] as above, c[i][j] the change of t[i] with input j."""
-        n, fade = code.n, real(self.model.fade_width)
-        lines: list[str] = []
-
-        def each(statement: str) -> None:
-            lines.extend(_loops(statement, n))
-
-        clamp = self.model.outside == "clamp"
-        if clamp:
-            lines.append(f"pen_clamp({n}U, &p[0], in, h);")
-        else:
-            each("h[@] = in[@];")
-        start = f"pen_clamp_slope({n}U, &p[0], in, @U)" if clamp else "(pen_real_t)1"
-        each(f"t[@][%] = {start};" if n == 1 else f"t[@][%] = (@ == %) ? {start} : (pen_real_t)0;")
-        each("c[@][%][#] = (pen_real_t)0;")
-        h, g, t, s, c, d, relu = "h", "g", "t", "s", "c", "d", ""
-        for layer, at in code.layers():
-            if isinstance(layer, Affine):
-                lines += [f"pen_act_relu({layer.n_out}U, {h});"] if relu else []
-                lines.append(_affine(layer, at, h, h))
-                each(f"{_AFFINE[layer.form]}_tangent({layer.n_out}U, {at}, {t}[@]);")
-                each(f"{_AFFINE[layer.form]}_tangent({layer.n_out}U, {at}, {c}[@][%]);")
-                relu = ""
-                continue
-            lines.append(f"pen_dense{relu}({layer.n_out}U, {layer.n_in}U, {at}, {h}, {g});")
-            lines += _activation(layer, g)
-            each(f"pen_dense_tangent({layer.n_out}U, {layer.n_in}U, {at}, {t}[@], {s}[@]);")
-            each(f"pen_dense_tangent({layer.n_out}U, {layer.n_in}U, {at}, {c}[@][%], {d}[@][%]);")
-            if layer.activation in ("relu", "step"):
-                each(f"pen_slope_{layer.activation}({layer.n_out}U, {g}, {d}[@][%]);")
-            elif layer.activation != "identity":
-                each(f"pen_bend_{layer.activation}({layer.n_out}U, {g}, {s}[@], {s}[%], {d}[@][%]);")
-            if layer.activation != "identity":
-                each(f"pen_slope_{layer.activation}({layer.n_out}U, {g}, {s}[@]);")
-            h, g, t, s, c, d, relu = g, h, s, t, d, c, _relu(layer)
-        each(f"bend[@][%] = {c}[@][%][0];")
-        if self.model.outside == "fade":
-            lines.append(f"const pen_real_t trust = pen_fade({n}U, &p[0], {fade}, in);")
-            slope = f"pen_fade_slope({n}U, &p[0], {fade}, in, ?U)"
-            each(
-                f"bend[@][%] = (trust * bend[@][%]) + ({t}[@][0] * {slope.replace('?', '%')}) + ({t}[%][0] * {slope.replace('?', '@')});",
-            )
-        return lines
+    def _saved(self, set_length: int) -> int:
+        """Values of an instance and its banks."""
+        return 3 * (len(self.model.states) + len(self.model.outputs)) + 2 * self.kept + 2 * set_length
 
     # -- sets -----------------------------------------------------------------------------------------------------
 
@@ -529,7 +348,7 @@ class _Emitter:
                 remark = units.si(tunable[name].unit) + (f": {tunable[name].description}" if tunable[name].description else "")
             else:
                 remark = f"network {name}"
-            found.append({"name": f"{self.prefix}_AT_{name.upper()}", "at": f"{at}U", "remark": remark})
+            found.append({"name": name, "at": f"{at}U", "remark": remark})
         return found
 
     def _set_summary(self) -> list[str]:
@@ -551,61 +370,6 @@ class _Emitter:
             "name": name, "id": chosen.id, "pieces": pieces,
             "checksum_float": sets.set_head(self.model, name)[3], "checksum_double": sets.set_head(self.model, name, float)[3],
         }  # fmt: skip
-
-
-def _by_value(code: _NetworkCode, lines: list[str]) -> list[str]:
-    """A single input is a number, not a row of one."""
-    if code.n > 1:
-        return lines
-    return [re.sub(r"\bin\[0\]", "in", re.sub(r"\bin([,)])", r"&in\1", line)) for line in lines]
-
-
-def _loops(statement: str, n: int) -> list[str]:
-    """The statement for every input @, every pair of inputs @, % or every triple @, %, #."""
-    if n == 1:
-        return [statement.replace("@U", "0U").replace("%U", "0U").replace("@", "0").replace("%", "0").replace("#", "0")]
-    marks = [(mark, name) for mark, name in zip("@%#", "ijk") if mark in statement]
-    for mark, name in marks:
-        statement = statement.replace(f"{mark}U", name).replace(mark, name)
-    lines = [statement]
-    for _, name in reversed(marks):
-        lines = [f"for (size_t {name} = 0U; {name} < {n}U; {name}++) {{", *(f"    {line}" for line in lines), "}"]
-    return lines
-
-
-def _affine(layer: Affine, at: str, here: str, there: str) -> str:
-    """A single value is scaled in place of a call."""
-    if layer.n_out > 1:
-        return f"{_AFFINE[layer.form]}({layer.n_out}U, {at}, {here}, {there});"
-    first = int(at[3:-1])
-    if layer.form == "centre":
-        return f"{there}[0] = ({here}[0] - p[{first}]) * p[{first + 1}];"
-    return f"{there}[0] = ({here}[0] * p[{first}]) + p[{first + 1}];"
-
-
-def _shape(layer: Layer) -> tuple[int, ...]:
-    """(inputs, outputs) of a dense layer."""
-    return (layer.n_in, layer.n_out) if isinstance(layer, Dense) else ()
-
-
-def _hidden16(layers: list[Layer]) -> int:
-    """How many layers 16 -> 16 a network 1-16-...-16-1 that begins here has; 0 if it is none with at least one."""
-    n = 0
-    while len(layers) > n + 1 and _shape(layers[n + 1]) == (16, 16) and _relu(layers[n + 1]):
-        n += 1
-    begins = _shape(layers[0]) == (1, 16) and bool(_relu(layers[0]))
-    return n if begins and len(layers) > n + 1 and _shape(layers[n + 1]) == (16, 1) else 0
-
-
-def _relu(layer: Layer) -> str:
-    """Suffix of the kernel that reads this layer's values: it applies the ReLU."""
-    return "_relu" if isinstance(layer, Dense) and layer.activation == "relu" else ""
-
-
-def _activation(layer: Layer, buffer: str) -> list[str]:
-    if isinstance(layer, Affine) or layer.activation in ("relu", "identity"):
-        return []
-    return [f"pen_act_{layer.activation}({layer.n_out}U, {buffer});"]
 
 
 def _remarked(line: str, step: Step) -> list[str]:

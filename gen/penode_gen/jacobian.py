@@ -12,7 +12,7 @@ from .causalise import Causal, Step
 
 class Derivatives:
     """
-    Derivatives of expressions of a causal model. `slopes` maps a network call's target to one symbol per input, `bends`
+    Derivatives of expressions of a causal model. `slopes` maps a network call's target to one symbol per input, `seconds`
     to one symbol per pair of inputs: its second derivatives. Networks in `straight` have none.
     """
 
@@ -25,8 +25,8 @@ class Derivatives:
             if step.network
         }
         self.slopes = {t: (ex.symbol(f"slope_{t.name}"),) if len(s) == 1 else s for t, s in self.slopes.items()}
-        self.bends: dict[sp.Symbol, list[list[sp.Symbol]]] = {
-            t: [[ex.symbol(f"bend_{min(i, j) + 1}{max(i, j) + 1}_{t.name}") for j in range(len(s))] for i in range(len(s))]
+        self.seconds: dict[sp.Symbol, list[list[sp.Symbol]]] = {
+            t: [[ex.symbol(f"second_{min(i, j) + 1}{max(i, j) + 1}_{t.name}") for j in range(len(s))] for i in range(len(s))]
             for t, s in self.slopes.items()
             if self._steps[t].network not in straight
         }
@@ -44,8 +44,8 @@ class Derivatives:
             found += _tidy(expr.diff(symbol)) * self._step(symbol, variable)
         for symbol in sorted(expr.free_symbols & set(self._slope_of), key=lambda s: s.name):
             target, i = self._slope_of[symbol]
-            for bend, argument in zip(self.bends.get(target, [[]] * (i + 1))[i], self._steps[target].arguments):
-                found += expr.diff(symbol) * bend * self.total(argument, variable)
+            for second, argument in zip(self.seconds.get(target, [[]] * (i + 1))[i], self._steps[target].arguments):
+                found += expr.diff(symbol) * second * self.total(argument, variable)
         return sp.factor_terms(found) if found.is_Add else found
 
     def curvature(

@@ -11,6 +11,8 @@ METHODS = ("euler", "heun", "rk4", "ros1", "ros2")
 INTERPOLATIONS = ("held", "linear", "parabola", "cubic")
 OUTSIDE = ("extrapolate", "clamp", "fade")
 MORE_PIECES = ("refuse", "layers")
+OUT_OF_RANGE = ("report", "clamp", "hold")
+ON_DAMAGE = ("report", "hold", "rollback")
 GROUND = "ground"
 
 
@@ -24,7 +26,7 @@ class ModelError(Exception):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known), 0 if nothing is said."""
+    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known), 0 if none is stated."""
 
     name: str
     value: float
@@ -109,16 +111,33 @@ class Signal:
     unit: str
     noise: float = 0.0
     description: str = ""
+    trial_bound: float | None = None  # how far a new set may lead it from the running one in its trial, SI
+
+
+@dataclass(frozen=True)
+class Promises:
+    """What every set must keep of a network F of one input, in SI (inc/penode/pen_promise.h). None: not promised."""
+
+    increasing: bool = False
+    decreasing: bool = False
+    dissipative: float | None = None  # F(v) v >= -dissipative |v|
+    max_slope: float | None = None
+    max_force: float | None = None
+    zero_at_zero: bool = False
+
+    def __bool__(self) -> bool:
+        return self != Promises()
 
 
 @dataclass(frozen=True)
 class NetworkPort:
-    """What a network stands for: names and units of its inputs and of its output."""
+    """What a network stands for: names and units of its inputs and of its output, and what is promised of it."""
 
     name: str
     input_units: tuple[str, ...]
     output_unit: str
     description: str = ""
+    promises: Promises = Promises()
 
 
 @dataclass(frozen=True)
@@ -129,6 +148,15 @@ class ParameterSet:
     id: int
     networks: dict[str, Network]
     parameters: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Guard:
+    """What the C does about inputs and sets that are not as they should be; `trial`: samples that a new set is tried on, 0: none."""
+
+    out_of_range: str = "report"
+    on_damage: str = "report"
+    trial: int = 0
 
 
 @dataclass(frozen=True)
@@ -158,6 +186,13 @@ class Model:
     sets: dict[str, ParameterSet]
     path: Path
     digest: str
+    guard: Guard = Guard()
+    set_owner: str = ""  # the model whose sets these are, if it is another
+
+    @property
+    def owner(self) -> str:
+        """The model that the sets are named after: several methods of one model share them."""
+        return self.set_owner or self.name
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from . import units
 from .model import Model, ParameterSet
 from .networks import Affine, Dense, Network
 
-ABI = 1
+ABI = 2
 _FLOAT_MAX = float(np.finfo(np.float32).max)
 
 
@@ -110,8 +110,16 @@ def layout(model: Model, dtype: type = np.float32) -> int:
     """Fingerprint of what the values mean: model name, tunable parameters, architectures, ABI and real type."""
     nets = model.sets["default"].networks if model.sets else {}
     names = tuple(p.name for p in model.tunable) + tuple((n, net.architecture) for n, net in nets.items())
-    text = repr((ABI, model.name, names, np.dtype(dtype).name))
+    text = repr((ABI, model.owner, names, np.dtype(dtype).name))
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "big")
+
+
+def digest(model: Model) -> str:
+    """Identifies the sets of a model: what they mean and all that they hold."""
+    sha = hashlib.sha256(repr((layout(model), layout(model, float), {n: s.id for n, s in model.sets.items()})).encode())
+    for name in model.sets or ("default",):
+        sha.update(set_values(model, name, np.float64).tobytes() if model.sets else b"")
+    return sha.hexdigest()
 
 
 def set_head(model: Model, set_name: str, dtype: type = np.float32) -> tuple[int, int, int, int]:

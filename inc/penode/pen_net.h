@@ -21,6 +21,10 @@
 #include "penode/pen_real.h"
 #include "penode/pen_status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* ---- dense layers: y = W x + b, and with _relu: y = W max(0, x) + b, the activation of the layer before ---- */
 
 /** Any shape. @param w [n_out * (n_in + 1)] as above; @param x [n_in]; @param y [n_out], may not overlap x */
@@ -54,11 +58,11 @@ void pen_slope_sigmoid(size_t n, const pen_real_t h[], pen_real_t t[]);
 void pen_slope_softplus(size_t n, const pen_real_t h[], pen_real_t t[]);
 void pen_slope_step(size_t n, const pen_real_t h[], pen_real_t t[]); /* 0 */
 
-/* ---- their bends: c[i] = act'(.) c[i] + act''(.) a[i] b[i], from the value h[i] after the activation ---- */
+/* ---- their second derivatives: c[i] = act'(.) c[i] + act''(.) a[i] b[i], from the value h[i] after the activation ---- */
 
-void pen_bend_tanh(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
-void pen_bend_sigmoid(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
-void pen_bend_softplus(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
+void pen_second_tanh(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
+void pen_second_sigmoid(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
+void pen_second_softplus(size_t n, const pen_real_t h[], const pen_real_t a[], const pen_real_t b[], pen_real_t c[]);
 
 /* ---- element-wise layers. Standardising and min-max scaling are pen_centre, their inverses pen_rescale; a PCA is
  *      pen_centre and then pen_dense with the components as rows. ---- */
@@ -111,5 +115,9 @@ pen_real_t pen_fade(size_t n, const pen_real_t range[], pen_real_t width, const 
 /** Derivatives of pen_clamp's y[i] and of pen_fade along x[i]: at an edge that of the inside, 0 where trust ends. */
 pen_real_t pen_clamp_slope(size_t n, const pen_real_t range[], const pen_real_t x[], size_t i);
 pen_real_t pen_fade_slope(size_t n, const pen_real_t range[], pen_real_t width, const pen_real_t x[], size_t i);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

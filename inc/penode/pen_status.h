@@ -4,17 +4,16 @@
 /**
  * One status type for the whole library: flags that add up, 0 is good.
  *
- * Each flag is also counted. A counter has one writer: the step's context counts PEN_STATUS_STEP, the tuning context
- * counts PEN_STATUS_TUNE. A reader in a third place never writes a shared word, so nothing is lost or counted twice,
+ * Each flag is also counted. A counter has one writer: the step's context counts the flags of a step, the tuning context
+ * those of a tuning call. A reader in a third place never writes a shared word, so nothing is lost or counted twice,
  * whoever pre-empts whom.
  *
- * NaN and Inf in memory: the step that meets one says so. But a bound of a trust envelope is only compared with, and of
- * a folded network one piece is in use. So each step also looks at one number of the running set and at one piece of
- * each folded network, the next step at the next: the patrol. Any NaN or Inf is said within NAME_PATROL steps, a
+ * NaN and Inf in memory: the step that meets one reports it. But a bound of a trust envelope is only compared with, and of
+ * a folded network one piece is in use. So each step also looks at one value of the running set and at one piece of
+ * each folded network, the next step at the next: the scrub. Any NaN or Inf is reported within NAME_SCRUB steps, a
  * constant of the generated header: the length of a set, or the room for pieces if that is more. Where steps read pieces
- * only it looks at pieces only: the weights that they were made of are checked when they are next folded. A good set
- * may have pieces so far out that they overflow: that is said, too. It costs the same wherever it is; what it takes is
- * in the figures of the step.
+ * only, it looks at pieces only. A good set may have pieces so far out that they overflow: that is reported too. The scrub
+ * costs the same wherever it is. Damage that stays finite is found by NAME_verify: penode/pen_instance.h.
  */
 #ifndef PEN_STATUS_H
 #define PEN_STATUS_H
@@ -22,38 +21,59 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef uint32_t pen_status_t;
 
 #define PEN_OK UINT32_C(0)
 
 /* Raised by a step. */
-#define PEN_INPUT_NONFINITE  UINT32_C(0x00001) /* an input is NaN or Inf; state and outputs held                      */
-#define PEN_STATE_NONFINITE  UINT32_C(0x00002) /* the state was NaN or Inf; the last good state is back, outputs held */
-#define PEN_STEP_NONFINITE   UINT32_C(0x00004) /* NaN or Inf arose inside (weight, overflow); state and outputs held  */
-#define PEN_SINGULAR         UINT32_C(0x00008) /* a linear solve met a singular matrix; state and outputs held        */
-#define PEN_OUTSIDE          UINT32_C(0x00010) /* a network input left its trust envelope; treated as the model says  */
-#define PEN_HELD             UINT32_C(0x00020) /* no step taken, as told by the tuning context                        */
-#define PEN_ADOPTED          UINT32_C(0x00040) /* a new parameter set is in force from this step on                   */
-#define PEN_BADARG           UINT32_C(0x00080) /* NULL, or an instance that was not initialised; nothing written      */
-#define PEN_WEIGHT_NONFINITE UINT32_C(0x00100) /* the patrol met NaN or Inf in the running set; nothing held          */
+#define PEN_INPUT_NONFINITE  UINT32_C(0x000001) /* an input is NaN or Inf; state and outputs held                      */
+#define PEN_STATE_NONFINITE  UINT32_C(0x000002) /* the state was NaN or Inf; the last good one is back, outputs held   */
+#define PEN_STEP_NONFINITE   UINT32_C(0x000004) /* NaN or Inf arose inside (weight, overflow); state and outputs held  */
+#define PEN_SINGULAR         UINT32_C(0x000008) /* a linear solve met a singular matrix; state and outputs held        */
+#define PEN_OUTSIDE          UINT32_C(0x000010) /* a network input left its trust envelope; treated as the model says  */
+#define PEN_HELD             UINT32_C(0x000020) /* no step taken, as told by the tuning context                        */
+#define PEN_ADOPTED          UINT32_C(0x000040) /* a new parameter set is in force from this step on                   */
+#define PEN_BADARG           UINT32_C(0x000080) /* NULL, or an instance that was not initialised; nothing written      */
+#define PEN_WEIGHT_NONFINITE UINT32_C(0x000100) /* the scrub met NaN or Inf in the running set; nothing held           */
+#define PEN_INPUT_RANGE      UINT32_C(0x000200) /* an input left its declared range; treated as the model says         */
+#define PEN_WITHDRAWN        UINT32_C(0x000400) /* a committed set was withdrawn before it came into force             */
 
-/* Raised by a tuning call; the running set is untouched. */
-#define PEN_SET_BUSY         UINT32_C(0x00200) /* a committed set still waits for the next step                       */
-#define PEN_SET_CLOSED       UINT32_C(0x00400) /* no set is open: begin was not called, or it is already committed    */
-#define PEN_SET_RANGE        UINT32_C(0x00800) /* a chunk leaves a gap or runs past the end                           */
-#define PEN_SET_SHORT        UINT32_C(0x01000) /* commit before the last value was written                            */
-#define PEN_SET_CHECKSUM     UINT32_C(0x02000) /* values do not match the checksum in the head                        */
-#define PEN_SET_NONFINITE    UINT32_C(0x04000) /* a value is NaN or Inf                                               */
-#define PEN_SET_LAYOUT       UINT32_C(0x08000) /* made for another model, layout version or real type                 */
-#define PEN_SET_NO_PREVIOUS  UINT32_C(0x10000) /* rollback: the previous set is gone                                  */
-#define PEN_SET_PIECES       UINT32_C(0x20000) /* a network has more pieces than there is room for                    */
+/* Raised by a tuning call. Refused calls leave the running set as it is. */
+#define PEN_SET_BUSY         UINT32_C(0x000800) /* a committed set still waits for the next step                       */
+#define PEN_SET_CLOSED       UINT32_C(0x001000) /* no set is open: begin was not called, or it is already committed    */
+#define PEN_SET_RANGE        UINT32_C(0x002000) /* a chunk leaves a gap or runs past the end                           */
+#define PEN_SET_SHORT        UINT32_C(0x004000) /* commit before the last value was written                            */
+#define PEN_SET_CHECKSUM     UINT32_C(0x008000) /* values do not match the checksum in the head                        */
+#define PEN_SET_NONFINITE    UINT32_C(0x010000) /* a value is NaN or Inf                                               */
+#define PEN_SET_LAYOUT       UINT32_C(0x020000) /* made for another model, layout version or real type                 */
+#define PEN_SET_NO_PREVIOUS  UINT32_C(0x040000) /* rollback: there is no rollback set                                  */
+#define PEN_SET_PIECES       UINT32_C(0x080000) /* a network has more pieces than there is room for                    */
+#define PEN_SET_BADARG       UINT32_C(0x100000) /* NULL, no banks, or an instance that was not initialised             */
+#define PEN_SET_PROMISE      UINT32_C(0x200000) /* a network breaks a promise of the model file                        */
+#define PEN_SET_TRIAL        UINT32_C(0x400000) /* the trial over the last samples failed                              */
+#define PEN_SET_DAMAGED      UINT32_C(0x800000) /* verify: the running set or its pieces have changed in memory        */
+#define PEN_SET_IDLE         UINT32_C(0x1000000) /* withdraw: no committed set waits                                   */
 
-#define PEN_STATUS_FLAGS 18U /* flags above, and counters                                   */
-#define PEN_STATUS_STEP   9U /* the first 9 flags are a step's, the others a tuning call's  */
+#define PEN_STATUS_FLAGS 25U /* flags above, and counters                                    */
+#define PEN_STATUS_STEP  11U /* the first 11 flags are a step's, the others a tuning call's  */
+
+/* What a step did not take: state and outputs held. */
 #define PEN_HOLDING \
     (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE | PEN_STEP_NONFINITE | PEN_SINGULAR | PEN_HELD | PEN_BADARG)
 
-/** True if the step advanced: state and outputs are of this sample (they may still be PEN_OUTSIDE). */
+/* Three kinds of flag. Faults want a reaction; warnings say that results are less sure; events are what was asked for.
+ * A tuning call that was refused is none of them: its caller has the answer. */
+#define PEN_FAULTS \
+    (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE | PEN_STEP_NONFINITE | PEN_SINGULAR | PEN_BADARG | PEN_WEIGHT_NONFINITE | \
+     PEN_SET_DAMAGED)
+#define PEN_WARNINGS (PEN_OUTSIDE | PEN_INPUT_RANGE)
+#define PEN_EVENTS   (PEN_HELD | PEN_ADOPTED | PEN_WITHDRAWN)
+
+/** True if the step advanced: state and outputs are of this sample (there may still be warnings and events). */
 static inline bool pen_advanced(pen_status_t status)
 {
     return (status & PEN_HOLDING) == PEN_OK;
@@ -67,14 +87,17 @@ typedef struct {
 
 /** What was raised since the last read. */
 typedef struct {
-    pen_status_t flags;                  /* sticky: every flag raised at least once */
-    uint32_t     times[PEN_STATUS_FLAGS]; /* how often, in the order of the flags    */
+    pen_status_t flags;                   /* sticky: every flag raised at least once                    */
+    uint32_t     times[PEN_STATUS_FLAGS]; /* how often, in the order of the flags: read by pen_status_times */
 } pen_status_report_t;
+
+/** How often `flag`, one of the flags above, was raised: pen_status_times(&report, PEN_OUTSIDE). 0 for anything else. */
+uint32_t pen_status_times(const pen_status_report_t *report, pen_status_t flag);
 
 /** Clear all counters. Not while another context uses the log. */
 void pen_status_clear(pen_status_log_t *log);
 
-/** Count the flags of a step, the others are ignored; for the step's context only. Cost: 49 instructions, at -Os 88. */
+/** Count the flags of a step, the others are ignored; for the step's context only. Cost: 59 instructions, at -Os 105. */
 void pen_status_note_step(pen_status_log_t *log, pen_status_t status);
 
 /** Count the flags of a tuning call, the others are ignored; for the tuning context only. */
@@ -85,5 +108,9 @@ void pen_status_note_tune(pen_status_log_t *log, pen_status_t status);
  * this report or in the next. At most 2^32 - 1 steps between two reads: then a counter has come round.
  */
 void pen_status_read(pen_status_log_t *log, pen_status_report_t *report);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

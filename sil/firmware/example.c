@@ -171,12 +171,12 @@ static bool report_status(void)
     const pen_status_t status = nqvm_status(&model, &report);
 
     print_pair("status: ", samples);
-    print_pair(" samples, held ", report.times[5]);
-    print_pair(", sets adopted ", report.times[6]);
+    print_pair(" samples, held ", pen_status_times(&report, PEN_HELD));
+    print_pair(", sets adopted ", pen_status_times(&report, PEN_ADOPTED));
     board_print(", flags ");
     board_print_hex(report.flags);
     board_print("\n");
-    return (status == PEN_OK) && ((report.flags & ~PEN_OUTSIDE) == (PEN_HELD | PEN_ADOPTED)) && (report.times[6] == 3U);
+    return (status == PEN_OK) && ((report.flags & ~PEN_OUTSIDE) == (PEN_HELD | PEN_ADOPTED)) && (pen_status_times(&report, PEN_ADOPTED) == 3U);
 }
 
 int main(void)

@@ -118,9 +118,8 @@ def generate(model: Path, output: Path) -> None:
         raise UserError(f"{output}: this is a file; name a directory")
     if not output.exists() and not output.absolute().parent.is_dir():
         raise UserError(f"{output}: there is no directory {output.parent}; create it")
-    penode_gen.generate(loaded, output)
-    for suffix in (".h", ".c", "_params.c"):
-        click.echo(str(output / f"{loaded.name}{suffix}"))
+    for path in penode_gen.generate(loaded, output):
+        click.echo(str(path))
 
 
 @cli.command(cls=_Several)

@@ -90,10 +90,10 @@ def generated(model: Any) -> Path:
     """The folder with the model's C, generated unless an earlier call did; keyed by model and generator."""
     sources = [path for path in _files(("gen/penode_gen", "*")) if path.is_file() and path.suffix != ".pyc"]
     folder = build_directory() / f"{model.name}-{_digest([model.digest, *sources])}"
-    if not (folder / f"{model.name}_params.c").exists():
+    if not (folder / f"{model.name}.c").exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-            penode_gen.generate(model, Path(scratch) / "c")
+            penode_gen.generate(model, Path(scratch) / "c", self_test=False)
             _move(Path(scratch) / "c", folder)
     return folder
 
@@ -156,7 +156,7 @@ def build_library(
 ) -> Path:
     """The shared library of a model; `source` is a folder with its C if it is not to be generated."""
     source = source or generated(model)
-    code, runtime = [source / f"{model.name}.c", source / f"{model.name}_params.c"], _files(("src", "*.c"))
+    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], _files(("src", "*.c"))
     shim = ROOT / "sil" / "firmware" / "sil.c"
     options = [
         *compiler,
@@ -216,7 +216,7 @@ class Sil:
 
     def flash_set(self, name: str) -> Set:
         """The committed set of that name, as it lies in the library."""
-        return Set.in_dll(self._library, f"{self.model.name}_set_{name}")
+        return Set.in_dll(self._library, f"{self.model.owner}_set_{name}")
 
     def instance(self, set_name: str = "default", banks: bool = True) -> SilInstance:
         """A fresh, initialised instance."""
@@ -406,7 +406,7 @@ TROUBLE = {1: "it could not open, read or write its files", 2: "it was given a t
 def build_firmware(model: Any, machine: str, source: Path | None = None, optimise: str = "-O2") -> Path:
     """The PiL program of a model for one of MACHINES."""
     source = source or generated(model)
-    code, runtime = [source / f"{model.name}.c", source / f"{model.name}_params.c"], _files(("src", "*.c"))
+    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], _files(("src", "*.c"))
     program, board = ROOT / "sil" / "firmware" / "pil.c", MACHINES[machine]
     port = ROOT / "port" / "host" / "board.c"
     sets = ",".join(f"&{model.name}_set_{name}" for name in model.sets)

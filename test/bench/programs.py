@@ -75,7 +75,7 @@ def our_program(
     objects = [step, *_runtime(machine, tuple(flags))]
     elf = folder / "program.elf"
     drives = [*command, "-fno-strict-aliasing", main]  # it looks into an instance and makes numbers of bits
-    _make([*drives, source / f"{model.name}_params.c", *objects], elf)
+    _make([*drives, source / f"{model.owner}_params.c", *objects], elf)
     return Program(elf, f"{model.name}_step", objects, machine)
 
 

@@ -86,10 +86,10 @@ void setUp(void)
 void tearDown(void) {}
 
 /* What a tuning call does once a set is ready: hand it over. */
-static pen_status_t announced(pen_status_t status, const pen_set_t *ready)
+static pen_status_t published(pen_status_t status, const pen_set_t *ready)
 {
     if (status == PEN_OK) {
-        pen_tuning_announce(&tuning, ready);
+        pen_tuning_publish(&tuning, ready);
     }
     return status;
 }
@@ -98,14 +98,14 @@ static pen_status_t commit(void)
 {
     pen_set_t ready;
 
-    return announced(pen_tuning_commit(&tuning, LAYOUT, LENGTH, &ready), &ready);
+    return published(pen_tuning_commit(&tuning, LAYOUT, LENGTH, &ready), &ready);
 }
 
 static pen_status_t choose(const pen_set_t *set)
 {
     pen_set_t ready;
 
-    return announced(pen_tuning_select(&tuning, LAYOUT, LENGTH, set, &ready), &ready);
+    return published(pen_tuning_select(&tuning, LAYOUT, LENGTH, set, &ready), &ready);
 }
 
 void test_begin_looks_at_pending_and_then_waits_for_its_view_of_active(void)
@@ -114,7 +114,7 @@ void test_begin_looks_at_pending_and_then_waits_for_its_view_of_active(void)
     TEST_ASSERT_EQUAL_STRING("p|", trace);
 }
 
-void test_commit_announces_a_set_that_is_whole_before_the_barrier(void)
+void test_commit_publishes_a_whole_set_before_the_barrier(void)
 {
     (void)pen_tuning_begin(&tuning, LAYOUT, LENGTH, &other.head);
     (void)pen_tuning_write(&tuning, LENGTH, 0U, other_value, LENGTH);
@@ -125,7 +125,7 @@ void test_commit_announces_a_set_that_is_whole_before_the_barrier(void)
     TEST_ASSERT_EQUAL_UINT32(1U, tuning.pending);
 }
 
-void test_select_announces_a_set_that_is_whole_before_the_barrier(void)
+void test_select_publishes_a_whole_set_before_the_barrier(void)
 {
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, choose(&other));
     TEST_ASSERT_EQUAL_STRING("p||P", trace);
@@ -152,7 +152,7 @@ void test_adopt_without_a_set_waiting_writes_nothing(void)
     TEST_ASSERT_EQUAL_STRING("p", trace);
 }
 
-void test_a_refused_set_is_not_announced(void)
+void test_a_refused_set_is_not_published(void)
 {
     other.head.checksum ^= 1U;
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_CHECKSUM, choose(&other));

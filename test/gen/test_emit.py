@@ -21,7 +21,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import penode_gen
-from penode_gen import c_text, emit_c, expressions, sets
+from penode_gen import c_text, emit_c, expressions, sets, write
 from penode_gen.causalise import causalise
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,7 +38,7 @@ METHODS, INPUTS, OUTSIDE, SUBSTEPS = ("euler", "heun", "rk4", "ros1", "ros2"), (
 
 def complaints(folder: Path, name: str, reals: tuple[list[str], ...] = REALS) -> list[str]:
     """What the compilers say about the C of a model."""
-    sources = [str(folder / f"{name}.c"), str(folder / f"{name}_params.c")]
+    sources = sorted(map(str, folder.glob("*.c")))
     found = []
     for compiler, real in itertools.product(COMPILERS, reals):
         result = subprocess.run([compiler, *STRICT, *real, f"-I{folder}", *sources], capture_output=True, text=True)
@@ -61,7 +61,7 @@ def test_the_same_bytes_in_every_process_and_folder(tmp_path):
             environment = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT / "gen")}
             subprocess.run([sys.executable, "-c", script, str(path), str(folder / out)], check=True, env=environment)
         files = sorted(p for p in folder.rglob("*.[ch]"))
-        assert len(files) == 6
+        assert len(files) == 10
         results.append({p.relative_to(folder): p.read_bytes() for p in files})
     assert results[0] == results[1]
     for text in results[0].values():
@@ -215,14 +215,14 @@ def test_all_files_or_none(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device", "rich_params.c")
 
     with monkeypatch.context() as patch, pytest.raises(OSError, match="No space left"):
-        patch.setattr(emit_c.os, "chmod", full)
+        patch.setattr(write.os, "chmod", full)
         penode_gen.generate(model, out)
     assert [p.name for p in out.iterdir()] == ["rich.h"] and (out / "rich.h").read_text() == "old"
 
     with pytest.raises(OSError):
         penode_gen.generate(model, tmp_path / "n2.json" / "below a file")
-    assert [p.name for p in penode_gen.generate(model, out)] == ["rich.h", "rich.c", "rich_params.c"]
-    assert sorted(p.name for p in out.iterdir()) == ["rich.c", "rich.h", "rich_params.c"]
+    assert [p.name for p in penode_gen.generate(model, out)] == ["rich.h", "rich.c", "rich_sets.h", "rich_params.c", "rich_selftest.c", "rich_layout.json"]
+    assert sorted(p.name for p in out.iterdir()) == sorted(["rich.c", "rich.h", "rich_sets.h", "rich_params.c", "rich_selftest.c", "rich_layout.json"])
     assert all(p.stat().st_mode & 0o777 == 0o644 for p in out.iterdir())
 
 
@@ -275,7 +275,7 @@ def test_weights_arrive_in_c_as_they_were(tmp_path):
     model = penode_gen.load(NQVM[0])
     text = penode_gen.render(model)[f"{model.name}_params.c"]
     for name in model.sets:
-        body = re.search(rf"{name}_value\[.*?\] = \{{(.*?)\}};", text, re.DOTALL)[1]
+        body = re.search(rf"value_{name}\[.*?\] = \{{(.*?)\}};", text, re.DOTALL)[1]
         printed = [value_of(v.strip()) for v in re.sub(r"/\*.*?\*/", "", body, flags=re.DOTALL).split(",") if v.strip()]
         assert np.array_equal(np.array(printed), penode_gen.set_values(model, name, np.float64))
         assert f"CHECKSUM_{name.upper()} 0x{penode_gen.set_head(model, name)[3]:08x}U" in text

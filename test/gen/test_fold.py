@@ -254,10 +254,10 @@ def test_too_many_pieces_are_refused_and_the_running_set_stays(tmp_path):
     sil = Sil(replace(made, pieces=24))
     instance = sil.instance()
     before = instance.step([0.5])[1][0]
-    assert sil.function("tune_select")(instance._self, ctypes.byref(sil.flash_set("rough"))) == 0x20000
+    assert sil.function("tune_select")(instance._self, ctypes.byref(sil.flash_set("rough"))) == 0x80000
     _, after, status = instance.step([0.5])
     assert status == 0 and after[0] == before
-    with pytest.raises(AssertionError, match="0x20000"):
+    with pytest.raises(AssertionError, match="0x80000"):
         sil.instance("rough")  # init refuses it as well
 
 

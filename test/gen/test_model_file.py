@@ -155,7 +155,7 @@ FAULTS = [
     ("tau = {", 'K = { value = 1, unit = "1" }\ntau = {', "parameters.K: its C constant GOOD_K is already taken"),
     ("tau = {", 'k_inverse = { value = 1, unit = "1" }\ntau = {', "parameters.k_inverse: its C constant GOOD_K_INVERSE"),
     ("tau = {", 'set_length = { value = 1, unit = "1" }\ntau = {', "GOOD_SET_LENGTH is already taken"),
-    ("tau = {", 'patrol = { value = 1, unit = "1" }\ntau = {', "GOOD_PATROL is already taken"),
+    ("tau = {", 'scrub = { value = 1, unit = "1" }\ntau = {', "GOOD_SCRUB is already taken"),
     ("tau = {", 'pieces = { value = 1, unit = "1" }\ntau = {', "GOOD_PIECES is already taken"),
     ("tau = {", 'damp_damping = { value = 1, unit = "1" }\ntau = {', "'damp_damping', which there is already", at("damp =")),
     ('load = { value = "F_foot"', 'q = { value = "F_foot"', "sensors.q: 'q' is already the name of another quantity"),

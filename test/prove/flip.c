@@ -3,8 +3,8 @@
 
 /*
  * flip EVERY: flips one bit of an instance, or of the sets in its banks, then takes 1000 steps, in which sets are
- * staged, selected and rolled back. Every EVERY-th bit of the banks, ten times as many of the instance, in three
- * situations: nothing open, a set half written, a set announced. Each in a process of its own. Instance and banks lie
+ * staged, selected, withdrawn, rolled back and verified. Every EVERY-th bit of the banks, ten times as many of the instance, in three
+ * situations: nothing open, a set half written, a set published. Each in a process of its own. Instance and banks lie
  * between poisoned memory, so that AddressSanitizer meets whatever goes beside; further away is no memory. Printed: how
  * often what became of it.
  */
@@ -29,7 +29,7 @@
 #define SECONDS 2 /* of the processor: a thousand times what a run takes */
 
 enum { NO_EFFECT, REFUSED, FLAGGED, READ_OUTSIDE, OTHER_RESULT, WRITE_OUTSIDE, HANG, BROKEN, OUTCOMES };
-enum { QUIET, HALF_WRITTEN, ANNOUNCED, SITUATIONS };
+enum { QUIET, HALF_WRITTEN, PUBLISHED, SITUATIONS };
 
 static const char *const outcome_name[OUTCOMES] = { "no effect",    "refused",       "flagged", "read outside",
                                                     "other result", "write outside", "hang",    "broken" };
@@ -38,8 +38,8 @@ static const pen_set_t *const sets[] = { MODEL_SETS };
 
 typedef struct {
     uint64_t     digest;
-    pen_status_t calls; /* all that the tuning calls said */
-    pen_status_t steps; /* all that the steps said        */
+    pen_status_t calls; /* all that the tuning calls returned */
+    pen_status_t steps; /* all that the steps reported    */
     uint32_t     done;
 } result_t;
 
@@ -83,7 +83,7 @@ static void step(uint32_t k)
     memcpy(&input, u, sizeof(input));
     memset(&y, 0, sizeof(y));
     status = MODEL(step)(&memory->model, &input, &y);
-    result->steps |= status & ~PEN_ADOPTED;
+    result->steps |= status & ~(PEN_ADOPTED | PEN_WITHDRAWN);
     for (size_t i = 0U; i < sizeof(y); i++) {
         result->digest = (result->digest ^ ((const uint8_t *)&y)[i]) * UINT64_C(0x100000001B3);
     }
@@ -122,7 +122,7 @@ static void before(uint32_t situation)
     if (situation == HALF_WRITTEN) {
         tune(MODEL(tune_begin)(&memory->model, &sets[0]->head));
         write_part(sets[0], 0U, N / 2U);
-    } else if (situation == ANNOUNCED) {
+    } else if (situation == PUBLISHED) {
         stage(sets[0]);
     } else {
         /* nothing open */
@@ -139,6 +139,9 @@ static void after(uint32_t situation)
             tune(MODEL(tune_commit)(&memory->model));
         } else if (k == 300U) {
             stage(sets[SETS - 1U]);
+        } else if (k == 500U) {
+            tune(MODEL(tune_select)(&memory->model, sets[0]));
+            tune(MODEL(tune_withdraw)(&memory->model));
         } else if (k == 600U) {
             tune(MODEL(tune_rollback)(&memory->model));
         } else if (k == 700U) {
@@ -147,6 +150,9 @@ static void after(uint32_t situation)
             tune(MODEL(tune_select)(&memory->model, sets[0]));
         } else {
             /* the step alone */
+        }
+        if ((k % 8U) == 7U) {
+            tune(MODEL(verify)(&memory->model, 1U + (MODEL_SIZE(VERIFY) / 10U)));
         }
         step(k);
     }

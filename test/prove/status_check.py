@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Gate: NaN or Inf anywhere is said, and the last good state is kept: every method, layered, folded and smooth."""
+"""Gate: NaN or Inf anywhere, an input out of its range, are reported, and the last good state is kept: every method, layered, folded and smooth."""
 
 from __future__ import annotations
 
@@ -20,22 +20,32 @@ from penode_sil.targets import FLAGS, generated, model_options
 WORK = gate.BUILD / "status"
 METHODS = ("euler", "heun", "rk4", "ros1", "ros2")
 OUTSIDE = ("extrapolate", "clamp", "fade")
+OUT_OF_RANGE = ("report", "clamp", "hold")
 
-# File, and fault: see gate.faulty.
+# Model, file and fault: see gate.faulty. How a model treats an input out of range: OUT_OF_RANGE, in turn.
+HOLDS, CLAMPS = "small_rk4_8_or_layers", "small_heun_8_or_layers"
 FAULTS = {
-    "input not checked": ("model", ("status |= check(SMALL_RK4_8_OR_LAYERS_N_U, self->u[1], PEN_INPUT_NONFINITE);", 0, "")),
-    "state not checked": ("model", ("status |= check(N_LAST, self->row[LAST], PEN_STATE_NONFINITE);", 0, "")),
-    "result not checked": ("model", ("check(N_LAST, self->row[NOW], PEN_STEP_NONFINITE)", 0, "PEN_OK")),
-    "second copy not kept": ("model", ("    copy(N_LAST, self->row[LAST], self->row[KEPT]);\n    copy(N_DRIVE", 0, "    copy(N_DRIVE")),
-    "bad input kept": ("model", ("self->u[received]", 0, "self->u[1]")),
-    "steps not counted": ("model", ("pen_status_note_step(&self->log, result);", 0, "")),
-    "values of a set not checked": ("pen_set.c", ("!pen_finite(length, set->value)", 0, "false")),
-    "patrol stands still": ("model", ("self->patrol = at + 1U;", 0, "")),
-    "patrol leaves out the last number": ("model", ("self->patrol % SMALL_RK4_8_OR_LAYERS_PATROL", 0, "self->patrol % (SMALL_RK4_8_OR_LAYERS_PATROL - 1U)")),
-    "patrol leaves out the last piece": ("model", ("at % SMALL_RK4_8_OR_LAYERS_PIECES", 0, "at % (SMALL_RK4_8_OR_LAYERS_PIECES - 1U)")),
-    "patrol does not look at the set": ("model", ("doubt = value - value", 0, "doubt = (pen_real_t)0")),
-    "patrol does not look at starts": ("model", ("doubt *= f->net[k].start;", 0, "")),
-    "finite whatever comes": ("pen_math.h", ("return sum >= (pen_real_t)0;", 0, "return (sum >= (pen_real_t)0) || true;")),
+    "input not checked": (HOLDS, "model", ("status |= pen_step_check(SMALL_RK4_8_OR_LAYERS_N_U, u1, PEN_INPUT_NONFINITE);", 0, "")),
+    "state not checked": (HOLDS, "model", ("status |= pen_step_check(SMALL_RK4_8_OR_LAYERS_N_LAST, self->row[PEN_ROW_LAST], PEN_STATE_NONFINITE);", 0, "")),
+    "result not checked": (HOLDS, "pen_step.h", ("pen_step_check(n_last, &row[PEN_ROW_NOW * n_last], PEN_STEP_NONFINITE)", 0, "PEN_OK")),
+    "second copy not kept": (HOLDS, "pen_step.h", ("    pen_step_copy(n_last, &row[PEN_ROW_LAST * n_last], &row[PEN_ROW_KEPT * n_last]);", 0, "")),
+    "bad input kept": (HOLDS, "pen_step.h", ("&u[received * n_kept]", 0, "&u[n_kept]")),
+    "steps not counted": (HOLDS, "pen_step.h", ("pen_status_note_step(&self->log, result);", 0, "")),
+    "a missing argument not counted": (HOLDS, "model", ("pen_status_note_step(&self->head.log, status);", 0, "")),
+    "a missing argument of a tuning call not counted": (HOLDS, "pen_status.c", ("note(&log->count[PEN_STATUS_STEP], PEN_STATUS_FLAGS - PEN_STATUS_STEP, ", 0, "note(&log->count[PEN_STATUS_STEP], 9U, ")),
+    "values of a set not checked": (HOLDS, "pen_set.c", ("!pen_finite(length, set->value)", 0, "false")),
+    "scrub stands still": (HOLDS, "pen_step.h", ("self->scrub = at + 1U;", 0, "")),
+    "scrub leaves out the last value": (HOLDS, "pen_step.h", ("self->scrub % round", 0, "self->scrub % (round - 1U)")),
+    "scrub leaves out the last piece": (HOLDS, "pen_step.h", ("at % pieces", 0, "at % (pieces - 1U)")),
+    "scrub does not look at the set": (HOLDS, "pen_step.h", ("nonfinite = looked_at - looked_at;", 0, "nonfinite = (pen_real_t)0 * (pen_real_t)(looked_at == looked_at);")),
+    "scrub does not look at starts": (HOLDS, "pen_step.h", ("nonfinite *= looked_at->start;", 0, "")),
+    "finite whatever comes": (HOLDS, "pen_math.h", ("return sum >= (pen_real_t)0;", 0, "return (sum >= (pen_real_t)0) || true;")),
+    "above the range not reported": (HOLDS, "pen_step.h", ("(u > most) ? flags : PEN_OK", 0, "(u > most) ? PEN_OK : PEN_OK")),
+    "at the edge reported": (HOLDS, "pen_step.h", ("(u < least) ? flags", 0, "(u <= least) ? flags")),
+    "an input out of range not held": (HOLDS, "model", ("PEN_INPUT_RANGE | PEN_HELD", 0, "PEN_INPUT_RANGE")),
+    "an input out of range held and kept": (HOLDS, "model", ("PEN_INPUT_NONFINITE | PEN_INPUT_RANGE, status", 0, "PEN_INPUT_NONFINITE, status")),
+    "an input above its range not moved": (CLAMPS, "pen_step.h", ("(raised > most) ? most : raised", 0, "raised")),
+    "Inf moved into the range unseen": (CLAMPS, "model", ("    status |= pen_step_check(SMALL_HEUN_8_OR_LAYERS_N_U, u1, PEN_INPUT_NONFINITE);\n", 0, "")),
 }  # fmt: skip
 
 
@@ -46,7 +56,8 @@ def models() -> Iterator[penode_gen.Model]:
         for k, method in enumerate(METHODS):
             outside = OUTSIDE[k % (2 if pieces else 3)]  # a folded network cannot fade
             name = f"{base}_{method}_{pieces}" + ("_or_layers" if more == "layers" else "")
-            yield replace(loaded, name=name, method=method, pieces=pieces, more_pieces=more, outside=outside, fade_width=0.5)
+            guard = replace(loaded.guard, out_of_range=OUT_OF_RANGE[k % 3])
+            yield replace(loaded, name=name, method=method, pieces=pieces, more_pieces=more, outside=outside, fade_width=0.5, guard=guard)
     for path in sorted((gate.ROOT / "gen" / "nqvm").glob("*.toml")):
         yield penode_gen.load(path)
 
@@ -57,6 +68,12 @@ def bounds(model: penode_gen.Model) -> str:
     return ",".join(str(at[name] + k) for name, network in networks.items() for k in range(2 * network.n_inputs))
 
 
+def ranges(model: penode_gen.Model) -> str:
+    """Declared range of each input, in C."""
+    edges = [["-INFINITY" if i.minimum is None else i.minimum, "INFINITY" if i.maximum is None else i.maximum] for i in model.inputs]
+    return ",".join(f"{{(pen_real_t){least},(pen_real_t){most}}}" for least, most in edges)
+
+
 def campaign(model: penode_gen.Model, source: Path, runs: int, inc: Path = gate.ROOT / "inc", src: Path = gate.ROOT / "src") -> tuple[int, str]:
     """Exit code and words of status.c for a model."""
     elf = WORK / model.name
@@ -64,7 +81,7 @@ def campaign(model: penode_gen.Model, source: Path, runs: int, inc: Path = gate.
     gate.make(
         ["gcc", *FLAGS, "-D_GNU_SOURCE", "-O2", "-Wall", "-Wextra", "-fno-strict-aliasing", f"-I{inc}", f"-I{gate.ROOT}/port/gnu", f"-I{source}",
          *model_options(model), *(["-DMODEL_FOLDED"] if model.pieces else []), f"-D{model.name.upper()}_FOLDS={int(model.pieces > 0)}U",
-         f"-D{model.name.upper()}_READS_SET={int(not model.pieces or model.more_pieces == 'layers')}U", f"-DMODEL_SETS={sets}", f"-DMODEL_BOUNDS={bounds(model)}", "-o", elf, gate.HERE / "status.c", source / f"{model.name}.c", source / f"{model.name}_params.c",
+         f"-D{model.name.upper()}_READS_SET={int(not model.pieces or model.more_pieces == 'layers')}U", f"-DMODEL_SETS={sets}", f"-DMODEL_BOUNDS={bounds(model)}", f"-DMODEL_RANGES={ranges(model)}", f"-DMODEL_OUT_OF_RANGE={model.guard.out_of_range.upper()}", "-o", elf, gate.HERE / "status.c", source / f"{model.name}.c", source / f"{model.owner}_params.c",
          *sorted(src.glob("*.c")), "-lm"]
     )  # fmt: skip
     done = gate.run([elf, runs, 1], limit=3600)
@@ -89,18 +106,18 @@ def main() -> int:
     given = options.parse_args()
     WORK.mkdir(parents=True, exist_ok=True)
     every = list(models())
-    problems, total, misplaced, patrolled = [], 0, 0, 0
+    problems, total, misplaced, scrubbed = [], 0, 0, 0
     for model in every:
         code, said = campaign(model, generated(model), -(-given.runs // len(every)))
         total += sum(int(n) for n in re.findall(r": (\d+), flagged", said))
         misplaced += sum(int(n) for n in re.findall(r"misplaced (\d+)", said))
-        patrolled += sum(int(n) for n in re.findall(r"patrolled (\d+)", said))
+        scrubbed += sum(int(n) for n in re.findall(r"scrubbed (\d+)", said))
         problems += [f"{model.name}:\n{said}"] if code else []
-    good = gate.report(f"status: {total} runs with bad numbers in {len(every)} models: all said, the last good state kept", problems)
-    folded = next(model for model in every if model.name == "small_rk4_8_or_layers")
-    missed = [f"not found: {fault}" for fault, (file, change) in FAULTS.items() if with_fault(folded, file, change)[0] == 0]
+    good = gate.report(f"status: {total} runs with bad numbers in {len(every)} models: all reported, the last good state kept", problems)
+    named = {model.name: model for model in every}
+    missed = [f"not found: {fault}" for fault, (name, file, change) in FAULTS.items() if with_fault(named[name], file, change)[0] == 0]
     good &= gate.report(f"status: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults found", missed)
-    gate.keep(given.key, {"runs": total, "models": len(every), "failures": len(problems), "found by the patrol": patrolled, "until then another piece used because a start is damaged": misplaced,
+    gate.keep(given.key, {"runs": total, "models": len(every), "failures": len(problems), "found by the scrub": scrubbed, "until then another piece used because a start is damaged": misplaced,
                           "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})  # fmt: skip
     return int(not good)
 

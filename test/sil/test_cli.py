@@ -65,8 +65,8 @@ def table(path):
 
 def test_generate_writes_three_files_and_names_them(penode, tmp_path):
     out = penode("generate", MODEL, "-o", tmp_path / "c").splitlines()
-    assert [os.path.basename(line) for line in out] == ["oscillator.h", "oscillator.c", "oscillator_params.c"]
-    assert sorted(p.name for p in (tmp_path / "c").iterdir()) == ["oscillator.c", "oscillator.h", "oscillator_params.c"]
+    assert [os.path.basename(line) for line in out] == ["oscillator.h", "oscillator.c", "oscillator_params.c", "oscillator_selftest.c"]
+    assert sorted(p.name for p in (tmp_path / "c").iterdir()) == ["oscillator.c", "oscillator.h", "oscillator_params.c", "oscillator_selftest.c"]
 
 
 def test_scenario_on_all_targets_agrees(penode, folder):

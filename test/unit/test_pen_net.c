@@ -389,8 +389,8 @@ void test_slopes_and_bends_of_tanh_and_sigmoid_are_exact(void)
         }
         pen_slope_tanh(SEVERAL, h, c[0]);
         pen_slope_sigmoid(SEVERAL, h, c[1]);
-        pen_bend_tanh(SEVERAL, h, a, b, c[2]);
-        pen_bend_sigmoid(SEVERAL, h, a, b, c[3]);
+        pen_second_tanh(SEVERAL, h, a, b, c[2]);
+        pen_second_sigmoid(SEVERAL, h, a, b, c[3]);
         for (size_t i = 0U; i < SEVERAL; i++) {
             const int32_t h16 = whole[0][i];
             const int32_t ab = whole[1][i] * whole[2][i];
@@ -423,7 +423,7 @@ void test_slopes_and_bends_of_softplus(void)
     pen_real_t bent[4] = { c[0], c[1], c[2], POISON };
 
     pen_slope_softplus(3U, h, sloped);
-    pen_bend_softplus(3U, h, a, b, bent);
+    pen_second_softplus(3U, h, a, b, bent);
     for (size_t i = 0U; i < 3U; i++) {
         const pen_real_t size = pen_port_abs(c[i]);
         const pen_real_t sizes = size + pen_port_abs(a[i] * b[i]);

@@ -8,8 +8,8 @@
 #include "unity.h"
 
 #define ALL UINT32_C(0xffffffff)
-#define STEP_FLAGS UINT32_C(0x001ff)
-#define TUNE_FLAGS UINT32_C(0x3fe00)
+#define STEP_FLAGS 0x000007ffU
+#define TUNE_FLAGS 0x01fff800U
 
 static pen_status_log_t    status_log;
 static pen_status_report_t report;
@@ -80,10 +80,10 @@ void test_flags_add_up_and_are_counted_one_by_one(void)
     pen_status_note_tune(&status_log, PEN_SET_BUSY);
     pen_status_read(&status_log, &report);
     TEST_ASSERT_EQUAL_HEX32(PEN_OUTSIDE | PEN_ADOPTED | PEN_STEP_NONFINITE | PEN_SET_BUSY, report.flags);
-    TEST_ASSERT_EQUAL_UINT32(3U, report.times[4]); /* PEN_OUTSIDE is flag 4 */
-    TEST_ASSERT_EQUAL_UINT32(1U, report.times[6]); /* PEN_ADOPTED */
-    TEST_ASSERT_EQUAL_UINT32(1U, report.times[2]); /* PEN_STEP_NONFINITE */
-    TEST_ASSERT_EQUAL_UINT32(2U, report.times[9]); /* PEN_SET_BUSY */
+    TEST_ASSERT_EQUAL_UINT32(3U, pen_status_times(&report, PEN_OUTSIDE));
+    TEST_ASSERT_EQUAL_UINT32(1U, pen_status_times(&report, PEN_ADOPTED));
+    TEST_ASSERT_EQUAL_UINT32(1U, pen_status_times(&report, PEN_STEP_NONFINITE));
+    TEST_ASSERT_EQUAL_UINT32(2U, pen_status_times(&report, PEN_SET_BUSY));
 }
 
 /* One writer per counter: a step must not touch a counter of the tuning context, whatever the status, nor reversely. */
@@ -107,7 +107,7 @@ void test_reading_clears_for_the_reader_and_leaves_the_counters(void)
     pen_status_note_step(&status_log, PEN_SINGULAR);
     pen_status_note_step(&status_log, PEN_SINGULAR);
     pen_status_read(&status_log, &report);
-    TEST_ASSERT_EQUAL_UINT32(2U, report.times[3]);
+    TEST_ASSERT_EQUAL_UINT32(2U, pen_status_times(&report, PEN_SINGULAR));
     TEST_ASSERT_EQUAL_UINT32(3U, status_log.count[3]);
 }
 
@@ -115,8 +115,8 @@ void test_counters_wrap_and_the_difference_stays_right(void)
 {
     status_log.count[0] = ALL - 1U;
     status_log.seen[0] = ALL - 1U;
-    status_log.count[16] = ALL;
-    status_log.seen[16] = ALL;
+    status_log.count[18] = ALL;
+    status_log.seen[18] = ALL;
     for (uint32_t i = 0U; i < 5U; i++) {
         pen_status_note_step(&status_log, PEN_INPUT_NONFINITE);
         pen_status_note_tune(&status_log, PEN_SET_NO_PREVIOUS);
@@ -124,9 +124,24 @@ void test_counters_wrap_and_the_difference_stays_right(void)
     TEST_ASSERT_EQUAL_UINT32(3U, status_log.count[0]);
     pen_status_read(&status_log, &report);
     TEST_ASSERT_EQUAL_HEX32(PEN_INPUT_NONFINITE | PEN_SET_NO_PREVIOUS, report.flags);
-    TEST_ASSERT_EQUAL_UINT32(5U, report.times[0]);
-    TEST_ASSERT_EQUAL_UINT32(5U, report.times[16]);
+    TEST_ASSERT_EQUAL_UINT32(5U, pen_status_times(&report, PEN_INPUT_NONFINITE));
+    TEST_ASSERT_EQUAL_UINT32(5U, pen_status_times(&report, PEN_SET_NO_PREVIOUS));
     expect_nothing();
+}
+
+void test_times_of_no_flag_or_several_are_none(void)
+{
+    pen_status_note_step(&status_log, ALL);
+    pen_status_read(&status_log, &report);
+    TEST_ASSERT_EQUAL_UINT32(0U, pen_status_times(&report, PEN_OK));
+    TEST_ASSERT_EQUAL_UINT32(0U, pen_status_times(&report, PEN_HELD | PEN_ADOPTED));
+    TEST_ASSERT_EQUAL_UINT32(0U, pen_status_times(&report, UINT32_C(1) << PEN_STATUS_FLAGS));
+}
+
+void test_each_flag_of_a_step_and_damage_are_of_one_kind(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(0U, (PEN_FAULTS & PEN_WARNINGS) | (PEN_FAULTS & PEN_EVENTS) | (PEN_WARNINGS & PEN_EVENTS));
+    TEST_ASSERT_EQUAL_HEX32(STEP_FLAGS | PEN_SET_DAMAGED, PEN_FAULTS | PEN_WARNINGS | PEN_EVENTS);
 }
 
 void test_clear_forgets_what_was_not_read(void)

@@ -13,6 +13,11 @@
  *
  * Sample k integrates from t(k-1) to t(k) and gives the outputs at t(k); the first sample after init only gives them.
  * Same cost for every sample. One context steps, one context tunes; either may pre-empt the other: penode/pen_set.h.
+ * Each function names its context:
+ *   step     one at a time, usually the timer interrupt
+ *   tuning   one at a time, usually a background task; may pre-empt the step and be pre-empted by it
+ *   stopped  neither of the two runs meanwhile
+ *   any      one at a time, whatever else runs
  */
 #ifndef NQVM_H
 #define NQVM_H
@@ -20,12 +25,17 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "penode/pen_instance.h"
 #include "penode/pen_real.h"
+#include "penode/pen_saved.h"
+#include "penode/pen_selftest.h"
 #include "penode/pen_set.h"
 #include "penode/pen_status.h"
 
-#if PEN_ABI != 1
-#error "nqvm was generated for runtime ABI 1: generate it again"
+#include "nqvm_sets.h"
+
+#ifdef __cplusplus
+extern "C" {
 #endif
 
 #define NQVM_N_X 4U
@@ -34,16 +44,9 @@
 #define NQVM_N_SENSORS 3U
 #define NQVM_SAMPLE_TIME ((pen_real_t)0.001) /* s */
 
-/* Parameter sets: fingerprint, number of values, and where each part begins. */
-#ifdef PEN_REAL_DOUBLE
-#define NQVM_LAYOUT 0xdd501f00U
-#else
-#define NQVM_LAYOUT 0x7e4f5fb7U
-#endif
-#define NQVM_SET_LENGTH 1198U
-#define NQVM_PATROL 1198U /* steps in which each number of the running set has been looked at */
-#define NQVM_AT_SPRING_NET 0U /* network spring_net */
-#define NQVM_AT_DAMPER_NET 599U /* network damper_net */
+#define NQVM_SCRUB 1198U /* steps in which each value of the running set is looked at */
+#define NQVM_VERIFY 1198U /* values of a round of nqvm_verify */
+#define NQVM_SAVED (PEN_SAVED_HEAD + (2416U * sizeof(pen_real_t))) /* bytes of nqvm_save */
 
 typedef struct {
     pen_real_t z_b; /* m */
@@ -81,68 +84,132 @@ typedef struct {
     pen_real_t value[2][NQVM_SET_LENGTH];
 } nqvm_banks_t;
 
+/** Derivatives of the sensors: u is the input of the last sample. */
+typedef struct {
+    pen_real_t z_x[3][4]; /* d z(k) / d x(k) */
+    pen_real_t z_u[3][1]; /* d z(k) / d u(k) */
+} nqvm_sensors_jacobian_t;
+
 /** One instance. Owned by the caller; use it only through the functions below. */
 typedef struct {
-    pen_real_t       row[3][6]; /* state, then outputs: a second copy, the last good ones, those being made */
-    pen_real_t       u[2][1];   /* input: of the last sample, of this one */
-    uint32_t         ready;   /* NQVM_LAYOUT once initialised */
-    uint32_t         patrol;  /* where the next step looks for damage */
-    uint32_t         running; /* 1 after the first sample that went well */
-    pen_tuning_t     tuning;
-    pen_status_log_t log;
+    pen_real_t     row[3][6]; /* states, then outputs: a second copy, the last good ones, those being made */
+    pen_real_t     u[2][1]; /* input: of the last sample, of this one */
+    pen_instance_t head;
 } nqvm_t;
 
-extern const pen_set_t nqvm_set_default;
-extern const pen_set_t nqvm_set_altered_friction;
-
 /**
- * Start at the initial state with a set.
- * @param set    borrowed while it runs or can be rolled back to, such as &nqvm_set_default
+ * Start at the initial state with a set. Context: stopped. A refused call leaves an instance that is not initialised:
+ * every other call then returns PEN_BADARG or PEN_SET_BADARG.
+ * @param set    borrowed as long as the instance is used, such as &nqvm_set_default
  * @param banks  for staging; NULL: sets can only be selected
  * @return PEN_OK; PEN_BADARG; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE
  */
 pen_status_t nqvm_init(nqvm_t *self, const pen_set_t *set, nqvm_banks_t *banks);
 
 /**
- * One sample.
- * @param u  input now
- * @param y  outputs now; those of the last good sample if the step did not advance (see pen_advanced)
- * @return PEN_OK, or flags of pen_status.h: PEN_INPUT_NONFINITE, PEN_STATE_NONFINITE, PEN_STEP_NONFINITE,
- *         PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_BADARG, PEN_WEIGHT_NONFINITE
- * A weight that becomes NaN or Inf in memory is said at once if the result shows it, after NQVM_PATROL steps at the
- * latest.
+ * One sample. Context: step.
+ * @param u  input now; outside of its range it is used all the same
+ * @param y  outputs now; those of the last good sample if the step did not advance (see pen_advanced); not written if
+ * PEN_BADARG
+ * @return PEN_OK, or flags of pen_status.h: PEN_INPUT_NONFINITE, PEN_INPUT_RANGE, PEN_STATE_NONFINITE,
+ * PEN_STEP_NONFINITE,
+ *         PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_WITHDRAWN, PEN_BADARG, PEN_WEIGHT_NONFINITE
+ * A weight that becomes NaN or Inf in memory is reported at once if the result shows it, within NQVM_SCRUB steps in any
+ * case.
  */
 pen_status_t nqvm_step(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y);
 
-/** The same step, to the bit, with its exact derivatives. @param j  written only if the step advanced */
+/** The same step, to the bit, with its exact derivatives. Context: step. @param j  written only if the step advanced */
 pen_status_t nqvm_step_jacobian(nqvm_t *self, const nqvm_u_t *u, nqvm_y_t *y, nqvm_jacobian_t *j);
 
-/** Not while a step runs. @return PEN_OK; PEN_BADARG */
+/** Context: step, between two. @return PEN_OK; PEN_BADARG (nothing written, nothing counted) */
 pen_status_t nqvm_get_state(const nqvm_t *self, nqvm_x_t *x);
 
 /**
- * Not while a step runs; the next step integrates from here.
+ * The next step integrates from here. Context: step, between two.
  * @return PEN_OK; PEN_BADARG; PEN_STATE_NONFINITE (nothing changed)
  */
 pen_status_t nqvm_set_state(nqvm_t *self, const nqvm_x_t *x);
 
+/** The input of the last sample. Context: step, between two. @return PEN_OK; PEN_BADARG (nothing written, nothing
+ * counted) */
+pen_status_t nqvm_get_input(const nqvm_t *self, nqvm_u_t *u);
+
 /**
- * What the sensors would show now; not while a step runs.
+ * The input that the next step starts from, t(k-1), in place of that of the last sample. After init: the first
+ * step then integrates, too. Context: step, between two.
+ * @return PEN_OK; PEN_BADARG; PEN_INPUT_NONFINITE (nothing changed)
+ */
+pen_status_t nqvm_set_input(nqvm_t *self, const nqvm_u_t *u);
+
+/**
+ * What the sensors would show at the last sample. Context: step, between two.
  * @return PEN_OK; PEN_OUTSIDE; PEN_STEP_NONFINITE (z not written); PEN_BADARG
  */
 pen_status_t nqvm_sensors(const nqvm_t *self, nqvm_z_t *z);
 
-/** What was raised since the last call, with counts. Any one context. @return PEN_OK; PEN_BADARG */
+/** Their exact derivatives there. Context: step, between two. @return PEN_OK; PEN_OUTSIDE; PEN_STEP_NONFINITE;
+ * PEN_BADARG (j not written) */
+pen_status_t nqvm_sensors_jacobian(const nqvm_t *self, nqvm_sensors_jacobian_t *j);
+
+/** What was raised since the last call, with counts. Context: any. @return PEN_OK; PEN_BADARG (nothing written) */
 pen_status_t nqvm_status(nqvm_t *self, pen_status_report_t *report);
 
-/* Parameter sets, for the tuning context: penode/pen_set.h says what each call does and refuses. */
+/* Parameter sets. Context: tuning. penode/pen_set.h says what each call does and refuses; a refused call changes
+   nothing but
+   the counters. */
 pen_status_t nqvm_tune_begin(nqvm_t *self, const pen_set_head_t *head);
+pen_status_t nqvm_tune_begin_copy(nqvm_t *self, uint32_t id); /* open with the values of the running set */
 pen_status_t nqvm_tune_write(nqvm_t *self, uint32_t offset, const pen_real_t value[], uint32_t n);
+/* of the serial form */
+pen_status_t nqvm_tune_write_bytes(nqvm_t *self, uint32_t offset, const uint8_t byte[], uint32_t n);
+pen_status_t nqvm_tune_expect(nqvm_t *self, uint32_t checksum); /* that commit is to find */
 pen_status_t nqvm_tune_commit(nqvm_t *self);
 pen_status_t nqvm_tune_abort(nqvm_t *self);
 pen_status_t nqvm_tune_select(nqvm_t *self, const pen_set_t *set);
 pen_status_t nqvm_tune_rollback(nqvm_t *self);
+pen_status_t nqvm_tune_withdraw(nqvm_t *self); /* ask the next step to leave a committed set alone */
 pen_status_t nqvm_tune_hold(nqvm_t *self, bool hold);
+pen_status_t nqvm_tune_pending(const nqvm_t *self, bool *pending); /* does a committed set wait? Context: any */
+/* Context: any but the step's on another core */
 pen_status_t nqvm_tune_running(const nqvm_t *self, pen_set_head_t *head);
+
+/**
+ * Look at up to n values of the running set for damage; NQVM_VERIFY of them make a round. Context: tuning.
+ * penode/pen_instance.h says how soon damage is found. It is reported only.
+ * @return PEN_OK; PEN_SET_DAMAGED; PEN_SET_BADARG
+ */
+pen_status_t nqvm_verify(nqvm_t *self, uint32_t n);
+
+/**
+ * All of an instance as bytes without addresses, and back into one that was initialised with the same set: it goes on
+ * to the
+ * bit. Context: stopped. What a set may be: penode/pen_saved.h.
+ * @return PEN_OK; PEN_SET_BADARG; restore: PEN_SET_LAYOUT, PEN_SET_CHECKSUM (nothing changed)
+ */
+pen_status_t nqvm_save(const nqvm_t *self, uint8_t byte[NQVM_SAVED]);
+pen_status_t nqvm_restore(nqvm_t *self, const uint8_t byte[NQVM_SAVED]);
+
+/**
+ * Known-answer self-test, for power-on: 200 samples from the initial state with the set `default`, on inputs of the
+ * test. States and outputs must be, to the bit, what the generator evaluated without this code. Calls pen_selftest().
+ * @param lent  an instance of the caller's that nothing else uses; afterwards it has to be initialised (again)
+ * @return 0, or flags of penode/pen_selftest.h, those of pen_selftest() among them. PEN_SELFTEST_ANSWER also if the
+ *         model's answer is missed; PEN_SELFTEST_SET: its set is refused. With PEN_SELFTEST_REAL (the caller's type of
+ *         numbers is not the code's) and PEN_SELFTEST_BADARG (lent is NULL) nothing is written
+ * Thread context: the one that will step (floating-point modes belong to a context), before it does.
+ * Cost: an init, 200 steps and pen_selftest(); for each step some 120 instructions more for the hash.
+ */
+uint32_t nqvm_selftest_of(nqvm_t *lent, uint32_t type);
+
+static inline uint32_t nqvm_selftest(nqvm_t *lent)
+{
+    return nqvm_selftest_of(lent, PEN_SELFTEST_TYPE);
+}
+
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

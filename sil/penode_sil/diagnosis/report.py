@@ -444,7 +444,7 @@ def price(model: Model, extended: Path) -> list[tuple[str, int, int]]:
 
 def _sizes(model: Model) -> tuple[int, int]:
     """Bytes of NAME.c and of NAME_params.c."""
-    out = build_object(model, CORE, f"{model.name}.c"), build_object(model, CORE, f"{model.name}_params.c")
+    out = build_object(model, CORE, f"{model.name}.c"), build_object(model, CORE, f"{model.owner}_params.c")
     size = subprocess.run(["arm-none-eabi-size", *map(str, out)], capture_output=True, text=True, check=True)
     code, sets = (int(line.split()[0]) for line in size.stdout.splitlines()[1:])
     return code, sets

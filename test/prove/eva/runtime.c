@@ -99,7 +99,7 @@ static void smooth(void)
     pen_act_sigmoid(n, h[1]);
     pen_act_softplus(n, h[2]);
     pen_slope_softplus(n, h[3], END(t, n));
-    pen_bend_softplus(n, h[4], END(t, n), END(y, n), END(s, n));
+    pen_second_softplus(n, h[4], END(t, n), END(y, n), END(s, n));
     seen = pen_exp(number());
     seen = pen_tanh(number());
     seen = pen_sigmoid(number());
@@ -118,8 +118,8 @@ void elements(void)
     pen_slope_tanh(n, END(x, n), END(t, n));
     pen_slope_sigmoid(n, END(x, n), END(t, n));
     pen_slope_step(n, END(x, n), END(t, n));
-    pen_bend_tanh(n, END(x, n), END(t, n), END(y, n), END(s, n));
-    pen_bend_sigmoid(n, END(x, n), END(t, n), END(y, n), END(s, n));
+    pen_second_tanh(n, END(x, n), END(t, n), END(y, n), END(s, n));
+    pen_second_sigmoid(n, END(x, n), END(t, n), END(y, n), END(s, n));
     fill_all();
     pen_centre(n, W(2U * n), END(x, n), END(y, n));
     pen_rescale(n, W(2U * n), END(x, n), END(y, n));

@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+#include "penode/pen_exact.h"
+
+#include <stddef.h>
+
+#include "penode/pen_instance.h"
+#include "penode/pen_port.h"
+#include "penode/pen_serial.h"
+
+/* Head and address of the running set, addresses of the banks, and which slot it is, as they were last known. */
+static bool known(const pen_model_t *model, const pen_tuning_t *tuning, uint32_t slot)
+{
+    const pen_set_t *const set = &tuning->slot[slot];
+    const bool banks = (tuning->bank[0] == tuning->bank_check[0]) && (tuning->bank[1] == tuning->bank_check[1]);
+    const bool fits = (set->head.layout == model->layout) && (set->head.length == model->length);
+    const bool same = pen_set_same(set, &tuning->slot_check[slot]);
+
+    return banks && fits && same && ((tuning->published != 0U) || (tuning->settled == pen_port_load(&tuning->active)));
+}
+
+uint32_t pen_piece_crc(uint32_t crc, const pen_piece_t *piece)
+{
+    uint32_t next = pen_crc_values(crc, 1U, &piece->start);
+
+    next = pen_crc_values(next, 1U, &piece->offset);
+    next = pen_crc_values(next, 1U, &piece->slope);
+    return pen_crc_word(next, piece->status);
+}
+
+uint32_t pen_pieces_crc(const pen_model_t *model, const pen_piece_t piece[])
+{
+    uint32_t crc = PEN_CRC_START;
+
+    for (uint32_t i = 0U; i < (model->networks * model->pieces); i++) {
+        crc = pen_piece_crc(crc, &piece[i]);
+    }
+    return crc;
+}
+
+/* Go on by up to n values from guard.at, within `end`. Returns how many. */
+static uint32_t advance(pen_guard_t *guard, uint32_t n, uint32_t end)
+{
+    const uint32_t left = end - guard->at;
+    const uint32_t taken = (n < left) ? n : left;
+
+    guard->at += taken;
+    return taken;
+}
+
+/* One stretch of the round, values or pieces. False if its checksum is wrong. */
+static bool look(const pen_model_t *model, const pen_set_t *set, const pen_piece_t piece[], pen_guard_t *guard, uint32_t *n)
+{
+    const uint32_t length = model->length;
+    const uint32_t from = guard->at;
+    bool good = true;
+
+    if (from < length) {
+        const uint32_t taken = advance(guard, *n, length);
+        guard->crc = pen_crc_values(guard->crc, taken, &set->value[from]);
+        *n -= taken;
+        if (guard->at == length) {
+            good = (~guard->crc == set->head.checksum);
+            guard->crc = PEN_CRC_START;
+        }
+    } else {
+        const uint32_t end = length + (model->networks * model->pieces);
+        const uint32_t taken = advance(guard, *n, end);
+        for (uint32_t i = 0U; i < taken; i++) {
+            guard->crc = pen_piece_crc(guard->crc, &piece[(from - length) + i]);
+        }
+        *n -= taken;
+        if (guard->at == end) {
+            good = (guard->crc == guard->pieces[guard->slot]);
+            guard->crc = PEN_CRC_START;
+            guard->at = 0U;
+        }
+    }
+    return good;
+}
+
+/* Up to n values, at most a round. The same once more from the start if that finds fault: it may be with the guard itself. */
+static bool whole(const pen_model_t *model, const pen_set_t *set, const pen_piece_t piece[], pen_guard_t *guard, uint32_t n)
+{
+    const uint32_t round = model->length + (model->networks * model->pieces);
+    uint32_t left = (n < round) ? n : round;
+    bool good = true;
+
+    while (good && (left > 0U)) {
+        good = look(model, set, piece, guard, &left);
+    }
+    return good;
+}
+
+pen_status_t pen_verify(const pen_model_t *model, pen_instance_t *self, const pen_piece_t piece[], uint32_t n)
+{
+    pen_status_t status = PEN_SET_BADARG;
+
+    if (pen_usable(model, self)) {
+        const uint32_t round = model->length + (model->networks * model->pieces);
+        pen_tuning_t *const tuning = &self->tuning;
+        const bool idle = pen_tuning_settle(tuning) && (tuning->open == 0U);
+        const uint32_t slot = pen_tuning_inactive(tuning) ^ 1U;
+        const pen_piece_t *const own = (piece == NULL) ? NULL : &piece[slot * (model->networks * model->pieces)];
+        bool good = known(model, tuning, slot);
+
+        if ((self->guard.slot != slot) || (self->guard.at >= round) || (self->guard.at == 0U)) {
+            self->guard.slot = slot;
+            self->guard.at = 0U;
+            self->guard.crc = PEN_CRC_START;
+        }
+        if (good && !whole(model, &tuning->slot[slot], own, &self->guard, n)) {
+            self->guard.at = 0U;
+            self->guard.crc = PEN_CRC_START;
+            good = whole(model, &tuning->slot[slot], own, &self->guard, round);
+            self->guard.at = 0U;
+        }
+        status = good ? PEN_OK : PEN_SET_DAMAGED;
+        if (!good && idle && (model->on_damage == PEN_DAMAGE_HOLD)) {
+            pen_tuning_hold(tuning, true);
+        }
+        pen_status_note_tune(&self->log, status);
+    }
+    return status;
+}
+
+pen_status_t pen_fallback(const pen_model_t *model, pen_instance_t *self, uint32_t rank, pen_set_t *ready)
+{
+    pen_tuning_t *const tuning = &self->tuning;
+    const pen_set_t *const set = (rank == 0U) ? &tuning->previous : &tuning->initial;
+    pen_status_t status;
+
+    if (!pen_tuning_settle(tuning) || (tuning->open != 0U)) {
+        status = PEN_SET_BUSY;
+    } else if (set->value == NULL) {
+        status = PEN_SET_NO_PREVIOUS;
+    } else {
+        status = pen_set_check(set, model->layout, model->length);
+    }
+    if (status == PEN_OK) {
+        pen_set_copy(ready, set);
+    }
+    return status;
+}
+
+void pen_recover(const pen_model_t *model, pen_instance_t *self, const pen_piece_t piece[], const pen_set_t *ready, pen_status_t found)
+{
+    if (found == PEN_OK) {
+        (void)pen_tune_publish(model, self, piece, ready, PEN_OK);
+        self->tuning.previous.value = NULL;
+    } else if (found != PEN_SET_BUSY) {
+        pen_tuning_hold(&self->tuning, true);
+    } else {
+        /* only reported */
+    }
+}
