@@ -11,6 +11,7 @@ from typing import NamedTuple
 import gate
 
 MODEL = gate.HERE / "spin_swap.pml"
+PARTS = [MODEL, gate.HERE / "spin_step.pml"]  # those that stand for lines of pen_set.c
 SOURCE = gate.ROOT / "src" / "pen_set.c"
 WORK = gate.BUILD / "spin"
 
@@ -73,7 +74,8 @@ def differences() -> list[str]:
     """Where the C lines that stand in the model are not those of pen_set.c, in their order, or one is missing."""
     body = {m[1]: m[2] for m in re.finditer(r"^\w[^;=\n]*\b(\w+)\([^;]*?\)\n\{\n(.*?)^\}", SOURCE.read_text(), re.M | re.S)}
     body = {name: re.sub(r"\s*/\*.*?\*/", "", text, flags=re.S) for name, text in body.items()}
-    quoted = {m[1]: re.findall(r"// (.*)$", m[2], re.M) for m in re.finditer(r"^inline (\w+)\(.*?\)[^\n]*\n\{\n(.*?)^\}", MODEL.read_text(), re.M | re.S)}
+    text = "".join(part.read_text() for part in PARTS)
+    quoted = {m[1]: re.findall(r"// (.*)$", m[2], re.M) for m in re.finditer(r"^inline (\w+)\(.*?\)[^\n]*\n\{\n(.*?)^\}", text, re.M | re.S)}
     found = []
     for name, lines in quoted.items():
         rest = body.get(name, "")

@@ -2,16 +2,17 @@
  * Copyright (c) 2026 the penode authors */
 
 /*
- * src/pen_set.c with its two contexts, for Spin. An inline has the name of the C function that it stands for, and each
- * of its lines ends in the C line that it is (spin_check.py compares the two, so that neither can change alone). What is
- * folded when a set is published belongs to the generated code; here it is one word for each slot.
+ * src/pen_set.c with its two contexts, for Spin: the tuning context here, the step in spin_step.pml; spin_memory.pml is how
+ * each sees the other's stores. An inline has the name of the C function that it stands for, and each of its lines ends in
+ * the C line that it is (spin_check.py compares the two, so that neither can change alone). What is folded when a set is
+ * published belongs to the generated code; here it is one word for each slot.
  *
  * Memory. WEAK: a store lies with its writer, then in memory, then is seen by the other context; it goes on at any time,
  * in any order, and only a barrier of the one who waits forces it. So stores come late and out of order, and loads see
- * old values. `active` and `pending`, which decide what is done next, are carried by a process; what the step only reads
- * is not: it is looked at in all three places, any of which the step may see. Without WEAK every store is seen at once: any interleaving of two contexts on one core, whichever
- * pre-empts the other. Words are whole (pen_port.h), everything larger is not. Not modelled: a load that takes its value
- * from a store that comes after it in the program.
+ * old values. `active` and `pending`, which decide what is done next, are carried by a process. What the step only reads
+ * is not: it is looked at in all three places, any of which the step may see. Without WEAK every store is seen at once:
+ * any interleaving of two contexts on one core, whichever pre-empts the other. Words are whole (pen_port.h), everything
+ * larger is not. Not modelled: a load that takes its value from a store that comes after it in the program.
  *
  * The tuning context makes any calls, without end, in any order, with good and bad values; the step runs forever. The
  * states are finite, so all of them are looked at: a set is known by an id, which comes back once nothing has it.
@@ -35,131 +36,17 @@
 #define NO  0
 #define YES 1
 
-/* words of pending */
-#define NOTHING  0
-#define ADOPT    1 /* + slot */
-#define WITHDRAW 3 /* + slot */
-#define CLEARED  5 /* NOTHING, stored by the tuning context: a fault */
-
-/* a set: what it is called, and where its values lie */
-#define BANK0   0
-#define BANK1   1
-#define FLASH   2 /* a set of constants */
-#define NOWHERE 3
-#define ID_OF_FLASH 4 /* those staged are 1 to 3                      */
-#define BAD         5 /* a value that belongs to no set that one has  */
-
-/* words with one writer: the tuning context's */
-#define VALUE(slot)   (slot)            /* slot[].value      */
-#define ID(slot)      (2 + (slot))      /* slot[].head       */
-#define WORD(bank, i) (4 + 2*(bank) + (i)) /* bank[][], two values each */
-#define PIECES(slot)  (8 + (slot))      /* folded            */
-/* the step's */
-#define ACTIVE 10
-#define WORDS  11
-
-byte mine[WORDS];   /* as the writer sees it */
-byte memory[WORDS];
-byte seen[WORDS];   /* by the other one      */
-
-/* pending has two writers: the tuning context stores a word, the step stores NOTHING */
-byte word_on_its_way; /* 0: none */
-bool nothing_on_its_way;
-byte pending, pending_for_tuner, pending_for_step;
-
-inline store(word, content)
-{
-    d_step {
-        mine[word] = content;
-#ifndef WEAK
-        memory[word] = content;
-        seen[word] = content;
-#endif
-    }
-}
-
-inline word_arrives()    { pending = word_on_its_way % CLEARED; word_on_its_way = 0; pending_for_tuner = pending }
-inline nothing_arrives() { pending = NOTHING; nothing_on_its_way = false; pending_for_step = NOTHING }
-
-inline store_pending_of_tuner(command)
-{
-    d_step {
-        word_on_its_way = command; /* over one that is still on its way, too */
-#ifndef WEAK
-        word_arrives();
-        pending_for_step = pending;
-#endif
-    }
-}
-
-inline store_pending_of_step()
-{
-    d_step {
-        nothing_on_its_way = true;
-#ifndef WEAK
-        nothing_arrives();
-        pending_for_tuner = NOTHING;
-#endif
-    }
-}
-
-#define load_pending_tuner (word_on_its_way != 0 -> word_on_its_way % CLEARED : pending_for_tuner)
-#define load_pending_step  (nothing_on_its_way -> NOTHING : pending_for_step)
-
-byte b;
-inline barrier_of_tuner()
-{
-    d_step {
-        for (b : 0 .. ACTIVE - 1) { memory[b] = mine[b] }
-        seen[ACTIVE] = memory[ACTIVE];
-        if :: word_on_its_way != 0 -> word_arrives() :: else fi;
-        pending_for_tuner = pending;
-        b = 0
-    }
-}
-
-inline barrier_of_step()
-{
-    d_step {
-        memory[ACTIVE] = mine[ACTIVE];
-        for (b : 0 .. ACTIVE - 1) { seen[b] = memory[b] }
-        if :: nothing_on_its_way -> nothing_arrives() :: else fi;
-        pending_for_step = pending;
-        b = 0
-    }
-}
-
-#ifdef WEAK
-active proctype bus_of_active()
-{
-end:
-    do
-    :: d_step { mine[ACTIVE] != memory[ACTIVE] -> memory[ACTIVE] = mine[ACTIVE] }
-    :: d_step { memory[ACTIVE] != seen[ACTIVE] -> seen[ACTIVE] = memory[ACTIVE] }
-    od
-}
-
-active proctype bus_of_pending()
-{
-end:
-    do
-    :: d_step { word_on_its_way != 0 -> word_arrives() }
-    :: d_step { nothing_on_its_way -> nothing_arrives() }
-    :: d_step { pending_for_tuner != pending -> pending_for_tuner = pending }
-    :: d_step { pending_for_step != pending -> pending_for_step = pending }
-    od
-}
-#endif
+#include "spin_memory.pml"
 
 /* ---- what must hold: told by counting, not by the protocol ---- */
 
-bool waiting;  /* a set is published, and neither adopted nor withdrawn        */
-bool asked;    /* its withdrawal has been asked for                            */
-bool granted;  /* the step has reported that it is withdrawn                   */
-bool way_back; /* there was a rollback set before it was published             */
+bool waiting;      /* a set is published, and neither adopted nor withdrawn */
+bool asked;        /* its withdrawal has been requested                     */
+bool granted;      /* the step has reported that it is withdrawn            */
+bool could_return; /* there was a rollback set before it was published      */
 byte id_waiting, id_now, id_before; /* before: of what ran before that */
 
-/* a committed set is adopted or, if that was asked for, withdrawn; then another may be published */
+/* a committed set is adopted or, if that was requested, withdrawn; then another may be published */
 #define unanswered (waiting || pending != NOTHING)
 ltl answered { [] (unanswered -> <> !unanswered) }
 
@@ -193,7 +80,7 @@ inline pen_tuning_settle()
                 assert(granted);
                 if :: MUTANT != 27 -> previous_id = replaced_id :: else fi; // pen_set_copy(&tuning->previous, &tuning->replaced);
                 if :: MUTANT != 27 -> previous_value = replaced_value :: else fi;
-                assert(!way_back || (previous_value != NOWHERE && previous_id == id_before))
+                assert(!could_return || (previous_value != NOWHERE && previous_id == id_before))
             :: else ->
                 assert(!granted && mine[ID(slot)] == id_now) /* it is in force, also if its withdrawal was overtaken */
             fi;
@@ -203,7 +90,7 @@ inline pen_tuning_settle()
             replaced_value = NOWHERE;
             asked = false;
             granted = false;
-            way_back = false
+            could_return = false
         :: else
         fi
     }
@@ -223,7 +110,7 @@ inline pen_tuning_publish()
     IF(30, replaced_id = mine[ID(slot ^ 1)],
            replaced_id = previous_id);            // pen_set_copy(&tuning->replaced, &tuning->previous);
     IF(30, replaced_value = mine[VALUE(slot ^ 1)], replaced_value = previous_value);
-    way_back = (previous_value != NOWHERE);
+    could_return = (previous_value != NOWHERE);
     IF(12, previous_id = ready_id,
            previous_id = mine[ID(slot ^ 1)]);     // pen_set_copy(&tuning->previous, &tuning->slot[slot ^ 1U]);
     IF(12, previous_value = ready_value, previous_value = mine[VALUE(slot ^ 1)]);
@@ -495,83 +382,4 @@ end:
     od
 }
 
-/* ---- pen_set.c, step ---- */
-
-inline pen_tuning_adopt()
-{
-    atomic {
-    running = mine[ACTIVE];                        // uint32_t active = pen_port_load(&tuning->active) & 1U;
-    if :: held = NO :: held = YES fi;             // pen_status_t status = pen_port_load(&tuning->hold) & PEN_HELD;
-    word = load_pending_step                      // const uint32_t pending = pen_port_load(&tuning->pending);
-    }
-    if
-    :: word != NOTHING &&                         // if (pending != 0U) {
-       !(MUTANT == 14 && held) ->
-        skip;                                     // const uint32_t other = active ^ 1U;
-        IF(2, skip, barrier_of_step());           // pen_port_barrier();
-        IF(8, store_pending_of_step(), skip);
-        atomic {
-            if
-            :: word == ADOPT + (running ^ 1) || MUTANT == 22 -> // if (pending == (ADOPT + other)) {
-                running = running ^ 1;              // active = other;
-                IF(13, skip, store(ACTIVE, running)); // pen_port_store(&tuning->active, active);
-                assert(waiting); /* each is adopted once, and none that is withdrawn */
-                waiting = false;                  // status |= PEN_ADOPTED;
-                id_before = id_now;
-                id_now = id_waiting;
-                id_waiting = 0;
-                waited = false
-            :: else ->
-                if
-                :: word == WITHDRAW + (running ^ 1) || // } else if (pending == (WITHDRAW + other)) {
-                   (MUTANT == 23 && word >= WITHDRAW) ->
-                    assert(waiting && asked); /* reported once, and only if asked for */
-                    waiting = false;              // status |= PEN_WITHDRAWN;
-                    granted = true;
-                    id_waiting = 0;
-                    waited = false
-                :: else                           // } else {
-                fi
-            fi
-        }
-        IF(3, skip, barrier_of_step());           // pen_port_barrier();
-        if
-        :: MUTANT == 8
-        :: MUTANT == 28 && word == WITHDRAW + running
-        :: else -> store_pending_of_step()        // pen_port_store(&tuning->pending, 0U);
-        fi
-    :: else
-    fi
-}
-
-/* The step may see what has been carried to it, what lies in memory, or what is on its way: all must be the same. */
-inline look(word, content)
-{
-    assert(seen[word] == content && memory[word] == content && mine[word] == content)
-}
-
-proctype step()
-{
-    byte running, place, word;
-    bool held, waited;
-end:
-    do
-    :: waited = waiting;
-        pen_tuning_adopt();
-        d_step { /* one look, at any time until the next step */
-#ifndef WEAK
-        assert(!waited); /* published before this step: this step has adopted it, or withdrawn as asked */
-#endif
-        look(ID(running), id_now);
-        look(PIECES(running), id_now);
-        place = seen[VALUE(running)];
-        look(VALUE(running), place);
-        if
-        :: place >= FLASH -> assert(id_now == ID_OF_FLASH)
-        :: else ->
-            look(WORD(place, 0), id_now);
-            look(WORD(place, 1), id_now)
-        fi;
-        place = 0; running = 0; held = false; word = 0; waited = false }
-    od
-}
+#include "spin_step.pml"
