@@ -54,10 +54,13 @@ campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings
 dist: ## Packages for firmware, into build/dist: CMake, pkg-config, PlatformIO, Zephyr, CMSIS-Pack, one .c and one .h; no Python
 	$(Q)port/packages/dist.sh build/dist
 
+structure: setup ## Take over counts of long files, long functions, circular imports and thresholds that have fallen
+	$(Q)$(PYTHON) test/tools/structure.py --take-over
+
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test prove figures bench campaign campaign-diagnosis dist clean
+.PHONY: help setup run test prove figures bench campaign campaign-diagnosis dist structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

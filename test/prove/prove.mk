@@ -26,7 +26,7 @@ prove-preempt: | $(READY) ## Emulated cores: step and tuning calls interrupt eac
 	@$(PYTHON) test/prove/preempt_check.py
 prove-tsan: | $(READY) ## ThreadSanitizer: one thread steps, one exchanges sets
 	@$(PYTHON) test/prove/tsan_check.py
-prove-status: | $(READY) ## NaN and Inf anywhere: always said, the last good state kept
+prove-status: | $(READY) ## NaN and Inf anywhere: always reported, the last good state kept
 	@$(PYTHON) test/prove/status_check.py
 prove-fuzz: | $(READY) ## libFuzzer: any calls of the interface, against an oracle
 	@$(PYTHON) test/prove/fuzz_check.py

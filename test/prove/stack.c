@@ -41,7 +41,7 @@ WAY(tune_rollback) { status = MODEL(tune_rollback)(&model); }
 WAY(tune_hold) { status = MODEL(tune_hold)(&model, false); }
 WAY(tune_running) { status = MODEL(tune_running)(&model, &head); }
 
-/* In an order in which none is refused; a step adopts what is announced. */
+/* In an order in which none is refused; a step adopts what is published. */
 static void (*const call[])(void) = { call_init,       call_step,        call_step_jacobian, call_get_state,   call_set_state,
                                       call_sensors,    call_status,      call_tune_begin,    call_tune_write,  call_tune_commit,
                                       call_step,       call_tune_begin,  call_tune_abort,    call_tune_select, call_step,
