@@ -22,7 +22,8 @@
  *   of a kink   where neurons switch so close together that their values are below 6 of their own errors (which are as that
  *               of a force, without the 16), or within 8 EPS |x|: up to 4 of them count as on or off in every combination,
  *               more than 4 as every slope from 0 to their own.
- * A slope that is exactly 0 because all neurons of a layer are off has no margin. In float, for the networks of the nQVM
+ * A slope that is exactly 0 because all neurons of a layer are off has no margin. Forces have none that
+ * is stated where slopes are as small as PEN_REAL_MIN / EPS. In float, for the networks of the nQVM
  * (1-16-16-16-1): damper, slopes up to 18 900 N*s/m are known to 0.1 N*s/m and forces up to 260 N to 0.12 N; spring, slopes
  * up to 120 000 N/m to 5 N/m and forces up to 2800 N to 0.8 N. In double 10^-9 of that.
  *
