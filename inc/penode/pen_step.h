@@ -42,7 +42,7 @@ static inline void pen_step_copy(size_t n, const pen_real_t from[], pen_real_t t
 }
 
 /** PEN_OK, or `flag` if a value is NaN or Inf: pen_finite, with the flag for its answer. */
-static inline pen_status_t pen_step_check(size_t n, const pen_real_t value[], pen_status_t flag)
+static inline pen_status_t pen_step_check(size_t n, const pen_real_t *value, pen_status_t flag)
 {
     pen_real_t sum = (pen_real_t)0;
     size_t i = 0U;

@@ -70,3 +70,16 @@ def test_program_keeps_its_own_contraction(one: Path, tmp_path: Path):
     """Only the runtime and the models are told how to compute, not a program that includes their headers."""
     said = run(["gcc", "-E", f"-I{one}", "-include", "nqvm.h", "-x", "c", "/dev/null"], cwd=tmp_path)
     assert "pen_real_t" in said and "optimize" not in said and "FP_CONTRACT" not in said
+
+
+def fused(one: Path, file: str) -> int:
+    """How many products and sums the compiler joins with its own defaults, on a core that can."""
+    core = ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard", "-ffreestanding"]
+    return run(["arm-none-eabi-gcc", *core, "-O2", f"-I{one}", "-S", one / file, "-o", "-"]).count("vfm")
+
+
+def test_no_contraction_without_a_flag(one: Path):
+    assert [fused(one, file) for file in ("penode.c", "nqvm.c", "nqvm_folded.c")] == [0, 0, 0]
+    for file in ("penode.c", "nqvm.c"):
+        change(one / file, "#define PENODE_EXACT\n", "")
+        assert fused(one, file) > 0, "the test cannot see it"
