@@ -39,7 +39,7 @@ figures: setup ## Measure what our steps cost; rewrite the tables of README.md a
 	$(Q)$(PYTHON) test/bench/bench.py --ours
 	$(Q)$(PYTHON) test/prove/promises.py
 
-bench: setup ## The same with the steps of other tools (ten minutes, downloads them)
+bench: setup ## The same with the steps of other tools (ten minutes, downloads them; test/bench/checkouts.py)
 	$(Q)$(PYTHON) test/bench/bench.py
 	$(Q)$(PYTHON) test/prove/promises.py
 

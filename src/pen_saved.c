@@ -111,14 +111,6 @@ static const pen_set_t *slot_set(const pen_tuning_t *tuning, uint32_t slot)
     return (idle && (slot == pen_tuning_inactive(tuning))) ? &tuning->slot[slot ^ 1U] : &tuning->slot[slot];
 }
 
-/* What is the rollback set again if the set published last is, or was, withdrawn; once that is adopted it is forgotten. */
-static const pen_set_t *replaced_set(const pen_tuning_t *tuning)
-{
-    const bool open_end = (tuning->published != 0U) && (((tuning->published - 1U) & 1U) == pen_tuning_inactive(tuning));
-
-    return open_end ? &tuning->replaced : &tuning->previous;
-}
-
 pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint32_t rows, const pen_real_t row[],
                       uint32_t inputs, const pen_real_t u[], uint8_t byte[], size_t size)
 {
@@ -127,7 +119,7 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
     if (pen_usable(model, self) && (byte != NULL) && (size >= size_of(model, rows, inputs))) {
         const pen_tuning_t *const tuning = &self->tuning;
         const pen_set_t *const set[SETS] = { &tuning->initial, slot_set(tuning, 0U), slot_set(tuning, 1U), &tuning->previous,
-                                             replaced_set(tuning) };
+                                             pen_tuning_fallback(tuning) };
         const uint32_t word[WORDS] = { self->running, self->scrub, tuning->active, tuning->pending, tuning->hold,
                                        tuning->published, tuning->settled, tuning->open, tuning->fill };
         const bool banks = (tuning->bank[0] != NULL);

@@ -39,6 +39,10 @@ missing_packages()
     [ "$(arm-none-eabi-gcc -print-file-name=libc.a 2>/dev/null || true)" != libc.a ] &&
         command -v arm-none-eabi-gcc >/dev/null || echo libnewlib-arm-none-eabi
     command -v qemu-system-arm >/dev/null || echo qemu-system-arm
+    command -v qemu-riscv32 >/dev/null && command -v qemu-s390x >/dev/null || echo qemu-user
+    command -v riscv64-unknown-elf-gcc >/dev/null || echo gcc-riscv64-unknown-elf
+    command -v s390x-linux-gnu-gcc >/dev/null || echo gcc-s390x-linux-gnu
+    command -v g++ >/dev/null || echo g++
     command -v ruby >/dev/null || echo ruby
     command -v git >/dev/null || echo git
     command -v cmake >/dev/null || echo cmake

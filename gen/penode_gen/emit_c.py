@@ -120,7 +120,7 @@ class _Emitter:
             "slope_lines": {c.name: by_value(c, slope_lines(model, c)) for c in self.networks},
             "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),
             "set_length": set_length, "scrub": max(set_length if reads_set else 0, model.pieces if uses_f else 0), "offsets": self._offset_lines(),
-            "verify": set_length + (model.pieces * len(folded) if uses_f else 0), "saved": self._saved(set_length), "ranges": self._ranges(), "trial_room": 1 << model.guard.trial.bit_length(), "bounds": [real(0.0 if o.trial_bound is None else o.trial_bound) for o in model.outputs],
+            "verify": set_length + (model.pieces * len(folded) if uses_f else 0), "saved": self._saved(set_length), "ranges": self._ranges(), "trial_room": 1 << (model.guard.trial + 2).bit_length(), "bounds": [real(0.0 if o.trial_bound is None else o.trial_bound) for o in model.outputs],
             "owner": model.owner, "sets_digest": sets.digest(model)[:16], "map_lines": layout.map_lines(model),
             "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,

@@ -5,8 +5,8 @@
  * The trial of a set before it is adopted (`trial` of the model file): the step keeps its last samples in a ring; a tuning
  * call then steps copies of the model through them, with the new set and with the running one. For generated code.
  *
- * The ring has more room than samples are used, and the step writes one ahead of those that are complete: so those that a
- * tuning call reads stay as they are from the moment it has closed the ring, also if a step is under way on another core.
+ * The ring has room for three samples more than a trial uses. Once a tuning call has closed it, a step under way on the same
+ * core may still write one sample; on another core two, and begin a third: what the trial reads stays as it is.
  * A sample that falls into a trial is not kept; the ring then begins anew, as it does behind a sample that was held.
  *
  * Cost of a step: a copy of its states and inputs, and some 20 instructions. Cost of a trial: twice as many steps as samples.
@@ -59,10 +59,10 @@ static inline void pen_trial_close(pen_trial_t *trial, uint32_t most, pen_trial_
     first = pen_port_load(&trial->first); /* before `written`: it is never ahead of that */
     pen_port_barrier();
     span->last = pen_port_load(&trial->written);
-    kept = span->last - first;
+    pen_port_barrier();
+    kept = (first == pen_port_load(&trial->first)) ? (span->last - first) : 0U; /* else there was a gap just now */
     kept = (kept > most) ? most : kept;
     span->first = span->last - kept;
-    pen_port_barrier();
 }
 
 /** Tuning context: let the step keep samples again. */

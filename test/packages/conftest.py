@@ -8,8 +8,9 @@ import os
 import shutil
 from pathlib import Path
 
+import build
 import pytest
-from build import ROOT, VERSION, run
+from build import ROOT, VERSION, Built, run
 
 WORK = ROOT / "build" / "packages-test"
 
@@ -55,3 +56,9 @@ def tree(dist: Path) -> Path:
     run(["tar", "xzf", dist / f"penode-{VERSION}.tar.gz", "-C", folder])
     run(["tar", "xzf", dist / f"penode-{VERSION}-amalgamated.tar.gz", "-C", folder])
     return folder
+
+
+@pytest.fixture(scope="session")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """What all packages have to be."""
+    return build.reference(tmp_path_factory.mktemp("reference"))

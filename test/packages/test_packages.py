@@ -17,11 +17,6 @@ import yaml
 from build import PACKAGES, ROOT, VERSION, Built, Fails, run
 
 
-@pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    return build.reference(tmp_path_factory.mktemp("reference"))
-
-
 @pytest.mark.parametrize("package", PACKAGES)
 def test_package_computes_the_same(package: str, tree: Path, tmp_path: Path, reference: Built):
     assert reference.said.endswith("good\n")

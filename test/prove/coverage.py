@@ -18,7 +18,7 @@ WORK = gate.BUILD / "coverage"
 MODELS = WORK / "models"
 UNIT = gate.ROOT / "test" / "unit"
 UNITY = gate.ROOT / "build" / "unity"
-NEEDED = ("test_pen_math", "test_pen_net", "test_pen_solve")  # without one of them something is not covered
+NEEDED = ("test_pen_math", "test_pen_net", "test_pen_solve", "test_pen_step")  # without one of them something is not covered
 KINDS = ("lines", "branches", "mcdc")
 # A double build and a size build have code of their own.
 BUILDS = {"float": [], "double": ["-DPEN_REAL_DOUBLE"], "size": ["-D__OPTIMIZE_SIZE__"]}
@@ -58,16 +58,22 @@ def refused(model: str) -> str:
 
 def unfelt(model: str) -> str:
     """A number that a step of `self` does not meet: of its last piece, or the lower bound of an envelope."""
-    return "self->pieces[self->tuning.active].spring_net[NQVM_FOLDED_PIECES - 1U].slope" if model == "nqvm_folded" else "value[SPRING]"
+    return "self->piece[self->head.tuning.active][NQVM_FOLDED_PIECES - 1U].slope" if model == "nqvm_folded" else "value[SPRING]"
+
+
+def chosen(model: str, key: str) -> str:
+    """What the model file says of out_of_range or on_damage."""
+    return next((line.split('"')[1] for line in eva.MODELS[model] if line.startswith(f"{key} = ")), "report")
 
 
 def model_tests(build: str) -> list[Path]:
     """coverage_model.c for each model."""
     programs = []
     for model in eva.MODELS:
-        others = [MODELS / f"{model}.c", MODELS / f"{model}_params.c"]
+        others = [MODELS / f"{model}.c", MODELS / "nqvm_params.c"]
         test = gate.HERE / "coverage_model.c"
-        programs.append(program(build, f"model_{model}", test, others, [*eva.told(model), f"-DREFUSED={refused(model)}", f"-DUNFELT={unfelt(model)}"]))
+        programs.append(program(build, f"model_{model}", test, others, [*eva.told(model), f"-DREFUSED={refused(model)}", f"-DUNFELT={unfelt(model)}",
+            f"-DOUT_OF_RANGE=({'PEN_INPUT_RANGE | PEN_HELD' if chosen(model, 'out_of_range') == 'hold' else 'PEN_INPUT_RANGE'})", f"-DON_DAMAGE=PEN_DAMAGE_{chosen(model, 'on_damage').upper()}"]))
     return programs
 
 

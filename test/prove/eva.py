@@ -22,16 +22,17 @@ MODELS = {
     "nqvm": [],
     "nqvm_euler": [],
     "nqvm_folded": [],
-    "clamped": ['method = "heun"', 'outside = "clamp"', 'input = "held"', "substeps = 2"],
-    "implicit": ['method = "ros1"', 'outside = "clamp"', 'input = "parabola"', "[elements]", WET],
-    "fading": ['method = "ros2"', 'outside = "fade"', "fade_width = 0.5"],
-    "folded_or_not": ['method = "euler"', 'outside = "clamp"', "pieces = 96", 'more_pieces = "layers"'],
+    "clamped": ['method = "heun"', 'outside = "clamp"', 'input = "held"', "substeps = 2", 'out_of_range = "clamp"'],
+    "implicit": ['method = "ros1"', 'outside = "clamp"', 'input = "parabola"', 'out_of_range = "hold"', 'on_damage = "rollback"', "[elements]", WET],
+    "fading": ['method = "ros2"', 'outside = "fade"', "fade_width = 0.5", 'on_damage = "hold"'],
+    "folded_or_not": ['method = "euler"', 'outside = "clamp"', "pieces = 96", 'more_pieces = "layers"', 'on_damage = "rollback"'],
 }
-PARTS = ("all_layers", "elements", "networks_of_16", "systems", "folding", "sets")
+OWNED = ("nqvm_sets.h", "nqvm_params.c")  # the sets of all of them
+PARTS = ("all_layers", "elements", "networks_of_16", "systems", "folding", "sets", "serial")
 
 OPTIONS = [
     *("-machdep", "gcc_x86_32"),  # 32 bits, as a Cortex-M
-    *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write,octagon:pen_fold"),
+    *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write,octagon:pen_tuning_write_bytes,octagon:pen_fold"),
     *("-eva-slevel-function", "go:1,pen_fold:1"),  # where they write needs no look at each turn: quicker without
     *("-warn-special-float", "none"),  # NaN and Inf are values
     *("-warn-unsigned-downcast", "-warn-signed-downcast", "-eva-no-show-progress", "-eva-msg-key=-final-states"),
@@ -111,8 +112,8 @@ def models(place: Path) -> None:
             file.write_text("\n".join(["[model]", f'extends = "{base}"', f'name = "{name}"', *lines, ""]))
             gate.make([Path(sys.executable).parent / "penode", "generate", file, "-o", place])
         else:
-            for end in (".c", ".h", "_params.c"):
-                shutil.copy(gate.ROOT / "gen" / "nqvm" / "c" / (name + end), place)
+            for file in (f"{name}.c", f"{name}.h", *OWNED):
+                shutil.copy(gate.ROOT / "gen" / "nqvm" / "c" / file, place)
 
 
 def told(model: str) -> list[str]:
@@ -142,7 +143,7 @@ def analyse(run: Run, place: Path) -> Seen:
     files = sorted((place / "src").glob("pen_*.c"))
     if run.model:
         words += [f"'{word}'" for word in told(run.model)]
-        files += [place / "src" / f"{run.model}.c", HARNESS / "model.c"]
+        files += [place / "src" / f"{run.model}.c", place / "src" / "nqvm_params.c", HARNESS / "model.c"]
     else:
         files += [HARNESS / "runtime.c"]
     # The limits of pen_math.c are volatile only to stop compilers; elsewhere a volatile read may give anything.

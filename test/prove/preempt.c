@@ -26,12 +26,12 @@
 #define SYST_ON   0x7U
 #define N         SMALL_SET_LENGTH
 
-enum { BEGIN, WRITE, COMMIT, ABORT, SELECT, ROLLBACK, HOLD, RUNNING, REPORT, EXCHANGE, KINDS };
+enum { BEGIN, WRITE, COMMIT, ABORT, SELECT, ROLLBACK, HOLD, RUNNING, REPORT, WITHDRAW, VERIFY, EXCHANGE, KINDS };
 enum { SOFT, STIFF, KINKED, SETS }; /* runs first, is selected, is staged */
 
 static const pen_set_t *const set[SETS] = { &small_set_default, &small_set_stiff, &small_set_kinked };
-static const char *const name[KINDS] = { "begin",    "write", "commit",  "abort",  "select",
-                                         "rollback", "hold",  "running", "status", "exchange" };
+static const char *const name[KINDS] = { "begin", "write",   "commit", "abort",    "select", "rollback",
+                                         "hold",  "running", "status", "withdraw", "verify", "exchange" };
 static small_t       model;
 static small_banks_t banks;
 static pen_real_t    expected[SETS];
@@ -46,9 +46,10 @@ static volatile pen_status_t result; /* of the tuning call */
 static uint32_t   kind;
 static uint32_t   in_force;  /* set */
 static uint32_t   waiting;   /* set, or SETS if none waits */
-static uint32_t   target;    /* set that the call announces, or SETS */
+static uint32_t   target;    /* set that the call publishes, or SETS */
 static uint32_t   adopted;   /* how often */
-static uint32_t   reported;  /* of these */
+static uint32_t   withdrawn; /* how often */
+static uint32_t   reported;  /* of those adopted */
 static pen_real_t last;
 static uint32_t   failures;
 static uint32_t   runs;
@@ -106,8 +107,10 @@ __attribute__((noinline)) void tune(void)
         break;
     case REPORT:
         status = small_status(&model, &report);
-        reported = report.times[6];
+        reported = pen_status_times(&report, PEN_ADOPTED);
         break;
+    case WITHDRAW: status = small_tune_withdraw(&model); break;
+    case VERIFY: status = small_verify(&model, SMALL_VERIFY); break;
     default:
         status = open_set();
         if (status == PEN_OK) {
@@ -146,17 +149,24 @@ static bool same(pen_real_t a, pen_real_t b)
 static void judge(bool must, bool may)
 {
     const bool adopts = (stepped & PEN_ADOPTED) != 0U;
+    const bool leaves = (stepped & PEN_WITHDRAWN) != 0U;
     const bool held = (stepped & PEN_HELD) != 0U;
 
-    expect(!must || adopts, "lost");
-    expect(may || !adopts, "adopted twice or never announced");
-    expect((stepped & ~(PEN_ADOPTED | PEN_HELD)) == PEN_OK, "flags");
+    expect(!must || adopts || leaves, "lost");
+    expect(may || !adopts, "adopted twice or never published");
+    expect(!leaves || ((kind == WITHDRAW) && (waiting != SETS) && !adopts), "withdrawn, and nobody asked");
+    expect((stepped & ~(PEN_ADOPTED | PEN_HELD | PEN_WITHDRAWN)) == PEN_OK, "flags");
     expect(!held || (kind == HOLD), "held");
     if (adopts) {
         in_force = (waiting != SETS) ? waiting : target;
         target = (waiting != SETS) ? target : SETS;
         waiting = SETS;
         adopted++;
+    } else if (leaves) {
+        waiting = SETS;
+        withdrawn++;
+    } else {
+        /* nothing has come */
     }
     expect((in_force < SETS) && same(y.v, held ? last : expected[in_force]), "torn");
     last = y.v;
@@ -230,6 +240,7 @@ static void prepare(bool pending)
     waiting = SETS;
     target = SETS;
     adopted = 0U;
+    withdrawn = 0U;
     reported = 0U;
     (void)small_init(&model, set[SOFT], &banks);
     step();
@@ -268,6 +279,8 @@ static void judge_call(bool pending, bool taken)
         expect(result == PEN_SET_CLOSED, "not closed");
     } else if (pending && needs_quiet) {
         expect((result == PEN_SET_BUSY) || (taken && (result == PEN_OK)), "neither busy nor good");
+    } else if (kind == WITHDRAW) {
+        expect((result == (pending ? PEN_OK : PEN_SET_IDLE)) || (taken && (result == PEN_SET_IDLE)), "neither asked nor idle");
     } else {
         expect(result == PEN_OK, "refused");
     }
@@ -311,7 +324,11 @@ static void end(bool was_waiting)
     next_step();
     expect((waiting == SETS) && (target == SETS), "lost in the end");
     (void)small_status(&model, &report);
-    expect((reported + report.times[6]) == adopted, "counter");
+    expect((reported + pen_status_times(&report, PEN_ADOPTED)) == adopted, "counter");
+    expect(pen_status_times(&report, PEN_WITHDRAWN) == withdrawn, "counter");
+    if (kind == WITHDRAW) { /* the rollback set is the one before what was adopted: none if that was withdrawn */
+        expect(small_tune_rollback(&model) == ((adopted > 0U) ? PEN_OK : PEN_SET_NO_PREVIOUS), "rollback set");
+    }
     runs++;
 }
 

@@ -247,11 +247,17 @@ class Margins:
         middle = [(a + b) / 2 for a, b in zip(places, places[1:])]
         size = abs(places[0]) + abs(places[-1]) + 1
         self.outer = () if clamp else (Hull(net, places[0] - size, number), Hull(net, places[-1] + size, number))
+        smallest = float(np.finfo(net.real).tiny) / float(np.finfo(net.real).eps)
         self.seen = sorted([(x, Hull(net, x, number)) for x in {*places, *middle}], key=lambda pair: pair[0])
+
+        # a slope next to the subnormal numbers is known to their spacing only, which counts along the whole line
+        self.normal = all(h.least == h.most == 0 or max(abs(h.least), abs(h.most)) > smallest for h in [hull for _, hull in self.seen] + list(self.outer))
 
     def keeps(self, promise: Promise) -> bool:
         limit = promise.limit
         hulls = [hull for _, hull in self.seen] + list(self.outer)
+        if promise.kind in (DISSIPATIVE, MAX_FORCE) and not self.normal:
+            return False
         match promise.kind:
             case 0x1:
                 return all(h.least >= 0 for h in hulls)

@@ -5,7 +5,7 @@
 
 PROVE_STATIC  := prove-rules prove-eva prove-coverage
 PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-readers prove-flip prove-longrun prove-stack prove-bits \
-                 prove-accuracy prove-cost prove-kernels prove-promises
+                 prove-accuracy prove-cost prove-kernels prove-promise prove-promises
 
 .PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC)
 
@@ -47,6 +47,8 @@ prove-cost: | $(READY) ## Functions take the instructions that their headers nam
 	@$(PYTHON) test/prove/cost_check.py
 prove-kernels: | $(READY) build/setup/unity ## A fault in a kernel in assembler is found by its test
 	@$(PYTHON) test/prove/kernels_check.py
+prove-promise: | $(READY) ## Random networks in exact arithmetic: what the promise check accepts and refuses
+	@$(PYTHON) test/prove/promise_check.py
 prove-promises: | $(READY) ## PROMISES.md: each promise, the test that shows it, the figures of the last run
 	@$(PYTHON) test/prove/promises.py
 

@@ -3,7 +3,7 @@
 
 /*
  * tsan SETS: one thread steps as fast as it can, one exchanges sets as fast as they are adopted: staged, selected and
- * rolled back, with refused and dropped ones in between. Made with ThreadSanitizer, which reports each access that is
+ * rolled back, with refused, dropped and withdrawn ones in between. Made with ThreadSanitizer, which reports each access that is
  * not ordered. The k-th set is known to both beforehand, so nothing but the instance is shared. Exit code 1 if a step
  * was not one whole set's, or a set was lost, came twice or out of order, or a counter is wrong.
  */
@@ -26,8 +26,9 @@ static MODEL(t) model;
 static MODEL(banks_t) banks;
 static pen_real_t expected[3];
 static unsigned long sets;
+static unsigned long granted; /* withdrawals, as the thread that tunes sees them */
 
-/* The set announced as number k; 0 runs first. Every fourth is a rollback, to the one before the last. */
+/* The set published as number k; 0 runs first. Every fourth is a rollback, to the one before the last. */
 static unsigned int which(unsigned long k)
 {
     static const unsigned int turn[4] = { 2U, 0U, 1U, 0U };
@@ -67,9 +68,25 @@ static pen_status_t exchange(unsigned long k)
     return status;
 }
 
+/* Withdraw the k-th set: true if the step has granted it. */
+static bool withdrawn(unsigned long k)
+{
+    pen_set_head_t head = { 0U, 0U, 0U, 0U };
+    bool pending = (MODEL(tune_withdraw)(&model) == PEN_OK);
+
+    while (pending) {
+        (void)sched_yield();
+        (void)MODEL(tune_pending)(&model, &pending);
+    }
+    (void)MODEL(tune_withdraw)(&model); /* nothing to withdraw: takes note of what has become of it */
+    (void)MODEL(tune_running)(&model, &head);
+    return head.id != set[which(k)]->head.id;
+}
+
 static void *tune(void *nothing)
 {
     unsigned long bad = 0U;
+    bool again = false;
     pen_status_report_t report;
 
     (void)nothing;
@@ -80,6 +97,13 @@ static void *tune(void *nothing)
             status = exchange(k);
         }
         bad += (status != PEN_OK) ? 1U : 0U;
+        again = ((k % 3U) == 0U) && !again && withdrawn(k);
+        if (again) { /* once more, and that counts */
+            granted++;
+            k--;
+        } else {
+            bad += (MODEL(verify)(&model, N) == PEN_OK) ? 0U : 1U;
+        }
         if ((k % 64U) == 0U) {
             (void)MODEL(status)(&model, &report);
         }
@@ -111,6 +135,7 @@ int main(int argc, char **argv)
     unsigned long steps = 0U;
     unsigned long torn = 0U;
     unsigned long idle = 0U;
+    unsigned long left = 0U;
     pthread_t tuner;
     void *bad = NULL;
     pen_real_t v;
@@ -129,12 +154,13 @@ int main(int argc, char **argv)
     (void)pthread_create(&tuner, NULL, tune, NULL);
     while ((adopted < sets) && (torn == 0U) && (idle < PATIENCE)) {
         const pen_status_t status = step(&v);
+        left += ((status & PEN_WITHDRAWN) != 0U) ? 1U : 0U;
         idle++;
         if ((status & PEN_ADOPTED) != 0U) {
             adopted++;
             idle = 0U;
         }
-        torn += (same(v, expected[which(adopted)]) && ((status & ~PEN_ADOPTED) == PEN_OK)) ? 0U : 1U;
+        torn += (same(v, expected[which(adopted)]) && ((status & ~(PEN_ADOPTED | PEN_WITHDRAWN)) == PEN_OK)) ? 0U : 1U;
         steps++;
     }
     if (adopted == sets) {
@@ -142,7 +168,8 @@ int main(int argc, char **argv)
         (void)clock_gettime(CLOCK_REALTIME, &until);
         until.tv_sec += WAIT;
         torn += (pthread_timedjoin_np(tuner, &bad, &until) == 0) ? 0U : 1U;
+        torn += (left == granted) ? 0U : 1U;
     }
-    printf("%lu adopted, %lu steps, %lu torn, %lu refused\n", adopted, steps, torn, (unsigned long)bad);
+    printf("%lu adopted, %lu steps, %lu torn, %lu withdrawn, %lu refused\n", adopted, steps, torn, left, (unsigned long)bad);
     return ((torn == 0U) && (bad == NULL) && (adopted == sets)) ? 0 : 1;
 }

@@ -19,7 +19,7 @@
 #define ROUND    (N + SLOT)
 
 static const pen_layer_t   layer[2] = { { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_DENSE, 3U, 1U } };
-static const pen_network_t network[NETWORKS] = { { { layer, 2U, 3U, 3U }, 1U }, { { layer, 2U, 3U, 3U }, 1U + NETWORK } };
+static const pen_network_t network[NETWORKS] = { { { layer, 2U, 3U, 3U }, 1U, NULL }, { { layer, 2U, 3U, 3U }, 1U + NETWORK, NULL } };
 static const pen_real_t    tent[NETWORK] = {
     (pen_real_t)-3, (pen_real_t)2, (pen_real_t)1, (pen_real_t)1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)1,
     (pen_real_t)0, (pen_real_t)1, (pen_real_t)-2, (pen_real_t)1,
@@ -57,7 +57,7 @@ static pen_status_t prepare(const pen_real_t value[], pen_piece_t of_slot[])
     pen_real_t line[4U * 3U];
     bool active[3];
 
-    return pen_prepare(&model, value, line, active, of_slot);
+    return pen_prepare(&model, value, line, active, of_slot, &instance.breach);
 }
 
 static pen_piece_t *inactive(void)

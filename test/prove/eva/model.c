@@ -29,6 +29,10 @@ static pen_status_report_t report;
 static pen_set_head_t head;
 static pen_real_t flash[2][MODEL_SIZE(SET_LENGTH)];
 static pen_real_t chunk[MODEL_SIZE(SET_LENGTH)];
+static uint8_t bytes[sizeof chunk];
+static uint8_t saved[MODEL_SIZE(SAVED)];
+static bool pending;
+static MODEL(sensors_jacobian_t) sensors_jacobian;
 static pen_set_t set;
 
 static void fill(void *at, size_t bytes)
@@ -46,6 +50,8 @@ static void arguments(void)
     fill(&head, sizeof head);
     fill(flash, sizeof flash);
     fill(chunk, sizeof chunk);
+    fill(bytes, sizeof bytes);
+    fill(saved, sizeof saved);
     fill(&set.head, sizeof set.head);
     set.value = OR_NULL((any == 0U) ? flash[0] : flash[1]);
 }
@@ -70,16 +76,27 @@ static void call(void)
     case 11U: MODEL(tune_select)(self, OR_NULL(&set)); break;
     case 12U: MODEL(tune_rollback)(self); break;
     case 13U: MODEL(tune_hold)(self, any != 0U); break;
-    default: MODEL(tune_running)(self, OR_NULL(&head)); break;
+    case 14U: MODEL(tune_running)(self, OR_NULL(&head)); break;
+    case 15U: MODEL(get_input)(self, OR_NULL(&input)); break;
+    case 16U: MODEL(set_input)(self, OR_NULL(&input)); break;
+    case 17U: MODEL(sensors_jacobian)(self, OR_NULL(&sensors_jacobian)); break;
+    case 18U: MODEL(tune_begin_copy)(self, any); break;
+    case 19U: MODEL(tune_write_bytes)(self, any, (n <= sizeof bytes) ? OR_NULL(bytes) : NULL, n); break;
+    case 20U: MODEL(tune_expect)(self, any); break;
+    case 21U: MODEL(tune_withdraw)(self); break;
+    case 22U: MODEL(tune_pending)(self, OR_NULL(&pending)); break;
+    case 23U: MODEL(verify)(self, any); break;
+    case 24U: MODEL(save)(self, OR_NULL(saved)); break;
+    default: MODEL(restore)(self, OR_NULL(saved)); break;
     }
 }
 
 void in_order(void)
 {
-    /*@ dynamic_split instance.ready; */
-    /*@ dynamic_split instance.tuning.open; */
-    /*@ dynamic_split instance.tuning.bank[0] == (void *)0; */
-    /*@ dynamic_split instance.tuning.bank[1] == (void *)0; */
+    /*@ dynamic_split instance.head.ready; */
+    /*@ dynamic_split instance.head.tuning.open; */
+    /*@ dynamic_split instance.head.tuning.bank[0] == (void *)0; */
+    /*@ dynamic_split instance.head.tuning.bank[1] == (void *)0; */
     while (any != 0U) {
         arguments();
         call();
@@ -101,11 +118,14 @@ void corrupted(void)
         fill(&banks, sizeof banks);
         fill(&instance, sizeof instance);
         for (size_t i = 0U; i < 2U; i++) {
-            instance.tuning.slot[i].value = buffer();
-            instance.tuning.bank[i] = OR_NULL(buffer());
-            instance.tuning.bank_again[i] = OR_NULL(buffer());
+            instance.head.tuning.slot[i].value = buffer();
+            instance.head.tuning.slot_check[i].value = OR_NULL(buffer());
+            instance.head.tuning.bank[i] = OR_NULL(buffer());
+            instance.head.tuning.bank_check[i] = OR_NULL(buffer());
         }
-        instance.tuning.previous.value = OR_NULL(buffer());
+        instance.head.tuning.previous.value = OR_NULL(buffer());
+        instance.head.tuning.replaced.value = OR_NULL(buffer());
+        instance.head.tuning.initial.value = buffer();
         call();
     }
 }

@@ -15,6 +15,7 @@
 #include "penode/pen_math.h"
 #include "penode/pen_net.h"
 #include "penode/pen_net16.h"
+#include "penode/pen_serial.h"
 #include "penode/pen_set.h"
 #include "penode/pen_solve.h"
 
@@ -205,6 +206,28 @@ void sets(void)
     seen = (pen_real_t)pen_tuning_init(&tuning, any, WIDE, &set, (any == 0U) ? NULL : t, (any == 0U) ? NULL : y);
 }
 
+void serial(void)
+{
+    static uint8_t byte[PEN_SERIAL_HEAD];
+    pen_set_head_t head;
+    pen_status_report_t report;
+
+    fill(byte, sizeof byte);
+    fill(&head, sizeof head);
+    fill(&report, sizeof report);
+    seen = (pen_real_t)pen_serial_read(byte, &head);
+    pen_serial_write(&head, byte);
+    seen = (pen_real_t)pen_serial_read(byte, &head);
+    fill_all();
+    for (size_t n = 0U; n <= (4U * sizeof(pen_real_t)); n++) {
+        pen_serial_put_bytes(W(4U), (4U * sizeof(pen_real_t)) - n, n, &byte[PEN_SERIAL_HEAD - n]);
+        pen_serial_get_bytes(W(4U), (4U * sizeof(pen_real_t)) - n, n, &byte[PEN_SERIAL_HEAD - n]);
+        seen = (pen_real_t)pen_crc_bytes(any, n, &byte[PEN_SERIAL_HEAD - n]);
+    }
+    seen = (pen_real_t)pen_crc_word(pen_crc_values(any, WIDE, x), any);
+    seen = (pen_real_t)pen_status_times(&report, any);
+}
+
 void runtime(void)
 {
     all_layers();
@@ -213,4 +236,5 @@ void runtime(void)
     systems();
     folding();
     sets();
+    serial();
 }
