@@ -3,7 +3,7 @@
 
 /* The words that the two contexts of spin_swap.pml share, and how a store comes from one to the other. */
 
-/* words of pending */
+/* words of pending: command(ADOPT, slot), command(WITHDRAW, slot) */
 #define NOTHING  0
 #define ADOPT    1 /* + slot */
 #define WITHDRAW 3 /* + slot */

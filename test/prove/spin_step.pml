@@ -18,7 +18,7 @@ inline pen_tuning_adopt()
         IF(8, store_pending_of_step(), skip);
         atomic {
             if
-            :: word == ADOPT + (running ^ 1) || MUTANT == 22 -> // if (pending == (ADOPT + other)) {
+            :: word == ADOPT + (running ^ 1) || MUTANT == 22 -> // if (pending == command(ADOPT, other)) {
                 running = running ^ 1;              // active = other;
                 IF(13, skip, store(ACTIVE, running)); // pen_port_store(&tuning->active, active);
                 assert(waiting); /* each is adopted once, and none that is withdrawn */
@@ -29,7 +29,7 @@ inline pen_tuning_adopt()
                 waited = false
             :: else ->
                 if
-                :: word == WITHDRAW + (running ^ 1) || // } else if (pending == (WITHDRAW + other)) {
+                :: word == WITHDRAW + (running ^ 1) || // } else if (pending == command(WITHDRAW, other)) {
                    (MUTANT == 23 && word >= WITHDRAW) ->
                     assert(waiting && asked); /* reported once, and only if asked for */
                     waiting = false;              // status |= PEN_WITHDRAWN;

@@ -76,7 +76,7 @@ inline pen_tuning_settle()
             assert(!waiting);
             assert(slot == mine[ACTIVE]);
             if
-            :: slot != published - 1 ->           // if (active != ((tuning->published - 1U) & 1U)) {
+            :: published == ADOPT + (slot ^ 1) ->    // if (tuning->published == command(ADOPT, active ^ 1U)) {
                 assert(granted);
                 if :: MUTANT != 27 -> previous_id = replaced_id :: else fi; // pen_set_copy(&tuning->previous, &tuning->replaced);
                 if :: MUTANT != 27 -> previous_value = replaced_value :: else fi;
@@ -116,7 +116,7 @@ inline pen_tuning_publish()
     IF(12, previous_value = ready_value, previous_value = mine[VALUE(slot ^ 1)]);
     open = NO;                                    // tuning->open = NO;
     dropped = true;
-    published = 1 + slot                          // tuning->published = 1U + slot;
+    published = ADOPT + slot                      // tuning->published = command(ADOPT, slot);
     }
     }
     IF(1, skip, barrier_of_tuner());              // pen_port_barrier();
@@ -124,22 +124,22 @@ inline pen_tuning_publish()
         assert(!waiting); /* none is published over one that waits */
         waiting = true;
         id_waiting = ready_id;
-        IF(15, skip, IF(9, skip, store_pending_of_tuner(ADOPT + slot))); // pen_port_store(&tuning->pending, ADOPT + slot);
+        IF(15, skip, IF(9, skip, store_pending_of_tuner(published))); // pen_port_store(&tuning->pending, tuning->published);
     }
 }
 
 inline pen_tuning_withdraw()
 {
-    d_step { target = published; }                // const uint32_t slot = (tuning->published - 1U) & 1U;
+    target = (published == ADOPT + 1 -> 1 : 0);   // const uint32_t slot = (tuning->published == command(ADOPT, 1U)) ? 1U : 0U;
     IF(24, good = false, pen_tuning_settle());    // if (pen_tuning_settle(tuning)) {
     if
     :: good
-    :: !good && (load_pending_tuner == ADOPT + target - 1 || /* asked for once only */
-                 MUTANT == 24 || MUTANT == 26) -> // } else if (pen_port_load(&tuning->pending) == (ADOPT + slot)) {
+    :: !good && (load_pending_tuner == ADOPT + target || /* asked for once only */
+                 MUTANT == 24 || MUTANT == 26) -> // } else if (pen_port_load(&tuning->pending) == command(ADOPT, slot)) {
         atomic { /* the step may have adopted it since */
             asked = true;
             IF(21, store_pending_of_tuner(CLEARED),
-                   store_pending_of_tuner(WITHDRAW + (target + 1) % 2)) // pen_port_store(&tuning->pending, WITHDRAW + slot);
+                   store_pending_of_tuner(WITHDRAW + target)) // pen_port_store(&tuning->pending, command(WITHDRAW, slot));
         }
     :: else
     fi;
@@ -206,7 +206,7 @@ inline pen_tuning_begin_copy()
     if :: copy = NO :: copy = YES fi;
     if
     :: copy ->
-        IF(29, good = true, pen_tuning_settle()); // const bool settled = pen_tuning_settle(tuning);
+        IF(29, good = true, pen_tuning_settle()); // if (pen_tuning_settle(tuning)) {
         d_step {
         pen_tuning_inactive();                    // const pen_set_t *const running = &tuning->slot[pen_tuning_inactive(tuning) ^ 1U];
         target = slot ^ 1
