@@ -34,7 +34,7 @@ FAULTS = {
     "the outer pieces are not looked at": ("pen_promise", ("broken |= at_edge ? 0U :", 0, "broken |= (at_edge || endless) ? 0U :")),
     "one side only": ("pen_promise", ("broken = travel(&line, promise, start, -ONE, lowest, &looks, &at);", 0, "broken = 0U;")),
     "undecided neurons are off": ("pen_cell", ("(((pattern >> i) & 1U) != 0U)", 0, "false")),
-    "undecided neurons are on or off at once": ("pen_cell", ("pattern < ((uint32_t)1U << cell->open)", 0, "pattern < 1U")),
+    "undecided neurons are on or off at once": ("pen_cell", ("pattern < ((uint32_t)1U << part->open)", 0, "pattern < 1U")),
     "many undecided neurons are off": ("pen_cell", ("const pen_real_t most = (high > ZERO) ? high : ZERO;", 0, "const pen_real_t most = ZERO;")),
     "a cell goes on past the kink": ("pen_cell", ("? ((size - error) / closing)", 0, "? (FOUR * ((size - error) / closing))")),
 }  # fmt: skip
