@@ -226,6 +226,6 @@ def test_refused_sets_say_why_and_change_nothing(sil):
 
 def test_without_banks_sets_can_only_be_selected(sil):
     instance = sil.instance(banks=False)
-    refused(instance, lambda: instance.begin(penode_gen.set_head(sil.model, "altered_friction", sil.dtype)), "badarg")
+    refused(instance, lambda: instance.begin(penode_gen.set_head(sil.model, "altered_friction", sil.dtype)), "set_badarg")
     assert instance.select("altered_friction") == 0
     assert names(instance.step([0.0])[2]) == ["adopted"]
