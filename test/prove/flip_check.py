@@ -123,7 +123,7 @@ def main() -> int:
     missed += [f"not found: {what}" for k, (what, (name, *fault)) in enumerate(VERIFY_FAULTS.items()) if not verify(name, 1, fault, f"v{k}")[0]]
     total = len(FAULTS) + len(VERIFY_FAULTS)
     good &= gate.report(f"flip: {total - len(missed)} of {total} faults found", missed)
-    gate.keep(given.key, figures | {"guarded": guarded, "faults": [*FAULTS, *VERIFY_FAULTS], "faults found": total - len(missed)})
+    gate.keep(given.key, figures | {"guarded bits": sum(guarded.values()), "faults": [*FAULTS, *VERIFY_FAULTS], "faults found": total - len(missed)})
     return int(not good)
 
 
