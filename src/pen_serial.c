@@ -11,13 +11,20 @@
 #define CRC_AT   28U
 #define RESERVED 24U
 
-/* On a big-endian core byte i of a value stands at i ^ swap(), on any other at i. */
+/* On a big-endian core byte `at` of the serial form stands at place(at, swap()), on any other at `at`. */
 static size_t swap(void)
 {
     static const uint32_t probe = 1U;
     const uint8_t *const first = (const uint8_t *)&probe;
 
-    return (first[0] == 1U) ? 0U : (sizeof(pen_real_t) - 1U);
+    return ((size_t)1U - first[0]) * (sizeof(pen_real_t) - 1U); /* first[0]: 1 if little endian, else 0 */
+}
+
+static size_t place(size_t at, size_t turn)
+{
+    const size_t last = sizeof(pen_real_t) - 1U;
+
+    return (at & ~last) + ((at ^ turn) & last);
 }
 
 /* four bits at a time */
@@ -53,7 +60,7 @@ uint32_t pen_crc_values(uint32_t crc, size_t n, const pen_real_t value[])
     uint32_t next = crc;
 
     for (size_t i = 0U; i < (n * sizeof(pen_real_t)); i++) {
-        next = crc_byte(next, byte[i ^ turn]);
+        next = crc_byte(next, byte[place(i, turn)]);
     }
     return next;
 }
@@ -91,7 +98,7 @@ void pen_serial_put_bytes(const pen_real_t value[], size_t offset, size_t n, uin
     const size_t turn = swap();
 
     for (size_t i = 0U; i < n; i++) {
-        byte[i] = from[(offset + i) ^ turn];
+        byte[i] = from[place(offset + i, turn)];
     }
 }
 
@@ -101,7 +108,7 @@ void pen_serial_get_bytes(pen_real_t value[], size_t offset, size_t n, const uin
     const size_t turn = swap();
 
     for (size_t i = 0U; i < n; i++) {
-        to[(offset + i) ^ turn] = byte[i];
+        to[place(offset + i, turn)] = byte[i];
     }
 }
 

@@ -236,12 +236,6 @@ pen_status_t pen_tuning_expect(pen_tuning_t *tuning, uint32_t checksum)
     return status;
 }
 
-/* May bytes [offset, offset + n) of a set of `size` bytes be written now? */
-static pen_status_t check_chunk(const pen_tuning_t *tuning, uint32_t size, uint32_t offset, uint32_t n)
-{
-    return ((offset > tuning->fill) || (offset > size) || (n > (size - offset))) ? PEN_SET_RANGE : PEN_OK;
-}
-
 static void note_fill(pen_tuning_t *tuning, uint32_t end)
 {
     tuning->fill = (end > tuning->fill) ? end : tuning->fill;
@@ -256,10 +250,10 @@ pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t length, uint32_t of
         status = PEN_SET_CLOSED;
     } else if (value == NULL) {
         status = PEN_SET_BADARG;
-    } else if ((offset > length) || (n > length)) {
+    } else if ((offset > length) || (n > (length - offset)) || ((SIZE * offset) > tuning->fill)) {
         status = PEN_SET_RANGE;
     } else {
-        status = check_chunk(tuning, SIZE * length, SIZE * offset, SIZE * n);
+        status = PEN_OK;
     }
     if (status == PEN_OK) {
         for (uint32_t i = 0U; i < n; i++) {
@@ -273,14 +267,17 @@ pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t length, uint32_t of
 pen_status_t pen_tuning_write_bytes(pen_tuning_t *tuning, uint32_t length, uint32_t offset, const uint8_t byte[], uint32_t n)
 {
     pen_real_t *const bank = open_bank(tuning);
+    const uint32_t size = SIZE * length;
     pen_status_t status;
 
     if (bank == NULL) {
         status = PEN_SET_CLOSED;
     } else if (byte == NULL) {
         status = PEN_SET_BADARG;
+    } else if ((offset > tuning->fill) || (offset > size) || (n > (size - offset))) {
+        status = PEN_SET_RANGE;
     } else {
-        status = check_chunk(tuning, SIZE * length, offset, n);
+        status = PEN_OK;
     }
     if (status == PEN_OK) {
         pen_serial_get_bytes(bank, offset, n, byte);

@@ -69,7 +69,7 @@ NOINLINE static pen_real_t solve_16(pen_real_t x) { return solve(16U, x); }
 
 NOINLINE static pen_real_t note(pen_real_t x)
 {
-    pen_status_note_step(&status_log, (x > 0.0F) ? 0x1ffU : PEN_OK);
+    pen_status_note_step(&status_log, (x > 0.0F) ? ((UINT32_C(1) << PEN_STATUS_STEP) - 1U) : PEN_OK);
     return x;
 }
 

@@ -66,15 +66,17 @@ def chosen(model: str, key: str) -> str:
     return next((line.split('"')[1] for line in eva.MODELS[model] if line.startswith(f"{key} = ")), "report")
 
 
+def told(model: str) -> list[str]:
+    """How coverage_model.c is told of a model."""
+    range_flags = "(PEN_INPUT_RANGE | PEN_HELD)" if chosen(model, "out_of_range") == "hold" else "PEN_INPUT_RANGE"
+    return [*eva.told(model), f"-DREFUSED={refused(model)}", f"-DUNFELT={unfelt(model)}", f"-DOUT_OF_RANGE={range_flags}",
+            f"-DON_DAMAGE=PEN_DAMAGE_{chosen(model, 'on_damage').upper()}"]  # fmt: skip
+
+
 def model_tests(build: str) -> list[Path]:
     """coverage_model.c for each model."""
-    programs = []
-    for model in eva.MODELS:
-        others = [MODELS / f"{model}.c", MODELS / "nqvm_params.c"]
-        test = gate.HERE / "coverage_model.c"
-        programs.append(program(build, f"model_{model}", test, others, [*eva.told(model), f"-DREFUSED={refused(model)}", f"-DUNFELT={unfelt(model)}",
-            f"-DOUT_OF_RANGE=({'PEN_INPUT_RANGE | PEN_HELD' if chosen(model, 'out_of_range') == 'hold' else 'PEN_INPUT_RANGE'})", f"-DON_DAMAGE=PEN_DAMAGE_{chosen(model, 'on_damage').upper()}"]))
-    return programs
+    test = gate.HERE / "coverage_model.c"
+    return [program(build, f"model_{model}", test, [MODELS / f"{model}.c", MODELS / "nqvm_params.c"], told(model)) for model in eva.MODELS]
 
 
 def export(build: str, programs: list[Path], *words: str) -> str:

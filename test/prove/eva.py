@@ -31,8 +31,7 @@ OWNED = ("nqvm_sets.h", "nqvm_params.c")  # the sets of all of them
 PARTS = ("all_layers", "elements", "networks_of_16", "systems", "folding", "sets", "serial")
 
 OPTIONS = [
-    *("-machdep", "gcc_x86_32"),  # 32 bits, as a Cortex-M
-    *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write,octagon:pen_tuning_write_bytes,octagon:pen_fold"),
+    *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write,octagon:pen_tuning_write_bytes,octagon:pen_serial_get_bytes,octagon:pen_serial_put_bytes,octagon:pen_fold", "-eva-octagon-through-calls"),
     *("-eva-slevel-function", "go:1,pen_fold:1"),  # where they write needs no look at each turn: quicker without
     *("-warn-special-float", "none"),  # NaN and Inf are values
     *("-warn-unsigned-downcast", "-warn-signed-downcast", "-eva-no-show-progress", "-eva-msg-key=-final-states"),
@@ -46,9 +45,10 @@ class Run:
     model: str | None
     entry: str
     size_build: bool = False
+    big_endian: bool = False
 
     def __str__(self) -> str:
-        return f"{self.model or 'runtime'}, {self.entry}{', size build' if self.size_build else ''}"
+        return f"{self.model or 'runtime'}, {self.entry}{', size build' if self.size_build else ''}{', big endian' if self.big_endian else ''}"
 
 
 @dataclass(frozen=True)
@@ -75,20 +75,29 @@ MODEL = Run("nqvm_euler", "corrupted")
 ORDER = Run("nqvm_euler", "in_order")
 SEEDS = [
     Seed("pen_set.c", " || (n > (length - offset))", "", MODEL),
-    Seed("pen_set.c", "(offset > length) || ", "", MODEL),
+    Seed("pen_set.c", "((offset > length) || (n", "((n", MODEL),
     Seed("pen_set.c", "n > (length - offset)", "n > (tuning->slot[0].head.length - offset)", MODEL),
+    Seed("pen_set.c", " || (n > (size - offset))", "", MODEL),
     Seed("pen_set.c", "    if (bank == NULL) {", "    if (tuning->open != YES) {", MODEL),
     Seed("pen_set.c", "return (pen_port_load(&tuning->active) & 1U) ^ 1U", "return pen_port_load(&tuning->active) ^ 1U", MODEL),
     Seed("pen_set.c", "uint32_t active = pen_port_load(&tuning->active) & 1U", "uint32_t active = pen_port_load(&tuning->active)", MODEL),
     Seed("pen_set.c", "((set == NULL) || (set->value == NULL))", "(set == NULL)", MODEL),
     Seed("pen_set.c", "(head == NULL) || ", "", MODEL),
     Seed("pen_set.c", "} else if (tuning->previous.value == NULL) {", "} else if (false) {", ORDER),
-    Seed("pen_set.c", "        tuning->slot[1] = *set;\n", "", ORDER),
-    Seed("pen_set.c", "table[crc & 0x0fU]", "table[crc & 0x1fU]", MODEL),
+    Seed("pen_set.c", "            pen_set_copy(&tuning->slot[i], set);\n", "            pen_set_copy(&tuning->slot[0], set);\n", ORDER),
     Seed("pen_set.c", "(tuning == NULL) || ", "", Run(None, "sets")),
+    Seed("pen_serial.c", "table[next & 0x0fU]", "table[next & 0x1fU]", MODEL),
+    Seed("pen_serial.c", "i < n; i++) {\n        to[", "i <= n; i++) {\n        to[", MODEL),
+    Seed("pen_verify.c", "(self->guard.at >= round) || ", "", MODEL),
+    Seed("pen_verify.c", "const uint32_t taken = (n < left) ? n : left;", "const uint32_t taken = n;", MODEL),
+    Seed("pen_verify.c", "} else if (set->value == NULL) {", "} else if (false) {", Run("implicit", "corrupted")),
+    Seed("pen_saved.c", "((place - KNOWN) < model->sets)", "((place - KNOWN) <= model->sets)", MODEL),
+    Seed("pen_saved.c", "(byte != NULL) && (size == ", "(size == ", MODEL),
+    Seed("pen_saved.c", "(set.value != NULL) && ", "", ORDER),
+    Seed("pen_instance.c", "return (self != NULL) && ", "return ", MODEL),
     Seed("pen_status.c", "i < PEN_STATUS_FLAGS", "i <= PEN_STATUS_FLAGS", MODEL),
-    Seed("nqvm_euler.c", "self->u[1U - (self->running & 1U)]", "self->u[1U - self->running]", MODEL),
-    Seed("nqvm_euler.c", "self->patrol % NQVM_EULER_PATROL", "self->patrol", MODEL),
+    Seed("pen_step.h", "self->scrub % round", "self->scrub", MODEL),
+    Seed("nqvm_euler.c", "self->u[1U - (self->head.running & 1U)]", "self->u[1U - self->head.running]", MODEL),
     Seed("nqvm_euler.c", "(u != NULL) && (y != NULL)", "(u != NULL)", MODEL),
     Seed("nqvm_euler.c", "(self != NULL) && ", "", MODEL),
     Seed("nqvm_euler.c", "    pen_status_t status = found;", "    pen_status_t status = PEN_OK;", ORDER),
@@ -149,7 +158,8 @@ def analyse(run: Run, place: Path) -> Seen:
     # The limits of pen_math.c are volatile only to stop compilers; elsewhere a volatile read may give anything.
     split = [f"-cpp-extra-args-per-file={place}/src/pen_math.c:-Dvolatile="]
     last = ["-then", "-metrics", "-metrics-eva-cover"]
-    done = gate.run(["frama-c", f"-cpp-extra-args={' '.join(words)}", *split, *files, "-main", run.entry, *OPTIONS, *last], limit=1800)
+    machine = "ppc_32" if run.big_endian else "gcc_x86_32"  # 32 bits, as a Cortex-M
+    done = gate.run(["frama-c", "-machdep", machine, f"-cpp-extra-args={' '.join(words)}", *split, *files, "-main", run.entry, *OPTIONS, *last], limit=1800)
     text = done.stdout + done.stderr
     alarms = [f"{run}: {' '.join(m.split())}" for m in re.findall(r"^\[eva:alarm\] (.*\n(?:  .*\n)*)", text, re.M)]
     counted = re.search(r"^  (\d+) alarms? generated", text, re.M)
@@ -203,7 +213,7 @@ def main(only: Sequence[str]) -> int:
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
     models(WORK)
-    runs = [Run(None, part) for part in PARTS] + [Run(None, "networks_of_16", size_build=True)]
+    runs = [Run(None, part) for part in PARTS] + [Run(None, "networks_of_16", size_build=True), Run(None, "serial", big_endian=True)]
     runs += [ORDER, *(Run(model, "corrupted") for model in MODELS)]
     good = True
     place = sources()

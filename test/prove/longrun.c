@@ -3,7 +3,7 @@
 
 /*
  * longrun SECONDS RHO0 RHO1 RHO2 RHO3: the folded quarter vehicle at 1 kHz with a new set every second, staged, selected
- * or rolled back, beside the same discrete step written down here in double, S, with the pieces that the set in force
+ * or rolled back, now and then withdrawn first, beside the same discrete step written down here in double, S, with the pieces that the set in force
  * was folded to. x is the float state, d the one of the run in double, e = x - d.
  *
  * Each step       |x(k+1) - S(x(k))| <= RHO, what rounding can do in one step: longrun_check.py derives it
@@ -73,11 +73,11 @@ static double net(const pen_piece_t piece[], double x, double *anchor, double *s
 
 static void rates(const double x[X], double z_road, double dx[X], stages_t *at, size_t stage)
 {
-    const nqvm_folded_pieces_t *const f = &model.pieces[model.tuning.active];
+    const pen_piece_t *const f = model.piece[model.head.tuning.active];
     const double s = x[0] - x[1];
     const double v = x[2] - x[3];
-    const double of_s = net(f->spring_net, s, &most.anchor_s, &at->slope_s[stage]);
-    const double of_v = net(f->damper_net, v, &most.anchor_v, &at->slope_v[stage]);
+    const double of_s = net(&f[0], s, &most.anchor_s, &at->slope_s[stage]);
+    const double of_v = net(&f[NQVM_FOLDED_PIECES], v, &most.anchor_v, &at->slope_v[stage]);
     const double force = (STIFFNESS * s) + (DAMPING * v) + of_s + of_v;
     const double tyre = TYRE * (x[1] - z_road);
 
@@ -214,6 +214,12 @@ static void drift(unsigned long last, const double rho[X], double bound[X])
 
 /* ---- a set every second ---- */
 
+/* In these seconds a set is withdrawn before the one that comes; not while that one is being staged. */
+static bool withdraws(unsigned long second)
+{
+    return ((second % 5U) == 3U) && (((second / 2U) % 3U) != 0U);
+}
+
 static pen_status_t tune(unsigned long second, unsigned int millisecond)
 {
     const pen_set_t *const next = set[second % 2U];
@@ -227,6 +233,11 @@ static pen_status_t tune(unsigned long second, unsigned int millisecond)
         const unsigned int from = (millisecond - 1U) * chunk;
         const unsigned int n = (millisecond < 100U) ? chunk : (NQVM_FOLDED_SET_LENGTH - from);
         status = nqvm_folded_tune_write(&model, from, &next->value[from], n);
+    } else if (withdraws(second) && (millisecond == 898U)) {
+        status = nqvm_folded_tune_select(&model, next);
+        status |= nqvm_folded_tune_withdraw(&model);
+    } else if (millisecond == 899U) {
+        status = nqvm_folded_verify(&model, NQVM_FOLDED_VERIFY);
     } else if (millisecond != 900U) {
         /* the step alone */
     } else if (way == 0U) {
@@ -245,7 +256,8 @@ int main(int argc, char **argv)
     unsigned long wrong = 0U;
     unsigned long adopted = 0U;
     unsigned long outside = 0U;
-    unsigned long counted[2] = { 0U, 0U };
+    unsigned long withdrawn = 0U;
+    unsigned long counted[3] = { 0U, 0U, 0U };
     double rho[X];
     double x[X] = { 0.0, 0.0, 0.0, 0.0 };
     double d[X] = { 0.0, 0.0, 0.0, 0.0 };
@@ -270,7 +282,9 @@ int main(int argc, char **argv)
         status = nqvm_folded_step(&model, &u, &y);
         adopted += ((status & PEN_ADOPTED) != PEN_OK) ? 1U : 0U;
         outside += ((status & PEN_OUTSIDE) != PEN_OK) ? 1U : 0U;
-        wrong += ((status & ~(PEN_ADOPTED | PEN_OUTSIDE)) == PEN_OK) ? 0U : 1U;
+        withdrawn += ((status & PEN_WITHDRAWN) != PEN_OK) ? 1U : 0U;
+        wrong += ((status & ~(PEN_ADOPTED | PEN_OUTSIDE | PEN_WITHDRAWN)) == PEN_OK) ? 0U : 1U;
+        wrong += (((status & PEN_WITHDRAWN) != PEN_OK) == (((k % RATE) == 898U) && withdraws(k / RATE))) ? 0U : 1U;
         wrong += (((status & PEN_ADOPTED) != PEN_OK) == ((k % RATE) == 900U)) ? 0U : 1U;
         (void)nqvm_folded_get_state(&model, &now);
         if (k > 0U) {
@@ -296,16 +310,18 @@ int main(int argc, char **argv)
                 note(&drift_share, (x[n] - d[n]) / bound[n]);
             }
             (void)nqvm_folded_status(&model, &report);
-            counted[0] += report.times[4];
-            counted[1] += report.times[6];
+            counted[0] += pen_status_times(&report, PEN_OUTSIDE);
+            counted[1] += pen_status_times(&report, PEN_ADOPTED);
+            counted[2] += pen_status_times(&report, PEN_WITHDRAWN);
         }
     }
     wrong += (counted[0] == outside) ? 0U : 1U;
     wrong += ((counted[1] == adopted) && (adopted == seconds)) ? 0U : 1U;
+    wrong += (counted[2] == withdrawn) ? 0U : 1U;
     wrong += ((step_share <= 1.0) && (drift_share <= 1.0)) ? 0U : 1U;
     printf("step %.3g\ndrift %.3g\napart %.3g %.3g %.3g %.3g\n", step_share, drift_share, apart[0], apart[1], apart[2], apart[3]);
     printf("z %.9g\nrate %.9g\ns %.9g\nv %.9g\ntyre %.9g\na %.9g\nnet_s %.9g\nnet_v %.9g\nanchor_s %.9g\nanchor_v %.9g\n", most.z,
            most.rate, most.s, most.v, most.tyre, most.a, most.net_s, most.net_v, most.anchor_s, most.anchor_v);
-    printf("slope_s %.9g\nslope_v %.9g\nadopted %lu\noutside %lu\nwrong %lu\n", most.slope_s, most.slope_v, adopted, outside, wrong);
+    printf("slope_s %.9g\nslope_v %.9g\nadopted %lu\nwithdrawn %lu\noutside %lu\nwrong %lu\n", most.slope_s, most.slope_v, adopted, withdrawn, outside, wrong);
     return (wrong == 0U) ? 0 : 1;
 }

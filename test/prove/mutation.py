@@ -107,11 +107,11 @@ def bench(name: str, flags: list[str]) -> Bench:
     stop.write_text("#include <stdlib.h>\nvoid __wrap_longjmp(void *to, int value) { (void)to; (void)value; abort(); }\n")
     shared = [stop, unity / "src" / "unity.c", coverage.UNIT / "unity_output.c", gate.ROOT / "port" / "host" / "board.c"]
     wanted = [(test, None) for test in sorted(coverage.UNIT.glob("test_*.c"))]
-    wanted += [(gate.HERE / "coverage_model.c", model) for model in ("nqvm_folded", "fading")]
+    wanted += [(gate.HERE / "coverage_model.c", model) for model in ("nqvm_folded", "fading", "implicit")]
     for test, model in wanted:
-        told = [*eva.told(model), f"-DREFUSED={coverage.refused(model)}"] if model else []
+        told = coverage.told(model) if model else []
         needs = re.search(r"needs: (.*) \*/", test.read_text())
-        needed = [f"{model}.c", f"{model}_params.c"] if model else [Path(n).name for n in (needs[1].split() if needs else [])]
+        needed = [f"{model}.c", "nqvm_params.c"] if model else [Path(n).name for n in (needs[1].split() if needs else [])]
         out = place / (model or test.stem)
         runner = f"{out}_runner.c"
         gate.make(["ruby", unity / "auto" / "generate_test_runner.rb", test, runner])

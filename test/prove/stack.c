@@ -23,6 +23,9 @@ static MODEL(z_t) z;
 static MODEL(jacobian_t) jacobian;
 static pen_status_report_t report;
 static pen_set_head_t head;
+static MODEL(sensors_jacobian_t) sensors_jacobian;
+static uint8_t saved[MODEL_SIZE(SAVED)];
+static bool pending;
 static volatile pen_status_t status; /* of the last call, so that none is a jump */
 
 WAY(init) { status = MODEL(init)(&model, sets[0], &banks); }
@@ -39,13 +42,27 @@ WAY(tune_abort) { status = MODEL(tune_abort)(&model); }
 WAY(tune_select) { status = MODEL(tune_select)(&model, sets[0]); }
 WAY(tune_rollback) { status = MODEL(tune_rollback)(&model); }
 WAY(tune_hold) { status = MODEL(tune_hold)(&model, false); }
+WAY(sensors_jacobian) { status = MODEL(sensors_jacobian)(&model, &sensors_jacobian); }
+WAY(get_input) { status = MODEL(get_input)(&model, &u); }
+WAY(set_input) { status = MODEL(set_input)(&model, &u); }
+WAY(tune_begin_copy) { status = MODEL(tune_begin_copy)(&model, 3U); }
+WAY(tune_write_bytes) { status = MODEL(tune_write_bytes)(&model, 0U, (const uint8_t *)sets[0]->value, 4U * sets[0]->head.length); }
+WAY(tune_expect) { status = MODEL(tune_expect)(&model, sets[0]->head.checksum); }
+WAY(tune_withdraw) { status = MODEL(tune_withdraw)(&model); }
+WAY(tune_pending) { status = MODEL(tune_pending)(&model, &pending); }
+WAY(verify) { status = MODEL(verify)(&model, MODEL_SIZE(VERIFY)); }
+WAY(save) { status = MODEL(save)(&model, saved); }
+WAY(restore) { status = MODEL(restore)(&model, saved); }
 WAY(tune_running) { status = MODEL(tune_running)(&model, &head); }
 
 /* In an order in which none is refused; a step adopts what is published. */
 static void (*const call[])(void) = { call_init,       call_step,        call_step_jacobian, call_get_state,   call_set_state,
                                       call_sensors,    call_status,      call_tune_begin,    call_tune_write,  call_tune_commit,
                                       call_step,       call_tune_begin,  call_tune_abort,    call_tune_select, call_step,
-                                      call_tune_rollback, call_step,     call_tune_hold,     call_tune_running };
+                                      call_tune_rollback, call_step,     call_tune_hold,     call_tune_running,
+                                      call_sensors_jacobian, call_get_input, call_set_input, call_tune_begin_copy, call_tune_write_bytes,
+                                      call_tune_expect, call_tune_commit, call_tune_withdraw, call_step, call_tune_pending,
+                                      call_verify,     call_save,        call_restore,       call_verify };
 #define CALLS (sizeof(call) / sizeof(call[0]))
 
 int main(void)
@@ -59,7 +76,7 @@ int main(void)
         board_stack_paint();
         call[k]();
         used[k] = board_stack_used();
-        good = good && ((status & ~(PEN_ADOPTED | PEN_OUTSIDE)) == PEN_OK);
+        good = good && ((status & ~(PEN_ADOPTED | PEN_OUTSIDE | PEN_WITHDRAWN)) == PEN_OK);
     }
     good = good && (board_write(file, used, sizeof(used)) == sizeof(used));
     board_close(file);

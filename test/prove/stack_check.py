@@ -54,7 +54,7 @@ def main() -> int:
                 bounds = {call: programs.stack_bound(elf, call) for call in painted}
                 problems += [f"{model.name} {level} {call}: {used} B used, bound {bounds[call]} B" for call, used in painted.items() if used > bounds[call]]
                 problems += [] if min(painted.values()) > 0 else [f"{model.name} {level}: nothing painted"]
-                row[f"{model.name} {level}"] = {name: {"bound": bounds[f"call_{name}"], "painted": painted[f"call_{name}"]} for name in ("step", "step_jacobian", "tune_commit")}
+                row[f"{model.name} {level}"] = {name: {"bound": bounds[f"call_{name}"], "painted": painted[f"call_{name}"]} for name in ("step", "step_jacobian", "tune_commit", "verify", "save", "restore")}
         good &= gate.report(f"stack: {machine}: {len(set(CALLS))} entries of {len(models)} models: painted within the bound", problems)
         figures[machine] = row
     missed = [f"has a bound: {fault}" for fault, code in FAULTS.items() if not refused(fault, code)]

@@ -224,6 +224,12 @@ void serial(void)
         pen_serial_get_bytes(W(4U), (4U * sizeof(pen_real_t)) - n, n, &byte[PEN_SERIAL_HEAD - n]);
         seen = (pen_real_t)pen_crc_bytes(any, n, &byte[PEN_SERIAL_HEAD - n]);
     }
+    {
+        const uint32_t n = (uint32_t)any % (uint32_t)(sizeof x + 1U);
+        const uint8_t *const bytes = (const uint8_t *)y;
+        pen_serial_get_bytes(x, 0U, n, bytes);
+        pen_serial_put_bytes(x, 0U, n, (uint8_t *)t);
+    }
     seen = (pen_real_t)pen_crc_word(pen_crc_values(any, WIDE, x), any);
     seen = (pen_real_t)pen_status_times(&report, any);
 }
