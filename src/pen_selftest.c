@@ -73,12 +73,7 @@ static uint32_t fill(uint32_t number, size_t n, pen_real_t value[])
     return last;
 }
 
-/* In 1/256: where one rounding less in a function changes its result, in float or in double; and two more of tanh. */
-static const int16_t exp_argument[ARGUMENTS] = { -4865, -2019, 1831, 4169, -4528, -1319, 1377, 4362 };
-static const int16_t tanh_argument[ARGUMENTS] = { -141, 126, -300, 700, -132, 115, -180, 1000 };
-static const int16_t sigmoid_argument[ARGUMENTS] = { -3264, -1324, 101, 591, -2774, -1359, 252, 4000 };
-static const int16_t softplus_argument[ARGUMENTS] = { -2379, -395, 395, 411, -2571, -565, 257, 443 };
-
+/* from 1/256 */
 static pen_real_t scaled(int16_t argument)
 {
     return (pen_real_t)argument * (pen_real_t)0x1p-8F;
@@ -87,6 +82,11 @@ static pen_real_t scaled(int16_t argument)
 /* Hash over what functions, layers and a linear solve give. */
 static uint32_t answer(void)
 {
+    /* In 1/256: where one rounding less in a function changes its result, in float or in double; and two more of tanh. */
+    static const int16_t exp_argument[ARGUMENTS] = { -4865, -2019, 1831, 4169, -4528, -1319, 1377, 4362 };
+    static const int16_t tanh_argument[ARGUMENTS] = { -141, 126, -300, 700, -132, 115, -180, 1000 };
+    static const int16_t sigmoid_argument[ARGUMENTS] = { -3264, -1324, 101, 591, -2774, -1359, 252, 4000 };
+    static const int16_t softplus_argument[ARGUMENTS] = { -2379, -395, 395, 411, -2571, -565, 257, 443 };
     pen_real_t w[3U * WIDE];
     pen_real_t x[5];
     pen_real_t y[WIDE];

@@ -47,7 +47,9 @@ class Levels:
     @staticmethod
     def within(low: float, high: float, share: float) -> Levels:
         """The middle `share` of a range, a little less: a power of two as step, its multiples as levels."""
-        middle, span = (low + high) / 2.0, (high - low) * share
+        middle, span = low / 2.0 + high / 2.0, (high - low) * share
+        if not 1e-30 < span < math.inf:  # steps that no float holds
+            return Levels(float(np.float32(middle)), 0.0)
         step = 2.0 ** math.floor(math.log2(span / (2**_LEVEL_BITS + 1)))
         first = math.ceil(middle / step - 2 ** (_LEVEL_BITS - 1))
         if abs(first) + 2**_LEVEL_BITS >= 2**24:  # a range too far from zero for its width: floats are coarser

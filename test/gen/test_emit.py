@@ -314,7 +314,7 @@ def test_steps_come_in_the_order_in_which_they_are_needed(tmp_path):
 # -- all files or none, one version -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("failing", [0, 1, 2])
+@pytest.mark.parametrize("failing", [0, 1, 2, 3])
 @pytest.mark.parametrize("earlier", [True, False])
 def test_a_file_that_cannot_be_replaced_leaves_all_as_they_were(tmp_path, monkeypatch, failing, earlier):
     model = penode_gen.load(NQVM[0])
