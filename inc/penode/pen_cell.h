@@ -15,6 +15,10 @@
 #include "penode/pen_fold.h"
 #include "penode/pen_real.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PEN_CELL_OPEN 4U /* undecided neurons of a cell whose patterns are all gone through */
 
 /** A network with its values and work space. */
@@ -45,5 +49,9 @@ typedef struct {
  * Cost on a Cortex-M4F: 34 instructions a weight, and 17 for each combination.
  */
 void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *part);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -45,6 +45,10 @@
 #include "penode/pen_fold.h"
 #include "penode/pen_real.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PEN_PROMISE_INCREASING   0x1U  /* F' >= 0                    */
 #define PEN_PROMISE_DECREASING   0x2U  /* F' <= 0                    */
 #define PEN_PROMISE_DISSIPATIVE  0x4U  /* F(v) v >= -band |v|        */
@@ -81,5 +85,9 @@ typedef struct {
  */
 bool pen_promise_kept(const pen_promise_t *promise, const pen_chain_t *chain, const pen_real_t p[], bool clamp, size_t capacity,
                       const pen_piece_t piece[], pen_real_t work[], bool active[], pen_breach_t *breach);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

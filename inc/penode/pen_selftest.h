@@ -30,6 +30,10 @@
 
 #include "penode/pen_real.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* What is broken; 0: nothing. */
 #define PEN_SELFTEST_FLUSH      UINT32_C(0x01) /* subnormal results or operands become 0                             */
 #define PEN_SELFTEST_ROUNDING   UINT32_C(0x02) /* not rounded to nearest, ties to even                               */
@@ -82,5 +86,9 @@ static inline uint32_t pen_selftest_next(uint32_t number)
 {
     return (number * 1664525U) + 1013904223U;
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
