@@ -18,7 +18,7 @@ unexport PYTHONDONTWRITEBYTECODE # else every command translates all of its modu
 help: ## Show this text
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-setup: $(addprefix build/setup/,tools python unity cmock) ## Install what is missing; every other target that needs it calls it
+setup: $(addprefix build/setup/,tools python unity cmock packages) ## Install what is missing; every other target that needs it calls it
 
 run: setup ## The main job: recalibration while it runs, on the host and a Cortex-M4F; then a diagnosis; with pictures
 	$(Q)mkdir -p build/run
@@ -39,7 +39,7 @@ figures: setup ## Measure what our steps cost; rewrite the tables of README.md a
 	$(Q)$(PYTHON) test/bench/bench.py --ours
 	$(Q)$(PYTHON) test/prove/promises.py
 
-bench: setup ## The same with the steps of other tools (ten minutes, downloads them)
+bench: setup ## The same with the steps of other tools (ten minutes, downloads them; test/bench/checkouts.py)
 	$(Q)$(PYTHON) test/bench/bench.py
 	$(Q)$(PYTHON) test/prove/promises.py
 
@@ -51,15 +51,22 @@ campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings
 	    --command "PySINDy=build/rivals/bin/python test/diagnosis/rivals/sindy.py" \
 	    --command "neural=build/rivals/bin/python test/diagnosis/rivals/neural.py"
 
+dist: ## Packages for firmware, into build/dist: CMake, pkg-config, PlatformIO, Zephyr, CMSIS-Pack, one .c and one .h; no Python
+	$(Q)port/packages/dist.sh build/dist
+
+structure: setup ## Take over counts of long files, long functions, circular imports and thresholds that have fallen
+	$(Q)$(PYTHON) test/tools/structure.py --take-over
+
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test prove figures bench campaign campaign-diagnosis clean
+.PHONY: help setup run test prove figures bench campaign campaign-diagnosis dist structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools
 build/setup/unity build/setup/cmock build/setup/proof: build/setup/tools
 build/setup/rivals: test/diagnosis/rivals/requirements.txt build/setup/tools
+build/setup/packages: test/packages/requirements.txt build/setup/tools
 build/setup/%:
 	$(Q)test/setup.sh $*
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_fold.h"
 
 #include "penode/pen_net.h"
@@ -73,7 +75,7 @@ static void follow_pattern(const walk_t *walk, size_t first, size_t n, pen_real_
     }
 }
 
-static view_t look(const walk_t *walk, pen_real_t x, pen_real_t way, bool begin)
+static view_t view_from(const walk_t *walk, pen_real_t x, pen_real_t way, bool begin)
 {
     const size_t width = walk->chain->width;
     const pen_real_t *p = walk->p;
@@ -137,7 +139,7 @@ static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size
 
     while (more && (left > 0U) && (*looks > 0U)) {
         pen_piece_t *const here = down ? &piece[left - 1U] : &piece[capacity - left];
-        const view_t view = look(walk, x, side->way, begin);
+        const view_t view = view_from(walk, x, side->way, begin);
         const pen_real_t next = x + (side->way * view.ahead);
         const size_t kink = (pen_port_abs(next) < PEN_REAL_MAX) ? view.neuron : walk->chain->neurons;
         /* is the edge beyond the kink? */

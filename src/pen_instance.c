@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_instance.h"
 
 #include <stddef.h>
@@ -33,6 +35,9 @@ pen_status_t pen_ready(const pen_model_t *model, pen_instance_t *self, const pen
         self->guard.slot = 0U;
         self->guard.pieces[0] = pen_pieces_crc(model, piece);
         self->guard.pieces[1] = self->guard.pieces[0];
+        self->breach.network = 0U;
+        self->breach.kind = 0U;
+        self->breach.at = (pen_real_t)0;
         pen_status_clear(&self->log);
         self->ready = model->layout;
     }
@@ -154,21 +159,45 @@ static void layer_by_layer(uint32_t n, pen_piece_t piece[])
     }
 }
 
-pen_status_t pen_prepare(const pen_model_t *model, const pen_real_t value[], pen_real_t line[], bool active[], pen_piece_t piece[])
+pen_status_t pen_prepare(const pen_model_t *model, const pen_real_t value[], pen_real_t work[], bool active[], pen_piece_t piece[],
+                         pen_breach_t *breach)
 {
     pen_status_t status = PEN_OK;
 
     for (uint32_t i = 0U; i < model->networks; i++) {
         const pen_network_t *const network = &model->network[i];
-        pen_piece_t *const own = &piece[i * model->pieces];
-        const pen_status_t found = pen_fold(&network->chain, &value[network->at], model->clamp, line, active, model->pieces, own);
-        if ((found != PEN_OK) && model->layers) {
-            layer_by_layer(model->pieces, own);
-        } else {
-            status |= found;
+        const pen_real_t *const p = &value[network->at];
+        const pen_piece_t *folded = NULL;
+        if (model->pieces > 0U) {
+            pen_piece_t *const own = &piece[i * model->pieces];
+            const pen_status_t found = pen_fold(&network->chain, p, model->clamp, work, active, model->pieces, own);
+            if (found == PEN_OK) {
+                folded = own;
+            } else if (model->layers) {
+                layer_by_layer(model->pieces, own);
+            } else {
+                status |= found;
+            }
+        }
+        if ((network->promise != NULL) && !pen_promise_kept(network->promise, &network->chain, p, model->clamp, model->pieces,
+                                                            folded, work, active, breach)) {
+            breach->network = i;
+            status |= PEN_SET_PROMISE;
         }
     }
     return status;
+}
+
+pen_status_t pen_tune_breach(const pen_model_t *model, const pen_instance_t *self, pen_breach_t *breach)
+{
+    const bool good = pen_usable(model, self) && (breach != NULL);
+
+    if (good) {
+        breach->network = self->breach.network;
+        breach->kind = self->breach.kind;
+        breach->at = self->breach.at;
+    }
+    return good ? PEN_OK : PEN_SET_BADARG;
 }
 
 pen_status_t pen_instance_status(const pen_model_t *model, pen_instance_t *self, pen_status_report_t *report)

@@ -12,6 +12,8 @@
  *
  * The polynomials, their errors and the constants come from test/accuracy/coefficients.py.
  */
+#include "penode/pen_exact.h"
+
 #include "penode/pen_math.h"
 
 #include <stdint.h>

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_net.h"
 
 #include <stdbool.h>

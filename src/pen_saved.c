@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_saved.h"
 
 #include "penode/pen_serial.h"
@@ -101,6 +103,14 @@ static void get_set(const pen_model_t *model, const pen_tuning_t *tuning, pen_se
     set->value = value_at(model, tuning, get(byte, at));
 }
 
+/* The set of a slot; of one that is not read and not asked about any more, that of the other. */
+static const pen_set_t *slot_set(const pen_tuning_t *tuning, uint32_t slot)
+{
+    const bool idle = (tuning->pending == 0U) && (tuning->open == 0U);
+
+    return (idle && (slot == pen_tuning_inactive(tuning))) ? &tuning->slot[slot ^ 1U] : &tuning->slot[slot];
+}
+
 pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint32_t rows, const pen_real_t row[],
                       uint32_t inputs, const pen_real_t u[], uint8_t byte[], size_t size)
 {
@@ -108,7 +118,8 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
 
     if (pen_usable(model, self) && (byte != NULL) && (size >= size_of(model, rows, inputs))) {
         const pen_tuning_t *const tuning = &self->tuning;
-        const pen_set_t *const set[SETS] = { &tuning->initial, &tuning->slot[0], &tuning->slot[1], &tuning->previous, &tuning->replaced };
+        const pen_set_t *const set[SETS] = { &tuning->initial, slot_set(tuning, 0U), slot_set(tuning, 1U), &tuning->previous,
+                                             pen_tuning_fallback(tuning) };
         const uint32_t word[WORDS] = { self->running, self->scrub, tuning->active, tuning->pending, tuning->hold,
                                        tuning->published, tuning->settled, tuning->open, tuning->fill };
         const bool banks = (tuning->bank[0] != NULL);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_set.h"
 
 #include "penode/pen_math.h"
@@ -9,8 +11,9 @@
 
 #define YES      1U
 #define NO       0U
-#define ADOPT    0x5a3c9600U /* pending = ADOPT + slot: no single bit that flips makes a command of nothing */
+#define ADOPT    0x5a3c9600U /* commands to the step, with the slot: no bit that flips makes one of nothing or of another */
 #define WITHDRAW 0xa5c36900U
+#define APART    0x00ff00ffU
 #define SIZE     ((uint32_t)sizeof(pen_real_t))
 
 uint32_t pen_set_checksum(const pen_real_t value[], uint32_t n)
@@ -40,6 +43,11 @@ bool pen_set_same(const pen_set_t *a, const pen_set_t *b)
     return (differences == 0U) && (a->value == b->value);
 }
 
+static uint32_t command(uint32_t what, uint32_t slot)
+{
+    return what ^ (slot * APART);
+}
+
 uint32_t pen_tuning_inactive(const pen_tuning_t *tuning)
 {
     return (pen_port_load(&tuning->active) & 1U) ^ 1U;
@@ -57,13 +65,20 @@ bool pen_tuning_settle(pen_tuning_t *tuning)
     pen_port_barrier(); /* if so, the step's view of `active` is ours */
     if (done && (tuning->published != 0U)) {
         const uint32_t active = pen_port_load(&tuning->active) & 1U;
-        if (active != ((tuning->published - 1U) & 1U)) {
-            pen_set_copy(&tuning->previous, &tuning->replaced); /* withdrawn */
+        if (tuning->published == command(ADOPT, active ^ 1U)) {
+            pen_set_copy(&tuning->previous, &tuning->replaced); /* it was withdrawn, or the command lost in memory */
         }
         tuning->settled = active;
         tuning->published = 0U;
     }
     return done;
+}
+
+const pen_set_t *pen_tuning_fallback(const pen_tuning_t *tuning)
+{
+    const bool not_adopted = (tuning->published == command(ADOPT, pen_tuning_inactive(tuning)));
+
+    return not_adopted ? &tuning->replaced : &tuning->previous;
 }
 
 void pen_tuning_publish(pen_tuning_t *tuning, const pen_set_t *ready)
@@ -75,20 +90,22 @@ void pen_tuning_publish(pen_tuning_t *tuning, const pen_set_t *ready)
     pen_set_copy(&tuning->replaced, &tuning->previous);
     pen_set_copy(&tuning->previous, &tuning->slot[slot ^ 1U]);
     tuning->open = NO;
-    tuning->published = 1U + slot;
+    tuning->published = command(ADOPT, slot);
     pen_port_barrier();
-    pen_port_store(&tuning->pending, ADOPT + slot);
+    pen_port_store(&tuning->pending, tuning->published);
 }
 
 pen_status_t pen_tuning_withdraw(pen_tuning_t *tuning)
 {
-    const uint32_t slot = (tuning->published - 1U) & 1U;
+    const uint32_t slot = (tuning->published == command(ADOPT, 1U)) ? 1U : 0U;
     pen_status_t status = PEN_OK;
 
     if (pen_tuning_settle(tuning)) {
         status = PEN_SET_IDLE;
+    } else if (pen_port_load(&tuning->pending) == command(ADOPT, slot)) {
+        pen_port_store(&tuning->pending, command(WITHDRAW, slot)); /* too late if the step has just adopted it: it will see so */
     } else {
-        pen_port_store(&tuning->pending, WITHDRAW + slot); /* too late if the step has just adopted it: it will see so */
+        /* asked already, or answered by now */
     }
     return status;
 }
@@ -195,14 +212,15 @@ pen_status_t pen_tuning_begin(pen_tuning_t *tuning, uint32_t layout, uint32_t le
 
 pen_status_t pen_tuning_begin_copy(pen_tuning_t *tuning, uint32_t layout, uint32_t length, uint32_t id)
 {
-    const pen_set_t *const running = &tuning->slot[pen_tuning_inactive(tuning) ^ 1U];
-    pen_set_head_t head = { layout, length, id, 0U };
-    pen_status_t status;
+    pen_status_t status = PEN_SET_BUSY;
 
-    head.checksum = running->head.checksum;
-    status = pen_tuning_begin(tuning, layout, length, &head);
-    if (status == PEN_OK) {
-        status = pen_tuning_write(tuning, length, 0U, running->value, length);
+    if (pen_tuning_settle(tuning)) { /* from here on it is certain which slot runs */
+        const pen_set_t *const running = &tuning->slot[pen_tuning_inactive(tuning) ^ 1U];
+        const pen_set_head_t head = { layout, length, id, running->head.checksum };
+        status = pen_tuning_begin(tuning, layout, length, &head);
+        if (status == PEN_OK) {
+            status = pen_tuning_write(tuning, length, 0U, running->value, length);
+        }
     }
     return status;
 }
@@ -347,11 +365,11 @@ pen_status_t pen_tuning_adopt(pen_tuning_t *tuning, uint32_t *slot)
     if (pending != 0U) {
         const uint32_t other = active ^ 1U;
         pen_port_barrier(); /* what was published is now seen whole ...                           */
-        if (pending == (ADOPT + other)) {
+        if (pending == command(ADOPT, other)) {
             active = other;
             pen_port_store(&tuning->active, active);
             status |= PEN_ADOPTED;
-        } else if (pending == (WITHDRAW + other)) {
+        } else if (pending == command(WITHDRAW, other)) {
             status |= PEN_WITHDRAWN;
         } else {
             /* a withdrawal that came too late, or damage */

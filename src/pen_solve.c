@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_solve.h"
 
 #include <stdint.h>
@@ -45,7 +47,7 @@ static void eliminate(size_t n, pen_real_t a[], pen_real_t b[], size_t k, pen_re
 }
 
 /*
- * `doubt` gathers v - v of every pivot and every x: it stays 0, or becomes NaN for good if a v is NaN or Inf. That is
+ * `nonfinite` gathers v - v of every pivot and every x: it stays 0, or becomes NaN for good if a v is NaN or Inf. That is
  * enough: a pivot of 0 has an infinite reciprocal, which makes its x Inf or NaN; a NaN or Inf elsewhere in `a` spreads
  * to a pivot or to an x, because 0 * Inf and 0 * NaN are NaN. A pivot of Inf alone would pass as x = 0.
  */
@@ -55,7 +57,7 @@ pen_status_t pen_solve(size_t n, pen_real_t a[], pen_real_t b[])
 
     if ((n >= 1U) && (n <= PEN_SOLVE_MAX) && (a != NULL) && (b != NULL)) {
         pen_real_t inverse[PEN_SOLVE_MAX];
-        pen_real_t doubt = ZERO;
+        pen_real_t nonfinite = ZERO;
 
         for (size_t k = 0U; k < n; k++) {
             const size_t row = pivot_row(n, a, k);
@@ -64,7 +66,7 @@ pen_status_t pen_solve(size_t n, pen_real_t a[], pen_real_t b[])
             }
             exchange(&b[k], &b[row]);
             inverse[k] = ONE / a[(k * n) + k];
-            doubt += a[(k * n) + k] - a[(k * n) + k];
+            nonfinite += a[(k * n) + k] - a[(k * n) + k];
             eliminate(n, a, b, k, inverse[k]);
         }
         for (size_t k = n; k > 0U; k--) {
@@ -73,9 +75,9 @@ pen_status_t pen_solve(size_t n, pen_real_t a[], pen_real_t b[])
                 sum -= a[((k - 1U) * n) + j] * b[j];
             }
             b[k - 1U] = sum * inverse[k - 1U];
-            doubt += b[k - 1U] - b[k - 1U];
+            nonfinite += b[k - 1U] - b[k - 1U];
         }
-        status = (doubt < ONE) ? PEN_OK : PEN_SINGULAR; /* NaN is not < 1 */
+        status = (nonfinite < ONE) ? PEN_OK : PEN_SINGULAR; /* NaN is not < 1 */
     }
     return status;
 }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
+#include "penode/pen_exact.h"
+
 #include "penode/pen_status.h"
 
 #include <stddef.h>
@@ -26,11 +28,14 @@ void pen_status_clear(pen_status_log_t *log)
 }
 
 /* The counters of `flags` flags from the one at `first` on. */
-static inline void note(volatile uint32_t first[], uint32_t flags, pen_status_t status)
+PEN_PORT_INLINE void note(volatile uint32_t first[], uint32_t flags, pen_status_t status)
 {
+    pen_status_t left = status;
+
     PEN_PORT_UNROLL
     for (uint32_t i = 0U; i < flags; i++) {
-        pen_port_store(&first[i], pen_port_load(&first[i]) + ((status >> i) & 1U));
+        pen_port_store(&first[i], pen_port_load(&first[i]) + (left & 1U));
+        left >>= 1U;
     }
 }
 

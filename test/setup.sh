@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 #
-# setup.sh tools|python|unity|cmock|proof|rivals: one part of the set-up each; the Makefile calls it, once. All goes into build/
+# setup.sh tools|python|unity|cmock|packages|proof|rivals: one part of the set-up each; the Makefile calls it, once. All goes into build/
 # but the Debian packages of `tools` and `proof`. Quiet where there is nothing to do; one line that names the remedy where it cannot.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -39,8 +39,14 @@ missing_packages()
     [ "$(arm-none-eabi-gcc -print-file-name=libc.a 2>/dev/null || true)" != libc.a ] &&
         command -v arm-none-eabi-gcc >/dev/null || echo libnewlib-arm-none-eabi
     command -v qemu-system-arm >/dev/null || echo qemu-system-arm
+    command -v qemu-riscv32 >/dev/null && command -v qemu-s390x >/dev/null || echo qemu-user
+    command -v riscv64-unknown-elf-gcc >/dev/null || echo gcc-riscv64-unknown-elf
+    command -v s390x-linux-gnu-gcc >/dev/null || echo gcc-s390x-linux-gnu
+    command -v g++ >/dev/null || echo g++
     command -v ruby >/dev/null || echo ruby
     command -v git >/dev/null || echo git
+    command -v cmake >/dev/null || echo cmake
+    command -v pkg-config >/dev/null || echo pkgconf
     command -v clang-19 >/dev/null || echo clang-19
     ls /usr/lib/llvm-19/lib/clang/19/lib/linux/libclang_rt.asan* >/dev/null 2>&1 || echo libclang-rt-19-dev
     python3 -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv
@@ -93,6 +99,15 @@ python()
     { build/venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt &&
         build/venv/bin/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .; } \
         >build/setup/python.log 2>&1 || give_up "pip failed, see build/setup/python.log; is the package index reachable?"
+}
+
+packages() # what reads manifests of packages, in a place of its own
+{
+    echo "setup: PlatformIO's and Zephyr's readers of manifests into build/packages"
+    rm -rf build/packages
+    python3 -m venv build/packages
+    build/packages/bin/python -m pip install --quiet --disable-pip-version-check -r test/packages/requirements.txt \
+        >build/setup/packages.log 2>&1 || give_up "pip failed, see build/setup/packages.log; is the package index reachable?"
 }
 
 rivals() # of the diagnosis, for `make campaign` only

@@ -5,12 +5,12 @@
 
 # Each takes one core there; the longest begin, so that none runs on alone.
 SUITES   := python-sil hidden-fixed hidden-fresh figures-check python-gen unit warnings misra accuracy python-tools \
-            python-diagnosis symbols board gen-check cmock
+            python-diagnosis symbols builds board gen-check cmock
 PYTHONS  := $(filter python-%,$(SUITES))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
 RUNTIME  := $(wildcard src/*.c)
 MODEL    := $(wildcard gen/nqvm/c/*.c)
-MODELS   := $(patsubst gen/nqvm/c/%.h,%,$(wildcard gen/nqvm/c/*.h))
+MODELS   := $(filter-out %_sets,$(patsubst gen/nqvm/c/%.h,%,$(wildcard gen/nqvm/c/*.h)))
 LIBRARY  := $(RUNTIME) $(MODEL)
 INCLUDE  := -Igen/nqvm/c
 
@@ -62,7 +62,19 @@ warnings-everything: | $(READY)
 ALLOWED.mps2-an385 := __aeabi_(f[a-z0-9]*|u?i2f)
 LEVELS := -O2 -Os -O3
 
-symbols: $(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),symbols-$c$l)) ## Library and model must need nothing from outside
+# Cores that no port has. Most call memcpy for a copied struct sooner than a Cortex-M; clang needs no more than itself.
+SOFT_FLOAT  := __aeabi_(f[a-z0-9]*|u?i2f|u?i?divmod|u?idiv)|__(add|sub|mul|div|eq|ne|lt|le|gt|ge|unord)sf[23]|__float(un)?sisf|__fix(uns)?sfsi
+CORES       := rv32 rv32-clang rv64 m0 m0plus-clang mips ppc s390x
+CC.rv32     := riscv64-unknown-elf-gcc -march=rv32imac -mabi=ilp32
+CC.rv32-clang   := clang-19 --target=riscv32-none-elf -march=rv32imc -mabi=ilp32
+CC.rv64     := riscv64-unknown-elf-gcc
+CC.m0       := arm-none-eabi-gcc -mcpu=cortex-m0 -mthumb
+CC.m0plus-clang := clang-19 --target=thumbv6m-none-eabi -mcpu=cortex-m0plus
+CC.mips     := clang-19 --target=mips-none-elf
+CC.ppc      := clang-19 --target=ppc32-none-elf
+CC.s390x    := s390x-linux-gnu-gcc -fexcess-precision=fast
+
+symbols: $(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),symbols-$c$l)) $(foreach c,$(CORES),$(foreach l,-O2 -Os,symbols-$c$l)) ## Library and model must need nothing from outside
 
 # (1) compiler, (2) optimisation; the port for bare metal keeps gcc from calling memcpy, here it may try
 define symbols
@@ -72,6 +84,8 @@ symbols-$(1)$(2): | $(READY)
 	    $(if $(filter $(1),$(MACHINES)),-ftree-loop-distribute-patterns) $(INCLUDE) $(LIBRARY)
 endef
 $(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),$(eval $(call symbols,$c,$l))))
+$(foreach c,$(CORES),$(eval ALLOWED.$c := $(SOFT_FLOAT))$(eval CC.$c += -ffreestanding -Iinc -Iport/gnu -Wall -Wextra -Werror))
+$(foreach c,$(CORES),$(foreach l,-O2 -Os,$(eval $(call symbols,$c,$l))))
 
 # -- MISRA C:2012, as far as cppcheck's addon goes --------------------------------------------------------------------
 
@@ -85,7 +99,7 @@ build/misra/%.c: gen/nqvm/c/%.h $(HEADERS) test/misra/every_entry
 	@mkdir -p $(@D)
 	$(Q)test/misra/every_entry $(filter %.h,$^) >$@
 
-sources_of = build/misra/$(1).c $(RUNTIME) gen/nqvm/c/$(1).c gen/nqvm/c/$(1)_params.c $(PROGRAM.$(1))
+sources_of = build/misra/$(1).c $(RUNTIME) gen/nqvm/c/$(1).c $(filter-out %_selftest.c,$(wildcard gen/nqvm/c/*_params.c)) gen/nqvm/c/$(1)_selftest.c $(PROGRAM.$(1))
 misra-plain-%: build/misra/%.c | $(READY)
 	@test/check "misra $*" test/misra/check clean $(call sources_of,$*)
 misra-gnuc-%: build/misra/%.c | $(READY) # the branches that only GCC and clang see
@@ -117,12 +131,13 @@ $(foreach m,$(MACHINES),$(eval RUN.$m := port/cortex-m/run $m))
 $(foreach m,$(MACHINES),$(eval LIBS.$m := -lc)) # Unity's setjmp
 $(foreach m,$(FPUS),$(foreach k,CC RUN LIBS,$(eval $k.small-$m := $($k.$m)))$(eval LEVEL.small-$m := -Os))
 
+KERNELS := test_pen_net test_pen_net16
 UNITS   := $(patsubst test/unit/%.c,%,$(wildcard test/unit/test_*.c))
 needs    = $(shell sed -n 's|.*needs: \(.*\) \*/.*|\1|p' test/unit/$(1).c)
 objects  = $(patsubst %.c,build/unit/$(1)/%.o,$(2))
 UNIT_CFLAGS := -std=c99 -g -Wall -Wextra $(INCLUDE) -Itest/unit -Ibuild/unity/src -include unity_config.h
 
-unit: $(foreach v,$(VARIANTS),$(UNITS:%=unit-$v-%)) $(FPUS:%=unit-small-%-test_pen_net) ## The C unit tests, on this machine and on the emulated ones
+unit: $(foreach v,$(VARIANTS),$(UNITS:%=unit-$v-%)) $(foreach t,$(KERNELS),$(FPUS:%=unit-small-%-$t)) ## The C unit tests, on this machine and on the emulated ones
 
 build/unit/runner/%.c: test/unit/%.c build/setup/unity
 	@mkdir -p $(@D)
@@ -147,7 +162,7 @@ endef
 
 $(foreach v,$(VARIANTS) $(FPUS:%=small-%),$(eval $(call objects_of_variant,$v)))
 $(foreach v,$(VARIANTS),$(foreach t,$(UNITS),$(eval $(call unit,$v,$t))))
-$(foreach m,$(FPUS),$(eval $(call unit,small-$m,test_pen_net)))
+$(foreach m,$(FPUS),$(foreach t,$(KERNELS),$(eval $(call unit,small-$m,$t))))
 -include $(shell find build/unit -name '*.d' 2>/dev/null)
 
 # -- the ports themselves ---------------------------------------------------------------------------------------------
@@ -200,3 +215,8 @@ hidden-fresh: | $(READY)
 
 figures-check: | $(READY) ## No figure may be 2 % worse than the kept one, or above what is promised
 	@test/check "figures" $(PYTHON) test/bench/bench.py --check
+
+# -- packages for firmware ------------------------------------------------------------------------------------------------
+
+include test/packages/packages.mk
+include test/builds/builds.mk

@@ -9,7 +9,7 @@ import jinja2
 import sympy as sp
 
 from . import expressions as ex
-from . import layout, sets, units
+from . import layout, promises, selftest, sets, units
 from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
 from .emit_networks import NetworkCode, by_value, hidden16, network_code, network_lines, second_lines, slope_lines
@@ -55,18 +55,17 @@ _METHOD_NAMES = {
 _FILES = {"model.h.j2": "{name}.h", "model.c.j2": "{name}.c", "sets.h.j2": "{owner}_sets.h", "params.c.j2": "{owner}_params.c"}
 
 
-def render(model: Model) -> dict[str, str]:
-    """File name -> text of the C of a model. Pure: no clock, no path beyond the model file's name."""
-    context = _Emitter(model).context()
-    texts = {}
-    for template, name in _FILES.items():
+def render(model: Model, self_test: bool = True) -> dict[str, str]:
+    """File name -> text of the C of a model, with or without its self-test. Pure: no clock, no path beyond the model file's name."""
+    context, texts = selftest.answered(_Emitter(model).context(), self_test), {}
+    for template, name in (_FILES | ({"selftest.c.j2": "{name}_selftest.c"} if self_test else {})).items():
         texts[name.format(name=model.name, owner=model.owner)] = fold(_TEMPLATES.get_template(template).render(context))
     return texts | {f"{model.owner}_layout.json": layout.to_json(model)}
 
 
-def generate(model: Model, directory: str | Path) -> list[Path]:
+def generate(model: Model, directory: str | Path, self_test: bool = True) -> list[Path]:
     """Write the C of a model into `directory`: all files, or none. Raises OSError."""
-    return write_all(render(model), directory)
+    return write_all(render(model, self_test), directory)
 
 
 class _Emitter:
@@ -121,12 +120,12 @@ class _Emitter:
             "slope_lines": {c.name: by_value(c, slope_lines(model, c)) for c in self.networks},
             "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),
             "set_length": set_length, "scrub": max(set_length if reads_set else 0, model.pieces if uses_f else 0), "offsets": self._offset_lines(),
-            "verify": set_length + (model.pieces * len(folded) if uses_f else 0), "saved": self._saved(set_length), "ranges": self._ranges(),
+            "verify": set_length + (model.pieces * len(folded) if uses_f else 0), "saved": self._saved(set_length), "ranges": self._ranges(), "trial_room": 1 << (model.guard.trial + 2).bit_length(), "bounds": [real(0.0 if o.trial_bound is None else o.trial_bound) for o in model.outputs],
             "owner": model.owner, "sets_digest": sets.digest(model)[:16], "map_lines": layout.map_lines(model),
             "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
             "uses_net16": any(hidden16(list(c.network.layers[i:])) for c in self.networks for i in range(len(c.network.layers))),
-            "folded": folded,
+            "folded": folded, "prepared": self._prepared(), "promised": any(port.promises for port in model.networks.values()),
             "uses_p": uses_p, "uses_f": uses_f, "reads_set": reads_set,
             "sample_time": real(model.sample_time), "real": real, "si": units.si,
             "columns": len(model.states) + (2 + self.curved + self.cubic) * len(model.inputs),
@@ -301,6 +300,17 @@ class _Emitter:
         return lines
 
     # -- guard ----------------------------------------------------------------------------------------------------
+
+    def _prepared(self) -> list[dict[str, Any]]:
+        """The networks that are folded, or of which something is promised, as initialisers of a pen_network_t want them."""
+        found = []
+        for code in self.networks:
+            for name in code.users:
+                port = self.model.networks[name]
+                promise = promises.initialiser(port, code.neurons) if port.promises else ""
+                if code.folded or promise:
+                    found.append({"name": name, "code": code.name, "layers": len(code.chain()), "width": code.width, "neurons": code.neurons, "promise": promise})
+        return found
 
     def _ranges(self) -> list[dict[str, Any]]:
         """The inputs that have a declared range, and its edges."""

@@ -26,7 +26,7 @@ class ModelError(Exception):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known), 0 if nothing is said."""
+    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known), 0 if none is stated."""
 
     name: str
     value: float
@@ -111,16 +111,33 @@ class Signal:
     unit: str
     noise: float = 0.0
     description: str = ""
+    trial_bound: float | None = None  # how far a new set may lead it from the running one in its trial, SI
+
+
+@dataclass(frozen=True)
+class Promises:
+    """What every set must keep of a network F of one input, in SI (inc/penode/pen_promise.h). None: not promised."""
+
+    increasing: bool = False
+    decreasing: bool = False
+    dissipative: float | None = None  # F(v) v >= -dissipative |v|
+    max_slope: float | None = None
+    max_force: float | None = None
+    zero_at_zero: bool = False
+
+    def __bool__(self) -> bool:
+        return self != Promises()
 
 
 @dataclass(frozen=True)
 class NetworkPort:
-    """What a network stands for: names and units of its inputs and of its output."""
+    """What a network stands for: names and units of its inputs and of its output, and what is promised of it."""
 
     name: str
     input_units: tuple[str, ...]
     output_unit: str
     description: str = ""
+    promises: Promises = Promises()
 
 
 @dataclass(frozen=True)

@@ -1,158 +1,35 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
 """Read and check a model file. Every problem is reported at once, with its line and a remedy."""
 
 from __future__ import annotations
 
 import difflib
-import hashlib
 import math
 import re
-import tomllib
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Iterable
 
-import numpy as np
-
 from . import expressions as ex
 from . import model as m
-from . import units
+from . import promises
 from .causalise import check
+from .fold import room
 from .laws import LAWS
-from .networks import Network, NetworkError, read_network
-from .fold import foldable, pieces, room
-from .sets import network_pieces
+from .read_networks import ROOM, UNKNOWN, NetworkTables
+from .read_places import one_line, show
+from .read_tables import C_PATTERN, MACROS, NAME, SECTIONS, same
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 _MODEL_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
-_C_WORDS = set(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false "
-    "self NULL linux unix size_t ptrdiff_t wchar_t "
-    "H GH SUBSTEPS N_X N_U N_Y N_Q N_W N_DRIVE N_KEPT N_COLUMNS AT_CHANGE AT_BEND AT_TWIST N_SENSORS".split()
-)
-_C_PATTERN = re.compile(r"u?int\w*_t|U?INT\w*_(MAX|MIN|C)|(SIZE|PTRDIFF|WCHAR|SIG_ATOMIC|WINT)_(MAX|MIN)")
-_RESERVED = {*ex.FUNCTIONS, "der", "where", m.GROUND}
-_PREFIXES = ("pen_", "PEN_", "slope_", "second_", "inputs_of_", "slopes_of_", "seconds_of_", "piece_of_", "der_", "network_")  # of names that the generated code makes
 # A model of that name would have a header or a type that others have already.
 _MODEL_WORDS = set(
     "assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdarg stdbool stddef stdint "
     "stdio stdlib string tgmath time wchar wctype size ptrdiff sample pen".split()
 )
-_COMMENT = re.compile(r"(?:(?!\*/|/\*)[^\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\\]){0,200}")
-_UNKNOWN = "?"  # stands for a unit that was missing: no second complaint where it is used
-
-_SECTIONS: dict[str, dict[str, type | tuple[type, ...]]] = {
-    "parameters": {"value": (int, float), "unit": str, "tolerance": (int, float), "tunable": bool, "description": str},
-    "inputs": {"unit": str, "min": (int, float), "max": (int, float), "noise": (int, float), "description": str},
-    "bodies": {"mass": str, "position": str, "velocity": str, "start_position": str, "start_velocity": str},
-    "states": {"unit": str, "start": (int, float), "description": str},
-    "variables": {"unit": str},
-    "networks": {"inputs": list, "output": str, "description": str},
-    "outputs": {"value": str, "unit": str, "description": str},
-    "sensors": {"value": str, "unit": str, "noise": (int, float), "description": str},
-}
-_REQUIRED = {
-    "parameters": ("value", "unit"),
-    "inputs": ("unit",),
-    "bodies": ("mass", "position", "velocity"),
-    "states": ("unit",),
-    "variables": ("unit",),
-    "networks": ("inputs", "output"),
-    "outputs": ("value", "unit"),
-    "sensors": ("value", "unit"),
-}
-_MACROS = (  # that each generated model defines, behind its name
-    "N_X N_U N_Y N_SENSORS N_LAST N_DRIVE N_COLUMNS N_KEPT N_Q N_W SAMPLE_TIME SUBSTEPS STEP IMPLICIT_STEP AT_FIRST AT_SECOND AT_THIRD "
-    "LAYOUT SET_LENGTH SCRUB VERIFY SAVED PIECES H SETS_H".split()
-)
-ROOM = 4096  # pieces of a folded network, at most
-_MODEL = {
+MODEL = {
     "extends": str, "name": str, "description": str, "sample_time": str, "method": str, "substeps": int, "input": str, "outside": str,
     "fade_width": (int, float), "pieces": int, "more_pieces": str, "out_of_range": str, "on_damage": str, "trial": int,
 }  # fmt: skip
-
-
-_TOKEN = re.compile(r'"""(?:\\.|[^\\])*?"""|\'\'\'.*?\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}\n]', re.DOTALL)
-_QUOTED = r'"[^"\n]*"|\'[^\'\n]*\''
-_HEADER = re.compile(rf"[ \t]*\[\[?((?:{_QUOTED}|[^\]\"'\n])+)\]")
-_KEY = re.compile(rf"[ \t]*((?:{_QUOTED}|[A-Za-z0-9_. \t-])+)=")
-_KEY_PART = re.compile(rf"{_QUOTED}|[A-Za-z0-9_-]+")
-
-
-class _Lines:
-    """Where in the file a key stands."""
-
-    def __init__(self, text: str):
-        self._at: dict[tuple[str, ...], int] = {}
-        table: tuple[str, ...] = ()
-        number, depth, starts = 1, 0, [(0, 1)]  # where statements may start: not within brackets or strings
-        for token in _TOKEN.finditer(text):
-            depth += (token[0] in "[{") - (token[0] in "]}")
-            number += token[0].count("\n")
-            if token[0] == "\n" and depth == 0:
-                starts.append((token.end(), number))
-        for at, line in starts:
-            if header := _HEADER.match(text, at):
-                table = self._parts(header[1])
-                self._at.setdefault(table, line)
-            elif key := _KEY.match(text, at):
-                path = table + self._parts(key[1])
-                for depth in range(len(table) + 1, len(path) + 1):
-                    self._at.setdefault(path[:depth], line)
-
-    @staticmethod
-    def _parts(key: str) -> tuple[str, ...]:
-        return tuple(part.strip("\"'") for part in _KEY_PART.findall(key))
-
-    def knows(self, path: tuple[str, ...]) -> bool:
-        """Does the file say anything under this path?"""
-        return path[:2] in self._at
-
-    def of(self, path: tuple[str, ...]) -> int:
-        """Line of the key or of the closest table around it."""
-        while path and path not in self._at:
-            path = path[:-1]
-        return self._at.get(path, 1)
-
-
-def _line(text: str) -> str:
-    """The text on one line, without anything that a terminal would act on."""
-    return "".join(c if c.isprintable() else " " for c in text)
-
-
-def _show(value: object) -> str:
-    """A value of the file, in messages."""
-    try:
-        text = repr(value)
-    except ValueError:  # an integer of thousands of digits
-        return "a huge number"
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _parse(path: Path, called: str = "") -> tuple[dict[str, Any], bytes, _Lines]:
-    """A model file as tables, bytes and places; `called` names who asked for it. Raises ModelError."""
-    try:
-        raw = path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise m.ModelError([_line(f"{called or path}{f': {path}' * bool(called)}: cannot be read ({reason}); give the path of a model file")]) from error
-    try:
-        text = raw.decode("utf-8").replace("\r\n", "\n")
-        return tomllib.loads(text), raw, _Lines(text)
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        raise m.ModelError([_line(f"{path}:{line}: is not UTF-8 text; save it as UTF-8, or give a TOML model file")]) from error
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError; so is an integer of thousands of digits
-        found = re.search(r" \(at line (\d+), column \d+\)", str(error))
-        toml = isinstance(error, tomllib.TOMLDecodeError)
-        what = str(error).replace(found[0], "") if found else str(error) if toml else "a number or a nesting beyond all measure"
-        line = found[1] if found else raw.count(b"\n") + (not raw.endswith(b"\n"))
-        raise m.ModelError([_line(f"{path}:{line}: is not valid TOML ({what}); mend the syntax there")]) from error
-
-
-def _merge(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
-    """`own` over `base`, section by section."""
-    return base | {k: base[k] | v if isinstance(v, dict) and isinstance(base.get(k), dict) else v for k, v in own.items()}
 
 
 class _All(frozenset):
@@ -162,138 +39,27 @@ class _All(frozenset):
         return True
 
 
-class _Reader:
+class _Reader(NetworkTables):
+    """Reads the whole model."""
+
     def __init__(self, path: Path):
-        self.path = path
-        self.problems: list[str] = []
-        self.files: dict[Path, Network | None] = {}
-        self.data, raw, lines = _parse(path)
-        self.digest = hashlib.sha256(raw)
-        self.places = [(path, lines)]
-        self.set_owner = ""  # the model that this one shares its sets with
-        self.unsure: set[str] = set()  # networks whose declaration is at fault
+        super().__init__(path)
         self.made: dict[str, tuple[str, ...]] = {}  # parameters made from quantities, and where
-        head = self.data.get("model")
-        if isinstance(head, dict) and isinstance(head.get("extends"), str):
-            base = path.parent / head["extends"]
-            place = f"{path}:{lines.of(('model', 'extends'))}: model.extends"
-            tables, raw, lines = _parse(base, place)
-            if isinstance(tables.get("model"), dict) and "extends" in tables["model"]:
-                raise m.ModelError([_line(f"{place}: {base} itself extends a file; extend that one")])
-            if not {"parameters", "networks", "sets"} & set(self.data) and isinstance(tables.get("model"), dict):
-                self.set_owner = str(tables["model"].get("name", ""))
-            self.data = _merge(tables, self.data)
-            self.digest.update(raw)
-            self.places.append((base, lines))
-
-    def place(self, where: tuple[str, ...]) -> tuple[Path, _Lines]:
-        """The file that says something about this key."""
-        return next(((p, la) for p, la in self.places if la.knows(where)), self.places[0])
-
-    def problem(self, where: Iterable[str], what: str, remedy: str) -> None:
-        where = tuple(where)
-        path, lines = self.place(where)
-        self.problems.append(_line(f"{path}:{lines.of(where)}: {'.'.join(where)}{': ' * bool(where)}{what}; {remedy}"))
-
-    # -- tables ---------------------------------------------------------------------------------------------------
-
-    def table(self, where: tuple[str, ...], allowed: dict[str, Any], data: Any, required: Iterable[str] = ()) -> dict[str, Any]:
-        """The keys of a table that are known and of the right type; everything else is a problem."""
-        if not isinstance(data, dict):
-            self.problem(where, "is not a table", "write it as { key = value, ... }")
-            return {}
-        good = {}
-        for key, value in data.items():
-            if key not in allowed:
-                near = difflib.get_close_matches(key, allowed, 1)
-                self.problem((*where, key), "unknown key", f"did you mean '{near[0]}'?" if near else f"known are {', '.join(allowed)}")
-            elif not isinstance(value, allowed[key]) or (isinstance(value, bool) and allowed[key] is not bool):
-                self.problem((*where, key), f"{_show(value)} has the wrong type", f"give {_type_name(allowed[key])}")
-            else:
-                good[key] = value
-                if key == "description" and not _COMMENT.fullmatch(value):
-                    self.problem((*where, key), "cannot be a comment in C", "use one line of up to 200 characters, without backslash, /* and */")
-        for key in required:
-            if key not in data:
-                self.problem(where, f"'{key}' is missing", f"add {key} = ...")
-        return good
-
-    def section(self, name: str) -> dict[str, dict[str, Any]]:
-        """All entries of a section such as [parameters]."""
-        entries = self.data.get(name, {})
-        if not isinstance(entries, dict):
-            self.problem((name,), "is not a table", f"write [{name}]")
-            return {}
-        found = {}
-        for key, value in entries.items():
-            self.name((name, key), key, _PREFIXES[:-1] if name == "networks" else _PREFIXES)
-            found[key] = self.table((name, key), _SECTIONS[name], value, _REQUIRED[name])
-        return found
-
-    def name(self, where: tuple[str, ...], name: str, prefixes: tuple[str, ...] = _PREFIXES) -> None:
-        """Report what cannot stand for a value in the generated C."""
-        if not _NAME.fullmatch(name) or name.endswith("_"):
-            self.problem(where, f"{_show(name)} cannot be a name", "use up to 40 letters, digits and _, with a letter in front and no _ at the end")
-        elif name in _C_WORDS or name in _RESERVED or _C_PATTERN.fullmatch(name) or name.startswith(prefixes):
-            self.problem(where, f"'{name}' has a meaning of its own in C or in model files", "choose another name")
-
-    def label(self, where: tuple[str, ...], name: str) -> None:
-        """Report what cannot be a part of a name."""
-        if not _NAME.fullmatch(name):
-            self.problem(where, f"{_show(name)} cannot be a name", "use up to 40 letters, digits and _, with a letter in front")
-
-    def unit(self, where: tuple[str, ...], text: Any) -> float:
-        """Factor to SI; 1 after reporting a problem, or where a unit is missing."""
-        if not isinstance(text, str):
-            return 1.0
-        try:
-            return units.factor(text)
-        except units.UnitError as error:
-            self.problem(where, str(error), "write it like 'N*s/m' or 'mm'")
-            return 1.0
-
-    def number(self, where: tuple[str, ...], value: int | float, scale: float = 1.0) -> float:
-        """A number in SI that a float can hold; NaN after reporting a problem."""
-        try:
-            found = float(value) * scale
-        except OverflowError:
-            found = math.inf
-        if not ex.in_range(found):
-            self.problem(where, f"{_show(value)} is no number that a float can hold", "give 0, or a size from 1.2e-38 to 3.4e38 in SI")
-            return math.nan
-        return found
-
-    def quantity(self, where: tuple[str, ...], text: str, unit: str) -> float:
-        """A text such as '1 ms' in SI, checked against the dimension of `unit`; NaN after reporting a problem."""
-        try:
-            value, given = units.quantity(text)
-        except units.UnitError as error:
-            self.problem(where, str(error), f"give a number with a unit, in {unit}")
-            return math.nan
-        if not _same(given, unit):
-            self.problem(where, f"{_show(text)} is not measured in {unit}", f"give a quantity in {unit}")
-        elif not ex.in_range(value):
-            self.problem(where, f"{_show(text)} is no number that a float can hold", "give 0, or a size from 1.2e-38 to 3.4e38 in SI")
-        else:
-            return value
-        return math.nan
-
-    # -- the parts of a model -------------------------------------------------------------------------------------
 
     def read(self) -> m.Model:
         if not self.data:
-            raise m.ModelError([_line(f"{self.path}:1: says nothing; write a model with [model], [inputs] and [outputs]")])
+            raise m.ModelError([one_line(f"{self.path}:1: says nothing; write a model with [model], [inputs] and [outputs]")])
         if not self.path.name.isprintable():
             self.problem((), "the file has a name that cannot stand in a comment", "rename it")
         for key in self.data:
-            if key not in (*_SECTIONS, "model", "elements", "equations", "sets"):
-                near = difflib.get_close_matches(key, [*_SECTIONS, "model", "elements", "equations", "sets"], 1)
+            if key not in (*SECTIONS, "model", "elements", "equations", "sets"):
+                near = difflib.get_close_matches(key, [*SECTIONS, "model", "elements", "equations", "sets"], 1)
                 self.problem((key,), "unknown section", f"did you mean [{near[0]}]?" if near else "remove it")
-        head = self.table(("model",), _MODEL, self.data.get("model", {}), ("name", "sample_time"))
+        head = self.table(("model",), MODEL, self.data.get("model", {}), ("name", "sample_time"))
         name = head.get("name", "model")
         if not _MODEL_NAME.fullmatch(name) or name.endswith("_"):
-            self.problem(("model", "name"), f"{_show(name)} cannot prefix C names", "use up to 40 lower-case letters, digits and _")
-        elif name in _MODEL_WORDS or name.startswith("pen_") or _C_PATTERN.fullmatch(f"{name}_t"):
+            self.problem(("model", "name"), f"{show(name)} cannot prefix C names", "use up to 40 lower-case letters, digits and _")
+        elif name in _MODEL_WORDS or name.startswith("pen_") or C_PATTERN.fullmatch(f"{name}_t"):
             self.problem(("model", "name"), f"'{name}' has a meaning of its own in C", "choose another name")
         sample_time = self.quantity(("model", "sample_time"), head.get("sample_time", "1 s"), "s")
         if sample_time < 1e-9 or sample_time > 86400.0:
@@ -311,7 +77,6 @@ class _Reader:
             self.problem(("model", "fade_width"), "is out of range", "give the fading distance in widths of the envelope, 1e-6 to 100")
         if head.setdefault("pieces", 0) != 0 and not 4 <= head["pieces"] <= ROOM:
             self.problem(("model", "pieces"), f"{head['pieces']} is out of range", f"give room for 4 to {ROOM} pieces, or 0 to evaluate layer by layer")
-
         if not 0 <= head.setdefault("trial", 0) <= 10000:
             self.problem(("model", "trial"), f"{head['trial']} is out of range", "give the samples that a new set is tried on, up to 10000, or 0 for none")
 
@@ -327,6 +92,7 @@ class _Reader:
         sensors = tuple(self.signals("sensors"))
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
         self.folds(head, sets)
+        promises.check(networks, sets, head["outside"], self.problem)
         self.unique(parameters, inputs, bodies, elements, states, variables, networks)
         moving = {*(s.name for s in states), *(b.position for b in bodies), *(b.velocity for b in bodies)}
         self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs))
@@ -354,13 +120,8 @@ class _Reader:
             if tolerance < 0.0 or tolerance >= 1.0:
                 self.problem(where, f"tolerance {tolerance} is not a share", "give 0 to 1, such as 0.05 for 5 %")
             tunable = entry.get("tunable", "tunable" in self.stated("parameters", name))  # of a wrong type: meant to be
-            found[name] = m.Parameter(name, value, entry.get("unit", _UNKNOWN), tolerance, tunable, entry.get("description", ""))
+            found[name] = m.Parameter(name, value, entry.get("unit", UNKNOWN), tolerance, tunable, entry.get("description", ""))
         return found
-
-    def stated(self, section: str, name: str) -> dict[str, Any]:
-        """The entry as it stands in the file, known or not."""
-        entry = self.data[section][name]
-        return entry if isinstance(entry, dict) else {}
 
     def inputs(self) -> Iterable[m.Input]:
         for name, entry in self.section("inputs").items():
@@ -369,7 +130,7 @@ class _Reader:
             low, high = (None if entry.get(k) is None else self.number((*where, k), entry[k], scale) for k in ("min", "max"))
             if low is not None and high is not None and low >= high:
                 self.problem(where, "min is not below max", "exchange them")
-            yield m.Input(name, entry.get("unit", _UNKNOWN), low, high, self.noise(where, entry, scale), entry.get("description", ""))
+            yield m.Input(name, entry.get("unit", UNKNOWN), low, high, self.noise(where, entry, scale), entry.get("description", ""))
 
     def noise(self, where: tuple[str, ...], entry: dict[str, Any], scale: float) -> float:
         """The standard deviation of a measured signal, SI."""
@@ -397,21 +158,21 @@ class _Reader:
         for name, entry in self.section("states").items():
             scale = self.unit(("states", name), entry.get("unit"))
             start = self.number(("states", name, "start"), entry.get("start", 0.0), scale)
-            yield m.State(name, entry.get("unit", _UNKNOWN), start, entry.get("description", ""))
+            yield m.State(name, entry.get("unit", UNKNOWN), start, entry.get("description", ""))
 
     def variables(self) -> Iterable[m.Variable]:
         for name, entry in self.section("variables").items():
             self.unit(("variables", name), entry.get("unit"))
-            yield m.Variable(name, entry.get("unit", _UNKNOWN))
+            yield m.Variable(name, entry.get("unit", UNKNOWN))
 
     def argument(self, where: tuple[str, ...], key: str, text: str, unit: str, new: str, parameters: dict[str, m.Parameter]) -> str:
         """Name of the parameter that `text` names, or of a new one made from a quantity such as '35 N'."""
         where = (*where, key)
-        if _NAME.fullmatch(text):
+        if NAME.fullmatch(text):
             if text not in parameters:
                 near = difflib.get_close_matches(text, parameters, 1)
                 self.problem(where, f"'{text}' is no parameter", f"did you mean '{near[0]}'?" if near else f"add it to [parameters] or write a quantity in {unit}")
-            elif not _same(parameters[text].unit, unit):
+            elif not same(parameters[text].unit, unit):
                 self.problem(where, f"'{text}' is in {parameters[text].unit}, needed is {unit}", "use a parameter of that unit")
             return text
         value = self.quantity(where, text, unit)
@@ -421,28 +182,6 @@ class _Reader:
             parameters[new] = m.Parameter(new, value, unit, description=f"{key} of {where[1]}")
             self.made[new] = where
         return new
-
-    def networks(self) -> Iterable[tuple[str, m.NetworkPort]]:
-        for name, entry in self.section("networks").items():
-            where = ("networks", name)
-            inputs = entry.get("inputs", [])
-            if not inputs or not all(isinstance(u, str) for u in inputs):
-                if "inputs" in entry:
-                    self.problem((*where, "inputs"), "must list the unit of each input", 'write inputs = ["m"]')
-                self.unsure.add(name)
-                inputs = []
-            for unit in (*inputs, entry.get("output")):
-                if self.unit(where, unit) != 1.0:
-                    self.problem(where, f"a network in {unit}: networks take and give SI values", f"declare {units.si(unit)}, and scale in the network")
-            yield name, m.NetworkPort(name, tuple(inputs), entry.get("output", _UNKNOWN), entry.get("description", ""))
-
-    def entries(self, section: str) -> dict[str, Any]:
-        """What stands in a section whose entries have no common form."""
-        found = self.data.get(section, {})
-        if isinstance(found, dict):
-            return found
-        self.problem((section,), "is not a table", f"write [{section}]")
-        return {}
 
     def elements(
         self, parameters: dict[str, m.Parameter], inputs: tuple[m.Input, ...], bodies: tuple[m.Body, ...], networks: dict[str, m.NetworkPort]
@@ -485,14 +224,14 @@ class _Reader:
     def ends(self, where: tuple[str, ...], ends: list[Any], known: list[str], inputs: tuple[m.Input, ...]) -> tuple[str, str]:
         """The two ends of an element."""
         if len(ends) != 2 or not all(isinstance(e, str) for e in ends) or ends[0] == ends[1]:
-            self.problem(where, f"{_show(ends)} does not name two different ends", 'write between = ["body", "wheel"]')
+            self.problem(where, f"{show(ends)} does not name two different ends", 'write between = ["body", "wheel"]')
             return m.GROUND, m.GROUND
         for end in ends:
             if end not in known:
                 near = difflib.get_close_matches(end, known, 1)
-                self.problem(where, f"end {_show(end)} is no body, input or ground", f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}")
+                self.problem(where, f"end {show(end)} is no body, input or ground", f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}")
         for i in inputs:
-            if i.name in ends and not _same(i.unit, "m"):
+            if i.name in ends and not same(i.unit, "m"):
                 self.problem(where, f"input '{i.name}' is in {i.unit}, an end needs a position", "use an input in m")
         return ends[0], ends[1]
 
@@ -502,25 +241,25 @@ class _Reader:
         if network not in networks:
             if "network" in entry:
                 near = difflib.get_close_matches(network, networks, 1)
-                self.problem((*where, "network"), f"network {_show(network)} is not declared", f"did you mean '{near[0]}'?" if near else "add it to [networks]")
+                self.problem((*where, "network"), f"network {show(network)} is not declared", f"did you mean '{near[0]}'?" if near else "add it to [networks]")
             return m.Element(name, ends, "network")
         port = networks[network]
         kinds = {"deflection": "m", "rate": "m/s"}
         takes = () if network in self.unsure else port.input_units
         inputs = entry.get("inputs")
         if inputs is None:  # the units say which is meant
-            inputs = [next((k for k, u in kinds.items() if _same(u, unit)), "") for unit in takes]
+            inputs = [next((k for k, u in kinds.items() if same(u, unit)), "") for unit in takes]
             for unit in (unit for unit, kind in zip(takes, inputs) if not kind):
                 self.problem(where, f"network '{network}' takes {unit}, an element has a deflection in m and a rate in m/s", "mend the unit in [networks]")
         else:
             for kind, unit in zip(inputs, takes):
                 if kind not in list(kinds):
-                    self.problem((*where, "inputs"), f"{_show(kind)} is neither deflection nor rate", 'write inputs = ["deflection"]')
-                elif not _same(kinds[kind], unit):
+                    self.problem((*where, "inputs"), f"{show(kind)} is neither deflection nor rate", 'write inputs = ["deflection"]')
+                elif not same(kinds[kind], unit):
                     self.problem((*where, "inputs"), f"the network takes {unit}, but {kind} is in {kinds[kind]}", "mend the unit in [networks]")
             if takes and len(inputs) != len(takes):
                 self.problem((*where, "inputs"), f"{len(inputs)} inputs for a network of {len(takes)}", "give one for each")
-        if not _same(port.output_unit, "N"):
+        if not same(port.output_unit, "N"):
             self.problem(where, f"network '{network}' gives {port.output_unit}, an element needs a force", "declare its output in N")
         return m.Element(name, ends, "network", network=network, network_inputs=tuple(inputs))
 
@@ -536,103 +275,10 @@ class _Reader:
         for name, entry in self.section(section).items():
             scale = self.unit((section, name), entry.get("unit"))
             noise = self.noise((section, name), entry, scale)
-            yield m.Signal(name, entry.get("value", ""), entry.get("unit", _UNKNOWN), noise, entry.get("description", ""))
-
-    def folds(self, head: dict[str, Any], sets: dict[str, m.ParameterSet]) -> None:
-        """Check that there is something to fold, and room for it."""
-        where, given = ("model", "pieces"), room(min(head["pieces"], ROOM))
-        if given == 0 or not sets:
-            return
-        if head["outside"] == "fade":
-            self.problem(where, "a network that fades is not made of straight pieces", "choose outside = 'extrapolate' or 'clamp', or leave pieces out")
-        elif not any(foldable(net) for net in sets["default"].networks.values()) and len(sets["default"].networks) == len(self.data.get("networks", {})):
-            self.problem(where, "no network has one input and only ReLU activations", "leave pieces out")
-        elif head["more_pieces"] == "refuse":
-            for chosen in sets.values():
-                for name, net in chosen.networks.items():
-                    need = pieces(net, head["outside"] == "clamp") if foldable(net) else 0
-                    if need > given:
-                        remedy = f"give room for {need} or more, or choose more_pieces = 'layers'"
-                        self.problem(where, f"{name} of set '{chosen.name}' has {need} straight pieces", remedy)
-
-    def sets(self, parameters: dict[str, m.Parameter], networks: dict[str, m.NetworkPort], masses: set[str]) -> dict[str, m.ParameterSet]:
-        tunable = {p.name: p for p in parameters.values() if p.tunable}
-        entries = self.entries("sets")
-        required = networks if "default" in entries else ()
-        if networks and "default" not in entries and isinstance(self.data.get("sets", {}), dict):
-            self.problem(("sets",), "there is no set 'default'", "add [sets.default] with a file for each network")
-        allowed = {n: (str, dict) for n in networks} | dict.fromkeys(tunable, str)
-        sets: dict[str, m.ParameterSet] = {}
-        files: dict[str, Network | None] = dict.fromkeys(networks)  # of the set 'default', which the others build on
-        values = {p.name: p.value for p in tunable.values()}
-        upper: dict[str, str] = {}
-        for number, (name, entry) in enumerate(({"default": {}} | entries).items(), 1):
-            where = ("sets", name)
-            self.label(where, name)
-            if upper.setdefault(name.upper(), name) != name:
-                self.problem(where, f"differs from the set '{upper[name.upper()]}' by case only", "rename one")
-            own = self.table(where, allowed, entry, required if name == "default" else ())
-            own_files = {n: self.network(where, n, own[n], networks[n]) for n in networks if n in own}
-            own_values = {n: self.quantity((*where, n), own[n], p.unit) for n, p in tunable.items() if n in own}
-            for n in masses & set(own_values):
-                if own_values[n] <= 0.0:
-                    self.problem((*where, n), f"mass {_show(own[n])} is not above zero", "give a positive mass")
-            if name == "default":
-                files, values = files | own_files, values | own_values
-            sets[name] = m.ParameterSet(name, number, {n: net for n, net in (files | own_files).items() if net is not None}, values | own_values)
-            for n, net in own_files.items():
-                first = files[n]
-                if net is not None and first is not None and net.architecture != first.architecture:
-                    self.problem((*where, n), "has another architecture than in the set 'default'", "train the same layers: sets share one code")
-        return sets
-
-    def network(self, where: tuple[str, ...], name: str, entry: str | dict[str, Any], port: m.NetworkPort) -> Network | None:
-        """The network file of one port, with its trust envelope; None after reporting a problem."""
-        where = (*where, name)
-        if isinstance(entry, str):
-            entry = {"file": entry}
-        entry = self.table(where, {"file": str, "min": list, "max": list}, entry, ("file",))
-        if "file" not in entry:
-            return None
-        path = self.place(where)[0].parent / entry["file"]
-        if path not in self.files:
-            try:
-                self.files[path] = read_network(path)
-                self.digest.update(path.read_bytes())
-            except NetworkError as error:
-                self.problem(where, str(error), "see [sets]")
-                self.files[path] = None
-            except (OSError, ValueError) as error:
-                self.problem(where, f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})", "mend the path")
-                self.files[path] = None
-            for layer in self.files[path].layers if self.files[path] else ():  # weights may lie in files of their own
-                for numbers in (v for v in vars(layer).values() if isinstance(v, np.ndarray)):
-                    self.digest.update(numbers.tobytes())
-        network = self.files[path]
-        if network is None or port.name in self.unsure:
-            return None
-        if network.n_inputs != len(port.input_units) or network.n_outputs != 1:
-            self.problem(where, f"{path.name} has {network.n_inputs} input(s) and {network.n_outputs} output(s), declared are {len(port.input_units)} and 1", "mend [networks] or the file")
-            return None
-        remedy = "give min and max, one number for each input, or write them into the file"
-        for key in ("min", "max"):
-            if not all(isinstance(v, (int, float)) and not isinstance(v, bool) and ex.in_range(v) for v in entry.get(key, [])):
-                self.problem((*where, key), "is not a list of numbers that a float can hold", remedy)
-                return None
-        try:
-            network = replace(network, input_min=entry.get("min", network.input_min), input_max=entry.get("max", network.input_max))
-        except NetworkError as error:
-            self.problem(where, str(error), remedy)
-            return None
-        with np.errstate(over="ignore"):
-            envelope, *layers = [p.values.astype(np.float32) for p in network_pieces(network)]
-        if not all(np.isfinite(values).all() for values in (envelope, *layers)):
-            self.problem(where, f"{path.name} has a number that a float cannot hold", "train or export the network again")
-            return None
-        if not (envelope[: network.n_inputs] < envelope[network.n_inputs :]).all():
-            self.problem(where, "the trained range is narrower than a float can tell", remedy)
-            return None
-        return network
+            bound = self.number((section, name, "trial_bound"), entry["trial_bound"], scale) if "trial_bound" in entry else None
+            if bound is not None and not bound > 0.0:
+                self.problem((section, name, "trial_bound"), f"{bound} is no distance", "give how far a new set may lead from the running one, above 0")
+            yield m.Signal(name, entry.get("value", ""), entry.get("unit", UNKNOWN), noise, entry.get("description", ""), bound)
 
     def unique(self, parameters, inputs, bodies, elements, states, variables, networks) -> None:
         """No name may mean two things."""
@@ -678,7 +324,7 @@ class _Reader:
 
     def macros(self, parameters: dict[str, m.Parameter], networks: dict[str, m.NetworkPort], model: str) -> None:
         """Constants of the generated C are in capitals: names that differ in case only would meet."""
-        seen = {n: "" for n in _MACROS}
+        seen = {n: "" for n in MACROS}
         for n in (*parameters, *networks):
             changes = n in networks or parameters[n].tunable
             for name in (f"AT_{n}",) if changes else (n, f"{n}_INVERSE"):
@@ -695,20 +341,6 @@ def _law_states(elements: Iterable[m.Element]) -> Iterable[m.State]:
             yield m.State(e.state(name), state.unit, description=f"{name} of {e.name}")
 
 
-def _same(a: str, b: str) -> bool:
-    try:
-        return units.same_dimension(a, b)
-    except units.UnitError:
-        return True  # reported where it stands
-
-
-def _type_name(kind: Any) -> str:
-    names = {str: "a text", bool: "true or false", list: "a list", dict: "a table", int: "a whole number"}
-    if kind == (int, float):
-        return "a number"
-    return names.get(kind, "a text or a table")
-
-
 def load(path: str | Path) -> m.Model:
     """Read and check a model file with all network files it names. Raises ModelError with every problem found."""
     reader = _Reader(Path(path))
@@ -716,7 +348,7 @@ def load(path: str | Path) -> m.Model:
     try:
         problems = check(model)
     except RecursionError as error:
-        raise m.ModelError([_line(f"{path}: has equations that depend on each other in too long a chain; write a smaller model")]) from error
+        raise m.ModelError([one_line(f"{path}: has equations that depend on each other in too long a chain; write a smaller model")]) from error
     for where, what, remedy in problems:
         reader.problem(where, what, remedy)
     if reader.problems:

@@ -26,6 +26,10 @@
 #include "penode/pen_real.h"
 #include "penode/pen_status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /** One straight piece: y = offset + slope * (x - centre) from `start` on. 16 bytes (double: 32). */
 typedef struct {
     pen_real_t   start;  /* in the first piece, which has no start: the centre of all pieces */
@@ -94,5 +98,9 @@ static inline pen_real_t pen_fold_value(const pen_piece_t piece[], const pen_pie
     *status |= at->status;
     return at->offset + (at->slope * (x - piece[0].start));
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

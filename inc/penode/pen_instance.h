@@ -27,6 +27,7 @@
 #include <stdint.h>
 
 #include "penode/pen_fold.h"
+#include "penode/pen_promise.h"
 #include "penode/pen_real.h"
 #include "penode/pen_set.h"
 #include "penode/pen_status.h"
@@ -35,10 +36,11 @@
 extern "C" {
 #endif
 
-/** A network of the sets that is folded. */
+/** A network of the sets that is folded, or of which the model file promises something. */
 typedef struct {
-    pen_chain_t chain;
-    uint32_t    at; /* where its values begin in a set */
+    pen_chain_t          chain;
+    uint32_t             at;      /* where its values begin in a set */
+    const pen_promise_t *promise; /* NULL: none                      */
 } pen_network_t;
 
 /** What the runtime needs to know of a model. Constant, in flash. */
@@ -48,8 +50,8 @@ typedef struct {
     uint32_t             on_damage; /* one of PEN_DAMAGE_...                                            */
     bool                 clamp;     /* outside of the trust envelope: true: the value at its edge       */
     bool                 layers;    /* too many pieces: true: layer by layer; false: refuse             */
-    uint32_t             pieces;    /* room of a folded network                                         */
-    uint32_t             networks;  /* that are folded                                                  */
+    uint32_t             pieces;    /* room of a folded network; 0: none is folded                      */
+    uint32_t             networks;  /* of network[]; if one is folded, all of them are                  */
     const pen_network_t *network;   /* [networks]                                                       */
     uint32_t             sets;      /* of the model file                                                */
     const pen_set_t *const *set;    /* [sets]                                                           */
@@ -74,6 +76,7 @@ typedef struct {
     uint32_t         running; /* 1 after the first sample that went well, 3 after the second, ...  */
     pen_tuning_t     tuning;
     pen_guard_t      guard;
+    pen_breach_t     breach;  /* of the last set that broke a promise                              */
     pen_status_log_t log;
 } pen_instance_t;
 
@@ -107,14 +110,19 @@ pen_status_t pen_tune_publish(const pen_model_t *model, pen_instance_t *self, co
                               pen_status_t found);
 
 /**
- * Fold the networks of a set.
+ * Fold the networks of a set, and see that it keeps the promises of the model file (penode/pen_promise.h).
  * @param value  [model->length]
- * @param line   [4 * the widest layer] work space
+ * @param work   [8 * the widest layer] work space; [4 * the widest layer] where nothing is promised
  * @param active [most neurons of one network] work space
- * @param piece  [networks * pieces]
- * @return PEN_OK; PEN_SET_PIECES
+ * @param piece  [networks * pieces]; NULL if nothing is folded
+ * @param breach written if a promise is broken
+ * @return PEN_OK; or of PEN_SET_PIECES, PEN_SET_PROMISE
  */
-pen_status_t pen_prepare(const pen_model_t *model, const pen_real_t value[], pen_real_t line[], bool active[], pen_piece_t piece[]);
+pen_status_t pen_prepare(const pen_model_t *model, const pen_real_t value[], pen_real_t work[], bool active[], pen_piece_t piece[],
+                         pen_breach_t *breach);
+
+/** Which promise the last set broke that was refused for one, and where. Tuning context. @return PEN_OK; PEN_SET_BADARG */
+pen_status_t pen_tune_breach(const pen_model_t *model, const pen_instance_t *self, pen_breach_t *breach);
 
 /** Read and clear the counters. Any one context; counts nothing itself. @return PEN_OK; PEN_BADARG */
 pen_status_t pen_instance_status(const pen_model_t *model, pen_instance_t *self, pen_status_report_t *report);

@@ -30,6 +30,10 @@
 #include "penode/pen_port.h"
 #include "penode/pen_real.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 pen_real_t pen_exp(pen_real_t x);      /* e^x; +Inf above log(PEN_REAL_MAX), gradual underflow to 0 below            */
 pen_real_t pen_tanh(pen_real_t x);     /* odd: pen_tanh(-x) == -pen_tanh(x)                                          */
 pen_real_t pen_sigmoid(pen_real_t x);  /* 1 / (1 + e^-x)                                                             */
@@ -83,5 +87,9 @@ static inline pen_real_t pen_heaviside(pen_real_t x)
 {
     return pen_where(x > (pen_real_t)0, (pen_real_t)1, (pen_real_t)0) + ((pen_real_t)0 * x);
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

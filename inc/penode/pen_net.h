@@ -21,6 +21,10 @@
 #include "penode/pen_real.h"
 #include "penode/pen_status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* ---- dense layers: y = W x + b, and with _relu: y = W max(0, x) + b, the activation of the layer before ---- */
 
 /** Any shape. @param w [n_out * (n_in + 1)] as above; @param x [n_in]; @param y [n_out], may not overlap x */
@@ -111,5 +115,9 @@ pen_real_t pen_fade(size_t n, const pen_real_t range[], pen_real_t width, const 
 /** Derivatives of pen_clamp's y[i] and of pen_fade along x[i]: at an edge that of the inside, 0 where trust ends. */
 pen_real_t pen_clamp_slope(size_t n, const pen_real_t range[], const pen_real_t x[], size_t i);
 pen_real_t pen_fade_slope(size_t n, const pen_real_t range[], pen_real_t width, const pen_real_t x[], size_t i);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -15,12 +15,15 @@
  * PEN_PORT_UNROLL, which stands before a loop whose length is a small constant and may ask the compiler to
  * write it out where speed counts more than size.
  *
- * A port may define PEN_PORT_ROWS too, and with it what takes the place of the C in pen_rows_relu (penode/pen_net16.h):
+ * A port may define PEN_PORT_ROWS and PEN_PORT_NET16 too, and with them what takes the place of the C in pen_rows_relu
+ * and in pen_net16 (penode/pen_net16.h):
  *
- *   void pen_port_rows(size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[])
+ *   void       pen_port_rows(size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[])
+ *   pen_real_t pen_port_net16(size_t hidden, const pen_real_t w[], pen_real_t x)
  *
- * Sixteen rows of a layer, n_in >= 1; y may be x. It must give the bits of the C (for NaN any NaN), and its time may
- * depend on n_in alone; test/unit/test_pen_net.c compares the bits. port/gnu has one for size builds on a Cortex-M with FPU.
+ * The first: sixteen rows of a layer, n_in >= 1; y may be x. Both must give the bits of the C (for NaN any NaN), and
+ * their time may depend on n_in and hidden alone; test/unit/test_pen_net.c and test_pen_net16.c compare the bits.
+ * port/gnu has both for size builds on a Cortex-M with FPU, and the second for speed builds.
  *
  * Cost on a Cortex-M with FPU: load, store, abs one instruction each, barrier one (DMB).
  */

@@ -15,7 +15,7 @@
  *
  * Only the step writes `active`, and only it clears `pending`; only the tuning context fills the slot that is not active,
  * and only while nothing is pending. So the step never sees a half-written set, whichever of the two pre-empts the other,
- * also on two cores. One tuning context at a time. A refused call changes nothing that the step reads.
+ * also on two cores. A command that loses a bit in memory is dropped: the running set goes on. One tuning context at a time. A refused call changes nothing that the step reads.
  *
  * `layout` and `length` are those of the model, constants of the code: no bit that flips in RAM can move a write out of a
  * bank, or let a set of another shape pass.
@@ -57,7 +57,7 @@ typedef struct {
     volatile uint32_t active;        /* 0 or 1; written by the step only                                              */
     volatile uint32_t pending;       /* 0, or a command to the next step: adopt a slot, withdraw it                    */
     volatile uint32_t hold;          /* PEN_HELD: the step keeps the state                                            */
-    uint32_t          published;     /* 1 + slot last published, until it is known what became of it; else 0          */
+    uint32_t          published;     /* the command last published, until it is known what became of it; else 0       */
     uint32_t          settled;       /* what `active` was when that was last known                                    */
     pen_set_t         slot_check[2]; /* copy of slot[]: a damaged head or address is found before it is used          */
     pen_set_t         previous;      /* the rollback set; value is NULL if there is none                              */
@@ -146,6 +146,9 @@ bool pen_tuning_pending(const pen_tuning_t *tuning);
 
 /** Has the step answered? If so, take note of what became of the set published last. */
 bool pen_tuning_settle(pen_tuning_t *tuning);
+
+/** The rollback set as it is if the set published last is, or was, withdrawn; once that is adopted, as it is. */
+const pen_set_t *pen_tuning_fallback(const pen_tuning_t *tuning);
 
 /** Drop the open set. @return PEN_OK; PEN_SET_CLOSED */
 pen_status_t pen_tuning_abort(pen_tuning_t *tuning);

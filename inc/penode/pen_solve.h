@@ -14,6 +14,10 @@
 #include "penode/pen_real.h"
 #include "penode/pen_status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define PEN_SOLVE_MAX 16U /* largest n */
 
 /**
@@ -41,11 +45,15 @@ static inline pen_status_t pen_solve2(const pen_real_t a[4], pen_real_t b[2])
     const pen_real_t pivot = q[1] - (factor * p[1]);
     const pen_real_t x1 = (b[second] - (factor * b[first])) * ((pen_real_t)1 / pivot);
     const pen_real_t x0 = (b[first] - (p[1] * x1)) * inverse;
-    const pen_real_t doubt = ((p[0] - p[0]) + (pivot - pivot)) + ((x1 - x1) + (x0 - x0)); /* NaN if one is not finite */
+    const pen_real_t nonfinite = ((p[0] - p[0]) + (pivot - pivot)) + ((x1 - x1) + (x0 - x0)); /* NaN if one is not finite */
 
     b[0] = x0;
     b[1] = x1;
-    return (doubt < (pen_real_t)1) ? PEN_OK : PEN_SINGULAR;
+    return (nonfinite < (pen_real_t)1) ? PEN_OK : PEN_SINGULAR;
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

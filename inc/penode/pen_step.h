@@ -28,17 +28,31 @@ extern "C" {
 #define PEN_ROW_LAST 1U
 #define PEN_ROW_NOW  2U
 
+/* n is at least 1 in the next two. */
+
 static inline void pen_step_copy(size_t n, const pen_real_t from[], pen_real_t to[])
 {
+    size_t i = 0U;
+
     PEN_PORT_UNROLL
-    for (size_t i = 0U; i < n; i++) {
+    do {
         to[i] = from[i];
-    }
+        i++;
+    } while (i < n);
 }
 
-static inline pen_status_t pen_step_check(size_t n, const pen_real_t value[], pen_status_t flag)
+/** PEN_OK, or `flag` if a value is NaN or Inf: pen_finite, with the flag for its answer. */
+static inline pen_status_t pen_step_check(size_t n, const pen_real_t *value, pen_status_t flag)
 {
-    return pen_finite(n, value) ? PEN_OK : flag;
+    pen_real_t sum = (pen_real_t)0;
+    size_t i = 0U;
+
+    PEN_PORT_UNROLL
+    do {
+        sum += (pen_real_t)0 * value[i];
+        i++;
+    } while (i < n);
+    return (sum >= (pen_real_t)0) ? PEN_OK : flag;
 }
 
 /** 1 once there are more than `samples` good samples (0, 1 or 2), else 0: how much of a step, parabola or cubic there is. */
@@ -129,9 +143,18 @@ static inline pen_status_t pen_step_finish(pen_instance_t *self, size_t n_last, 
     const uint32_t whole = ((result & PEN_STATE_NONFINITE) == PEN_OK) ? 1U : 0U;
     const uint32_t received = ((result & refused) == PEN_OK) ? 1U : 0U;
 
-    pen_step_copy(n_last, &row[(good + whole) * n_last], &row[PEN_ROW_LAST * n_last]);
-    pen_step_copy(n_last, &row[PEN_ROW_LAST * n_last], &row[PEN_ROW_KEPT * n_last]);
-    pen_step_copy(n_kept, &u[received * n_kept], &u[0]);
+    const pen_real_t *const from = &row[(good + whole) * n_last];
+
+    PEN_PORT_UNROLL
+    for (size_t i = 0U; i < n_last; i++) {
+        const pen_real_t value = from[i];
+        row[(PEN_ROW_LAST * n_last) + i] = value;
+        row[(PEN_ROW_KEPT * n_last) + i] = value;
+    }
+    PEN_PORT_UNROLL
+    for (size_t i = 0U; i < n_kept; i++) {
+        u[i] = u[(received * n_kept) + i];
+    }
     if (past == 1U) {
         self->running |= good;
     } else {

@@ -6,7 +6,8 @@
  *
  * On a Cortex-M a load or store is one plain LDR or STR and the barrier one DMB: the library puts a barrier wherever
  * order matters. On a host they also acquire and release, which costs nothing on x86 and is what ThreadSanitizer
- * understands.
+ * understands. A core without instructions for exchanges (Armv6-M, RISC-V without A) loads and stores an aligned word in
+ * one piece all the same, but there clang makes a call into libatomic of the built-ins: a volatile access takes their place.
  */
 #ifndef PEN_PORT_TARGET_H
 #define PEN_PORT_TARGET_H
@@ -31,12 +32,20 @@
 
 PEN_PORT_INLINE uint32_t pen_port_load(const volatile uint32_t *word)
 {
+#if __GCC_ATOMIC_INT_LOCK_FREE == 2
     return __atomic_load_n(word, PEN_PORT_ACQUIRE);
+#else
+    return *word;
+#endif
 }
 
 PEN_PORT_INLINE void pen_port_store(volatile uint32_t *word, uint32_t value)
 {
+#if __GCC_ATOMIC_INT_LOCK_FREE == 2
     __atomic_store_n(word, value, PEN_PORT_RELEASE);
+#else
+    *word = value;
+#endif
 }
 
 PEN_PORT_INLINE void pen_port_barrier(void)
@@ -53,9 +62,15 @@ PEN_PORT_INLINE pen_real_t pen_port_abs(pen_real_t x)
 #endif
 }
 
-#if defined(__OPTIMIZE_SIZE__) && !defined(PEN_REAL_DOUBLE) && defined(__ARM_FP) && defined(__ARM_ARCH_PROFILE)
+/* Kernels for the FPU of a Cortex-M: for size on any; for speed not where the FPU has double precision: such a core, an
+ * M7 or M55, may load while it computes. An M7 with single precision looks like an M4 and is treated as one. */
+#if !defined(PEN_REAL_DOUBLE) && defined(__ARM_FP) && defined(__ARM_ARCH_PROFILE)
 #if (__ARM_ARCH_PROFILE == 'M') && ((__ARM_FP & 4) != 0)
+#if defined(__OPTIMIZE_SIZE__)
 #include "pen_port_rows.h"
+#elif defined(__OPTIMIZE__) && ((__ARM_FP & 8) == 0)
+#include "pen_port_net16.h"
+#endif
 #endif
 #endif
 

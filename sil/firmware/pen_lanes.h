@@ -252,7 +252,7 @@ LANES_INLINE lanes_t lanes_sign(lanes_t x)
 LANES_INLINE mask_t lanes_solve(size_t n, lanes_t a[], lanes_t b[])
 {
     lanes_t inverse[n]; /* n is a constant where this is inlined */
-    lanes_t doubt = {0};
+    lanes_t nonfinite = {0};
 
     for (size_t k = 0U; k < n; k++) {
         lanes_t largest = lanes_abs(a[(k * n) + k]);
@@ -275,7 +275,7 @@ LANES_INLINE mask_t lanes_solve(size_t n, lanes_t a[], lanes_t b[])
             b[i] = lanes_pick(here, kept, b[i]);
         }
         inverse[k] = ONE / a[(k * n) + k];
-        doubt += a[(k * n) + k] - a[(k * n) + k];
+        nonfinite += a[(k * n) + k] - a[(k * n) + k];
         for (size_t i = k + 1U; i < n; i++) {
             const lanes_t factor = a[(i * n) + k] * inverse[k];
             for (size_t j = k + 1U; j < n; j++) {
@@ -290,9 +290,9 @@ LANES_INLINE mask_t lanes_solve(size_t n, lanes_t a[], lanes_t b[])
             sum -= a[((k - 1U) * n) + j] * b[j];
         }
         b[k - 1U] = sum * inverse[k - 1U];
-        doubt += b[k - 1U] - b[k - 1U];
+        nonfinite += b[k - 1U] - b[k - 1U];
     }
-    return doubt < ONE;
+    return nonfinite < ONE;
 }
 
 /* ---- pen_net: dense layers. Weights are stored as pen_net.h says. ---- */

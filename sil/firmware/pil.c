@@ -120,7 +120,7 @@ static void put_words(const void *source, size_t bytes)
 /* Is the tape for this model? */
 static bool header_fits(void)
 {
-    const uint32_t expected[] = {
+    static const uint32_t expected[] = {
         TAPE_MAGIC,
         (uint32_t)sizeof(pen_real_t),
         (uint32_t)SAMPLE_X,

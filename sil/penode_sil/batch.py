@@ -32,7 +32,9 @@ Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
 # Not -ffast-math, which takes nothing for NaN. But gcc drops 0*x, by which lanes_max and its like pass NaN on: states, inputs and outputs
 # that are not finite are told by their bits all the same.
-QUICK = ("-ffp-contract=fast", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math", "-DLANES_FLUSH")
+QUICK = ("-ffp-contract=fast", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math", "-DLANES_FLUSH",
+         # the library refuses these options and prevents contraction; here its bits are not asked for
+         "-DPEN_EXACT_H", "-U__ASSOCIATIVE_MATH__", "-U__NO_SIGNED_ZEROS__")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 import penode_gen
 
 from .errors import UserError
+from .instance import Instance, Set
 from .schedule import Call
-from .status import BIT
 
 ROOT = Path(__file__).resolve().parents[2]
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
@@ -93,7 +93,7 @@ def generated(model: Any) -> Path:
     if not (folder / f"{model.name}.c").exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-            penode_gen.generate(model, Path(scratch) / "c")
+            penode_gen.generate(model, Path(scratch) / "c", self_test=False)
             _move(Path(scratch) / "c", folder)
     return folder
 
@@ -175,24 +175,6 @@ def build_library(
 # -- SiL --------------------------------------------------------------------------------------------------------------
 
 
-class Head(ctypes.Structure):
-    """pen_set_head_t"""
-
-    _fields_ = [(name, ctypes.c_uint32) for name in ("layout", "length", "id", "checksum")]
-
-
-class Report(ctypes.Structure):
-    """pen_status_report_t"""
-
-    _fields_ = [("flags", ctypes.c_uint32), ("times", ctypes.c_uint32 * len(BIT))]
-
-
-class Set(ctypes.Structure):
-    """pen_set_t"""
-
-    _fields_ = [("head", Head), ("value", ctypes.c_void_p)]
-
-
 class Sil:
     """A model's shared library; instance() gives as many independent copies as wanted."""
 
@@ -201,8 +183,8 @@ class Sil:
     ):
         self.model, self.dtype = model, dtype
         self._library = ctypes.CDLL(str(build_library(model, dtype, compiler, source)))
-        sizes = list((ctypes.c_uint32 * 7).in_dll(self._library, "sil_sizes"))
-        self.instance_size, self.banks_size = sizes[0], sizes[1]
+        sizes = list((ctypes.c_uint32 * 8).in_dll(self._library, "sil_sizes"))
+        self.instance_size, self.banks_size, self.saved_size = sizes[0], sizes[1], sizes[7]
         if sizes[2] != np.dtype(dtype).itemsize:
             raise AssertionError("the library was built for another real type")
         self.n_x, self.n_u, self.n_y, self.n_z = (size // sizes[2] for size in sizes[3:7])
@@ -212,6 +194,12 @@ class Sil:
         """A function of the generated interface, without the model's prefix."""
         function = getattr(self._library, name if name.startswith("sil_") else f"{self.model.name}_{name}")
         function.restype = result
+        return function
+
+    def runtime(self, name: str) -> Any:
+        """A function of the runtime, pen_..., that returns a status."""
+        function = getattr(self._library, name)
+        function.restype = ctypes.c_uint32
         return function
 
     def flash_set(self, name: str) -> Set:
@@ -233,101 +221,8 @@ class Sil:
         return self.instance(set_name).run(u, calls, progress)
 
 
-class SilInstance:
-    """One instance in memory of its own. Calls are those of the generated header; statuses are returned as they come.
-
-    `memory` and `banks` are the instance's bytes and its two staging areas, for tests that poke.
-    """
-
-    def __init__(self, sil: Sil, set_name: str, banks: bool):
-        self.sil, self.dtype = sil, sil.dtype
-        self.memory = np.zeros(sil.instance_size + 8, dtype=np.uint8)
-        shift = -self.memory.ctypes.data % 8
-        self.memory = self.memory[shift : shift + sil.instance_size]
-        self.banks = np.zeros((2, sil.set_length), dtype=self.dtype)
-        self._kept: list[Any] = []  # what the instance borrows
-        self._y = np.zeros(sil.n_y, dtype=self.dtype)
-        status = sil.function("init")(
-            self._self, ctypes.byref(sil.flash_set(set_name)), self._pointer(self.banks) if banks else None
-        )
-        if status:
-            raise AssertionError(f"init refused its own set: {status:#x}")
-
-    @property
-    def _self(self) -> ctypes.c_void_p:
-        return self._pointer(self.memory)
-
-    @staticmethod
-    def _pointer(array: NDArray[Any]) -> ctypes.c_void_p:
-        return ctypes.c_void_p(array.ctypes.data)
-
-    def _vector(self, values: Any) -> NDArray[Any]:
-        return np.ascontiguousarray(values, dtype=self.dtype)
-
-    def step(self, u: Any) -> tuple[NDArray[Any], NDArray[Any], int]:
-        """One step with u [n_u]: state, outputs (those before if it holds) and status."""
-        status = self.sil.function("step")(self._self, self._pointer(self._vector(u)), self._pointer(self._y))
-        return self.get_state(), self._y.copy(), status
-
-    def step_jacobian(self, u: Any, entries: int) -> tuple[NDArray[Any], NDArray[Any], int]:
-        """One step and its derivatives: outputs, the `entries` reals of the jacobian struct, status."""
-        jacobian = np.zeros(entries, dtype=self.dtype)
-        status = self.sil.function("step_jacobian")(
-            self._self, self._pointer(self._vector(u)), self._pointer(self._y), self._pointer(jacobian)
-        )
-        return self._y.copy(), jacobian, status
-
-    def get_state(self) -> NDArray[Any]:
-        x = np.zeros(self.sil.n_x, dtype=self.dtype)
-        if x.size:
-            self.sil.function("get_state")(self._self, self._pointer(x))
-        return x
-
-    def set_state(self, x: Any) -> int:
-        return self.sil.function("set_state")(self._self, self._pointer(self._vector(x)))
-
-    def sensors(self) -> NDArray[Any]:
-        z = np.zeros(self.sil.n_z, dtype=self.dtype)
-        self.sil.function("sensors")(self._self, self._pointer(z))
-        return z
-
-    def status(self) -> Report:
-        """Read and clear the sticky flags and their counts."""
-        report = Report()
-        self.sil.function("status")(self._self, ctypes.byref(report))
-        return report
-
-    def begin(self, head: Sequence[int]) -> int:
-        return self.sil.function("tune_begin")(self._self, ctypes.byref(Head(*head)))
-
-    def write(self, offset: int, values: Any) -> int:
-        values = self._vector(values)
-        return self.sil.function("tune_write")(
-            self._self, ctypes.c_uint32(offset), self._pointer(values), ctypes.c_uint32(values.size)
-        )
-
-    def commit(self) -> int:
-        return self.sil.function("tune_commit")(self._self)
-
-    def abort(self) -> int:
-        return self.sil.function("tune_abort")(self._self)
-
-    def rollback(self) -> int:
-        return self.sil.function("tune_rollback")(self._self)
-
-    def select(self, what: str | Set) -> int:
-        """Select a committed set by name, or one that the caller made (it is kept alive)."""
-        chosen = self.sil.flash_set(what) if isinstance(what, str) else what
-        self._kept.append(chosen)
-        return self.sil.function("tune_select")(self._self, ctypes.byref(chosen))
-
-    def hold(self, on: bool) -> int:
-        return self.sil.function("tune_hold")(self._self, ctypes.c_bool(on))
-
-    def running(self) -> Head:
-        head = Head()
-        self.sil.function("tune_running")(self._self, ctypes.byref(head))
-        return head
+class SilInstance(Instance):
+    """One instance, with scheduled calls and runs over many samples."""
 
     def call(self, call: Call) -> int:
         """Make one scheduled call."""

@@ -2,8 +2,10 @@
 # Copyright (c) 2026 the penode authors
 """`make bench`: what a step costs, ours and that of other tools, measured anew; writes bench.json and table.md.
 
-bench.py            measures everything (some minutes), writes both, and the blocks of README.md
+bench.py            measures everything (some minutes), writes both, and the blocks of README.md; see checkouts.py for
+                    peers that are in no registry
 bench.py --ours     the same, but keeps what was measured of others
+bench.py --checkouts  measures only the peers of checkouts.py
 bench.py --table    writes tables and blocks from bench.json
 bench.py --check    measures the steps in float on the Cortex-M4F, and RK4 on all cores; fails where a figure is more than
                     2 % worse than the kept one or above what is promised, or where README.md shows something else
@@ -12,7 +14,6 @@ bench.py --check    measures the steps in float on the Cortex-M4F, and RK4 on al
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
 import shutil
 import subprocess
@@ -27,22 +28,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 import batch
+import checkouts
 import cycles
 import peers
-import penode_gen
 import programs
 import report
 import worst_case
-from figures import CORES, README, ROOT, accuracy, hostile_inputs, run_text, same, with_block
+from figures import CORES, OURS, PRICES, README, ROOT, accuracy, hostile_inputs, run_text, same, with_block
 from programs import Program
 from reference import same_step
 
 HERE = Path(__file__).parent
 KEPT, TABLE = HERE / "bench.json", HERE / "table.md"
 
-# Rows of ours. Another model file of gen/nqvm or another method is another entry here.
-METHODS = {"RK4": "rk4", "Heun": "heun", "explicit Euler": "euler", "Rosenbrock 1": "ros1", "Rosenbrock 2": "ros2"}
-EVALUATORS = {"layered": "nqvm.toml", "folded": "nqvm_folded.toml"}
 REALS = {"float": (), "double": ("-DPEN_REAL_DOUBLE",)}
 DOUBLE_UNIT = {"m7": ("-mfpu=fpv5-d16",)}  # the M7 may have one, the M55 has it
 LEVELS = ("-O2", "-Os")
@@ -96,33 +94,22 @@ def measured(program: Program, u: NDArray, n_x: int = 4, weights_inside: int = 0
 # -- ours -------------------------------------------------------------------------------------------------------------
 
 
-def our_models() -> dict[tuple[str, str], penode_gen.Model]:
-    """The quarter vehicle by method and evaluator."""
-    bases = {
-        evaluator: penode_gen.load(programs.ROOT / "gen" / "nqvm" / name) for evaluator, name in EVALUATORS.items()
-    }
-    return {
-        (method, evaluator): dataclasses.replace(base, name=f"bench_{key}_{evaluator}", method=key)
-        for evaluator, base in bases.items()
-        for method, key in METHODS.items()
-    }
-
-
 def our_figures(say: Callable[[str], None], wanted: Callable[[Figures], bool] = lambda row: True) -> list[Figures]:
     """One row for each method, evaluator, type, core and level that is wanted."""
     rows = []
-    for (method, evaluator), model in our_models().items():
+    for (method, evaluator), ours in OURS.items():
+        model = ours.model()
         for real, defines in REALS.items():
             dtype = np.float64 if real == "double" else np.float32
             u = np.repeat(hostile_inputs()[::12].astype(dtype), len(model.inputs), axis=1)
             for machine in CORES:
-                keys = {"method": method, "evaluator": evaluator, "real": real, "machine": machine}
+                keys = {"method": method, "evaluator": evaluator, "model": ours.title, "real": real, "machine": machine}
                 if not wanted(keys):
                     continue
                 say(", ".join(keys.values()))
                 unit = DOUBLE_UNIT.get(machine, ()) if real == "double" else ()
                 for level in LEVELS:
-                    program = programs.our_program(model, machine, (level, *defines, *unit))
+                    program = programs.our_program(model, machine, (level, *defines, *unit), source=ours.source)
                     rows.append(keys | {"level": level} | measured(program, u, len(model.states)))
     return rows
 
@@ -130,12 +117,14 @@ def our_figures(say: Callable[[str], None], wanted: Callable[[Figures], bool] = 
 def memory_figures() -> list[Figures]:
     """Bytes that the caller gives, on an Arm core: an instance, buffers for staging, a set, the stack of a commit."""
     rows = []
-    for evaluator in EVALUATORS:
+    for method, evaluator in PRICES.values():
         for real, defines in REALS.items():
-            model = our_models()["RK4", evaluator]
-            elf = programs.our_program(model, "m4f", ("-O2", *defines), HERE / "worst_case.c").elf
+            ours = OURS[method, evaluator]
+            model = ours.model()
+            elf = programs.our_program(model, "m4f", ("-O2", *defines), HERE / "worst_case.c", ours.source).elf
             variables = {"instance": "model", "banks": "banks", "set": "staged"}
-            row = {"evaluator": evaluator, "real": real} | {k: programs.size_of(elf, v) for k, v in variables.items()}
+            row = {"method": method, "evaluator": evaluator, "model": ours.title, "real": real}
+            row |= {k: programs.size_of(elf, v) for k, v in variables.items()}
             rows.append(row | {"commit stack bound": programs.stack_bound(elf, f"{model.name}_tune_commit")})
     return rows
 
@@ -148,10 +137,22 @@ def chirp(samples: int) -> NDArray[np.float32]:
     return (0.1 * np.sin(np.arange(samples) ** 2 * 2e-5)).astype(np.float32)
 
 
-def peer_figures(case: peers.Case, say: Callable[[str], None]) -> list[Figures]:
+def local_figures(case: peers.Case, say: Callable[[str], None], kept: list[Figures]) -> list[Figures]:
+    """Peers of checkouts.py; of those not at hand the rows kept from when they were: quoted."""
+    local = checkouts.at_hand()
+    missing = [peer for variable, peer in checkouts.NAMES.items() if variable not in local]
+    return [row | {"quoted": True} for row in kept if of_checkout(row) in missing] + peer_figures(case, say, local)
+
+
+def of_checkout(row: Figures) -> str:
+    """Whose row it is, without its commit."""
+    return row["name"].split(" (")[0]
+
+
+def peer_figures(case: peers.Case, say: Callable[[str], None], makers: dict[str, Callable]) -> list[Figures]:
     """One row for each peer, level and contraction; raises AssertionError where a peer computes something else."""
     rows = []
-    for make in peers.PEERS.values():
+    for make in makers.values():
         peer = make(case)
         say(peer.name)
         for level in PEER_LEVELS:
@@ -175,14 +176,13 @@ def peer_figures(case: peers.Case, say: Callable[[str], None]) -> list[Figures]:
 def host_ratios(case: peers.Case, say: Callable[[str], None]) -> list[Figures]:
     """Time of a step on this machine in units of our layered RK4 step: one run, the best of several rounds each."""
     say("host")
-    models = our_models()
-    made = {
-        f"**penode, {evaluator}**": programs.our_program(models["RK4", evaluator], "host", ("-O2",))
-        for evaluator in EVALUATORS
-    }
+    made = {}
+    for evaluator in ("layered", "folded"):
+        ours = OURS["RK4", evaluator]
+        made[f"**penode, {evaluator}**"] = programs.our_program(ours.model(), "host", ("-O2",), source=ours.source)
     made |= {
         (peer := make(case)).name: programs.peer_program(peer, "host", ("-O2", report.OFF))
-        for make in peers.PEERS.values()
+        for make in [*peers.PEERS.values(), *checkouts.at_hand().values()]
     }
     best = dict.fromkeys(made, np.inf)
     with tempfile.TemporaryDirectory() as folder:
@@ -206,26 +206,27 @@ def worst_figures(say: Callable[[str], None], steps: int = 10_000) -> list[Figur
     """Fewest and most instructions by what the step had to do, over everything that may come."""
     rows = []
 
-    def row(what: str, machine: str, kind: str, calls: NDArray) -> None:
-        rows.append({"evaluator": what, "machine": machine, "kind": kind, "calls": len(calls)})
+    def row(what: str, file: str, machine: str, kind: str, calls: NDArray) -> None:
+        rows.append({"evaluator": what, "model": file, "machine": machine, "kind": kind, "calls": len(calls)})
         rows[-1]["instructions"] = [int(calls["instructions"].min()), int(calls["instructions"].max())]
         if machine == "m4f":
             rows[-1]["cycles"] = [int(calls[end].max()) for end in ("low", "high")]
             rows[-1]["constant cycles"] = bool(all(np.ptp(calls[end]) == 0 for end in ("low", "high")))
 
-    for evaluator in EVALUATORS:
+    for evaluator in ("layered", "folded"):
+        ours = OURS["RK4", evaluator]
         for machine in CORES:
             say(f"worst case, {evaluator}, {machine}")
             soft = machine not in worst_case.FPU
-            found = worst_case.measure(our_models()["RK4", evaluator], machine, 1000 if soft else steps)
+            found = worst_case.measure(ours.model(), machine, 1000 if soft else steps, source=ours.source)
             for kind, calls in found.items():
-                row(f"RK4, {evaluator}", machine, kind, calls)
+                row(f"RK4, {evaluator}", ours.title, machine, kind, calls)
     for model in worst_case.everything():
         for machine in worst_case.FPU:
             say(f"worst case, {model.name}, {machine}")
             found = worst_case.measure(model, machine, steps)
             same = [calls for kind, calls in found.items() if kind not in ("adopting", "commit")]
-            row(f"{model.method}, every law, {model.outside}", machine, "all but adopting", np.concatenate(same))
+            row(f"{model.method}, every law, {model.outside}", "`all_laws.py`", machine, "all but adopting", np.concatenate(same))
     return rows
 
 
@@ -241,8 +242,8 @@ def measure_ours() -> Figures:
     return {"ours": our_figures(say), "memory": memory_figures(), "accuracy": accuracy(), "worst case": worst_figures(say)}
 
 
-def measure() -> Figures:
-    """Everything."""
+def measure(kept: Figures) -> Figures:
+    """Everything; of peers that are not at hand what is kept."""
 
     def first_line(*command: str) -> str:
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[0]
@@ -255,7 +256,7 @@ def measure() -> Figures:
                 "emulator": first_line("qemu-system-arm", "--version"),
             }
         ],
-        "peers": peer_figures(case, say),
+        "peers": peer_figures(case, say, peers.PEERS) + local_figures(case, say, kept["peers"]),
         "host": host_ratios(case, say),
         "batch": batch.measure(),
     } | measure_ours()
@@ -263,9 +264,9 @@ def measure() -> Figures:
 
 # What is promised of the whole step on the Cortex-M4F in float, whatever was kept.
 PROMISED = {
-    ("RK4", "layered", "-O2"): {"instructions": 16_600, "cycles": 18_900, "stack bound": 300, "ram": 0},
-    ("RK4", "layered", "-Os"): {"instructions": 12_600, "text": 1_200, "stack bound": 300, "ram": 0},
-    ("RK4", "folded", "-O2"): {"instructions": 1_100, "cycles": 1_300, "stack bound": 300, "ram": 0},
+    ("RK4", "layered", "-O2"): {"instructions": 11_600, "cycles": 17_500, "stack bound": 288, "ram": 0},
+    ("RK4", "layered", "-Os"): {"instructions": 9_200, "text": 1_200, "stack bound": 288, "ram": 0},
+    ("RK4", "folded", "-O2"): {"instructions": 790, "cycles": 1_100, "stack bound": 288, "ram": 0},
     ("Rosenbrock 1", "layered", "-O2"): {"instructions": 7_700},
     ("Rosenbrock 1", "folded", "-O2"): {"instructions": 550},
 }
@@ -324,6 +325,7 @@ def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = arguments.add_mutually_exclusive_group()
     what.add_argument("--ours", action="store_true", help="measure only what changes with our code")
+    what.add_argument("--checkouts", action="store_true", help="measure only the peers of checkouts.py")
     what.add_argument("--table", action="store_true", help="measure nothing, write what is made from bench.json")
     what.add_argument("--check", action="store_true", help="write nothing, compare")
     given = arguments.parse_args()
@@ -333,8 +335,12 @@ def main() -> int:
         for line in found:
             print(line, file=sys.stderr)
         return 1 if found else 0
-    if not given.table:
-        figures |= measure_ours() if given.ours else measure()
+    if given.checkouts:
+        others = [row for row in figures["peers"] if of_checkout(row) not in checkouts.NAMES.values()]
+        figures["peers"] = others + local_figures(peers.the_case(), say, figures["peers"])
+        KEPT.write_text(written(figures))
+    elif not given.table:
+        figures |= measure_ours() if given.ours else measure(figures)
         KEPT.write_text(written(figures))
     TABLE.write_text(report.table(figures))
     README.write_text(shown(figures))

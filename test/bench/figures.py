@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +22,46 @@ from penode_sil.targets import Sil
 ROOT = Path(__file__).resolve().parents[2]
 README = ROOT / "README.md"
 CORES = {"m3": "Cortex-M3 (no FPU)", "m4f": "Cortex-M4F", "m7": "Cortex-M7", "m33": "Cortex-M33", "m55": "Cortex-M55"}
-COMMITTED = {"RK4": "nqvm", "RK4, folded": "nqvm_folded", "explicit Euler": "nqvm_euler"}  # models with their C in the repository
+
+
+@dataclasses.dataclass(frozen=True)
+class Ours:
+    """A row of ours: a model file of gen/nqvm, and what is changed of it for this row."""
+
+    file: str
+    changed: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """The one model file that a figure is about, as tables show it."""
+        return ", ".join([f"`{self.file}`", *(f"{key} = {value}" for key, value in self.changed.items())])
+
+    @property
+    def source(self) -> Path | None:
+        """The folder of its committed C; None where something is changed: then its C is generated."""
+        return None if self.changed else ROOT / "gen" / "nqvm" / "c"
+
+    def model(self) -> penode_gen.Model:
+        base = penode_gen.load(ROOT / "gen" / "nqvm" / self.file)
+        name = "_".join(["bench", base.name, *map(str, self.changed.values())])
+        return dataclasses.replace(base, name=name, **self.changed) if self.changed else base
+
+
+# Rows of ours by method and evaluator. Another model file of gen/nqvm or another method is another entry here.
+OURS = {
+    ("RK4", "layered"): Ours("nqvm.toml"),
+    ("Heun", "layered"): Ours("nqvm.toml", {"method": "heun"}),
+    ("explicit Euler", "layered"): Ours("nqvm_euler.toml"),
+    ("Rosenbrock 1", "layered"): Ours("nqvm.toml", {"method": "ros1"}),
+    ("Rosenbrock 2", "layered"): Ours("nqvm.toml", {"method": "ros2"}),
+    ("RK4", "folded"): Ours("nqvm_folded.toml"),
+    ("Heun", "folded"): Ours("nqvm_folded.toml", {"method": "heun"}),
+    ("explicit Euler", "folded"): Ours("nqvm_euler.toml", {"pieces": 96}),
+    ("Rosenbrock 1", "folded"): Ours("nqvm_folded.toml", {"method": "ros1"}),
+    ("Rosenbrock 2", "folded"): Ours("nqvm_folded.toml", {"method": "ros2"}),
+}
+# Columns of the price table: each is one model whose C is in the repository, in every row of it.
+PRICES = {"RK4": ("RK4", "layered"), "RK4, folded": ("RK4", "folded"), "explicit Euler": ("explicit Euler", "layered")}
 
 
 def hostile_inputs() -> np.ndarray:
@@ -42,14 +83,13 @@ def exchange(model: penode_gen.Model, at: int) -> list[Call]:
 def accuracy() -> list[dict[str, str | int]]:
     """Distance of the float C from the exact solution [nm] over 10 s of the published chirp: largest and RMS of z_b, z_w."""
     chirp, times = VelocityChirp(0.15, 1.0, 0.25, np.pi / 2), np.arange(10_001) * 1e-3
-    models = {title: penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml") for title, name in COMMITTED.items()}
-    first = models["RK4"]
+    first = OURS[PRICES["RK4"]].model()
     exact = mil.solve(first, Instance("", "default"), {"z_road": chirp}, times[-1], times, len(penode_gen.set_values(first, "default"))).y
     rows = []
-    for title, model in models.items():
-        error = Sil(model, source=ROOT / "gen" / "nqvm" / "c").run(chirp.value(times)[:, None]).y - exact
+    for title, ours in ((title, OURS[key]) for title, key in PRICES.items()):
+        error = Sil(ours.model(), source=ours.source).run(chirp.value(times)[:, None]).y - exact
         largest, rms = np.abs(error).max(), np.sqrt((error**2).mean(axis=0)).max()
-        rows.append({"model": title, "largest": round(1e9 * float(largest)), "RMS": round(1e9 * float(rms))})
+        rows.append({"model": title, "file": ours.title, "largest": round(1e9 * float(largest)), "RMS": round(1e9 * float(rms))})
     return rows
 
 

@@ -62,11 +62,11 @@ def _compiler(machine: str) -> list[str]:
 
 
 def our_program(
-    model: penode_gen.Model, machine: str = "m4f", flags: Sequence[str] = ("-O2",), main: Path = HERE / "drive.c"
+    model: penode_gen.Model, machine: str = "m4f", flags: Sequence[str] = ("-O2",), main: Path = HERE / "drive.c", source: Path | None = None
 ) -> Program:
-    """Our step with the runtime as it stands; `main` drives it."""
-    source = generated(model)
-    folder = PLACE / "programs" / "-".join([model.name, machine, main.stem, *flags])
+    """Our step with the runtime as it stands; `main` drives it. source: where the model's C is; None: it is generated."""
+    folder = PLACE / "programs" / "-".join([model.name, machine, main.stem, *flags, *(["committed"] if source else [])])
+    source = source or generated(model)
     folder.mkdir(parents=True, exist_ok=True)
     sets = ",".join(f"&{model.name}_set_{name}" for name in model.sets)
     command = [*_compiler(machine), *FLAGS, *flags, *model_options(model), f"-I{source}", f"-DMODEL_SETS={sets}"]
@@ -135,7 +135,7 @@ def sizes(program: Program, weights_inside: int = 0) -> dict[str, int]:
     found = {m[1]: int(m[2]) for m in re.finditer(r"^\.(\w+)\S*\s+(\d+)", text, re.M)}
     return {
         "text": found.get("text", 0),
-        "rodata": found.get("rodata", 0) - weights_inside,
+        "rodata": max(found.get("rodata", 0) - weights_inside, 0),  # some weights may have become literals in the text
         "ram": found.get("data", 0) + found.get("bss", 0),
     }
 

@@ -7,19 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from figures import CORES
+from figures import CORES, OURS, PRICES
 
 OFF = "-ffp-contract=off"
-# Not in a registry, so it cannot be measured here: measured once with the same counter, compiler and networks.
-ONNX2C = {
-    "name": "onnx2c (ea045cc), quoted",
-    "level": "-O3",
-    "contract": OFF,
-    "instructions": [17461, 17461],
-    "cycles": [22200, 24700],
-    "text": 5208,
-}
-
 Figures = dict[str, Any]
 
 
@@ -48,10 +38,15 @@ def ours_at(figures: Figures, **keys: str) -> list[Figures]:
 def best_of_peers(figures: Figures) -> list[Figures]:
     """Each peer without contraction at the flags that give it the fewest cycles (low), fewest first."""
     best: dict[str, Figures] = {}
-    for row in [*figures["peers"], ONNX2C]:
+    for row in figures["peers"]:
         if row["contract"] == OFF and (row["name"] not in best or row["cycles"] < best[row["name"]]["cycles"]):
             best[row["name"]] = row
-    return sorted(best.values(), key=lambda row: row["cycles"])
+    return sorted(map(_quoted, best.values()), key=lambda row: row["cycles"])
+
+
+def _quoted(row: Figures) -> Figures:
+    """A peer that was not at hand says so."""
+    return row | {"name": f"{row['name']}, quoted"} if row.get("quoted") else row
 
 
 HOW = """\
@@ -100,8 +95,13 @@ weights.
   calls `fmax`, which computes in double; mended. RAM: work space; constants: zeros for inputs that are not given.
 * scalarised: every multiply-add a statement, as the 117 KB in the paper that the quarter vehicle comes from. With
   literals the text holds the weights.
-* onnx2c is in no registry: its figures are quoted, measured once with the same networks, Runge-Kutta step, compiler,
-  way of counting and cycle model."""
+* onnx2c: the C that it makes of each network as ONNX, with its weights as constants. RAM: its buffers. At
+  -O3 some weights are literals in the text.
+* CMSIS-NN: `arm_fully_connected_f32`, which adds the bias and clamps for ReLU. Its kernels in float came after release
+  7.0.0; they are in C but for cores with MVE, for which its packed layout of weights is. No other kernel there is a dense
+  layer in float.
+* Both are in no registry: measured where `ONNX2C_DIR` and `CMSIS_NN_DIR` name a checkout (`checkouts.py`), with the commit
+  in their name; "quoted": it was not at hand, the figures are those of the last run that had it."""
 
 HOST = "Ratios of one run, the best of seven rounds each; they differ by some 10 % from run to run."
 
@@ -119,6 +119,12 @@ set, and folds it, in the slow context; sets of more pieces than there is room f
 soft float takes a time that depends on the numbers, a tenth of the calls. "every law": a model with every law,
 function and kind of layer that there is (`all_laws.py`); ros1 runs through all their slopes, too."""
 
+HOSTS = {f"**penode, {what}**": f"**penode, {what}** ({OURS['RK4', what].title})" for what in ("layered", "folded")}
+BATCH = {
+    "nQVM, layer by layer": "`nqvm.toml`",
+    "nQVM, folded": "`nqvm.toml`, pieces = 96",
+    "hypothesis, 12 states": "`batch.py`",
+}
 CALLER = ("instance", "banks", "set", "commit stack bound")
 COSTS = ("instructions", "modelled kilocycles", "text", "constants", "RAM", "stack", "its bound")
 
@@ -138,7 +144,18 @@ def summary(figures: Figures) -> str:
     return rows_of(header, rows)
 
 
-PRICES = {"RK4": ("RK4", "layered"), "RK4, folded": ("RK4", "folded"), "explicit Euler": ("explicit Euler", "layered")}
+
+def files(figures: Figures) -> dict[str, str]:
+    """The model file of each column of the price table; ValueError if one has figures of two, or of one that was changed."""
+    found = {}
+    for title, (method, evaluator) in PRICES.items():
+        of_ours = lambda key: [r["model"] for r in figures[key] if (r["method"], r["evaluator"]) == (method, evaluator)]
+        exact = [row["file"] for row in figures["accuracy"] if row["model"] == title]
+        names = {*of_ours("ours"), *of_ours("memory"), *exact}
+        if len(names) != 1 or not all(name.endswith(".toml`") for name in names):
+            raise ValueError(f"{title}: figures of {' and of '.join(sorted(names))} under one heading")
+        found[title] = names.pop()
+    return found
 
 
 def prices(figures: Figures) -> str:
@@ -149,21 +166,23 @@ def prices(figures: Figures) -> str:
         for machine in CORES
         for level in ("-O2", "-Os")
     }
+    file = files(figures)
     columns = [(title, level) for title in PRICES for level in ("-O2", "-Os")]
     header = [f"{title} {level}" for title, level in columns]
+    of = ["model file", *(file[title] for title, _ in columns)]
     counts = [[name, *(span(at[title, machine, level]["instructions"]) for title, level in columns)] for machine, name in CORES.items()]
     names = {"text": "code of the whole step", "rodata": "its constants, without weights", "stack": "its stack", "ram": "other RAM"}
     sizes = [[name, *(number(at[title, "m4f", level][key]) for title, level in columns)] for key, name in names.items()]
-    memory = {row["evaluator"]: row for row in figures["memory"] if row["real"] == "float"}
+    memory = {(row["method"], row["evaluator"]): row for row in figures["memory"] if row["real"] == "float"}
     caller = {"instance": "an instance", "set": "a parameter set, in flash or in RAM of the caller"}
-    sizes += [[name, *(number(memory[PRICES[title][1]][key]) for title, _ in columns)] for key, name in caller.items()]
+    sizes += [[name, *(number(memory[PRICES[title]][key]) for title, _ in columns)] for key, name in caller.items()]
     errors = {row["model"]: row for row in figures["accuracy"]}
     exact = [[name, *(_micrometres(errors[title][key]) for title in PRICES)] for key, name in (("largest", "largest error of z_b, z_w"), ("RMS", "RMS error"))]
     return "\n\n".join(
         (
-            rows_of(["instructions a step", *header], counts),
-            rows_of(["bytes on a Cortex-M4F", *header], sizes),
-            rows_of(["float C at 1 ms against the exact solution, 10 s of a chirp", *PRICES], exact),
+            rows_of(["instructions a step", *header], [of, *counts]),
+            rows_of(["bytes on a Cortex-M4F", *header], [of, *sizes]),
+            rows_of(["float C at 1 ms against the exact solution, 10 s of a chirp", *PRICES], [["model file", *file.values()], *exact]),
         )
     )
 
@@ -179,14 +198,14 @@ def table(figures: Figures) -> str:
     parts = [
         HOW.format(**figures["made with"][0]),
         "## Ours",
-        rows_of(["step, Cortex-M4F", "type", "flags", *COSTS], [[*_name(r), *_costs(r)] for r in ours]),
+        rows_of(["step, Cortex-M4F", "model file", "type", "flags", *COSTS], [[*_name(r), *_costs(r)] for r in ours]),
         "### On other cores",
-        rows_of(["instructions", "type", "flags", *CORES.values()], [[*_name(r), *_by_core(figures, r)] for r in ours]),
+        rows_of(["instructions", "model file", "type", "flags", *CORES.values()], [[*_name(r), *_by_core(figures, r)] for r in ours]),
         SOFT,
         "### Memory of the caller",
         rows_of(
-            ["bytes that the caller gives", "type", "an instance", "buffers for staging", "a set", "stack of a commit"],
-            [[r["evaluator"], r["real"], *(number(r[k]) for k in CALLER)] for r in figures["memory"]],
+            ["bytes that the caller gives", "model file", "type", "an instance", "buffers for staging", "a set", "stack of a commit"],
+            [[f"{r['method']}, {r['evaluator']}", r["model"], r["real"], *(number(r[k]) for k in CALLER)] for r in figures["memory"]],
         ),
         MEMORY,
         "## Peers, each at its best flags",
@@ -198,29 +217,29 @@ def table(figures: Figures) -> str:
         "### At all flags",
         rows_of(
             ["RK4 step, Cortex-M4F", "flags", "-ffp-contract", *COSTS],
-            [[r["name"], r["level"], r["contract"].split("=")[1], *_costs(r)] for r in figures["peers"]],
+            [[_quoted(r)["name"], r["level"], r["contract"].split("=")[1], *_costs(r)] for r in figures["peers"]],
         ),
         "### On the host",
-        rows_of(["time of a step, gcc -O2", "times ours"], [[r["name"], f"{r['ratio']:.2f}"] for r in figures["host"]]),
+        rows_of(["time of a step, gcc -O2", "times ours"], [[HOSTS.get(r["name"], r["name"]), f"{r['ratio']:.2f}"] for r in figures["host"]]),
         HOST,
         "### Many runs at once on the host",
         MANY,
-        rows_of(["model", "real", "times the C loop"], [[r["model"], r["real"], f"{r['ratio']:.1f}"] for r in figures["batch"] if "real" in r]),
+        rows_of(["model", "model file", "real", "times the C loop"], [[r["model"], BATCH[r["model"]], r["real"], f"{r['ratio']:.1f}"] for r in figures["batch"] if "real" in r]),
         "\n".join(f"* {r['model']}: {number(r['ratio'])} times" for r in figures["batch"] if "real" not in r),
         "## Worst case",
         WORST,
-        rows_of(["float, -O2", "calls", *CORES.values(), "M4F, modelled kilocycles"], _worst(figures)),
+        rows_of(["float, -O2", "model file", "calls", *CORES.values(), "M4F, modelled kilocycles"], _worst(figures)),
     ]
     return "\n\n".join(parts) + "\n"
 
 
 def _named(rows: Iterable[Figures]) -> list[Figures]:
     """Ours, with a name as peers have one."""
-    return [row | {"name": f"**penode, {row['evaluator']}**"} for row in rows]
+    return [row | {"name": f"**penode, {row['evaluator']}** ({row['model']})"} for row in rows]
 
 
 def _name(row: Figures) -> list[str]:
-    return [f"{row['method']}, {row['evaluator']}", row["real"], row["level"]]
+    return [f"{row['method']}, {row['evaluator']}", row["model"], row["real"], row["level"]]
 
 
 def _costs(row: Figures) -> list[str]:
@@ -243,5 +262,5 @@ def _worst(figures: Figures) -> list[list[str]]:
         same = {r["machine"]: r for r in figures["worst case"] if (r["evaluator"], r["kind"]) == what}
         cost = kilo(m4f["cycles"]) + (", constant" if m4f["constant cycles"] else ", the most")
         counts = [span(same[machine]["instructions"]) if machine in same else "" for machine in CORES]
-        rows.append([", ".join(what), number(m4f["calls"]), *counts, cost])
+        rows.append([", ".join(what), m4f["model"], number(m4f["calls"]), *counts, cost])
     return rows

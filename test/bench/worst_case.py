@@ -57,13 +57,13 @@ def everything() -> list[penode_gen.Model]:
     return [dataclasses.replace(model, name=name, method=m, outside=o) for (m, o), name in names.items()]
 
 
-def measure(model: penode_gen.Model, machine: str, steps: int, flags: Sequence[str] = ("-O2",)) -> dict[str, NDArray]:
+def measure(model: penode_gen.Model, machine: str, steps: int, flags: Sequence[str] = ("-O2",), source: Path | None = None) -> dict[str, NDArray]:
     """
     Calls (cycles.CALL) of the step, at least `steps` of them, by kind: normal, refused (a number was not finite),
     adopting, holding; and of commit.
     """
     folded = ("-DMODEL_FOLDED",) if model.pieces else ()
-    program = programs.our_program(model, machine, (*flags, *folded), programs.HERE / "worst_case.c")
+    program = programs.our_program(model, machine, (*flags, *folded), programs.HERE / "worst_case.c", source)
     commit = f"{model.name}_tune_commit"
     with tempfile.TemporaryDirectory() as folder:
         with cycles.counting(program.elf, [program.step, commit], machine == "m4f") as result:

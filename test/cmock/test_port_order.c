@@ -114,7 +114,7 @@ void test_begin_looks_at_pending_and_then_waits_for_its_view_of_active(void)
     TEST_ASSERT_EQUAL_STRING("p|", trace);
 }
 
-void test_commit_announces_a_set_that_is_whole_before_the_barrier(void)
+void test_commit_publishes_a_whole_set_before_the_barrier(void)
 {
     (void)pen_tuning_begin(&tuning, LAYOUT, LENGTH, &other.head);
     (void)pen_tuning_write(&tuning, LENGTH, 0U, other_value, LENGTH);
@@ -125,7 +125,7 @@ void test_commit_announces_a_set_that_is_whole_before_the_barrier(void)
     TEST_ASSERT_EQUAL_UINT32(1U, tuning.pending);
 }
 
-void test_select_announces_a_set_that_is_whole_before_the_barrier(void)
+void test_select_publishes_a_whole_set_before_the_barrier(void)
 {
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, choose(&other));
     TEST_ASSERT_EQUAL_STRING("p||P", trace);

@@ -5,7 +5,20 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
+
+from penode_gen import selftest
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def short_self_tests() -> Iterator[None]:
+    """Self-tests of 8 samples instead of 200: what is generated here is mostly not about them. test_selftest.py sets its own length."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(selftest, "LEVELS", 1)
+        yield

@@ -61,7 +61,7 @@ def test_the_same_bytes_in_every_process_and_folder(tmp_path):
             environment = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT / "gen")}
             subprocess.run([sys.executable, "-c", script, str(path), str(folder / out)], check=True, env=environment)
         files = sorted(p for p in folder.rglob("*.[ch]"))
-        assert len(files) == 8
+        assert len(files) == 10
         results.append({p.relative_to(folder): p.read_bytes() for p in files})
     assert results[0] == results[1]
     for text in results[0].values():
@@ -221,8 +221,8 @@ def test_all_files_or_none(tmp_path, monkeypatch):
 
     with pytest.raises(OSError):
         penode_gen.generate(model, tmp_path / "n2.json" / "below a file")
-    assert [p.name for p in penode_gen.generate(model, out)] == ["rich.h", "rich.c", "rich_sets.h", "rich_params.c", "rich_layout.json"]
-    assert sorted(p.name for p in out.iterdir()) == sorted(["rich.c", "rich.h", "rich_sets.h", "rich_params.c", "rich_layout.json"])
+    assert [p.name for p in penode_gen.generate(model, out)] == ["rich.h", "rich.c", "rich_sets.h", "rich_params.c", "rich_selftest.c", "rich_layout.json"]
+    assert sorted(p.name for p in out.iterdir()) == sorted(["rich.c", "rich.h", "rich_sets.h", "rich_params.c", "rich_selftest.c", "rich_layout.json"])
     assert all(p.stat().st_mode & 0o777 == 0o644 for p in out.iterdir())
 
 
@@ -314,7 +314,7 @@ def test_steps_come_in_the_order_in_which_they_are_needed(tmp_path):
 # -- all files or none, one version -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("failing", [0, 1, 2])
+@pytest.mark.parametrize("failing", [0, 1, 2, 3])
 @pytest.mark.parametrize("earlier", [True, False])
 def test_a_file_that_cannot_be_replaced_leaves_all_as_they_were(tmp_path, monkeypatch, failing, earlier):
     model = penode_gen.load(NQVM[0])

@@ -31,7 +31,7 @@ def main() -> int:
     right = found["gcc"]
     problems = [f"{name}: {said}" for name, said in found.items() if said != right or len(set(said)) != 4]
     good = gate.report(f"bits: exp, tanh, sigmoid, softplus: 10^6 floats, the same on {len(found)} targets", problems)
-    caught = hashes("m4f", "-ffp-contract=fast") != right
+    caught = hashes("m4f", "-ffp-contract=fast", "-DPEN_EXACT_H") != right  # without the header that prevents it
     good &= gate.report("bits: a fused multiply-add is found", [] if caught else ["not found"])
     gate.keep("bits", {"floats": 1_000_000, "targets": list(found), "different": len(problems), "hashes": right,
                        "faults": ["a fused multiply-add"], "faults found": int(caught)})  # fmt: skip

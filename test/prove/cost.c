@@ -15,6 +15,7 @@
 #include "penode/pen_fold.h"
 #include "penode/pen_math.h"
 #include "penode/pen_net16.h"
+#include "penode/pen_selftest.h"
 #include "penode/pen_solve.h"
 #include "penode/pen_status.h"
 
@@ -72,6 +73,8 @@ NOINLINE static pen_real_t note(pen_real_t x)
     return x;
 }
 
+NOINLINE static pen_real_t test(pen_real_t x) { return x + (pen_real_t)pen_selftest(); }
+
 static const struct {
     const char *name;
     pen_real_t (*call)(pen_real_t);
@@ -81,6 +84,7 @@ static const struct {
     { "pen_fold_find_96", find96 },  { "pen_fold_find_128", find128 }, { "pen_solve_2", solve_2 },
     { "pen_solve_4", solve_4 },      { "pen_solve_8", solve_8 },       { "pen_solve_16", solve_16 },
     { "pen_solve2", solve2 },        { "pen_status_note_step", note },
+    { "pen_selftest", test },
 };
 
 static uint32_t cost(pen_real_t (*call)(pen_real_t), pen_real_t x)

@@ -39,6 +39,24 @@ def promised() -> dict[tuple[str, str], int]:
     found |= {(f"pen_fold_find_{n}", "-O2"): HALVINGS * halving for n in (96, 128)}
     note = re.search(r"Cost: (\d+) instructions, at -Os (\d+)", text["pen_status"])
     found |= {("pen_status_note_step", level): int(n) for level, n in zip(("-O2", "-Os"), note.groups())}
+    test = re.search(r"pen_selftest +(\d+) / (\d+) instructions", text["pen_selftest"])
+    found |= {("pen_selftest", level): int(n) for level, n in zip(("-O2", "-Os"), test.groups())}
+    return found
+
+
+def of_selftest() -> list[str]:
+    """Where code and constants of a self-test are not the bytes that pen_selftest.h names, to 2 %."""
+    text, found = (gate.ROOT / "inc" / "penode" / "pen_selftest.h").read_text(), []
+    runtime = re.search(r"pen_selftest .* instructions, (\d+) / (\d+) bytes", text).groups()
+    model = re.search(r"NAME_selftest +(\d+) / (\d+) bytes", text).groups()
+    folder = gate.ROOT / "gen" / "nqvm" / "c"
+    for source, said in ((gate.ROOT / "src" / "pen_selftest.c", runtime), (folder / "nqvm_selftest.c", model)):
+        for level, bytes_said in zip(("-O2", "-Os"), map(int, said)):
+            out = WORK / "selftest.o"
+            gate.make([PORT / "cc", MACHINES["m4f"], "-std=c99", level, f"-I{folder}", "-c", "-o", out, source])
+            columns = gate.run(["arm-none-eabi-size", out]).stdout.split("\n")[1].split()
+            size = int(columns[0]) + int(columns[1])
+            found += [] if abs(size - bytes_said) <= 0.02 * bytes_said else [f"{source.name} {level}: {size} bytes, the header says {bytes_said}"]
     return found
 
 
@@ -91,6 +109,7 @@ def main() -> int:
     counts = {level: measured(level) for level in ("-O2", "-Os")}
     good = gate.report(f"cost: {len(promised())} counts of the headers are right, for every argument", differences(counts))
     good &= gate.report("cost: load, store, abs and barrier of the port are one instruction each", of_port())
+    good &= gate.report("cost: bytes of the self-tests are those of the header", of_selftest())
     missed = []
     for k, (fault, change) in enumerate(FAULTS.items()):
         copy = WORK / f"fault{k}.c"

@@ -5,7 +5,7 @@
 
 PROVE_STATIC  := prove-rules prove-eva prove-coverage
 PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-readers prove-flip prove-longrun prove-stack prove-bits \
-                 prove-accuracy prove-cost prove-promises
+                 prove-accuracy prove-cost prove-kernels prove-promise prove-promises
 
 .PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC)
 
@@ -26,7 +26,7 @@ prove-preempt: | $(READY) ## Emulated cores: step and tuning calls interrupt eac
 	@$(PYTHON) test/prove/preempt_check.py
 prove-tsan: | $(READY) ## ThreadSanitizer: one thread steps, one exchanges sets
 	@$(PYTHON) test/prove/tsan_check.py
-prove-status: | $(READY) ## NaN and Inf anywhere: always said, the last good state kept
+prove-status: | $(READY) ## NaN and Inf anywhere: always reported, the last good state kept
 	@$(PYTHON) test/prove/status_check.py
 prove-fuzz: | $(READY) ## libFuzzer: any calls of the interface, against an oracle
 	@$(PYTHON) test/prove/fuzz_check.py
@@ -45,6 +45,10 @@ prove-accuracy: | $(READY) ## exp, tanh, sigmoid, softplus: no further off than 
 	@$(PYTHON) test/prove/accuracy_check.py
 prove-cost: | $(READY) ## Functions take the instructions that their headers name
 	@$(PYTHON) test/prove/cost_check.py
+prove-kernels: | $(READY) build/setup/unity ## A fault in a kernel in assembler is found by its test
+	@$(PYTHON) test/prove/kernels_check.py
+prove-promise: | $(READY) ## Random networks in exact arithmetic: what the promise check accepts and refuses
+	@$(PYTHON) test/prove/promise_check.py
 prove-promises: | $(READY) ## PROMISES.md: each promise, the test that shows it, the figures of the last run
 	@$(PYTHON) test/prove/promises.py
 

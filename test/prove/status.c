@@ -265,10 +265,10 @@ static void check_range(const pen_real_t u[N_U], const MODEL(x_t) *x_after, pen_
     }
 }
 
-static void refuse(pen_status_t said, pen_status_t right, pen_status_t counts)
+static void refuse(pen_status_t reported, pen_status_t right, pen_status_t counts)
 {
-    if (said != right) {
-        fail("an argument is missing", NO_ARGUMENT, 0, said);
+    if (reported != right) {
+        fail("an argument is missing", NO_ARGUMENT, 0, reported);
     }
     for (uint32_t i = 0U; i < PEN_STATUS_FLAGS; i++) {
         counted[i] += (counts >> i) & 1U;

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -175,3 +176,68 @@ def test_readme_is_compared_to_the_word_and_to_two_percent_of_a_number():
     assert not figures.same(kept.replace("force", "moment"), kept)
     assert not figures.same(kept.replace("730", "731"), kept)
     assert not figures.same(kept.replace("100.0% explained, 4.8 s", ""), kept)
+
+
+# -- one model under each heading -------------------------------------------------------------------------------------
+
+KEPT = json.loads((BENCH / "bench.json").read_text())
+COMMITTED = figures.ROOT / "gen" / "nqvm" / "c"
+FILE = re.compile(r"`(\w+\.(?:toml|py))`")
+
+
+def tables(text: str) -> list[list[list[str]]]:
+    """Each table of a page: rows of cells, the header first."""
+    blocks = re.findall(r"(?:^\|.*\n)+", text + "\n", re.M)
+    return [[[cell.strip() for cell in line.strip("|\n ").split("|")] for line in block.splitlines() if "| --- |" not in line] for block in blocks]
+
+
+def block(name: str) -> str:
+    return re.search(rf"<!-- {name} -->\n(.*?)<!-- end of {name} -->", figures.README.read_text(), re.S)[1]
+
+
+def test_each_column_of_the_price_table_is_one_committed_model() -> None:
+    """Costs, memory and accuracy of a column come from one model file, and its C is in the repository."""
+    assert report.files(KEPT) == {"RK4": "`nqvm.toml`", "RK4, folded": "`nqvm_folded.toml`", "explicit Euler": "`nqvm_euler.toml`"}
+    for title, file in report.files(KEPT).items():
+        ours = figures.OURS[figures.PRICES[title]]
+        assert ours.title == file and ours.source == COMMITTED
+        assert (COMMITTED / f"{ours.model().name}.c").exists()
+
+
+@pytest.mark.parametrize("part", ["ours", "memory", "accuracy"])
+@pytest.mark.parametrize("wrong", ["`nqvm.toml`", "`nqvm_euler.toml`, input = linear"])
+def test_two_models_under_one_heading_are_refused(part: str, wrong: str) -> None:
+    other = json.loads(json.dumps(KEPT))
+    key = "file" if part == "accuracy" else "model"
+    row = next(row for row in other[part] if row[key] == "`nqvm_euler.toml`")
+    row[key] = wrong
+    with pytest.raises(ValueError, match="explicit Euler: figures of .* and of"):
+        report.prices(other)
+
+
+def test_every_table_names_one_model_file_for_each_of_our_figures() -> None:
+    for table in tables(block("figures")):
+        names = next(row for row in table if row[0] == "model file")
+        assert len(names) == len(table[0]) and all(FILE.fullmatch(name) for name in names[1:])
+    seen = 0
+    for table in tables(block("bench") + report.table(KEPT)):
+        if "model file" in table[0]:
+            named = [row[table[0].index("model file")] for row in table[1:]]
+        else:
+            named = [row[0] for row in table[1:] if "penode" in row[0]]
+        assert all(len(FILE.findall(name)) == 1 for name in named), named
+        seen += len(named)
+    assert seen > 100
+
+
+@pytest.mark.parametrize("title", figures.PRICES)
+def test_the_price_table_is_what_the_committed_c_costs(title: str) -> None:
+    """Measured anew from the model file that README names: to the instruction with the compiler that it was made with."""
+    counts = tables(block("figures"))[0]
+    column = counts[0].index(f"{title} -O2")
+    file = FILE.fullmatch(next(row for row in counts if row[0] == "model file")[column])[1]
+    shown = int(next(row for row in counts if row[0] == "Cortex-M4F")[column].replace(" ", ""))
+    program = programs.our_program(model(file.removesuffix(".toml")), source=COMMITTED)
+    found = bench.measured(program, bench.chirp(65)[:, None])["instructions"][1]
+    compiler = subprocess.run(["arm-none-eabi-gcc", "--version"], check=True, capture_output=True, text=True).stdout.splitlines()[0]
+    assert abs(found - shown) <= (0 if compiler == KEPT["made with"][0]["compiler"] else 0.02 * shown)

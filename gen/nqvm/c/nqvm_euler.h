@@ -28,6 +28,7 @@
 #include "penode/pen_instance.h"
 #include "penode/pen_real.h"
 #include "penode/pen_saved.h"
+#include "penode/pen_selftest.h"
 #include "penode/pen_set.h"
 #include "penode/pen_status.h"
 
@@ -198,6 +199,24 @@ pen_status_t nqvm_euler_verify(nqvm_euler_t *self, uint32_t n);
  */
 pen_status_t nqvm_euler_save(const nqvm_euler_t *self, uint8_t byte[NQVM_EULER_SAVED]);
 pen_status_t nqvm_euler_restore(nqvm_euler_t *self, const uint8_t byte[NQVM_EULER_SAVED]);
+
+/**
+ * Known-answer self-test, for power-on: 200 samples from the initial state with the set `default`, on inputs of the
+ * test. States and outputs must be, to the bit, what the generator evaluated without this code. Calls pen_selftest().
+ * @param lent  an instance of the caller's that nothing else uses; afterwards it has to be initialised (again)
+ * @return 0, or flags of penode/pen_selftest.h, those of pen_selftest() among them. PEN_SELFTEST_ANSWER also if the
+ *         model's answer is missed; PEN_SELFTEST_SET: its set is refused. With PEN_SELFTEST_REAL (the caller's type of
+ *         numbers is not the code's) and PEN_SELFTEST_BADARG (lent is NULL) nothing is written
+ * Thread context: the one that will step (floating-point modes belong to a context), before it does.
+ * Cost: an init, 200 steps and pen_selftest(); for each step some 120 instructions more for the hash.
+ */
+uint32_t nqvm_euler_selftest_of(nqvm_euler_t *lent, uint32_t type);
+
+static inline uint32_t nqvm_euler_selftest(nqvm_euler_t *lent)
+{
+    return nqvm_euler_selftest_of(lent, PEN_SELFTEST_TYPE);
+}
+
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+/**
+ * The trial of a set before it is adopted (`trial` of the model file): the step keeps its last samples in a ring; a tuning
+ * call then steps copies of the model through them, with the new set and with the running one. For generated code.
+ *
+ * The ring has room for three samples more than a trial uses. Once a tuning call has closed it, a step under way on the same
+ * core may still write one sample; on another core two, and begin a third: what the trial reads stays as it is.
+ * A sample that falls into a trial is not kept; the ring then begins anew, as it does behind a sample that was held.
+ *
+ * Cost of a step: a copy of its states and inputs, and some 20 instructions. Cost of a trial: twice as many steps as samples.
+ */
+#ifndef PEN_TRIAL_H
+#define PEN_TRIAL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "penode/pen_port.h"
+#include "penode/pen_status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** The ring of an instance, without its samples. */
+typedef struct {
+    volatile uint32_t written; /* samples kept so far; wraps; the step's                        */
+    volatile uint32_t first;   /* the oldest of those without a gap up to now; the step's       */
+    volatile uint32_t closed;  /* 1 during a trial; the tuning context's                        */
+} pen_trial_t;
+
+/** The samples a trial may use: first, first + 1, ... last - 1, each at its number modulo the room. */
+typedef struct {
+    uint32_t first;
+    uint32_t last;
+} pen_trial_span_t;
+
+/** Step context, after a sample: was it kept? The samples before are used only if it follows on them. */
+static inline void pen_trial_keep(pen_trial_t *trial, bool advanced)
+{
+    const uint32_t open = (pen_port_load(&trial->closed) == 0U) ? 1U : 0U;
+    const uint32_t next = pen_port_load(&trial->written) + (advanced ? open : 0U);
+
+    pen_port_barrier(); /* the sample is there before it counts */
+    pen_port_store(&trial->first, ((open == 1U) && advanced) ? pen_port_load(&trial->first) : next);
+    pen_port_store(&trial->written, next);
+}
+
+/** Tuning context: close the ring, and see which of its samples, `most` at most, there are. */
+static inline void pen_trial_close(pen_trial_t *trial, uint32_t most, pen_trial_span_t *span)
+{
+    uint32_t first;
+    uint32_t kept;
+
+    pen_port_store(&trial->closed, 1U);
+    pen_port_barrier();
+    first = pen_port_load(&trial->first); /* before `written`: it is never ahead of that */
+    pen_port_barrier();
+    span->last = pen_port_load(&trial->written);
+    pen_port_barrier();
+    kept = (first == pen_port_load(&trial->first)) ? (span->last - first) : 0U; /* else there was a gap just now */
+    kept = (kept > most) ? most : kept;
+    span->first = span->last - kept;
+}
+
+/** Tuning context: let the step keep samples again. */
+static inline void pen_trial_open(pen_trial_t *trial)
+{
+    pen_port_barrier();
+    pen_port_store(&trial->closed, 0U);
+}
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

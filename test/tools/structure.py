@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Counts of what makes the project hard to change, against structure.json: each may only fall.
+
+structure.py             print the counts; exit code 1 if one is not the kept one
+structure.py --take-over write counts that have fallen into structure.json; none that has risen (`make structure`)
+
+What is counted, in files that are written by hand (generated models in gen/*/c are not):
+long files         more than 400 lines: C, headers, Python, templates, make, Spin
+long functions     more than 60 lines: C from brace to brace, Python from `def` to its last line
+circular imports   modules of penode_gen and penode_sil, and C headers, that import themselves by way of others
+named thresholds   module-level numbers with an UPPER_CASE name in penode_sil: NAME = number, or arithmetic of numbers
+runtime lines      lines of inc/penode and src together; no ratchet but a budget: only more than the kept number fails
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDERS = ("inc", "src", "gen", "sil", "port", "test")
+KINDS = {".c", ".h", ".py", ".j2", ".mk", ".pml"}
+FILE_LINES = 400
+FUNCTION_LINES = 60
+BUDGETS = {"runtime lines"}
+
+Found = dict[str, list[str]]
+
+
+def sources(root: Path) -> list[Path]:
+    """All files that count, in a fixed order."""
+    generated = re.compile(r"gen/[^/]+/c/")
+    files = [p for folder in FOLDERS for p in sorted((root / folder).rglob("*")) if p.suffix in KINDS and p.is_file()]
+    files += [p for p in (root / "Makefile",) if p.is_file()]
+    return [p for p in files if not generated.match(p.relative_to(root).as_posix()) and "build" not in p.relative_to(root).parts]
+
+
+def bare(text: str) -> str:
+    """C without comments, strings, characters and lines of the preprocessor; the lines stay where they are."""
+    kept = re.sub(
+        r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*',
+        lambda m: "\n" * m[0].count("\n"),
+        text,
+        flags=re.S | re.M,
+    )
+    return re.sub(r"\bextern\s*\{", "extern;", kept)  # extern "C": its brace holds functions; the last one closes nothing
+
+
+def c_functions(text: str) -> Iterator[tuple[int, int]]:
+    """First line and number of lines of each function, from brace to brace."""
+    depth, line, start, last = 0, 1, 0, ""
+    for character in bare(text):
+        if character == "{":
+            if depth == 0:
+                start = line if last == ")" else 0
+            depth += 1
+        elif character == "}" and depth > 0:
+            depth -= 1
+            if depth == 0 and start:
+                yield start, line - start + 1
+        line += character == "\n"
+        last = last if character.isspace() else character
+
+
+def python_functions(text: str) -> Iterator[tuple[int, int]]:
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node.lineno, (node.end_lineno or node.lineno) - node.lineno + 1
+
+
+def thresholds(text: str) -> Iterator[int]:
+    """Lines of module-level numbers with a name in capitals."""
+    numbers = ast.Constant | ast.UnaryOp | ast.BinOp | ast.operator | ast.unaryop
+    for node in ast.parse(text).body:
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+        named = any(isinstance(t, ast.Name) and t.id.isupper() for t in targets)
+        parts = list(ast.walk(node.value)) if named and node.value is not None else []
+        values = [p.value for p in parts if isinstance(p, ast.Constant)]
+        if parts and all(isinstance(p, numbers) for p in parts) and all(type(v) in (int, float) for v in values):
+            yield node.lineno
+
+
+def python_imports(root: Path, package: Path) -> dict[str, set[str]]:
+    """Which modules of a package each of them imports, wherever the import stands."""
+    modules = {
+        ".".join(p.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__"): p
+        for p in sorted(package.rglob("*.py"))
+    }
+    edges: dict[str, set[str]] = {name: set() for name in modules}
+    for name, path in modules.items():
+        here = name if path.name == "__init__.py" else name.rpartition(".")[0]
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                edges[name] |= {a.name for a in node.names} & modules.keys()
+            elif isinstance(node, ast.ImportFrom):
+                base = here.split(".")[: len(here.split(".")) - node.level + 1] if node.level else []
+                source = ".".join([*base, *([node.module] if node.module else [])])
+                for alias in node.names:
+                    edges[name] |= {f"{source}.{alias.name}" if f"{source}.{alias.name}" in modules else source} & modules.keys()
+    return edges
+
+
+def header_includes(files: list[Path]) -> dict[str, set[str]]:
+    """Which headers each header includes, by their file names."""
+    headers = {p.name: p for p in files if p.suffix == ".h"}
+    include = re.compile(r'^[ \t]*#[ \t]*include[ \t]*["<]([^">]+)[">]', re.M)
+    return {n: {Path(i).name for i in include.findall(p.read_text())} & headers.keys() for n, p in headers.items()}
+
+
+def circular(edges: dict[str, set[str]]) -> list[str]:
+    """All that come back to themselves by way of at least one other."""
+    found = []
+    for start in edges:
+        reached: set[str] = set()
+        ahead = [n for n in edges[start] if n != start]
+        while ahead:
+            name = ahead.pop()
+            if name not in reached:
+                reached.add(name)
+                ahead += edges[name]
+        found += [start] if start in reached else []
+    return found
+
+
+def look(root: Path) -> tuple[dict[str, int], Found]:
+    """The counts, and what each of them is made of."""
+    found: Found = {"long files": [], "long functions": [], "circular imports": [], "named thresholds": [], "runtime lines": []}
+    files = sources(root)
+    runtime = 0
+    for path in files:
+        name, text = path.relative_to(root).as_posix(), path.read_text()
+        lines = text.count("\n")
+        if lines > FILE_LINES:
+            found["long files"].append(f"{name}: {lines} lines")
+        functions = c_functions(text) if path.suffix in {".c", ".h"} else python_functions(text) if path.suffix == ".py" else ()
+        found["long functions"] += [f"{name}:{first}: {n} lines" for first, n in functions if n > FUNCTION_LINES]
+        if name.startswith("sil/penode_sil/") and path.suffix == ".py":
+            found["named thresholds"] += [f"{name}:{line}" for line in thresholds(text)]
+        if name.startswith(("inc/penode/", "src/")):
+            runtime += lines
+    for package in ("gen/penode_gen", "sil/penode_sil"):
+        if (root / package).is_dir():
+            found["circular imports"] += circular(python_imports(root, root / package))
+    found["circular imports"] += circular(header_includes(files))
+    return {kind: len(items) for kind, items in found.items()} | {"runtime lines": runtime}, found
+
+
+def compare(kept: dict[str, int], counts: dict[str, int], found: Found) -> list[str]:
+    """What is wrong, with the remedy; empty if nothing is."""
+    problems = [] if kept.keys() == counts.keys() else [f"structure.json must hold just {', '.join(counts)}"]
+    for kind, count in counts.items():
+        limit = kept.get(kind, count)
+        if count > limit:
+            problems.append("\n  ".join([f"{kind}: {count}, at most {limit}; split what is new:", *found[kind]]))
+        elif count < limit and kind not in BUDGETS:
+            problems.append(f"{kind}: {count}, kept {limit}; run `make structure` to take over what has been gained")
+    return problems
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--take-over", action="store_true", help="write the counts that have fallen")
+    parser.add_argument("--root", type=Path, default=ROOT, help="folder of the project")
+    chosen = parser.parse_args(arguments)
+    kept_at = chosen.root / "test" / "tools" / "structure.json"
+    kept = json.loads(kept_at.read_text())
+    counts, found = look(chosen.root)
+    if chosen.take_over:
+        kept = {kind: min(count, kept.get(kind, count)) for kind, count in counts.items()}
+        kept_at.write_text(json.dumps(kept, indent=1) + "\n")
+    for kind, count in counts.items():
+        print(f"{kind:18}{count:6}")
+    problems = compare(kept, counts, found)
+    print("\n".join(problems), file=sys.stderr)
+    return int(bool(problems))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
