@@ -39,7 +39,7 @@ VERIFY_FAULTS = {
     "which slot is active not compared": ("small_rollback", "pen_verify.c", ("(tuning->settled == pen_port_load(&tuning->active))", 0, "true")),
     "a damaged rollback set taken": ("small_rollback", "pen_verify.c", ("status = pen_set_check(set, model->layout, model->length);", 0, "status = PEN_OK;")),
     "the set given to init forgotten": ("small_rollback", "model", ("rank < 2U", 0, "rank < 1U")),
-    "pieces of the set to go back to not made": ("small_rollback", "model", ("found = small_rollback_fold(ready.value, ", 0, "found = small_rollback_fold(self->head.tuning.slot[0].value, ")),
+    "pieces of the set to go back to not made": ("small_rollback", "model", ("found = small_rollback_prepare(self, ready.value,", 0, "found = small_rollback_prepare(self, self->head.tuning.slot[0].value,")),
     "reacts while a set is open": ("small_rollback", "pen_verify.c", (" || (tuning->open != 0U)", 0, "")),
     "holds while a set is open": ("small_hold", "pen_verify.c", ("!good && idle &&", 0, "!good &&")),
     "does not hold without a set to go back to": ("small_rollback", "pen_verify.c", ("        pen_tuning_hold(&self->tuning, true);", 0, "")),
