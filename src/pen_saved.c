@@ -143,7 +143,7 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
         put_values(rows, row, byte, &at);
         put_values(inputs, u, byte, &at);
         for (uint32_t i = 0U; i < 2U; i++) {
-            put_values(model->length, banks ? tuning->bank[i] : tuning->initial.value, byte, &at);
+            put_values(model->length, (tuning->bank[i] != NULL) ? tuning->bank[i] : tuning->initial.value, byte, &at);
         }
         put(~pen_crc_bytes(PEN_CRC_START, at, byte), byte, &at);
         status = found ? PEN_OK : PEN_SET_BADARG;

@@ -39,39 +39,30 @@ uint32_t pen_pieces_crc(const pen_model_t *model, const pen_piece_t piece[])
     return crc;
 }
 
-/* Go on by up to n values from guard.at, within `end`. Returns how many. */
-static uint32_t advance(pen_guard_t *guard, uint32_t n, uint32_t end)
-{
-    const uint32_t left = end - guard->at;
-    const uint32_t taken = (n < left) ? n : left;
-
-    guard->at += taken;
-    return taken;
-}
-
-/* One stretch of the round, values or pieces. False if its checksum is wrong. */
+/* One stretch of the round, values or pieces, up to *n of them. False if its checksum is wrong. */
 static bool look(const pen_model_t *model, const pen_set_t *set, const pen_piece_t piece[], pen_guard_t *guard, uint32_t *n)
 {
     const uint32_t length = model->length;
-    const uint32_t from = guard->at;
+    const uint32_t end = length + (model->networks * model->pieces);
     bool good = true;
 
-    if (from < length) {
-        const uint32_t taken = advance(guard, *n, length);
-        guard->crc = pen_crc_values(guard->crc, taken, &set->value[from]);
-        *n -= taken;
+    if (guard->at < length) {
+        while ((*n > 0U) && (guard->at < length)) {
+            guard->crc = pen_crc_values(guard->crc, 1U, &set->value[guard->at]);
+            guard->at += 1U;
+            *n -= 1U;
+        }
         if (guard->at == length) {
             good = (~guard->crc == set->head.checksum);
             guard->crc = PEN_CRC_START;
         }
     } else {
-        const uint32_t end = length + (model->networks * model->pieces);
-        const uint32_t taken = advance(guard, *n, end);
-        for (uint32_t i = 0U; i < taken; i++) {
-            guard->crc = pen_piece_crc(guard->crc, &piece[(from - length) + i]);
+        while ((*n > 0U) && (guard->at < end)) {
+            guard->crc = pen_piece_crc(guard->crc, &piece[guard->at - length]);
+            guard->at += 1U;
+            *n -= 1U;
         }
-        *n -= taken;
-        if (guard->at == end) {
+        if (guard->at >= end) {
             good = (guard->crc == guard->pieces[guard->slot]);
             guard->crc = PEN_CRC_START;
             guard->at = 0U;
@@ -105,7 +96,7 @@ pen_status_t pen_verify(const pen_model_t *model, pen_instance_t *self, const pe
         const pen_piece_t *const own = (piece == NULL) ? NULL : &piece[slot * (model->networks * model->pieces)];
         bool good = known(model, tuning, slot);
 
-        if ((self->guard.slot != slot) || (self->guard.at >= round) || (self->guard.at == 0U)) {
+        if ((self->guard.slot != slot) || (self->guard.at == 0U)) {
             self->guard.slot = slot;
             self->guard.at = 0U;
             self->guard.crc = PEN_CRC_START;

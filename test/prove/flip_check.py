@@ -31,19 +31,19 @@ VERIFY_FAULTS = {
     "pieces not covered": ("small_rollback", "pen_verify.c", ("good = (guard->crc == guard->pieces[guard->slot]);", 0, "good = true;")),
     "the status of a piece left out": ("small_rollback", "pen_verify.c", ("return pen_crc_word(next, piece->status);", 0, "return next;")),
     "values not compared if a call ends with the last": ("small_layers_rollback", "pen_verify.c", ("if (guard->at == length) {", 0, "if ((guard->at == length) && (*n > 0U)) {")),
-    "the last value left out": ("small_layers_rollback", "pen_verify.c", ("taken, &set->value[from]);", 0, "(guard->at == length) ? (taken - 1U) : taken, &set->value[from]);\n        guard->crc = (guard->at == length) ? ~set->head.checksum : guard->crc;")),
+    "the last value left out": ("small_layers_rollback", "pen_verify.c", ("if (guard->at < length) {", 0, "if (guard->at == (length - 1U)) {\n        guard->at = length;\n        *n -= 1U;\n    } else if (guard->at < length) {")),
+    "which slot the guard is about not compared": ("small_rollback", "pen_verify.c", ("(self->guard.slot != slot) || ", 0, "")),
     "the head not compared": ("small_rollback", "pen_set.c", ("(differences == 0U) && ", 0, "")),
     "the address not compared": ("small_rollback", "pen_set.c", (" && (a->value == b->value)", 0, "")),
     "the addresses of the banks not compared": ("small_rollback", "pen_verify.c", ("return banks && fits", 0, "return fits")),
     "which slot is active not compared": ("small_rollback", "pen_verify.c", ("(tuning->settled == pen_port_load(&tuning->active))", 0, "true")),
     "a damaged rollback set taken": ("small_rollback", "pen_verify.c", ("status = pen_set_check(set, model->layout, model->length);", 0, "status = PEN_OK;")),
     "the set given to init forgotten": ("small_rollback", "model", ("rank < 2U", 0, "rank < 1U")),
-    "pieces of the set to go back to not made": ("small_rollback", "model", ("found = small_rollback_fold(ready.value, ", 0, "found = small_rollback_fold(self->head.tuning.slot[0].value, ")),
+    "pieces of the set to go back to not made": ("small_rollback", "model", ("found = small_rollback_prepare(self, ready.value,", 0, "found = small_rollback_prepare(self, self->head.tuning.slot[0].value,")),
     "reacts while a set is open": ("small_rollback", "pen_verify.c", (" || (tuning->open != 0U)", 0, "")),
     "holds while a set is open": ("small_hold", "pen_verify.c", ("!good && idle &&", 0, "!good &&")),
     "does not hold without a set to go back to": ("small_rollback", "pen_verify.c", ("        pen_tuning_hold(&self->tuning, true);", 0, "")),
     "no confirmation": ("small_rollback", "pen_verify.c", ("good = whole(model, &tuning->slot[slot], own, &self->guard, round);", 0, "good = false;")),
-    "a place beyond the round": ("small_rollback", "pen_verify.c", ("(self->guard.at >= round) || ", 0, "")),
 }  # fmt: skip
 
 

@@ -34,7 +34,6 @@ typedef struct {
 
 static known_t running, previous, waiting, opened;
 static known_t  replaced;       /* the rollback set again, if what waits is withdrawn */
-static pen_set_t idle_slot;     /* what lies in the slot that does not run: a set that was withdrawn, or ran before */
 static bool     waits, withdrawn, open_now, holding, usable;
 static uint32_t fill;           /* bytes */
 static uint32_t times[PEN_STATUS_FLAGS];
@@ -174,13 +173,6 @@ static pen_status_t check(const pen_set_head_t *head, const pen_real_t values[])
     return status;
 }
 
-/* A set as it is now: banks are others after a move. */
-static const pen_set_t *now_at(known_t *known)
-{
-    known->set.value = (known->place < FLASH) ? both_banks[own]->value[known->place] : known->set.value;
-    return &known->set;
-}
-
 /* A set that is good may still have too many pieces. It must say so at each try, and then nothing has changed. */
 static bool published(known_t *ready, pen_status_t said)
 {
@@ -190,7 +182,6 @@ static bool published(known_t *ready, pen_status_t said)
         withdrawn = false;
         replaced = previous;
         previous = running;
-        idle_slot.value = now_at(ready)->value;
         open_now = false;
     }
     return said == PEN_OK;
@@ -236,7 +227,6 @@ static void start(void)
         initial = set;
         previous.place = NOWHERE;
         replaced.place = NOWHERE;
-        idle_slot = set;
         next_in_pool = (next_in_pool + 1U) % POOL;
         waits = false;
         open_now = false;
@@ -260,7 +250,6 @@ static void note_opened(const pen_set_head_t *head, const pen_real_t values[])
     opened.id = head->id;
     opened.set.head = *head;
     opened.set.value = both_banks[own]->value[opened.place];
-    idle_slot.value = opened.set.value;
     memcpy(opened.keep, values, sizeof(opened.keep)); /* what is to be sent; checked later as what has been */
     open_now = true;
     fill = 0U;
@@ -296,10 +285,12 @@ static void begin_copy(void)
     pen_status_t right = PEN_OK;
     pen_status_t said;
 
-    if (!usable || !with_banks) {
+    if (!usable) {
         right = PEN_SET_BADARG;
     } else if (waits) {
         right = PEN_SET_BUSY;
+    } else if (!with_banks) {
+        right = PEN_SET_BADARG;
     } else {
         /* good */
     }
@@ -417,7 +408,7 @@ static void drop(void)
 static bool in_pool(const pen_real_t *values)
 {
     return (running.set.value == values) || (previous.set.value == values) || (initial.value == values) ||
-           (replaced.set.value == values) || (idle_slot.value == values) || (waits && (waiting.set.value == values));
+           (replaced.set.value == values) || (waits && (waiting.set.value == values));
 }
 
 static void pick(void)
@@ -485,15 +476,10 @@ static void verify(void)
     tuned("verify", MODEL(verify)(model, (byte() < 128U) ? byte() : word()), usable ? PEN_OK : PEN_SET_BADARG);
 }
 
-/* Is this set where restore would find it? */
-static bool findable(const pen_set_t *set)
+/* Is this set where restore would find it, if there is one? */
+static bool findable(const known_t *known)
 {
-    bool found = (set->value == both_banks[own]->value[0]) || (set->value == both_banks[own]->value[1]) || (set->value == initial.value);
-
-    for (size_t i = 0U; i < SETS; i++) {
-        found = found || (set->value == sets[i]->value);
-    }
-    return found;
+    return (known->place != FLASH) || (known->set.value == initial.value);
 }
 
 /* Saved, restored into the other instance, which goes on; the first one and its banks are spoilt. */
@@ -502,10 +488,7 @@ static void move(void)
     static uint8_t bytes[MODEL_SIZE(SAVED)];
     MODEL(t) *const other = &instance[1U - own];
     const uint32_t kind = byte();
-    const bool in_bank = (idle_slot.value == both_banks[own]->value[0]) || (idle_slot.value == both_banks[own]->value[1]);
-    const uint32_t bank = (idle_slot.value == both_banks[own]->value[0]) ? 0U : 1U;
-    const bool found = usable && findable(now_at(&running)) && ((previous.place == NOWHERE) || findable(now_at(&previous))) &&
-                       ((replaced.place == NOWHERE) || findable(now_at(&replaced))) && findable(&idle_slot);
+    const bool found = usable && findable(&running) && findable(&previous) && (!waits || (findable(&waiting) && findable(&replaced)));
     pen_status_t said = MODEL(save)(model, (kind == 0U) ? NULL : bytes);
 
     expect(said == ((found && (kind != 0U)) ? PEN_OK : PEN_SET_BADARG), "save", said, found ? 1U : 0U);
@@ -528,7 +511,6 @@ static void move(void)
         memset(both_banks[own], 0xA5, sizeof(*both_banks[own]));
         own = 1U - own;
         model = other;
-        idle_slot.value = in_bank ? both_banks[own]->value[bank] : idle_slot.value;
     }
 }
 
@@ -612,7 +594,6 @@ static void step(void)
             memcpy(twin_values[twin_turn], waiting.keep, sizeof(waiting.keep));
             set.value = twin_values[twin_turn];
             expect(MODEL(tune_select)(&twin, &set) == PEN_OK, "twin", 1U, 1U);
-            idle_slot = *now_at(&running);
             running = waiting;
             answer = PEN_ADOPTED;
         } else {
@@ -723,7 +704,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     previous.set.value = NULL;
     replaced.set.value = NULL;
     initial.value = NULL;
-    idle_slot.value = NULL;
     start();
     while (left > 0U) {
         switch (byte() % 24U) {

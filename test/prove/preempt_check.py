@@ -28,14 +28,14 @@ FAULTS = {
     "begin while a set waits": ("!pen_tuning_settle(tuning)", 0, "false"),
     "select while a set waits": ("!pen_tuning_settle(tuning)", 1, "false"),
     "rollback while a set waits": ("!pen_tuning_settle(tuning)", 2, "false"),
-    "pending before the slot is written": ("    pen_set_copy(&tuning->slot[slot], ready);", 0, "    pen_port_store(&tuning->pending, ADOPT + slot);\n    pen_set_copy(&tuning->slot[slot], ready);"),
+    "pending before the slot is written": ("    pen_set_copy(&tuning->slot[slot], ready);", 0, "    pen_port_store(&tuning->pending, command(ADOPT, slot));\n    pen_set_copy(&tuning->slot[slot], ready);"),
     "pending cleared before active is flipped": ("            active = other;", 0, "            pen_port_store(&tuning->pending, 0U);\n            active = other;"),
-    "pending forgotten by publish": ("pen_port_store(&tuning->pending, ADOPT + slot);", 0, ""),
+    "pending forgotten by publish": ("pen_port_store(&tuning->pending, tuning->published);", 0, ""),
     "active not flipped": ("            active = other;", 0, ""),
     "not adopted while holding": ("if (pending != 0U) {", 0, "if ((status == PEN_OK) && (pending != 0U)) {"),
-    "withdrawn by the tuning context itself": ("pen_port_store(&tuning->pending, WITHDRAW + slot);", 0, "pen_port_store(&tuning->pending, 0U);"),
-    "a withdrawal that came too late is granted": ("} else if (pending == (WITHDRAW + other)) {", 0, "} else if ((pending & ~1U) == WITHDRAW) {"),
-    "a withdrawal taken for granted": ("if (active != ((tuning->published - 1U) & 1U)) {", 0, "if (true) {"),
+    "withdrawn by the tuning context itself": ("pen_port_store(&tuning->pending, command(WITHDRAW, slot));", 0, "pen_port_store(&tuning->pending, 0U);"),
+    "a withdrawal that came too late is granted": ("} else if (pending == command(WITHDRAW, other)) {", 0, "} else if ((pending == command(WITHDRAW, 0U)) || (pending == command(WITHDRAW, 1U))) {"),
+    "a withdrawal taken for granted": ("if (tuning->published == command(ADOPT, active ^ 1U)) {", 0, "if (true) {"),
 }  # fmt: skip
 
 

@@ -379,14 +379,22 @@ static void one_run(void)
         }
     } else if (place == SET_INPUT) {
         pen_real_t wrong[N_U];
+        pen_status_t right;
         MODEL(u_t) input;
         memcpy(wrong, model.u[0], sizeof(wrong));
         wrong[draw() % N_U] = value;
         memcpy(&input, wrong, sizeof(input));
         status = MODEL(set_input)(&model, &input);
-        counted[0] += (status == PEN_INPUT_NONFINITE) ? 1U : 0U;
+        right = (all_finite(wrong, sizeof(wrong)) ? PEN_OK : PEN_INPUT_NONFINITE) | ((MODEL_OUT_OF_RANGE != REPORT) ? out_of_range(wrong) : PEN_OK);
+        for (size_t k = 0U; k < N_U; k++) {
+            wrong[k] = (MODEL_OUT_OF_RANGE == CLAMP) ? fminf(fmaxf(wrong[k], range[k][0]), range[k][1]) : wrong[k];
+        }
+        for (uint32_t i = 0U; i < PEN_STATUS_STEP; i++) {
+            counted[i] += (status >> i) & 1U;
+        }
         (void)MODEL(get_input)(&model, &input);
-        if (((status == PEN_INPUT_NONFINITE) != bad) || (memcmp(&input, bad ? saved.u[0] : wrong, sizeof(input)) != 0)) {
+        const bool taken = ((right & PEN_INPUT_NONFINITE) == PEN_OK) && ((MODEL_OUT_OF_RANGE != HOLD) || (right == PEN_OK));
+        if ((status != right) || (memcmp(&input, taken ? wrong : saved.u[0], sizeof(input)) != 0)) {
             fail("not refused, or for nothing", place, value, status);
         }
         memcpy(&input, saved.u[0], sizeof(input));
