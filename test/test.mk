@@ -74,7 +74,7 @@ CC.mips     := clang-19 --target=mips-none-elf
 CC.ppc      := clang-19 --target=ppc32-none-elf
 CC.s390x    := s390x-linux-gnu-gcc -fexcess-precision=fast
 
-symbols: $(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),symbols-$c$l)) $(foreach c,$(CORES),$(foreach l,-O2 -Os,symbols-$c$l)) ## Library and model must need nothing from outside
+symbols: $(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),symbols-$c$l)) symbols-m0-O2 symbols-rv32-O2 $(CORES:%=symbols-%-Os) ## Library and model must need nothing from outside
 
 # (1) compiler, (2) optimisation; the port for bare metal keeps gcc from calling memcpy, here it may try
 define symbols
