@@ -120,8 +120,8 @@ static void damage(uint32_t kind)
         banks.value[1][i] = value;
     }
 #ifdef MODEL_FOLDED
-    pen_piece_t *const piece = (pen_piece_t *)(void *)&model.pieces;
-    for (size_t i = 0U; i < (sizeof(model.pieces) / sizeof(*piece)); i++) {
+    pen_piece_t *const piece = &model.piece[0][0];
+    for (size_t i = 0U; i < (sizeof(model.piece) / sizeof(*piece)); i++) {
         piece[i].start = number(kind, (pen_real_t)10);
         piece[i].offset = number(kind, (pen_real_t)10);
         piece[i].slope = number(kind, (pen_real_t)10);
