@@ -27,7 +27,7 @@ MODELS = {
     "fading": ['method = "ros2"', 'outside = "fade"', "fade_width = 0.5", 'on_damage = "hold"'],
     "folded_or_not": ['method = "euler"', 'outside = "clamp"', "pieces = 96", 'more_pieces = "layers"', 'on_damage = "rollback"'],
 }
-OWNED = ("nqvm_sets.h", "nqvm_params.c")  # the sets of all of them
+OWNED = ("nqvm_sets.h", "nqvm_params.c", "nqvm_selftest.c")  # the sets of all of them, and the self-test of the first
 PARTS = ("all_layers", "elements", "networks_of_16", "systems", "folding", "sets", "serial")
 
 OPTIONS = [
