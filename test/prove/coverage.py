@@ -32,7 +32,7 @@ def program(build: str, name: str, test: Path, others: list[Path], words: list[s
     gate.make(["ruby", UNITY / "auto" / "generate_test_runner.rb", test, runner])
     gate.make([
         "port/host/cc", "clang-19", "-std=c99", "-O1", "-g", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc",
-        f"-I{MODELS}", "-Itest/unit", f"-I{UNITY}/src", "-include", "unity_config.h", *BUILDS[build], *words,
+        f"-I{MODELS}", "-Itest/unit", "-Itest/prove", f"-I{UNITY}/src", "-include", "unity_config.h", *BUILDS[build], *words,
         "-o", out, runner, test, UNIT / "unity_output.c", UNITY / "src" / "unity.c", *sorted((gate.ROOT / "src").glob("*.c")), *others,
     ])  # fmt: skip
     done = gate.run([out], env=os.environ | {"LLVM_PROFILE_FILE": f"{out}.profraw"})
@@ -74,9 +74,11 @@ def told(model: str) -> list[str]:
 
 
 def model_tests(build: str) -> list[Path]:
-    """coverage_model.c for each model."""
-    test = gate.HERE / "coverage_model.c"
-    return [program(build, f"model_{model}", test, [MODELS / f"{model}.c", MODELS / "nqvm_params.c"], told(model)) for model in eva.MODELS]
+    """coverage_model.c and coverage_model_sets.c for each model."""
+    return [
+        program(build, f"{test.stem}_{model}", test, [MODELS / f"{model}.c", MODELS / "nqvm_params.c"], told(model))
+        for test in sorted(gate.HERE.glob("coverage_model*.c")) for model in eva.MODELS
+    ]  # fmt: skip
 
 
 def export(build: str, programs: list[Path], *words: str) -> str:

@@ -101,18 +101,18 @@ def bench(name: str, flags: list[str]) -> Bench:
     made = Bench(place, flags, {}, {})
     link(made, SOURCES[0].name, SOURCES[0])
     linked = ["-L", place, f"-Wl,-rpath,{place}", "-lruntime"]
-    words = [f"-I{coverage.MODELS}", "-Itest/unit", f"-I{unity}/src", "-include", "unity_config.h", "-Isil/firmware"]
+    words = [f"-I{coverage.MODELS}", "-Itest/unit", "-Itest/prove", f"-I{unity}/src", "-include", "unity_config.h", "-Isil/firmware"]
     words += ["-Wl,--wrap=longjmp"]  # with which Unity leaves a test: the first assertion that fails ends the program
     stop = place / "stop.c"
     stop.write_text("#include <stdlib.h>\nvoid __wrap_longjmp(void *to, int value) { (void)to; (void)value; abort(); }\n")
     shared = [stop, unity / "src" / "unity.c", coverage.UNIT / "unity_output.c", gate.ROOT / "port" / "host" / "board.c"]
     wanted = [(test, None) for test in sorted(coverage.UNIT.glob("test_*.c"))]
-    wanted += [(gate.HERE / "coverage_model.c", model) for model in ("nqvm_folded", "fading", "implicit")]
+    wanted += [(test, model) for test in sorted(gate.HERE.glob("coverage_model*.c")) for model in ("nqvm_folded", "fading", "implicit")]
     for test, model in wanted:
         told = coverage.told(model) if model else []
         needs = re.search(r"needs: (.*) \*/", test.read_text())
         needed = [f"{model}.c", "nqvm_params.c"] if model else [Path(n).name for n in (needs[1].split() if needs else [])]
-        out = place / (model or test.stem)
+        out = place / (f"{test.stem}_{model}" if model else test.stem)
         runner = f"{out}_runner.c"
         gate.make(["ruby", unity / "auto" / "generate_test_runner.rb", test, runner])
         sources = [runner, test, *shared, *(coverage.MODELS / file for file in needed)]

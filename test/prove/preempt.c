@@ -2,19 +2,15 @@
  * Copyright (c) 2026 the penode authors */
 
 /*
- * preempt ALL FILE: every tuning call of small.toml is pre-empted by a step, and every step by a tuning call, once at
- * each boundary between two instructions, with and without a set that waits. preempt_check.py runs it. An instruction
- * lasts 2^10 ns of the machine's time, which is more than 20 ticks of SysTick on every machine here; the delay before the
- * interrupt grows by 20 from run to run, so no boundary is left out.
- *
- * ALL   0: nothing is interrupted (to count what is executed); 1: all
- * FILE  written: addresses at which a call was interrupted, then those at which a step was, one bit for each halfword
+ * preempt ALL FILE: every tuning call of small.toml is pre-empted by a step, and every step by a tuning call, once at each
+ * boundary between two instructions, with and without a set that waits; for preempt_check.py. An instruction lasts 2^10 ns,
+ * more than 20 ticks of SysTick on every machine here; the delay before the interrupt grows by 20 from run to run.
+ * ALL: 0: nothing is interrupted (to count what is executed); 1: all. FILE gets a bit for each halfword at which a call was
+ * interrupted, then a step.
  */
-
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
 #include "board.h"
 #include "cortex_m.h"
 #include "small.h"
