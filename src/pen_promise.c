@@ -192,7 +192,9 @@ bool pen_promise_kept(const pen_promise_t *promise, const pen_chain_t *chain, co
     if ((broken == 0U) && ((promise->kinds & ALONG) != 0U)) {
         broken = travel(&line, promise, start, -ONE, lowest, &looks, &at);
     }
-    breach->kind = broken;
-    breach->at = at;
+    if (broken != 0U) {
+        breach->kind = broken;
+        breach->at = at;
+    }
     return (broken == 0U);
 }

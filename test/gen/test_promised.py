@@ -78,6 +78,24 @@ def test_a_set_that_breaks_a_promise_is_refused_and_says_where(pieces, tmp_path)
     assert instance.step([0.01])[2] & BIT["adopted"]
 
 
+def test_networks_that_keep_their_promises_do_not_hide_the_breach_of_another(tmp_path):
+    """Two networks with promises; the first breaks its own. A good set afterwards does not clear it either."""
+    path = tmp_path / "both.toml"
+    path.write_text(
+        f'[model]\nextends = "{os.path.relpath(NQVM, tmp_path)}"\nname = "both"\n[networks]\n'
+        'spring_net = { inputs = ["m"], output = "N", max_slope = "130000 N/m" }\n'
+        'damper_net = { inputs = ["m/s"], output = "N", max_slope = "1e6 N*s/m" }\n'
+    )
+    sil = Sil(penode_gen.load(path))
+    instance, breach = sil.instance(), Breach()
+    bad, kept = steeper(sil, 10.0)
+    good, kept_too = steeper(sil, 1.0)
+    for chosen, status in ((bad, BIT["set_promise"]), (good, 0)):
+        assert sil.function("tune_select")(instance._self, ctypes.byref(chosen)) == status
+        assert sil.function("tune_breach")(instance._self, ctypes.byref(breach)) == 0
+        assert (breach.network, breach.kind) == (SPRING, MAX_SLOPE)
+
+
 def test_init_refuses_it_as_well(tmp_path):
     sil = Sil(model(tmp_path, 0))
     instance = sil.instance()

@@ -23,8 +23,10 @@ static const pen_chain_t bow = { bow_layer, 2U, 2U, 2U };
 static bool kept(const pen_chain_t *chain, const pen_real_t p[], bool clamp, uint32_t kind, pen_real_t limit)
 {
     const pen_promise_t promise = { kind, LOOKS, limit, limit, limit };
-    const bool good = pen_promise_kept(&promise, chain, p, clamp, 0U, NULL, work, active, &breach);
+    bool good;
 
+    breach.kind = 0U;
+    good = pen_promise_kept(&promise, chain, p, clamp, 0U, NULL, work, active, &breach);
     TEST_ASSERT_EQUAL_HEX32(good ? 0U : kind, breach.kind);
     return good;
 }
@@ -104,6 +106,22 @@ void test_the_place(void)
     TEST_ASSERT_TRUE(breach.at <= (pen_real_t)0);
     TEST_ASSERT_FALSE(bow_keeps(1.0, -1.0, 0.0, true, PEN_PROMISE_MAX_FORCE, 3.5)); /* at the edge, 4 */
     TEST_ASSERT_TRUE((breach.at >= (pen_real_t)4) && (breach.at <= (pen_real_t)4));
+}
+
+/* A network that keeps its promises leaves what was found of another. */
+void test_a_kept_promise_writes_no_breach(void)
+{
+    TEST_ASSERT_FALSE(bow_keeps(1.0, -1.0, 0.0, true, PEN_PROMISE_MAX_FORCE, 3.5));
+    {
+        static const pen_promise_t promise = { PEN_PROMISE_INCREASING, LOOKS, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0 };
+        static const pen_real_t p[9] = {
+            (pen_real_t)-2, (pen_real_t)4, (pen_real_t)1, (pen_real_t)1, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1
+        };
+        const pen_real_t at = breach.at;
+        TEST_ASSERT_TRUE(pen_promise_kept(&promise, &bow, p, false, 0U, NULL, work, active, &breach));
+        TEST_ASSERT_EQUAL_HEX32(PEN_PROMISE_MAX_FORCE, breach.kind);
+        TEST_ASSERT_TRUE((breach.at >= at) && (breach.at <= at));
+    }
 }
 
 /* The folded form: what the piece at 0 gives. */
@@ -205,6 +223,7 @@ void test_no_more_evaluations_than_allowed(void)
 
     for (uint32_t looks = 0U; looks < 20U; looks++) {
         promise.looks = looks;
+        breach.kind = 0U;
         good = pen_promise_kept(&promise, &bow, p, false, 0U, NULL, work, active, &breach);
         TEST_ASSERT_EQUAL_HEX32(good ? 0U : PEN_PROMISE_INCREASING, breach.kind);
         TEST_ASSERT_TRUE(!good || (looks >= 6U)); /* two kinks, two ends: six cells */
