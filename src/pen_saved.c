@@ -66,7 +66,8 @@ static uint32_t place_of(const pen_model_t *model, const pen_tuning_t *tuning, c
     return (value == NULL) ? NONE : place;
 }
 
-static const pen_real_t *value_at(const pen_model_t *model, const pen_tuning_t *tuning, uint32_t place)
+/* NULL if there is no such set here, or another in its place. */
+static const pen_real_t *value_at(const pen_model_t *model, const pen_tuning_t *tuning, uint32_t place, uint32_t checksum)
 {
     const pen_real_t *value = NULL;
 
@@ -75,7 +76,8 @@ static const pen_real_t *value_at(const pen_model_t *model, const pen_tuning_t *
     } else if ((place == BANK) || (place == (BANK + 1U))) {
         value = tuning->bank[place - BANK];
     } else if ((place >= KNOWN) && ((place - KNOWN) < model->sets)) {
-        value = model->set[place - KNOWN]->value;
+        const pen_set_t *const set = model->set[place - KNOWN];
+        value = (set->head.checksum == checksum) ? set->value : NULL;
     } else {
         /* none */
     }
@@ -100,7 +102,7 @@ static void get_set(const pen_model_t *model, const pen_tuning_t *tuning, pen_se
     set->head.length = get(byte, at);
     set->head.id = get(byte, at);
     set->head.checksum = get(byte, at);
-    set->value = value_at(model, tuning, get(byte, at));
+    set->value = value_at(model, tuning, get(byte, at), set->head.checksum);
 }
 
 /* The set of a slot; of one that is not read and not asked about any more, that of the other. */
@@ -151,16 +153,17 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
     return status;
 }
 
-/* Sets of the two slots that could be run: of this model, and to be found here. */
-static bool slots_fit(const pen_model_t *model, const pen_tuning_t *tuning, const uint8_t byte[])
+/* The sets of the slots, which could be run, and the two to roll back to, if any: of this model, and to be found here. */
+static bool sets_fit(const pen_model_t *model, const pen_tuning_t *tuning, const uint8_t byte[])
 {
     size_t at = 4U * (4U + WORDS + 5U);
     bool fit = true;
 
-    for (uint32_t i = 0U; i < 2U; i++) {
+    for (uint32_t i = 0U; i < 4U; i++) {
+        const bool none = (i >= 2U) && (pen_serial_get(&byte[at + 16U]) == NONE);
         pen_set_t set;
         get_set(model, tuning, &set, byte, &at);
-        fit = fit && (set.value != NULL) && (set.head.layout == model->layout) && (set.head.length == model->length);
+        fit = fit && (none || ((set.value != NULL) && (set.head.layout == model->layout) && (set.head.length == model->length)));
     }
     return fit;
 }
@@ -169,14 +172,15 @@ static bool slots_fit(const pen_model_t *model, const pen_tuning_t *tuning, cons
 static pen_status_t check(const pen_model_t *model, const pen_tuning_t *tuning, const uint8_t byte[], size_t size)
 {
     const uint32_t banks = (tuning->bank[0] != NULL) ? 1U : 0U;
-    const uint32_t *const initial = &tuning->initial.head.checksum;
+    const uint32_t initial = place_of(model, tuning, tuning->initial.value); /* if in a bank, restoring it must not change it */
     pen_status_t status = PEN_OK;
 
     if (pen_serial_get(&byte[size - 4U]) != ~pen_crc_bytes(PEN_CRC_START, size - 4U, byte)) {
         status = PEN_SET_CHECKSUM;
     } else if ((pen_serial_get(&byte[0]) != MAGIC) || (pen_serial_get(&byte[4]) != FORM) ||
                (pen_serial_get(&byte[8]) != model->layout) || (pen_serial_get(&byte[12]) != banks) ||
-               (pen_serial_get(&byte[INITIAL_AT]) != *initial) || !slots_fit(model, tuning, byte)) {
+               (pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||
+               (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) || !sets_fit(model, tuning, byte)) {
         status = PEN_SET_LAYOUT;
     } else {
         /* good */

@@ -34,8 +34,8 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
 /**
  * Into an instance that was initialised, with banks if that which was saved had some. A refused call changes nothing.
  * The caller folds the networks of both slots afterwards, and calls pen_restored.
- * @return PEN_OK; PEN_SET_BADARG; PEN_SET_LAYOUT: saved by another model or real type, or with another set given to init;
- *         PEN_SET_CHECKSUM: damaged
+ * @return PEN_OK; PEN_SET_BADARG; PEN_SET_LAYOUT: saved by another model or real type, or with another set given to init, or
+ *         that in a bank, or a set of the model file that is used has changed; PEN_SET_CHECKSUM: damaged
  */
 pen_status_t pen_restore(const pen_model_t *model, pen_instance_t *self, uint32_t rows, pen_real_t row[], uint32_t inputs,
                          pen_real_t u[], const uint8_t byte[], size_t size);

@@ -218,3 +218,36 @@ void test_set_that_is_nowhere_and_was_withdrawn(void)
     TEST_ASSERT_EQUAL_HEX8_ARRAY(byte, again, SIZE);
     expect_alike(&a, &b);
 }
+
+/* A set of the model file that has other values by now: not run in place of the one that was saved. */
+void test_set_of_the_model_file_that_has_changed(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, choose(&a, &other));
+    TEST_ASSERT_EQUAL_HEX32(PEN_ADOPTED, step(&a));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, save(&a, byte));
+    fill(&other, other_value, 4U);
+    expect_refused(PEN_SET_LAYOUT, byte, SIZE); /* runs */
+    fill(&other, other_value, 2U);
+    stage(&a, 5U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_ADOPTED, step(&a));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, save(&a, byte));
+    fill(&other, other_value, 4U);
+    expect_refused(PEN_SET_LAYOUT, byte, SIZE); /* may be rolled back to */
+    fill(&other, other_value, 2U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, restore(&b, byte));
+}
+
+/* The set given to init lies in a bank, and would be overwritten by what was saved of that. */
+void test_initial_set_in_a_bank(void)
+{
+    pen_set_t set;
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, save(&a, byte));
+    fill(&set, b.bank[0], 1U);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_init(&model, &b.head, &set, b.bank[0], b.bank[1]));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_ready(&model, &b.head, NULL, PEN_OK));
+    expect_refused(PEN_SET_LAYOUT, byte, SIZE);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, save(&b, again));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, restore(&b, again));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_verify(&model, &b.head, NULL, N));
+}
