@@ -130,7 +130,7 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
 
         put(MAGIC, byte, &at);
         put(FORM, byte, &at);
-        put(model->layout, byte, &at);
+        put(model->source, byte, &at);
         put(banks ? 1U : 0U, byte, &at);
         for (uint32_t i = 0U; i < WORDS; i++) {
             put(word[i], byte, &at);
@@ -178,7 +178,7 @@ static pen_status_t check(const pen_model_t *model, const pen_tuning_t *tuning, 
     if (pen_serial_get(&byte[size - 4U]) != ~pen_crc_bytes(PEN_CRC_START, size - 4U, byte)) {
         status = PEN_SET_CHECKSUM;
     } else if ((pen_serial_get(&byte[0]) != MAGIC) || (pen_serial_get(&byte[4]) != FORM) ||
-               (pen_serial_get(&byte[8]) != model->layout) || (pen_serial_get(&byte[12]) != banks) ||
+               (pen_serial_get(&byte[8]) != model->source) || (pen_serial_get(&byte[12]) != banks) ||
                (pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||
                (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) || !sets_fit(model, tuning, byte)) {
         status = PEN_SET_LAYOUT;

@@ -47,6 +47,7 @@ typedef struct {
 typedef struct {
     uint32_t             layout;    /* fingerprint that every set must name                             */
     uint32_t             length;    /* values of a set                                                  */
+    uint32_t             source;    /* fingerprint of the model file: models may share sets             */
     uint32_t             on_damage; /* one of PEN_DAMAGE_...                                            */
     bool                 clamp;     /* outside of the trust envelope: true: the value at its edge       */
     bool                 layers;    /* too many pieces: true: layer by layer; false: refuse             */

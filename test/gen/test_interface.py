@@ -238,6 +238,12 @@ def test_restored_with_folded_networks(phase):
     alike(a, b, u[5:], phase, "altered_friction")
 
 
+def test_bytes_of_a_model_with_the_same_sets_are_refused():
+    """Two methods of one model share their sets, and their instances are of one size."""
+    saved, other = Sil(penode_gen.load(NQVM / "nqvm.toml")).instance().save(), Sil(penode_gen.load(NQVM / "nqvm_euler.toml")).instance()
+    assert len(saved) == len(other.save()) and names(other.restore(saved)) == ["set_layout"]
+
+
 def test_bytes_of_another_model_or_type_are_refused(kind, tmp_path):
     _, sil = kind
     saved, instance = sil.instance().save(), sil.instance()

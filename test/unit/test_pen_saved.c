@@ -127,14 +127,14 @@ void test_every_bit_of_the_bytes_counts(void)
 /* Whole, but not for this instance. */
 void test_bytes_of_another_instance(void)
 {
-    static const uint32_t word[4] = { 0x534e4550U, 0x00020001U, LAYOUT ^ 1U, 0U }; /* magic, form, layout, banks */
+    static const uint32_t word[4] = { 0x534e4550U, 0x00020001U, SOURCE ^ 1U, 0U }; /* magic, form, layout, banks */
     pen_set_t set = first;
     pen_real_t value[N];
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, save(&a, byte));
     TEST_ASSERT_EQUAL_HEX32(0x494e4550U, pen_serial_get(&byte[0])); /* "PENI" */
     TEST_ASSERT_EQUAL_HEX32(1U | ((uint32_t)sizeof(pen_real_t) << 16U), pen_serial_get(&byte[4]));
-    TEST_ASSERT_EQUAL_HEX32(LAYOUT, pen_serial_get(&byte[8]));
+    TEST_ASSERT_EQUAL_HEX32(SOURCE, pen_serial_get(&byte[8]));
     TEST_ASSERT_EQUAL_HEX32(1U, pen_serial_get(&byte[12]));
     for (size_t i = 0U; i < 4U; i++) {
         const uint32_t kept = pen_serial_get(&byte[4U * i]);

@@ -372,6 +372,7 @@ static const pen_set_t *const nqvm_sets[2] = { &nqvm_set_default, &nqvm_set_alte
 static const pen_model_t nqvm_model = {
     NQVM_LAYOUT,
     NQVM_SET_LENGTH,
+    0x4a6b0f0cU, /* source */
     PEN_DAMAGE_REPORT,
     false, /* clamp */
     false, /* layers */

@@ -327,6 +327,7 @@ static const pen_set_t *const nqvm_euler_sets[2] = { &nqvm_euler_set_default, &n
 static const pen_model_t nqvm_euler_model = {
     NQVM_EULER_LAYOUT,
     NQVM_EULER_SET_LENGTH,
+    0xf3a1d19aU, /* source */
     PEN_DAMAGE_REPORT,
     false, /* clamp */
     false, /* layers */

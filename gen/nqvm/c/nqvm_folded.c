@@ -356,6 +356,7 @@ static const pen_set_t *const nqvm_folded_sets[2] = { &nqvm_folded_set_default, 
 static const pen_model_t nqvm_folded_model = {
     NQVM_FOLDED_LAYOUT,
     NQVM_FOLDED_SET_LENGTH,
+    0x1793cc4eU, /* source */
     PEN_DAMAGE_REPORT,
     false, /* clamp */
     false, /* layers */
