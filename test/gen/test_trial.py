@@ -108,6 +108,20 @@ def test_without_samples_there_is_nothing_to_try_on(sil):
     assert select(instance, bad) == 0
 
 
+def test_a_model_without_states_is_tried_on_each_sample(tmp_path):
+    """And its C has no unused parameter."""
+    path = tmp_path / "gain.toml"
+    path.write_text(
+        '[model]\nname = "gain"\nsample_time = "1 ms"\ntrial = 4\n[parameters]\nk = { value = 50, unit = "N/m", tunable = true }\n'
+        '[inputs]\nz = { unit = "m" }\n[outputs]\nf = { value = "k*z", unit = "N", trial_bound = 40 }\n'
+        '[sets.default]\n[sets.stiff]\nk = "100 N/m"\n'
+    )
+    sil = Sil(penode_gen.load(path), compiler=("gcc", "-O2", "-Wall", "-Wextra", "-Werror"))
+    for z, expected in ((0.7, 0), (0.9, BIT["set_trial"])):  # 35 and 45 N apart
+        instance = sil.instance()
+        assert instance.step([z])[2] == 0 and instance.select("stiff") == expected
+
+
 def test_only_samples_without_a_gap_count(sil):
     """A held sample ends the row of samples: what the set does to older ones does not count."""
     instance = sil.instance()
