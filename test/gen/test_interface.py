@@ -168,6 +168,11 @@ def test_input_before_the_step(kind):
         assert np.array_equal(a, b)
 
 
+def test_outputs_before_the_first_good_sample_are_0(kind):
+    instance = kind[1].instance()
+    assert not np.any(instance.step([np.nan, 0.0])[1]) and np.any(instance.step([0.0, 0.0])[1])
+
+
 # -- saved and restored -------------------------------------------------------------------------------------------------
 
 PHASES = ("fresh", "plain", "open", "pending", "to be withdrawn", "withdrawn", "adopted", "held")

@@ -109,8 +109,8 @@ pen_status_t nqvm_init(nqvm_t *self, const pen_set_t *set, nqvm_banks_t *banks);
 /**
  * One sample. Context: step.
  * @param u  input now; outside of its range it is used all the same
- * @param y  outputs now; those of the last good sample if the step did not advance (see pen_advanced); not written if
- * PEN_BADARG
+ * @param y  outputs now; those of the last good sample, 0 before the first, if the step did not advance (see
+ * pen_advanced); not written if PEN_BADARG
  * @return PEN_OK, or flags of pen_status.h: PEN_INPUT_NONFINITE, PEN_INPUT_RANGE, PEN_STATE_NONFINITE,
  * PEN_STEP_NONFINITE,
  *         PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_WITHDRAWN, PEN_BADARG, PEN_WEIGHT_NONFINITE
@@ -143,13 +143,13 @@ pen_status_t nqvm_get_input(const nqvm_t *self, nqvm_u_t *u);
 pen_status_t nqvm_set_input(nqvm_t *self, const nqvm_u_t *u);
 
 /**
- * What the sensors would show at the last sample. Context: step, between two.
+ * What the sensors would show at the last sample. Context: step, between two. Counts nothing.
  * @return PEN_OK; PEN_OUTSIDE; PEN_STEP_NONFINITE (z not written); PEN_BADARG
  */
 pen_status_t nqvm_sensors(const nqvm_t *self, nqvm_z_t *z);
 
-/** Their exact derivatives there. Context: step, between two. @return PEN_OK; PEN_OUTSIDE; PEN_STEP_NONFINITE;
- * PEN_BADARG (j not written) */
+/** Their exact derivatives there. Context: step, between two. Counts nothing. @return PEN_OK; PEN_OUTSIDE;
+ * PEN_STEP_NONFINITE; PEN_BADARG (j not written) */
 pen_status_t nqvm_sensors_jacobian(const nqvm_t *self, nqvm_sensors_jacobian_t *j);
 
 /** What was raised since the last call, with counts. Context: any. @return PEN_OK; PEN_BADARG (nothing written) */

@@ -120,8 +120,8 @@ pen_status_t nqvm_folded_init(nqvm_folded_t *self, const pen_set_t *set, nqvm_fo
 /**
  * One sample. Context: step.
  * @param u  input now; outside of its range it is used all the same
- * @param y  outputs now; those of the last good sample if the step did not advance (see pen_advanced); not written if
- * PEN_BADARG
+ * @param y  outputs now; those of the last good sample, 0 before the first, if the step did not advance (see
+ * pen_advanced); not written if PEN_BADARG
  * @return PEN_OK, or flags of pen_status.h: PEN_INPUT_NONFINITE, PEN_INPUT_RANGE, PEN_STATE_NONFINITE,
  * PEN_STEP_NONFINITE,
  *         PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_WITHDRAWN, PEN_BADARG, PEN_WEIGHT_NONFINITE
@@ -155,13 +155,13 @@ pen_status_t nqvm_folded_get_input(const nqvm_folded_t *self, nqvm_folded_u_t *u
 pen_status_t nqvm_folded_set_input(nqvm_folded_t *self, const nqvm_folded_u_t *u);
 
 /**
- * What the sensors would show at the last sample. Context: step, between two.
+ * What the sensors would show at the last sample. Context: step, between two. Counts nothing.
  * @return PEN_OK; PEN_OUTSIDE; PEN_STEP_NONFINITE (z not written); PEN_BADARG
  */
 pen_status_t nqvm_folded_sensors(const nqvm_folded_t *self, nqvm_folded_z_t *z);
 
-/** Their exact derivatives there. Context: step, between two. @return PEN_OK; PEN_OUTSIDE; PEN_STEP_NONFINITE;
- * PEN_BADARG (j not written) */
+/** Their exact derivatives there. Context: step, between two. Counts nothing. @return PEN_OK; PEN_OUTSIDE;
+ * PEN_STEP_NONFINITE; PEN_BADARG (j not written) */
 pen_status_t nqvm_folded_sensors_jacobian(const nqvm_folded_t *self, nqvm_folded_sensors_jacobian_t *j);
 
 /** What was raised since the last call, with counts. Context: any. @return PEN_OK; PEN_BADARG (nothing written) */
