@@ -52,7 +52,7 @@ def _quantity(where: tuple[str, ...], text: Any, of: list[str], problem: Problem
         problem(where, str(error), "give a number with a unit")
         return None
     if units.dimension(unit) != needed:
-        problem(where, f"'{text}' is not in {units.describe(needed)}", f"give a quantity in {' / '.join(of)}")
+        problem(where, f"'{text}' is not measured in {units.describe(needed)}", f"give a quantity in {' / '.join(of)}")
         return None
     if not value >= 0.0 or not ex.in_range(value):
         problem(where, f"'{text}' is not a limit", "give 0, or a number from 1.2e-38 to 3.4e38 in SI units")
