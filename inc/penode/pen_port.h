@@ -2,8 +2,8 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * Everything the library requires of a target. pen_port_target.h is found on the include path: port/gnu for GCC and clang
- * on any core, port/template (plain C99, the one to copy) for everything else. It defines, as `static inline`:
+ * Everything the library requires of a target. pen_port_target.h is found on the include path: port/gnu for GCC and
+ * clang on any core, port/template (plain C99, the one to copy) for everything else. It defines, as `static inline`:
  *
  *   uint32_t   pen_port_load(const volatile uint32_t *word)             atomic read of an aligned word
  *   void       pen_port_store(volatile uint32_t *word, uint32_t value)  atomic write of an aligned word

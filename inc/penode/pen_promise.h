@@ -2,38 +2,38 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * Check of a parameter set against the promises of the model file for networks of one input with ReLU activations: they are
- * proven for the weights of the set, on the target, in the tuning context, before the set is adopted.
+ * Check of a parameter set against the promises of the model file for networks of one input with ReLU activations: they
+ * are proven for the weights of the set, on the target, in the tuning context, before the set is adopted.
  *
- * A promise is about the network F in exact arithmetic of its stored values, for all real inputs: with `clamp` about the
- * network behind the clamp, else about the network extrapolated along its last pieces. PEN_PROMISE_ZERO_AT_ZERO alone is
- * about the bits that the step computes at 0.
+ * A promise is about the network F in exact arithmetic of its stored values, for all real inputs: with `clamp` about
+ * the network behind the clamp, else about the network extrapolated along its last pieces. PEN_PROMISE_ZERO_AT_ZERO
+ * alone is about the bits that the step computes at 0.
  *
- * How. From 0 outwards, both ways, in cells: at the start of a cell all layers are evaluated with their derivatives and with
- * bounds of both rounding errors (penode/pen_cell.h). A neuron whose sign is certain on the whole cell is on or off. One that
- * may switch within the cell is undecided, and is tried on and off. So each cell gives an interval that contains all exact
- * slopes on it, whatever the order in which rounding lets neurons switch. No piece is stored.
+ * How. From 0 outwards, both ways, in cells: at the start of a cell all layers are evaluated with their derivatives and
+ * with bounds of both rounding errors (penode/pen_cell.h). A neuron whose sign is certain on the whole cell is on or
+ * off. One that may switch within the cell is undecided, and is tried on and off. So each cell gives an interval that
+ * contains all exact slopes on it, whatever the order in which rounding lets neurons switch. No piece is stored.
  *
- * Margin. A set that breaks a promise is never accepted, by however little it breaks it. One that keeps its promises by more
- * than the margin is never refused; in between it may be refused. With EPS = PEN_REAL_EPSILON, and c the sum of (inputs + 10)
- * over the layers (12 for a scaling), the margin is
+ * Margin. A set that breaks a promise is never accepted, by however little it breaks it. One that keeps its promises by
+ * more than the margin is never refused; in between it may be refused. With EPS = PEN_REAL_EPSILON, and c the sum of
+ * (inputs + 10) over the layers (12 for a scaling), the margin is
  *   of a slope  c EPS times the sum of |products of the weights| along all paths through neurons that are on;
  *   of a force  16 c EPS times that sum over all paths from the input and from each bias, times the sizes that enter there;
- *   of a kink   where neurons switch so close together that their values are below 6 of their own errors (which are as that
- *               of a force, without the 16), or within 8 EPS |x|: up to 4 of them count as on or off in every combination,
- *               more than 4 as every slope from 0 to their own.
+ *   of a kink   where neurons switch so close together that their values are below 6 of their own errors (which are as
+ *               that of a force, without the 16), or within 8 EPS |x|: up to 4 of them count as on or off in every
+ *               combination, more than 4 as every slope from 0 to their own.
  * The margin is 0 for a slope that is exactly 0 because all neurons of a layer are off. No margin is stated for
  * forces where slopes are as small as PEN_REAL_MIN / EPS. In float, for the networks of the nQVM
- * (1-16-16-16-1): damper, slopes up to 18 900 N*s/m are known to 0.1 N*s/m and forces up to 260 N to 0.12 N; spring, slopes
- * up to 120 000 N/m to 5 N/m and forces up to 2800 N to 0.8 N. In double 10^-9 of that.
+ * (1-16-16-16-1): damper, slopes up to 18 900 N*s/m are known to 0.1 N*s/m and forces up to 260 N to 0.12 N; spring,
+ * slopes up to 120 000 N/m to 5 N/m and forces up to 2800 N to 0.8 N. In double 10^-9 of that.
  *
- * Dissipative. F(v) v >= -band |v|. With band 0 that asks for F(0) = 0 exactly, which is proven where all neurons of one
- * layer are off or exactly 0 at v = 0 and no bias follows; then F(v) / v has the margin of a slope. A trained network misses
- * 0 at least by rounding: promise a band, say 0.1 N. Then F has the margin of a force.
+ * Dissipative. F(v) v >= -band |v|. With band 0 that asks for F(0) = 0 exactly, which is proven where all neurons of
+ * one layer are off or exactly 0 at v = 0 and no bias follows; then F(v) / v has the margin of a slope. A trained
+ * network misses 0 at least by rounding: promise a band, say 0.1 N. Then F has the margin of a force.
  *
- * Cost. Two cells a kink, and at most promise->looks evaluations, where the combinations of a cell count as half of one each.
- * A Cortex-M4F (-O2) takes 34 instructions a weight for an evaluation: 20 300 for a network of the nQVM, which needs 163
- * to 262 of them, 3.3 to 5.3 million instructions (12 times what folding takes). Stack: 400 bytes, work[] apart.
+ * Cost. Two cells a kink, and at most promise->looks evaluations, where the combinations of a cell count as half of one
+ * each. A Cortex-M4F (-O2) takes 34 instructions a weight for an evaluation: 20 300 for a network of the nQVM, which
+ * needs 163 to 262 of them, 3.3 to 5.3 million instructions (12 times what folding takes). Stack: 400 bytes, work[] apart.
  */
 #ifndef PEN_PROMISE_H
 #define PEN_PROMISE_H

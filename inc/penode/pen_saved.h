@@ -2,9 +2,9 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * A whole instance as bytes without addresses: state, inputs, sets and banks, a pending exchange, counters. Little endian
- * on every core. A restored instance continues with the same bits. For generated code; applications call NAME_save and
- * NAME_restore.
+ * A whole instance as bytes without addresses: state, inputs, sets and banks, a pending exchange, counters. Little
+ * endian on every core. A restored instance continues with the same bits. For generated code; applications call
+ * NAME_save and NAME_restore.
  * A set is recorded by its place: a bank (whose values are saved), the set given to init, or one of the sets of the
  * model file. An instance that runs any other set, or may roll back to one, cannot be saved.
  */
@@ -34,8 +34,8 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
 /**
  * Restore an instance that was initialised, with banks if the saved one had banks. A refused call changes nothing.
  * The caller then folds the networks of both slots and calls pen_restored.
- * @return PEN_OK; PEN_SET_BADARG; PEN_SET_LAYOUT: saved by another model or real type, or with another set given to init;
- *         PEN_SET_CHECKSUM: damaged
+ * @return PEN_OK; PEN_SET_BADARG; PEN_SET_LAYOUT: saved by another model or real type, or with another set given to
+ *         init; PEN_SET_CHECKSUM: damaged
  */
 pen_status_t pen_restore(const pen_model_t *model, pen_instance_t *self, uint32_t rows, pen_real_t row[], uint32_t inputs,
                          pen_real_t u[], const uint8_t byte[], size_t size);

@@ -4,10 +4,10 @@
 /**
  * Known-answer self-test, for power-on: does this build, on this core, keep the numerical contract of penode/pen_real.h?
  *
- * What the preprocessor can see is refused by #error. The rest is reported here: start-up code that sets flush to zero or
- * another rounding mode, a library built for another real type, a compiler that contracts a * b + c, and anything else
- * that changes a bit of the kernels. The known answers come from an evaluation in Python in the order of the C, never from
- * a run of the C; they are the same on every core and in both byte orders.
+ * What the preprocessor can see is refused by #error. The rest is reported here: start-up code that sets flush to zero
+ * or another rounding mode, a library built for another real type, a compiler that contracts a * b + c, and anything
+ * else that changes a bit of the kernels. The known answers come from an evaluation in Python in the order of the C,
+ * never from a run of the C; they are the same on every core and in both byte orders.
  *
  * pen_selftest() covers the runtime. Contraction is a matter of each file: NAME_selftest() of a generated model
  * (NAME_selftest.c) covers the code of the model too, and calls pen_selftest() itself.

@@ -13,12 +13,12 @@
  *   begin / select / rollback again       (everything else of this struct is the tuning context's own)
  *   withdraw -> pending = withdraw slot   slot not active yet? do not adopt it; barrier, pending = 0
  *
- * Only the step writes `active`, and only it clears `pending`; only the tuning context fills the inactive slot, and only
- * while nothing is pending. So the step never sees a half-written set, whichever of the two pre-empts the other, also on
- * two cores. A command damaged in memory is dropped, and the running set stays in force. One tuning context at a time. A
- * refused call changes nothing that the step reads.
- * `layout` and `length` are constants of the model's code: no bit that flips in RAM can move a write out of a bank, or let
- * a set of another shape pass.
+ * Only the step writes `active`, and only it clears `pending`; only the tuning context fills the inactive slot, and
+ * only while nothing is pending. So the step never sees a half-written set, whichever of the two pre-empts the other,
+ * also on two cores. A command damaged in memory is dropped, and the running set stays in force. One tuning context at
+ * a time. A refused call changes nothing that the step reads.
+ * `layout` and `length` are constants of the model's code: no bit that flips in RAM can move a write out of a bank, or
+ * let a set of another shape pass.
  *
  * The values are in the order in which the kernels read them (see the map in the generated header of the sets).
  * Applications call the functions of their model, NAME_tune_...; those of this header are for generated code.
@@ -83,14 +83,14 @@ pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t len
 
 /**
  * Open the inactive slot for a new set. The rollback set is kept if a bank is free.
- * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT if layout or length differ; PEN_SET_BADARG if head is NULL, or there is no
- *         bank, or its address is damaged
+ * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT if layout or length differ; PEN_SET_BADARG if head is NULL, or there is
+ *         no bank, or its address is damaged
  */
 pen_status_t pen_tuning_begin(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_head_t *head);
 
 /**
- * The same with a copy of the running set: any part may be overwritten, in any order. Its checksum is that of the running
- * set until pen_tuning_expect gives another. Cost: one copy of the set.
+ * The same with a copy of the running set: any part may be overwritten, in any order. Its checksum is that of the
+ * running set until pen_tuning_expect gives another. Cost: one copy of the set.
  * @return as pen_tuning_begin
  */
 pen_status_t pen_tuning_begin_copy(pen_tuning_t *tuning, uint32_t layout, uint32_t length, uint32_t id);
@@ -107,8 +107,8 @@ pen_status_t pen_tuning_write(pen_tuning_t *tuning, uint32_t length, uint32_t of
 /** The same in bytes of the serial form (penode/pen_serial.h): offset and n count bytes, nothing need be aligned. */
 pen_status_t pen_tuning_write_bytes(pen_tuning_t *tuning, uint32_t length, uint32_t offset, const uint8_t byte[], uint32_t n);
 
-/* Three sources of a new set. Each call checks it and returns it in *ready; nothing changes until it is published. Before
- * that, the caller prepares folded networks for the slot that the set will take. Cost: about 10 operations per byte. */
+/* Three sources of a new set. Each call checks it and returns it in *ready; nothing changes until it is published.
+ * Before that, the caller folds networks into the slot that the set will take. Cost: about 10 operations per byte. */
 
 /**
  * Check the open set. A refused one stays open: write the wrong part again, or abort.

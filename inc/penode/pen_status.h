@@ -4,16 +4,16 @@
 /**
  * One status type for the whole library: flags that are ORed; 0 is good.
  *
- * Each flag is also counted. A counter has one writer: the step's context counts the flags of a step, the tuning context
- * those of a tuning call. A reader in a third context writes no shared word, so nothing is lost or counted twice,
- * whichever context pre-empts another.
+ * Each flag is also counted. A counter has one writer: the step's context counts the flags of a step, the tuning
+ * context those of a tuning call. A reader in a third context writes no shared word, so nothing is lost or counted
+ * twice, whichever context pre-empts another.
  *
- * NaN and Inf in memory: a step whose result is affected reports it. But a bound of a trust envelope is only compared, and
- * only one piece of a folded network is in use. So each step also checks one value of the running set and one piece of
- * each folded network, the next step the next ones: the scrub. Any NaN or Inf is reported within NAME_SCRUB steps, a
+ * NaN and Inf in memory: a step whose result is affected reports it. But a bound of a trust envelope is only compared,
+ * and only one piece of a folded network is in use. So each step also checks one value of the running set and one piece
+ * of each folded network, the next step the next ones: the scrub. Any NaN or Inf is reported within NAME_SCRUB steps, a
  * constant of the generated header: the length of a set, or the capacity for pieces if that is more. Where steps read
- * pieces only, it checks pieces only. A good set may have pieces so far out that they overflow: that is reported too. The
- * scrub always costs the same. Damage that stays finite is found by NAME_verify: penode/pen_instance.h.
+ * pieces only, it checks pieces only. A good set may have pieces so far out that they overflow: that is reported too.
+ * The scrub always costs the same. Damage that stays finite is found by NAME_verify: penode/pen_instance.h.
  */
 #ifndef PEN_STATUS_H
 #define PEN_STATUS_H

@@ -2,11 +2,11 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * The part of a step that is the same for all generated models: inline, so that sizes are constants and there are no calls.
- * For generated code; step context only. Only the exchange of sets branches on data.
+ * The part of a step that is the same for all generated models: inline, so that all sizes are constants. For generated
+ * code; step context only. Only the exchange of sets branches on data.
  *
- * Rows of an instance, n_last values each (states, then outputs): KEPT a second copy of the last good ones, LAST the last
- * good ones, NOW those being computed. Inputs, n_kept values each: [0] of the last sample, [1] of this one.
+ * Rows of an instance, n_last values each (states, then outputs): KEPT a second copy of the last good ones, LAST the
+ * last good ones, NOW those being computed. Inputs, n_kept values each: [0] of the last sample, [1] of this one.
  */
 #ifndef PEN_STEP_H
 #define PEN_STEP_H
@@ -128,7 +128,7 @@ static inline pen_real_t pen_step_inner(size_t n, const pen_real_t a[], const pe
 }
 
 /**
- * Keep the new row if it is good, else the last one, else the second copy; selected by index, the same work in each case.
+ * Keep the new row if it is good, else the last one, else the second copy; selected by index, always the same work.
  * @param row  [3 * n_last]; @param u  [2 * n_kept]
  * @param past     good samples to remember: 1, and more where inputs have rates or curves
  * @param refused  an input with one of these flags is not taken over

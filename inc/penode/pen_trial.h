@@ -2,12 +2,12 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * The trial of a set before it is adopted (`trial` of the model file): the step keeps its last samples in a ring; a tuning
- * call then steps copies of the model through them, with the new set and with the running one. For generated code.
+ * The trial of a set before it is adopted (`trial` of the model file): the step keeps its last samples in a ring; a
+ * tuning call then simulates them on copies of the model, with the new set and the running one. For generated code.
  *
- * The ring has room for three samples more than a trial uses. After a tuning call has closed it, a step in progress on the
- * same core may still write one sample; on another core two, and begin a third: what the trial reads does not change.
- * Samples during a trial are not kept; the ring then restarts, as it does after a held sample.
+ * The ring has room for three samples more than a trial uses. After a tuning call has closed it, a step in progress on
+ * the same core may still write one sample; on another core two, and begin a third: what the trial reads does not
+ * change. Samples during a trial are not kept; the ring then restarts, as it does after a held sample.
  *
  * Cost per step: a copy of its states and inputs, and some 20 instructions. Cost of a trial: two steps per sample.
  */
