@@ -118,7 +118,7 @@ def test_networks_of_which_nothing_can_be_proven(tmp_path):
 def test_a_set_that_breaks_a_promise_is_named(tmp_path, says, net, outside, message):
     with pytest.raises(penode_gen.ModelError) as caught:
         load(tmp_path, says, other=net, net=net if "decreasing" in says else bow(0.5, -0.5, 0.0) if outside == "clamp" else bow(3.0, -2.0), outside=outside)
-    assert f"sets.other.net: {message}" in str(caught.value) and "train it under its promises" in str(caught.value)
+    assert f"sets.other.net: {message}" in str(caught.value) and "train the network to keep its promises" in str(caught.value)
 
 
 def test_pieces_are_the_exact_ones():
