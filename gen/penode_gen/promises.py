@@ -29,7 +29,7 @@ def read(where: tuple[str, ...], entry: dict[str, Any], inputs: list[str], outpu
     """The promises in an entry of [networks]."""
     rising = entry.get("monotone", False)
     if rising not in (True, False, "increasing", "decreasing"):
-        problem((*where, "monotone"), f"'{rising}' is no direction", 'write true, "increasing" or "decreasing"')
+        problem((*where, "monotone"), f"'{rising}' is not a direction", 'write true, "increasing" or "decreasing"')
     band = entry.get("dissipative", False)
     slope, force, small = (
         _quantity((*where, key), entry.get(key), of, problem)
@@ -55,7 +55,7 @@ def _quantity(where: tuple[str, ...], text: Any, of: list[str], problem: Problem
         problem(where, f"'{text}' is not measured in {units.describe(needed)}", f"give a quantity in {' / '.join(of)}")
         return None
     if not value >= 0.0 or not ex.in_range(value):
-        problem(where, f"'{text}' is no limit", "give 0, or a size from 1.2e-38 to 3.4e38 in SI")
+        problem(where, f"'{text}' is not a limit", "give 0, or a number from 1.2e-38 to 3.4e38 in SI units")
         return None
     return value
 
@@ -67,15 +67,15 @@ def check(networks: dict[str, NetworkPort], sets: dict[str, ParameterSet], outsi
             continue
         shapes = [chosen.networks[name] for chosen in sets.values() if name in chosen.networks]
         if not all(foldable(net) for net in shapes):
-            problem(("networks", name), "promises are proven for networks of one input with ReLU activations only", "leave them out, or train such a network")
+            problem(("networks", name), "promises are proven for networks of one input with ReLU activations only", "remove them, or train such a network")
         elif outside == "fade":
-            problem(("networks", name), "a network that fades is not made of straight pieces: its promises cannot be proven", "choose outside = 'extrapolate' or 'clamp', or leave them out")
+            problem(("networks", name), "a network that fades is not piecewise linear: its promises cannot be proven", "choose outside = 'extrapolate' or 'clamp', or remove them")
         else:
             done: set[int] = set()  # sets that leave a network out share that of the set 'default'
             for chosen in (c for c in sets.values() if name in c.networks and id(c.networks[name]) not in done):
                 done.add(id(chosen.networks[name]))
                 for what in broken(port.promises, chosen.networks[name], outside == "clamp"):
-                    problem(("sets", chosen.name, name), what, "train it under its promises, or mend [networks]")
+                    problem(("sets", chosen.name, name), what, "train the network to keep its promises, or relax them in [networks]")
 
 
 def broken(promises: Promises, network: Network, clamp: bool) -> list[str]:

@@ -53,7 +53,7 @@ class NetworkTables(Tables):
         if given == 0 or not sets:
             return
         if head["outside"] == "fade":
-            self.problem(where, "a network that fades is not made of straight pieces", "choose outside = 'extrapolate' or 'clamp', or leave pieces out")
+            self.problem(where, "a network that fades is not piecewise linear", "choose outside = 'extrapolate' or 'clamp', or leave pieces out")
         elif not any(foldable(net) for net in sets["default"].networks.values()) and len(sets["default"].networks) == len(self.data.get("networks", {})):
             self.problem(where, "no network has one input and only ReLU activations", "leave pieces out")
         elif head["more_pieces"] == "refuse":

@@ -78,7 +78,7 @@ class _Reader(NetworkTables):
         if head.setdefault("pieces", 0) != 0 and not 4 <= head["pieces"] <= ROOM:
             self.problem(("model", "pieces"), f"{head['pieces']} is out of range", f"give room for 4 to {ROOM} pieces, or 0 to evaluate layer by layer")
         if not 0 <= head.setdefault("trial", 0) <= 10000:
-            self.problem(("model", "trial"), f"{head['trial']} is out of range", "give the samples that a new set is tried on, up to 10000, or 0 for none")
+            self.problem(("model", "trial"), f"{head['trial']} is out of range", "give the number of last samples that a new set is tried on, up to 10000, or 0 for no trial")
 
         parameters = self.parameters()
         inputs = tuple(self.inputs())
@@ -277,7 +277,7 @@ class _Reader(NetworkTables):
             noise = self.noise((section, name), entry, scale)
             bound = self.number((section, name, "trial_bound"), entry["trial_bound"], scale) if "trial_bound" in entry else None
             if bound is not None and not bound > 0.0:
-                self.problem((section, name, "trial_bound"), f"{bound} is no distance", "give how far a new set may lead from the running one, above 0")
+                self.problem((section, name, "trial_bound"), f"{bound} is not a bound", "give how far outputs with a new set may be from those with the running one, above 0")
             yield m.Signal(name, entry.get("value", ""), entry.get("unit", UNKNOWN), noise, entry.get("description", ""), bound)
 
     def unique(self, parameters, inputs, bodies, elements, states, variables, networks) -> None:

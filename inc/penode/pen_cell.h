@@ -2,9 +2,9 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * A network of one input with ReLU activations on a stretch of its line, enclosed: what pen_promise_kept() looks at.
+ * Bounds of value and slope of a network of one input with ReLU activations on an interval, for pen_promise_kept().
  *
- * All numbers come with a bound of what rounding may have done to them, so they hold of the network in exact arithmetic.
+ * They include rounding errors, so they hold for the network in exact arithmetic.
  */
 #ifndef PEN_CELL_H
 #define PEN_CELL_H
@@ -19,7 +19,7 @@
 extern "C" {
 #endif
 
-#define PEN_CELL_OPEN 4U /* undecided neurons of a cell whose patterns are all gone through */
+#define PEN_CELL_OPEN 4U /* up to this many undecided neurons, every on/off pattern of a cell is evaluated */
 
 /** A network with its values and work space. */
 typedef struct {
@@ -32,8 +32,8 @@ typedef struct {
 /** The network at x, and from there on along `way` for `length`. */
 typedef struct {
     pen_real_t x;
-    pen_real_t way;                   /* 1 or -1                                                                   */
-    pen_real_t guard;                 /* no cell is shorter: numbers lie closer together than that                 */
+    pen_real_t way;                   /* direction: 1 or -1                                                        */
+    pen_real_t guard;                 /* shortest cell: more than the spacing of pen_real_t here                   */
     pen_real_t length;                /* PEN_REAL_MAX: no neuron switches any more                                 */
     size_t     open;                  /* how many neurons are undecided; 0: the network is straight                */
     size_t     neuron[PEN_CELL_OPEN]; /* the first of them                                                         */
@@ -44,8 +44,8 @@ typedef struct {
 } pen_cell_t;
 
 /**
- * The cell that starts at x. A neuron that may switch within it is undecided. Up to PEN_CELL_OPEN undecided neurons are put
- * on and off in every combination; if there are more, each counts as every slope from 0 to that of its line.
+ * The cell that starts at x. A neuron that may switch within it is undecided. Up to PEN_CELL_OPEN undecided neurons are
+ * tried on and off in every combination; with more, each contributes every slope from 0 to its own.
  * Cost on a Cortex-M4F: 34 instructions a weight, and 17 for each combination.
  */
 void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *part);

@@ -2,21 +2,21 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * Keeps the compiler from joining a product and a sum into one operation of one rounding (FMA), which changes bits. No
- * macro shows whether it would: GCC does it by default (-std=gnu17), clang within an expression. Every C file of the
+ * Keeps the compiler from contracting a product and a sum to an FMA, which rounds once and so changes bits. No macro
+ * reveals contraction: GCC does it by default (-std=gnu17), clang within an expression. Every C file of the
  * library and of a model includes this header before anything else; then no flag is needed. Programs need not include it.
  *
  * What each compiler is told:
  *
- * - GCC does not know the pragma of C99, so the option is set inside the file, where the core has such an instruction.
- *   That pragma sets all options anew and loses what -ffreestanding and -Os on Thumb-2 imply, so both are set again: loops
- *   stay loops (a copy never becomes a call of memcpy), and registers are saved in one place. With this list the code is
+ * - GCC ignores the pragma of C99, so the option is set inside the file, where the core has such an instruction.
+ *   That pragma resets all options and loses what -ffreestanding and -Os on Thumb-2 imply, so both are set again: loops
+ *   stay loops (no copy becomes a call of memcpy), and registers are saved in one place. With this list the code is
  *   the same, instruction by instruction, as with -ffp-contract=off on the command line and without this header.
- * - clang is also told not to reorder sums and not to divide by reciprocals: it shows neither flag in a macro, GCC shows
- *   both (see penode/pen_real.h).
+ * - clang is also told not to reorder sums and not to divide by reciprocals: no macro of clang reveals these flags; GCC
+ *   has one for each (see penode/pen_real.h).
  * - any other compiler gets the pragma of C99.
  *
- * What remains: clang obeys -ffp-contract=fast in spite of any pragma, and shows no macro for -fno-signed-zeros.
+ * What remains: clang obeys -ffp-contract=fast in spite of any pragma, and defines no macro for -fno-signed-zeros.
  *
  * Cost: none.
  */

@@ -2,18 +2,18 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * Folding: a network of one input with ReLU activations is a chain of straight pieces. When its weights are staged, the
- * tuning context finds all pieces; the step then looks up the right one instead of running through the layers.
+ * Folding: a network of one input with ReLU activations is piecewise linear. When its weights are staged, the tuning
+ * context finds all pieces; the step then looks up the current one instead of evaluating the layers.
  *
  * How. From the centre of the trust envelope outwards, both ways: at a point, all layers are evaluated together with
- * their derivatives; the neuron whose sign changes next, going on along the straight line, ends the piece; it alone is
- * switched; on from there. Which neurons are on is kept as a pattern of its own, so rounding cannot confuse the walk.
+ * their derivatives; the neuron whose sign changes next along the straight line ends the piece; that neuron alone is
+ * switched, and the walk continues there. The pattern of active neurons is stored, so rounding cannot confuse the walk.
  *
- * Accuracy. On each piece value and slope are those of the layers along that pattern. Against the evaluation layer by
- * layer the difference stays within twice the forward rounding error of those layers (test/gen/test_fold.py derives
- * it, and tests it at the ends of all pieces and their neighbours). At a kink the slope is that of the right piece.
+ * Accuracy. On each piece value and slope are those of the layers with that pattern. The difference from the evaluation
+ * layer by layer stays within twice the forward rounding error of those layers (test/gen/test_fold.py derives
+ * it, and tests it at the ends of all pieces and their neighbours). At a kink the slope is that of the piece above it.
  *
- * The trust envelope ends pieces too: outside of it each piece carries PEN_OUTSIDE. So the step needs no other check.
+ * Pieces also end at the edges of the trust envelope and carry PEN_OUTSIDE beyond it: the step needs no other check.
  */
 #ifndef PEN_FOLD_H
 #define PEN_FOLD_H
@@ -61,12 +61,12 @@ typedef struct {
 /**
  * Find the pieces of a network.
  * @param p         its values in a set, all finite: lowest and highest input seen in training, then the layers
- * @param clamp     true: outside of the trust envelope the value at its edge; false: go on
+ * @param clamp     true: outside of the trust envelope the value at its edge; false: extrapolate
  * @param line      [4 * chain->width] work space
  * @param active    [chain->neurons] work space
  * @param capacity  of piece[], at least 4; all of it is written
  * @return PEN_OK; PEN_SET_PIECES if there are more pieces than capacity (piece[] is undefined)
- * Cost: a piece takes one evaluation with its derivative; at most capacity + chain->neurons + 4 of them for any weights. A
+ * Cost: one evaluation with its derivative for each piece; at most capacity + chain->neurons + 4 for any weights. A
  * network that would take more, because neurons switch between two neighbouring numbers, is refused as well.
  */
 pen_status_t pen_fold(const pen_chain_t *chain, const pen_real_t p[], bool clamp, pen_real_t line[], bool active[],

@@ -2,7 +2,7 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * Elementary functions, the same bits on every target. No libm.
+ * Elementary functions with the same bits on every target. No libm.
  *
  * Any argument is allowed; NaN gives NaN. Largest error in ulp, the distance of neighbouring numbers at the exact value
  * (correct rounding: 0.5): in float over all 2^32 arguments, where each function is also monotone; in double over some
@@ -53,7 +53,7 @@ static inline bool pen_finite(size_t n, const pen_real_t value[])
     return sum >= (pen_real_t)0; /* false for NaN; -0 >= 0 is true */
 }
 
-/** `yes` or `no`, both made beforehand: through memory, so that no compiler branches around the one it does not need. */
+/** `yes` or `no`, both evaluated; selected through memory, so that no compiler branches around the unused one. */
 static inline pen_real_t pen_where(bool condition, pen_real_t yes, pen_real_t no)
 {
     const pen_real_t both[2] = { no, yes };

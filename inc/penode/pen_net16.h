@@ -2,7 +2,7 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * The commonest network in one piece: one input, layers of 16 neurons with ReLU, one output (1-16-16-16-1, say).
+ * The most common network as one function: one input, layers of 16 neurons with ReLU, one output (1-16-16-16-1, say).
  *
  * The same bits as layer by layer with penode/pen_net.h, and the same storage: a stream of biases and columns for each
  * layer. All rows of a layer are accumulated side by side, so that each weight is read once and in order.

@@ -2,21 +2,21 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * All that the library asks of a target. `pen_port_target.h` is found on the include path: port/gnu for GCC and clang
- * on any core, port/template (plain C99, the one to copy) for everything else. It defines, as `static inline`:
+ * Everything the library requires of a target. pen_port_target.h is found on the include path: port/gnu for GCC and
+ * clang on any core, port/template (plain C99, the one to copy) for everything else. It defines, as `static inline`:
  *
- *   uint32_t   pen_port_load(const volatile uint32_t *word)             one aligned word, read in one piece
- *   void       pen_port_store(volatile uint32_t *word, uint32_t value)  one aligned word, written in one piece
+ *   uint32_t   pen_port_load(const volatile uint32_t *word)             atomic read of an aligned word
+ *   void       pen_port_store(volatile uint32_t *word, uint32_t value)  atomic write of an aligned word
  *   void       pen_port_barrier(void)       no load or store moves across it, neither in compiler nor in core
  *   pen_real_t pen_port_abs(pen_real_t x)   |x|; NaN stays NaN, -0 becomes +0; one instruction where the core has one
  *   uint32_t   pen_port_cycles(void)        free-running counter for measurements; wraps; 0 where there is none
  *
- * and two macros: PEN_PORT_INLINE for `static inline`, and stronger where a compiler might still make a call of it;
- * PEN_PORT_UNROLL, which stands before a loop whose length is a small constant and may ask the compiler to
- * write it out where speed counts more than size.
+ * and two macros: PEN_PORT_INLINE is `static inline`, with the compiler's attribute to always inline where needed;
+ * PEN_PORT_UNROLL stands before a loop whose length is a small constant and may ask the compiler to unroll it
+ * where speed counts more than size.
  *
- * A port may define PEN_PORT_ROWS and PEN_PORT_NET16 too, and with them what takes the place of the C in pen_rows_relu
- * and in pen_net16 (penode/pen_net16.h):
+ * A port may also define PEN_PORT_ROWS and PEN_PORT_NET16, and functions that replace the C in pen_rows_relu and in
+ * pen_net16 (penode/pen_net16.h):
  *
  *   void       pen_port_rows(size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[])
  *   pen_real_t pen_port_net16(size_t hidden, const pen_real_t w[], pen_real_t x)

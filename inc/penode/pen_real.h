@@ -6,8 +6,8 @@
  *
  * Everything is computed in `pen_real_t`: float, or double if PEN_REAL_DOUBLE is defined for the library and for
  * everything that includes it. Results are bit-identical on every target that keeps IEEE 754 arithmetic in that type. A
- * compiler option that breaks this stops the compiler here if a macro shows it; contraction to FMA, which none shows, is
- * prevented (penode/pen_exact.h). So no option is needed. Left to the application: no flush to zero, rounding to nearest.
+ * compiler option that breaks this is refused here if a macro reveals it; contraction to FMA, which none reveals, is
+ * prevented (penode/pen_exact.h). So no option is needed. The application sets rounding to nearest, no flush to zero.
  */
 #ifndef PEN_REAL_H
 #define PEN_REAL_H

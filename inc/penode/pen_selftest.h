@@ -4,10 +4,10 @@
 /**
  * Known-answer self-test, for power-on: does this build, on this core, keep the numerical contract of penode/pen_real.h?
  *
- * What the preprocessor can see stops the compiler. The rest is reported here: start-up code that sets flush to zero or
- * another rounding mode, a library built for another real type, a compiler that contracts a * b + c, and anything else that
- * changes a bit of the kernels. The known answers come from an evaluation in Python in the order of the C, never from a
- * run of the C; they are the same on every core and in both byte orders.
+ * What the preprocessor can see is refused by #error. The rest is reported here: start-up code that sets flush to zero
+ * or another rounding mode, a library built for another real type, a compiler that contracts a * b + c, and anything
+ * else that changes a bit of the kernels. The known answers come from an evaluation in Python in the order of the C,
+ * never from a run of the C; they are the same on every core and in both byte orders.
  *
  * pen_selftest() covers the runtime. Contraction is a matter of each file: NAME_selftest() of a generated model
  * (NAME_selftest.c) covers the code of the model too, and calls pen_selftest() itself.
@@ -15,7 +15,7 @@
  * The double build: a software double that does not round as IEEE 754 says is reported like any other breach. That of
  * GCC's libgcc for Arm (cores without an FPU for doubles) gives PEN_SELFTEST_ROUNDING: see penode/pen_math.h.
  *
- * Thread context: any, nothing is kept. Floating-point modes belong to a context: run it in the one that steps.
+ * Thread context: any, no state is kept. Floating-point modes belong to a context: run it in the one that steps.
  * Cost on a Cortex-M4F, -O2 / -Os:
  *   pen_selftest     7284 / 7123 instructions, 1152 / 948 bytes of code and constants, 0.5 KB of stack, no RAM
  *   NAME_selftest    400 / 400 bytes for gen/nqvm; instructions: those of an init and 200 steps, and of the hash
@@ -39,9 +39,9 @@ extern "C" {
 #define PEN_SELFTEST_ROUNDING   UINT32_C(0x02) /* not rounded to nearest, ties to even                               */
 #define PEN_SELFTEST_REAL       UINT32_C(0x04) /* pen_real_t of the caller is not that of the library                */
 #define PEN_SELFTEST_CONTRACTED UINT32_C(0x08) /* a * b + c is rounded once: compile with -ffp-contract=off          */
-#define PEN_SELFTEST_ANSWER     UINT32_C(0x10) /* a known answer is missed; alone: a compiler's fault, or damaged code */
+#define PEN_SELFTEST_ANSWER     UINT32_C(0x10) /* a known answer is missed; alone: a compiler bug, or damaged code     */
 #define PEN_SELFTEST_SET        UINT32_C(0x20) /* of a model: its set `default` is refused (pen_selftest() never)    */
-#define PEN_SELFTEST_BADARG     UINT32_C(0x40) /* of a model: no instance is lent (pen_selftest() never)             */
+#define PEN_SELFTEST_BADARG     UINT32_C(0x40) /* of a model: the instance is NULL (pen_selftest() never)            */
 
 /* The real type in one number: digits, range and size. */
 #ifdef PEN_REAL_DOUBLE
@@ -59,7 +59,7 @@ static inline uint32_t pen_selftest(void)
     return pen_selftest_of(PEN_SELFTEST_TYPE);
 }
 
-/** Does the file that includes this contract? a b + c, 0 with two roundings, eps^2 with one. @return 0 or PEN_SELFTEST_CONTRACTED */
+/** Contraction in the including file: a b + c is 0 with two roundings, else eps^2. @return 0 or PEN_SELFTEST_CONTRACTED */
 static inline uint32_t pen_selftest_contracted(void)
 {
     const volatile pen_real_t given[2] = { (pen_real_t)1 + PEN_REAL_EPSILON, (pen_real_t)-1 - ((pen_real_t)2 * PEN_REAL_EPSILON) };

@@ -2,7 +2,7 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * Small dense linear systems, partial pivoting, in place.
+ * Solution of small dense linear systems with partial pivoting, in place.
  */
 #ifndef PEN_SOLVE_H
 #define PEN_SOLVE_H

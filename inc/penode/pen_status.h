@@ -2,18 +2,18 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * One status type for the whole library: flags that add up, 0 is good.
+ * One status type for the whole library: flags that are ORed; 0 is good.
  *
- * Each flag is also counted. A counter has one writer: the step's context counts the flags of a step, the tuning context
- * those of a tuning call. A reader in a third place never writes a shared word, so nothing is lost or counted twice,
- * whoever pre-empts whom.
+ * Each flag is also counted. A counter has one writer: the step's context counts the flags of a step, the tuning
+ * context those of a tuning call. A reader in a third context writes no shared word, so nothing is lost or counted
+ * twice, whichever context pre-empts another.
  *
- * NaN and Inf in memory: the step that meets one reports it. But a bound of a trust envelope is only compared with, and of
- * a folded network one piece is in use. So each step also looks at one value of the running set and at one piece of
- * each folded network, the next step at the next: the scrub. Any NaN or Inf is reported within NAME_SCRUB steps, a
- * constant of the generated header: the length of a set, or the room for pieces if that is more. Where steps read pieces
- * only, it looks at pieces only. A good set may have pieces so far out that they overflow: that is reported too. The scrub
- * costs the same wherever it is. Damage that stays finite is found by NAME_verify: penode/pen_instance.h.
+ * NaN and Inf in memory: a step whose result is affected reports it. But a bound of a trust envelope is only compared,
+ * and only one piece of a folded network is in use. So each step also checks one value of the running set and one piece
+ * of each folded network, the next step the next ones: the scrub. Any NaN or Inf is reported within NAME_SCRUB steps, a
+ * constant of the generated header: the length of a set, or the capacity for pieces if that is more. Where steps read
+ * pieces only, it checks pieces only. A good set may have pieces so far out that they overflow: that is reported too.
+ * The scrub always costs the same. Damage that stays finite is found by NAME_verify: penode/pen_instance.h.
  */
 #ifndef PEN_STATUS_H
 #define PEN_STATUS_H
@@ -31,11 +31,11 @@ typedef uint32_t pen_status_t;
 
 /* Raised by a step. */
 #define PEN_INPUT_NONFINITE  UINT32_C(0x000001) /* an input is NaN or Inf; state and outputs held                      */
-#define PEN_STATE_NONFINITE  UINT32_C(0x000002) /* the state was NaN or Inf; the last good one is back, outputs held   */
+#define PEN_STATE_NONFINITE  UINT32_C(0x000002) /* the state was NaN or Inf; last good one restored, outputs held      */
 #define PEN_STEP_NONFINITE   UINT32_C(0x000004) /* NaN or Inf arose inside (weight, overflow); state and outputs held  */
 #define PEN_SINGULAR         UINT32_C(0x000008) /* a linear solve met a singular matrix; state and outputs held        */
 #define PEN_OUTSIDE          UINT32_C(0x000010) /* a network input left its trust envelope; treated as the model says  */
-#define PEN_HELD             UINT32_C(0x000020) /* no step taken, as told by the tuning context                        */
+#define PEN_HELD             UINT32_C(0x000020) /* no step taken: hold requested, or set by NAME_verify                */
 #define PEN_ADOPTED          UINT32_C(0x000040) /* a new parameter set is in force from this step on                   */
 #define PEN_BADARG           UINT32_C(0x000080) /* NULL, or an instance that was not initialised; nothing written      */
 #define PEN_WEIGHT_NONFINITE UINT32_C(0x000100) /* the scrub met NaN or Inf in the running set; nothing held           */
@@ -61,12 +61,12 @@ typedef uint32_t pen_status_t;
 #define PEN_STATUS_FLAGS 25U /* flags above, and counters                                    */
 #define PEN_STATUS_STEP  11U /* the first 11 flags are a step's, the others a tuning call's  */
 
-/* What a step did not take: state and outputs held. */
+/* The step did not advance: state and outputs are held. */
 #define PEN_HOLDING \
     (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE | PEN_STEP_NONFINITE | PEN_SINGULAR | PEN_HELD | PEN_BADARG)
 
-/* Three kinds of flag. Faults want a reaction; warnings say that results are less sure; events are what was asked for.
- * A tuning call that was refused is none of them: its caller has the answer. */
+/* Three kinds of flag. Faults need a reaction; warnings mean that results are less certain; events were requested.
+ * A refused tuning call is none of them: its return value tells the caller. */
 #define PEN_FAULTS \
     (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE | PEN_STEP_NONFINITE | PEN_SINGULAR | PEN_BADARG | PEN_WEIGHT_NONFINITE | \
      PEN_SET_DAMAGED)
@@ -94,18 +94,18 @@ typedef struct {
 /** How often `flag`, one of the flags above, was raised: pen_status_times(&report, PEN_OUTSIDE). 0 for anything else. */
 uint32_t pen_status_times(const pen_status_report_t *report, pen_status_t flag);
 
-/** Clear all counters. Not while another context uses the log. */
+/** Clear all counters. No other context may use the log meanwhile. */
 void pen_status_clear(pen_status_log_t *log);
 
-/** Count the flags of a step, the others are ignored; for the step's context only. Cost: 59 instructions, at -Os 92. */
+/** Count the flags of a step and ignore the others; for the step's context only. Cost: 59 instructions, at -Os 92. */
 void pen_status_note_step(pen_status_log_t *log, pen_status_t status);
 
-/** Count the flags of a tuning call, the others are ignored; for the tuning context only. */
+/** Count the flags of a tuning call and ignore the others; for the tuning context only. */
 void pen_status_note_tune(pen_status_log_t *log, pen_status_t status);
 
 /**
  * Read and clear: everything raised since the last read. One reader; any context. What is raised during the call is in
- * this report or in the next. At most 2^32 - 1 steps between two reads: then a counter has come round.
+ * this report or in the next. Read at least every 2^32 - 1 steps: then a counter wraps.
  */
 void pen_status_read(pen_status_log_t *log, pen_status_report_t *report);
 

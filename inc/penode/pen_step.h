@@ -2,11 +2,11 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * The step half of a generated model, as far as it is the same for all: inline, so that sizes are constants and the step
- * takes no instruction more. For generated code; step context only. No branch depends on the data but the exchange of sets.
+ * The part of a step that is the same for all generated models: inline, so that all sizes are constants. For generated
+ * code; step context only. Only the exchange of sets branches on data.
  *
- * Rows of an instance, n_last values each (states, then outputs): KEPT a second copy of the last good ones, LAST the last
- * good ones, NOW those being made. Inputs, n_kept values each: [0] of the last sample, [1] of this one.
+ * Rows of an instance, n_last values each (states, then outputs): KEPT a second copy of the last good ones, LAST the
+ * last good ones, NOW those being computed. Inputs, n_kept values each: [0] of the last sample, [1] of this one.
  */
 #ifndef PEN_STEP_H
 #define PEN_STEP_H
@@ -41,7 +41,7 @@ static inline void pen_step_copy(size_t n, const pen_real_t from[], pen_real_t t
     } while (i < n);
 }
 
-/** PEN_OK, or `flag` if a value is NaN or Inf: pen_finite, with the flag for its answer. */
+/** PEN_OK, or `flag` if a value is NaN or Inf, as pen_finite. */
 static inline pen_status_t pen_step_check(size_t n, const pen_real_t *value, pen_status_t flag)
 {
     pen_real_t sum = (pen_real_t)0;
@@ -55,7 +55,7 @@ static inline pen_status_t pen_step_check(size_t n, const pen_real_t *value, pen
     return (sum >= (pen_real_t)0) ? PEN_OK : flag;
 }
 
-/** 1 once there are more than `samples` good samples (0, 1 or 2), else 0: how much of a step, parabola or cubic there is. */
+/** 1 after more than `samples` good samples (0, 1 or 2), else 0: a factor of the integration and of input curves. */
 static inline pen_real_t pen_step_history(const pen_instance_t *self, uint32_t samples)
 {
     const uint32_t more = (self->running >> samples) & 1U;
@@ -63,7 +63,7 @@ static inline pen_real_t pen_step_history(const pen_instance_t *self, uint32_t s
     return (pen_real_t)more;
 }
 
-/** Derivatives at the start: x follows itself. @param d  [n_x * n_columns] */
+/** Initial derivatives: dx/dx = 1, all others 0. @param d  [n_x * n_columns] */
 static inline void pen_step_unit(size_t n_x, size_t n_columns, pen_real_t d[])
 {
     for (size_t n = 0U; n < n_x; n++) {
@@ -74,7 +74,7 @@ static inline void pen_step_unit(size_t n_x, size_t n_columns, pen_real_t d[])
 }
 
 /**
- * Look at one value of the set in force and at one piece of each folded network; the next step looks at the next.
+ * Check one value of the set in force and one piece of each folded network; the next step checks the next ones.
  * @param round   NAME_SCRUB
  * @param length  of value[]; 0 if steps read pieces only
  * @param piece   [networks * pieces] of the slot in force
@@ -82,7 +82,7 @@ static inline void pen_step_unit(size_t n_x, size_t n_columns, pen_real_t d[])
 static inline pen_status_t pen_step_scrub(pen_instance_t *self, uint32_t round, uint32_t length, const pen_real_t value[],
                                           uint32_t networks, uint32_t pieces, const pen_piece_t piece[])
 {
-    const uint32_t at = self->scrub % round; /* whatever its memory has become; no branch, as a comparison may be */
+    const uint32_t at = self->scrub % round; /* in range even if scrub is damaged; no branch, unlike a comparison */
     pen_real_t nonfinite = (pen_real_t)0;    /* 0, or NaN once a number is not finite */
 
     if (length > 0U) {
@@ -128,7 +128,7 @@ static inline pen_real_t pen_step_inner(size_t n, const pen_real_t a[], const pe
 }
 
 /**
- * Keep what is new if it is good, else what was there, else the second copy: picked by number, the same work each way.
+ * Keep the new row if it is good, else the last one, else the second copy; selected by index, always the same work.
  * @param row  [3 * n_last]; @param u  [2 * n_kept]
  * @param past     good samples to remember: 1, and more where inputs have rates or curves
  * @param refused  an input with one of these flags is not taken over

@@ -2,14 +2,14 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * The trial of a set before it is adopted (`trial` of the model file): the step keeps its last samples in a ring; a tuning
- * call then steps copies of the model through them, with the new set and with the running one. For generated code.
+ * The trial of a set before it is adopted (`trial` of the model file): the step keeps its last samples in a ring; a
+ * tuning call then simulates them on copies of the model, with the new set and the running one. For generated code.
  *
- * The ring has room for three samples more than a trial uses. Once a tuning call has closed it, a step under way on the same
- * core may still write one sample; on another core two, and begin a third: what the trial reads stays as it is.
- * A sample that falls into a trial is not kept; the ring then begins anew, as it does behind a sample that was held.
+ * The ring has room for three samples more than a trial uses. After a tuning call has closed it, a step in progress on
+ * the same core may still write one sample; on another core two, and begin a third: what the trial reads does not
+ * change. Samples during a trial are not kept; the ring then restarts, as it does after a held sample.
  *
- * Cost of a step: a copy of its states and inputs, and some 20 instructions. Cost of a trial: twice as many steps as samples.
+ * Cost per step: a copy of its states and inputs, and some 20 instructions. Cost of a trial: two steps per sample.
  */
 #ifndef PEN_TRIAL_H
 #define PEN_TRIAL_H
@@ -26,18 +26,18 @@ extern "C" {
 
 /** The ring of an instance, without its samples. */
 typedef struct {
-    volatile uint32_t written; /* samples kept so far; wraps; the step's                        */
-    volatile uint32_t first;   /* the oldest of those without a gap up to now; the step's       */
-    volatile uint32_t closed;  /* 1 during a trial; the tuning context's                        */
+    volatile uint32_t written; /* samples kept so far; wraps; written by the step               */
+    volatile uint32_t first;   /* oldest sample without a gap since; written by the step        */
+    volatile uint32_t closed;  /* 1 during a trial; written by the tuning context               */
 } pen_trial_t;
 
-/** The samples a trial may use: first, first + 1, ... last - 1, each at its number modulo the room. */
+/** The samples a trial may use: first, first + 1, ... last - 1, each at its number modulo the size of the ring. */
 typedef struct {
     uint32_t first;
     uint32_t last;
 } pen_trial_span_t;
 
-/** Step context, after a sample: was it kept? The samples before are used only if it follows on them. */
+/** Step context, after a sample was written to the ring: count it, or restart the ring if it is closed or the step held. */
 static inline void pen_trial_keep(pen_trial_t *trial, bool advanced)
 {
     const uint32_t open = (pen_port_load(&trial->closed) == 0U) ? 1U : 0U;
@@ -48,7 +48,7 @@ static inline void pen_trial_keep(pen_trial_t *trial, bool advanced)
     pen_port_store(&trial->written, next);
 }
 
-/** Tuning context: close the ring, and see which of its samples, `most` at most, there are. */
+/** Tuning context: close the ring, and return its newest samples without a gap, `most` at most. */
 static inline void pen_trial_close(pen_trial_t *trial, uint32_t most, pen_trial_span_t *span)
 {
     uint32_t first;

@@ -301,7 +301,7 @@ def test_damage_in_any_piece_or_value_is_found_within_a_round(tmp_path, capacity
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ('pieces = 96\noutside = "fade"', "a network that fades is not made of straight pieces"),
+        ('pieces = 96\noutside = "fade"', "a network that fades is not piecewise linear"),
         ("pieces = 3", "3 is out of range; give room for 4 to 4096 pieces"),
         ("pieces = 5000", "5000 is out of range"),
         ('pieces = 96\nmore_pieces = "layer"', "'layer' is unknown; choose one of refuse, layers"),

@@ -78,12 +78,12 @@ def test_a_limit_is_not_rounded_up():
 @pytest.mark.parametrize(
     ("says", "message"),
     [
-        ('monotone = "up"', "networks.net.monotone: 'up' is no direction; write true"),
+        ('monotone = "up"', "networks.net.monotone: 'up' is not a direction; write true"),
         ("monotone = 1", "monotone: 1 has the wrong type; give true, false or a text"),
         ("zero_at_zero = 0", "zero_at_zero: 0 has the wrong type; give true or false"),
         ('max_slope = "4 N"', "max_slope: '4 N' is not measured in kg*s^-1; give a quantity in N / m/s"),
         ('max_force = "4 m"', "max_force: '4 m' is not measured in"),
-        ('max_force = "-4 N"', "max_force: '-4 N' is no limit; give 0, or"),
+        ('max_force = "-4 N"', "max_force: '-4 N' is not a limit; give 0, or"),
         ('dissipative = "2 m"', "dissipative: '2 m' is not measured in"),
         ('max_force = "much"', "max_force: 'much' is not a number with a unit"),
     ],
@@ -95,9 +95,9 @@ def test_what_cannot_be_promised(tmp_path, says, message):
 
 
 def test_networks_of_which_nothing_can_be_proven(tmp_path):
-    with pytest.raises(penode_gen.ModelError, match="for networks of one input with ReLU activations only; leave them out"):
+    with pytest.raises(penode_gen.ModelError, match="for networks of one input with ReLU activations only; remove them"):
         load(tmp_path, "monotone = true", bow(3.0, -2.0, activation="tanh"), bow(3.0, -2.0, activation="tanh"))
-    with pytest.raises(penode_gen.ModelError, match="a network that fades is not made of straight pieces: its promises cannot be proven; choose outside"):
+    with pytest.raises(penode_gen.ModelError, match="a network that fades is not piecewise linear: its promises cannot be proven; choose outside"):
         load(tmp_path, "monotone = true", outside="fade")
 
 
@@ -118,7 +118,7 @@ def test_networks_of_which_nothing_can_be_proven(tmp_path):
 def test_a_set_that_breaks_a_promise_is_named(tmp_path, says, net, outside, message):
     with pytest.raises(penode_gen.ModelError) as caught:
         load(tmp_path, says, other=net, net=net if "decreasing" in says else bow(0.5, -0.5, 0.0) if outside == "clamp" else bow(3.0, -2.0), outside=outside)
-    assert f"sets.other.net: {message}" in str(caught.value) and "train it under its promises" in str(caught.value)
+    assert f"sets.other.net: {message}" in str(caught.value) and "train the network to keep its promises" in str(caught.value)
 
 
 def test_pieces_are_the_exact_ones():

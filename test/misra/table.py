@@ -37,7 +37,7 @@ def table() -> list[tuple[list[str], str]]:
 
 def targets() -> set[str]:
     """What make can be asked for."""
-    files = [ROOT / "Makefile", ROOT / "test" / "test.mk", ROOT / "test" / "prove" / "prove.mk"]
+    files = [ROOT / "Makefile", *sorted((ROOT / "test").rglob("*.mk"))]
     return {m for file in files for m in re.findall(r"^([a-z][\w-]*):", file.read_text(), re.M)}
 
 

@@ -249,7 +249,7 @@ static pen_status_t nqvm_sense_jacobian(const pen_real_t p[], const pen_real_t x
     return status;
 }
 
-/* what drives the model at a share of the sample: the inputs */
+/* the drive at a share of the sample: the inputs */
 static void nqvm_drive(pen_real_t share, const pen_real_t u0[], const pen_real_t u1[], pen_real_t us[])
 {
     for (size_t n = 0U; n < NQVM_N_U; n++) {
@@ -282,10 +282,10 @@ static pen_real_t nqvm_along(const pen_real_t fx[], const pen_real_t fu[], pen_r
     return sum;
 }
 
-/* where in the step each stage stands, as a share of it; a stage starts from the slope of the one before */
+/* time of each stage as a share of the step; a stage starts from the slope of the one before */
 static const pen_real_t nqvm_node[4] = { (pen_real_t)0.0, (pen_real_t)0.5, (pen_real_t)0.5, (pen_real_t)1.0 };
 
-/* from t(k-1) to t(k): Runge-Kutta of order 4; advance is 1, or 0 for a sample that stays where it is */
+/* from t(k-1) to t(k): Runge-Kutta of order 4; advance is 0 for the first sample, else 1 */
 static pen_status_t nqvm_integrate(const pen_real_t p[], const pen_real_t u0[], const pen_real_t u1[],
     pen_real_t advance,
     const pen_real_t x0[], pen_real_t x[])
@@ -396,7 +396,7 @@ PEN_PORT_INLINE bool nqvm_usable(const nqvm_t *self)
     return (self != NULL) && (self->head.ready == NQVM_LAYOUT);
 }
 
-/* take over what is pending and the input, and see what there is to start from */
+/* adopt a pending set, copy the inputs, and check inputs and state */
 static pen_status_t nqvm_begin(nqvm_t *self, const nqvm_u_t *u, uint32_t *slot)
 {
     pen_status_t status = pen_tuning_adopt(&self->head.tuning, slot);

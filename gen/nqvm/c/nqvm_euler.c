@@ -277,7 +277,7 @@ static pen_real_t nqvm_euler_along(const pen_real_t fx[], const pen_real_t fu[],
     return sum;
 }
 
-/* from t(k-1) to t(k): explicit Euler; advance is 1, or 0 for a sample that stays where it is */
+/* from t(k-1) to t(k): explicit Euler; advance is 0 for the first sample, else 1 */
 static pen_status_t nqvm_euler_integrate(const pen_real_t p[], const pen_real_t u0[], pen_real_t advance,
     const pen_real_t x0[], pen_real_t x[])
 {
@@ -351,7 +351,7 @@ PEN_PORT_INLINE bool nqvm_euler_usable(const nqvm_euler_t *self)
     return (self != NULL) && (self->head.ready == NQVM_EULER_LAYOUT);
 }
 
-/* take over what is pending and the input, and see what there is to start from */
+/* adopt a pending set, copy the inputs, and check inputs and state */
 static pen_status_t nqvm_euler_begin(nqvm_euler_t *self, const nqvm_euler_u_t *u, uint32_t *slot)
 {
     pen_status_t status = pen_tuning_adopt(&self->head.tuning, slot);

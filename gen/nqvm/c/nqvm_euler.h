@@ -11,13 +11,13 @@
  *   network   damper_net [m/s] -> [N]: 1-16-16-16-1, 593 parameters
  *   outside of its trust envelope a network extrapolates, and PEN_OUTSIDE is raised
  *
- * Sample k integrates from t(k-1) to t(k) and gives the outputs at t(k); the first sample after init only gives them.
- * Same cost for every sample. One context steps, one context tunes; either may pre-empt the other: penode/pen_set.h.
- * Each function names its context:
- *   step     one at a time, usually the timer interrupt
- *   tuning   one at a time, usually a background task; may pre-empt the step and be pre-empted by it
- *   stopped  neither of the two runs meanwhile
- *   any      one at a time, whatever else runs
+ * Step k integrates from t(k-1) to t(k) and returns the outputs at t(k); the first step after init returns the
+ * outputs of the initial state. All steps cost the same. One context steps, one context tunes; either may pre-empt
+ * the other: penode/pen_set.h. Each function names its context:
+ *   step     one call at a time, usually in the timer interrupt
+ *   tuning   one call at a time, usually in a background task; may pre-empt a step and be pre-empted by it
+ *   stopped  no step and no tuning call runs meanwhile
+ *   any      one call at a time, whatever else runs
  */
 #ifndef NQVM_EULER_H
 #define NQVM_EULER_H
@@ -44,7 +44,7 @@ extern "C" {
 #define NQVM_EULER_N_SENSORS 3U
 #define NQVM_EULER_SAMPLE_TIME ((pen_real_t)0.001) /* s */
 
-/* The sets of nqvm are this model's. */
+/* This model uses the parameter sets of nqvm. */
 #define NQVM_EULER_LAYOUT NQVM_LAYOUT
 #define NQVM_EULER_SET_LENGTH NQVM_SET_LENGTH
 #define NQVM_EULER_AT_SPRING_NET NQVM_AT_SPRING_NET
@@ -52,8 +52,8 @@ extern "C" {
 #define nqvm_euler_set_default nqvm_set_default
 #define nqvm_euler_set_altered_friction nqvm_set_altered_friction
 
-#define NQVM_EULER_SCRUB 1198U /* steps in which each value of the running set is looked at */
-#define NQVM_EULER_VERIFY 1198U /* values of a round of nqvm_euler_verify */
+#define NQVM_EULER_SCRUB 1198U /* steps to check each value of the running set once */
+#define NQVM_EULER_VERIFY 1198U /* values of one round of nqvm_euler_verify */
 #define NQVM_EULER_SAVED (PEN_SAVED_HEAD + (2416U * sizeof(pen_real_t))) /* bytes of nqvm_euler_save */
 
 typedef struct {
@@ -78,7 +78,7 @@ typedef struct {
     pen_real_t deflection; /* m: suspension deflection */
 } nqvm_euler_z_t;
 
-/** Derivatives of one step: u_before is the input of the sample before, u that of this one. */
+/** Derivatives of one step in SI units: u is the input of this sample, u_before that of the sample before. */
 typedef struct {
     pen_real_t x_x[4][4];        /* d x(k) / d x(k-1) */
     pen_real_t x_u_before[4][1]; /* d x(k) / d u(k-1) */
@@ -87,7 +87,7 @@ typedef struct {
     pen_real_t y_u[2][1];        /* d y(k) / d u(k)   */
 } nqvm_euler_jacobian_t;
 
-/** Two buffers for staged sets. Owned by the caller, lent to the instance. */
+/** Two buffers for new sets. Owned by the caller, used by the instance as long as it runs. */
 typedef struct {
     pen_real_t value[2][NQVM_EULER_SET_LENGTH];
 } nqvm_euler_banks_t;
@@ -100,115 +100,124 @@ typedef struct {
 
 /** One instance. Owned by the caller; use it only through the functions below. */
 typedef struct {
-    pen_real_t     row[3][6]; /* states, then outputs: a second copy, the last good ones, those being made */
+    pen_real_t     row[3][6]; /* states, then outputs: copy of the last good ones, last good ones, new ones */
     pen_real_t     u[2][1]; /* input: of the last sample, of this one */
     pen_instance_t head;
 } nqvm_euler_t;
 
 /**
- * Start at the initial state with a set. Context: stopped. A refused call leaves an instance that is not initialised:
- * every other call then returns PEN_BADARG or PEN_SET_BADARG.
- * @param set    borrowed as long as the instance is used, such as &nqvm_euler_set_default
- * @param banks  for staging; NULL: sets can only be selected
+ * Set the initial state and the first parameter set. Context: stopped. After a refused call the instance is not
+ * initialised: all other calls return PEN_BADARG or PEN_SET_BADARG.
+ * @param set    such as &nqvm_euler_set_default; must stay unchanged as long as the instance is used
+ * @param banks  buffers for new sets; NULL: sets can only be selected
  * @return PEN_OK; PEN_BADARG; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE
  */
 pen_status_t nqvm_euler_init(nqvm_euler_t *self, const pen_set_t *set, nqvm_euler_banks_t *banks);
 
 /**
- * One sample. Context: step.
- * @param u  input now; outside of its range it is used all the same
- * @param y  outputs now; those of the last good sample, 0 before the first, if the step did not advance (see
- * pen_advanced); not written if PEN_BADARG
+ * One step. Context: step.
+ * @param u  inputs at t(k); an input outside of its range is used unchanged
+ * @param y  outputs at t(k); those of the last good sample, 0 before the first, if the step did not advance (see
+ *           pen_advanced); not written if PEN_BADARG
  * @return PEN_OK, or flags of pen_status.h: PEN_INPUT_NONFINITE, PEN_INPUT_RANGE, PEN_STATE_NONFINITE,
- * PEN_STEP_NONFINITE,
- *         PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_WITHDRAWN, PEN_BADARG, PEN_WEIGHT_NONFINITE
- * A weight that becomes NaN or Inf in memory is reported at once if the result shows it, within NQVM_EULER_SCRUB steps
- * in any case.
+ *         PEN_STEP_NONFINITE, PEN_OUTSIDE, PEN_HELD, PEN_ADOPTED, PEN_WITHDRAWN, PEN_BADARG,
+ *         PEN_WEIGHT_NONFINITE
+ * A weight that becomes NaN or Inf in memory is reported at once if it affects the result,
+ * in any case within NQVM_EULER_SCRUB steps.
  */
 pen_status_t nqvm_euler_step(nqvm_euler_t *self, const nqvm_euler_u_t *u, nqvm_euler_y_t *y);
 
-/** The same step, to the bit, with its exact derivatives. Context: step. @param j  written only if the step advanced */
+/**
+ * The same step, to the bit, with its exact derivatives. Context: step.
+ * @param j  written only if the step advanced
+ * @return as nqvm_euler_step
+ */
 pen_status_t nqvm_euler_step_jacobian(nqvm_euler_t *self, const nqvm_euler_u_t *u, nqvm_euler_y_t *y,
     nqvm_euler_jacobian_t *j);
 
-/** Context: step, between two. @return PEN_OK; PEN_BADARG (nothing written, nothing counted) */
+/**
+ * Get the state after the last step. Context: step, between two steps.
+ * @return PEN_OK; PEN_BADARG (nothing written, nothing counted)
+ */
 pen_status_t nqvm_euler_get_state(const nqvm_euler_t *self, nqvm_euler_x_t *x);
 
 /**
- * The next step integrates from here. Context: step, between two.
+ * Set the state that the next step integrates from. Context: step, between two steps.
  * @return PEN_OK; PEN_BADARG; PEN_STATE_NONFINITE (nothing changed)
  */
 pen_status_t nqvm_euler_set_state(nqvm_euler_t *self, const nqvm_euler_x_t *x);
 
-/** The input of the last sample. Context: step, between two. @return PEN_OK; PEN_BADARG (nothing written, nothing
- * counted) */
+/**
+ * Get the inputs of the last sample. Context: step, between two steps.
+ * @return PEN_OK; PEN_BADARG (nothing written, nothing counted)
+ */
 pen_status_t nqvm_euler_get_input(const nqvm_euler_t *self, nqvm_euler_u_t *u);
 
 /**
- * The input that the next step starts from, t(k-1), in place of that of the last sample. After init: the first
- * step then integrates, too. Context: step, between two.
+ * Set the inputs at t(k-1), from which the next step integrates, in place of those of the last sample.
+ * After init, the first step then integrates as well. Context: step, between two steps.
  * @return PEN_OK; PEN_BADARG; PEN_INPUT_NONFINITE (nothing changed)
  */
 pen_status_t nqvm_euler_set_input(nqvm_euler_t *self, const nqvm_euler_u_t *u);
 
 /**
- * What the sensors would show at the last sample. Context: step, between two. Counts nothing.
+ * What the sensors would show at the last sample. Context: step, between two steps; counts nothing.
  * @return PEN_OK; PEN_OUTSIDE; PEN_STEP_NONFINITE (z not written); PEN_BADARG
  */
 pen_status_t nqvm_euler_sensors(const nqvm_euler_t *self, nqvm_euler_z_t *z);
 
-/** Their exact derivatives there. Context: step, between two. Counts nothing. @return PEN_OK; PEN_OUTSIDE;
- * PEN_STEP_NONFINITE; PEN_BADARG (j not written) */
+/**
+ * Exact derivatives of the sensors at the last sample. Context: step, between two steps; counts nothing.
+ * @return PEN_OK; PEN_OUTSIDE; PEN_STEP_NONFINITE; PEN_BADARG (j not written)
+ */
 pen_status_t nqvm_euler_sensors_jacobian(const nqvm_euler_t *self, nqvm_euler_sensors_jacobian_t *j);
 
-/** What was raised since the last call, with counts. Context: any. @return PEN_OK; PEN_BADARG (nothing written) */
+/** Flags raised since the last call, with counts. Context: any. @return PEN_OK; PEN_BADARG (nothing written) */
 pen_status_t nqvm_euler_status(nqvm_euler_t *self, pen_status_report_t *report);
 
-/* Parameter sets. Context: tuning. penode/pen_set.h says what each call does and refuses; a refused call changes
-   nothing but
-   the counters. */
+/* Parameter sets. Context: tuning, unless another is named. penode/pen_set.h describes the calls and what they
+   return. A refused call changes nothing but the counters. */
 pen_status_t nqvm_euler_tune_begin(nqvm_euler_t *self, const pen_set_head_t *head);
-pen_status_t nqvm_euler_tune_begin_copy(nqvm_euler_t *self, uint32_t id); /* open with the values of the running set */
+pen_status_t nqvm_euler_tune_begin_copy(nqvm_euler_t *self, uint32_t id); /* opens with the values of the running set */
 pen_status_t nqvm_euler_tune_write(nqvm_euler_t *self, uint32_t offset, const pen_real_t value[], uint32_t n);
-/* of the serial form */
+/* in serial form */
 pen_status_t nqvm_euler_tune_write_bytes(nqvm_euler_t *self, uint32_t offset, const uint8_t byte[], uint32_t n);
-pen_status_t nqvm_euler_tune_expect(nqvm_euler_t *self, uint32_t checksum); /* that commit is to find */
+pen_status_t nqvm_euler_tune_expect(nqvm_euler_t *self, uint32_t checksum); /* for commit */
 pen_status_t nqvm_euler_tune_commit(nqvm_euler_t *self);
 pen_status_t nqvm_euler_tune_abort(nqvm_euler_t *self);
 pen_status_t nqvm_euler_tune_select(nqvm_euler_t *self, const pen_set_t *set);
 pen_status_t nqvm_euler_tune_rollback(nqvm_euler_t *self);
-pen_status_t nqvm_euler_tune_withdraw(nqvm_euler_t *self); /* ask the next step to leave a committed set alone */
-pen_status_t nqvm_euler_tune_hold(nqvm_euler_t *self, bool hold);
-/* does a committed set wait? Context: any */
-pen_status_t nqvm_euler_tune_pending(const nqvm_euler_t *self, bool *pending);
+pen_status_t nqvm_euler_tune_withdraw(nqvm_euler_t *self); /* asks the next step not to adopt a pending set */
+pen_status_t nqvm_euler_tune_hold(nqvm_euler_t *self, bool hold); /* true: steps hold state and outputs; false: go on */
+pen_status_t nqvm_euler_tune_pending(const nqvm_euler_t *self, bool *pending); /* Context: any */
 /* Context: any but the step's on another core */
 pen_status_t nqvm_euler_tune_running(const nqvm_euler_t *self, pen_set_head_t *head);
 
 /**
- * Look at up to n values of the running set for damage; NQVM_EULER_VERIFY of them make a round. Context: tuning.
- * penode/pen_instance.h says how soon damage is found. It is reported only.
+ * Check up to n values of the running set for damage. Context: tuning.
+ * Damage is found within two rounds of NQVM_EULER_VERIFY values (penode/pen_instance.h), and only reported.
  * @return PEN_OK; PEN_SET_DAMAGED; PEN_SET_BADARG
  */
 pen_status_t nqvm_euler_verify(nqvm_euler_t *self, uint32_t n);
 
 /**
- * All of an instance as bytes without addresses, and back into one that was initialised with the same set: it goes on
- * to the
- * bit. Context: stopped. What a set may be: penode/pen_saved.h.
+ * Save an instance as bytes without addresses; restore it into one that was initialised with the same set. The
+ * restored one continues with the same bits. Context: stopped. penode/pen_saved.h names the sets that can be saved.
  * @return PEN_OK; PEN_SET_BADARG; restore: PEN_SET_LAYOUT, PEN_SET_CHECKSUM (nothing changed)
  */
 pen_status_t nqvm_euler_save(const nqvm_euler_t *self, uint8_t byte[NQVM_EULER_SAVED]);
 pen_status_t nqvm_euler_restore(nqvm_euler_t *self, const uint8_t byte[NQVM_EULER_SAVED]);
 
 /**
- * Known-answer self-test, for power-on: 200 samples from the initial state with the set `default`, on inputs of the
- * test. States and outputs must be, to the bit, what the generator evaluated without this code. Calls pen_selftest().
- * @param lent  an instance of the caller's that nothing else uses; afterwards it has to be initialised (again)
- * @return 0, or flags of penode/pen_selftest.h, those of pen_selftest() among them. PEN_SELFTEST_ANSWER also if the
- *         model's answer is missed; PEN_SELFTEST_SET: its set is refused. With PEN_SELFTEST_REAL (the caller's type of
- *         numbers is not the code's) and PEN_SELFTEST_BADARG (lent is NULL) nothing is written
- * Thread context: the one that will step (floating-point modes belong to a context), before it does.
- * Cost: an init, 200 steps and pen_selftest(); for each step some 120 instructions more for the hash.
+ * Known-answer self-test, for power-on: 200 steps from the initial state with the set `default` and built-in inputs.
+ * States and outputs must equal, to the bit, those that the generator computed without this code. Calls
+ * pen_selftest().
+ * @param lent  an instance that nothing else uses; has to be initialised (again) afterwards
+ * @return 0, or flags of penode/pen_selftest.h, including those of pen_selftest(). PEN_SELFTEST_ANSWER: a result
+ *         differs; PEN_SELFTEST_SET: the set is refused; PEN_SELFTEST_REAL: the caller has another pen_real_t, and
+ *         PEN_SELFTEST_BADARG: lent is NULL (nothing is written in these two cases)
+ * Thread context: the one that will step (floating-point modes belong to a context), before the first step.
+ * Cost: an init, 200 steps and pen_selftest(); some 120 instructions a step for the hash.
  */
 uint32_t nqvm_euler_selftest_of(nqvm_euler_t *lent, uint32_t type);
 

@@ -28,7 +28,7 @@ static uint32_t nqvm_euler_selftest_draw(uint32_t number, nqvm_euler_u_t *u)
     return last;
 }
 
-/* one sample, and the hash over state and outputs; a step that does not go well leaves both as they were */
+/* one step, and the hash over state and outputs; a step that does not advance leaves both as they were */
 static uint32_t nqvm_euler_selftest_sample(nqvm_euler_t *lent, const nqvm_euler_u_t *u, uint32_t hash)
 {
     nqvm_euler_y_t y;

@@ -219,7 +219,7 @@ static pen_status_t nqvm_folded_sense_jacobian(const pen_piece_t f[], const pen_
     return status;
 }
 
-/* what drives the model at a share of the sample: the inputs */
+/* the drive at a share of the sample: the inputs */
 static void nqvm_folded_drive(pen_real_t share, const pen_real_t u0[], const pen_real_t u1[], pen_real_t us[])
 {
     for (size_t n = 0U; n < NQVM_FOLDED_N_U; n++) {
@@ -253,10 +253,10 @@ static pen_real_t nqvm_folded_along(const pen_real_t fx[], const pen_real_t fu[]
     return sum;
 }
 
-/* where in the step each stage stands, as a share of it; a stage starts from the slope of the one before */
+/* time of each stage as a share of the step; a stage starts from the slope of the one before */
 static const pen_real_t nqvm_folded_node[4] = { (pen_real_t)0.0, (pen_real_t)0.5, (pen_real_t)0.5, (pen_real_t)1.0 };
 
-/* from t(k-1) to t(k): Runge-Kutta of order 4; advance is 1, or 0 for a sample that stays where it is */
+/* from t(k-1) to t(k): Runge-Kutta of order 4; advance is 0 for the first sample, else 1 */
 static pen_status_t nqvm_folded_integrate(const pen_piece_t f[], const pen_real_t u0[], const pen_real_t u1[],
     pen_real_t advance,
     const pen_real_t x0[], pen_real_t x[])
@@ -380,7 +380,7 @@ PEN_PORT_INLINE bool nqvm_folded_usable(const nqvm_folded_t *self)
     return (self != NULL) && (self->head.ready == NQVM_FOLDED_LAYOUT);
 }
 
-/* take over what is pending and the input, and see what there is to start from */
+/* adopt a pending set, copy the inputs, and check inputs and state */
 static pen_status_t nqvm_folded_begin(nqvm_folded_t *self, const nqvm_folded_u_t *u, uint32_t *slot)
 {
     pen_status_t status = pen_tuning_adopt(&self->head.tuning, slot);
@@ -575,7 +575,7 @@ pen_status_t nqvm_folded_status(nqvm_folded_t *self, pen_status_report_t *report
     return pen_instance_status(&nqvm_folded_model, nqvm_folded_head(self), report);
 }
 
-/* what is made of a set before it runs, for a slot that no step reads: its networks folded */
+/* prepare a set for a slot that no step reads: its networks folded */
 static pen_status_t nqvm_folded_prepare(nqvm_folded_t *self, const pen_real_t value[], uint32_t slot)
 {
     pen_real_t work[4U * 16U];
@@ -584,7 +584,7 @@ static pen_status_t nqvm_folded_prepare(nqvm_folded_t *self, const pen_real_t va
     return pen_prepare(&nqvm_folded_model, value, work, active, self->piece[slot], &self->head.breach);
 }
 
-/* let the next step take a set that was found good, and prepared */
+/* publish a set that was checked and prepared */
 static pen_status_t nqvm_folded_publish(nqvm_folded_t *self, const pen_set_t *ready, pen_status_t found)
 {
     pen_status_t status = found;

@@ -2,11 +2,11 @@
    again. */
 
 /**
- * The parameter sets of nqvm: fingerprint, number of values, and where each is. nqvm_layout.json is the same for
- * programs. A layer of n rows is cut into blocks of 16, 4 and 1 rows: biases of the block, then its weights, input by
- * input.
+ * The parameter sets of nqvm: layout fingerprint, number of values, and the place of each; for programs the same is in
+ * nqvm_layout.json. A layer of n rows is cut into blocks of 16, 4 and 1 rows: the biases of the block, then its
+ * weights, input by input.
  *
- *   values from .. to  what [unit]
+ *   values             array [unit]
  *        0 .. 0      spring_net.input_min[1] [m]
  *        1 .. 1      spring_net.input_max[1] [m]
  *        2 .. 2      spring_net.shift_1[1]
