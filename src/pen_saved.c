@@ -151,17 +151,24 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
     return status;
 }
 
-/* The sets of the two slots, that could be run: are they of this model, and to be found here? */
+/* The set of a slot, that could be run: is it of this model, and to be found here? Its values are somewhere in any case. */
+static bool get_slot(const pen_model_t *model, const pen_tuning_t *tuning, pen_set_t *set, const uint8_t byte[], size_t *at)
+{
+    const pen_real_t *found;
+
+    get_set(model, tuning, set, byte, at);
+    found = set->value;
+    set->value = (found != NULL) ? found : tuning->initial.value;
+    return (found != NULL) && (set->head.layout == model->layout) && (set->head.length == model->length);
+}
+
 static bool slots_fit(const pen_model_t *model, const pen_tuning_t *tuning, pen_set_t slot[2], const uint8_t byte[])
 {
     size_t at = 4U * (4U + WORDS + 5U);
-    bool fit = true;
+    const bool first = get_slot(model, tuning, &slot[0], byte, &at);
+    const bool second = get_slot(model, tuning, &slot[1], byte, &at);
 
-    for (uint32_t i = 0U; i < 2U; i++) {
-        get_set(model, tuning, &slot[i], byte, &at);
-        fit = fit && (slot[i].value != NULL) && (slot[i].head.layout == model->layout) && (slot[i].head.length == model->length);
-    }
-    return fit;
+    return first && second;
 }
 
 /* May these bytes be restored into this instance? If so, slot[] holds the sets of its slots. */
