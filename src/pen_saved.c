@@ -153,23 +153,34 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
     return status;
 }
 
-/* The sets of the slots, which could be run, and the two to roll back to, if any: of this model, and to be found here. */
-static bool sets_fit(const pen_model_t *model, const pen_tuning_t *tuning, const uint8_t byte[])
+/* A set that could be run: is it of this model, and to be found here? Its values are somewhere in any case. */
+static bool get_known(const pen_model_t *model, const pen_tuning_t *tuning, bool none_allowed, pen_set_t *set,
+                      const uint8_t byte[], size_t *at)
 {
-    size_t at = 4U * (4U + WORDS + 5U);
-    bool fit = true;
+    const bool none = none_allowed && (pen_serial_get(&byte[*at + 16U]) == NONE);
+    const pen_real_t *found;
 
-    for (uint32_t i = 0U; i < 4U; i++) {
-        const bool none = (i >= 2U) && (pen_serial_get(&byte[at + 16U]) == NONE);
-        pen_set_t set;
-        get_set(model, tuning, &set, byte, &at);
-        fit = fit && (none || ((set.value != NULL) && (set.head.layout == model->layout) && (set.head.length == model->length)));
-    }
-    return fit;
+    get_set(model, tuning, set, byte, at);
+    found = set->value;
+    set->value = (found != NULL) ? found : tuning->initial.value;
+    return none || ((found != NULL) && (set->head.layout == model->layout) && (set->head.length == model->length));
 }
 
-/* May these bytes be restored into this instance? */
-static pen_status_t check(const pen_model_t *model, const pen_tuning_t *tuning, const uint8_t byte[], size_t size)
+/* The sets of both slots, and the two to roll back to, if any. */
+static bool sets_fit(const pen_model_t *model, const pen_tuning_t *tuning, pen_set_t slot[2], const uint8_t byte[])
+{
+    size_t at = 4U * (4U + WORDS + 5U);
+    const bool first = get_known(model, tuning, false, &slot[0], byte, &at);
+    const bool second = get_known(model, tuning, false, &slot[1], byte, &at);
+    pen_set_t other;
+    const bool previous = get_known(model, tuning, true, &other, byte, &at);
+    const bool replaced = get_known(model, tuning, true, &other, byte, &at);
+
+    return first && second && previous && replaced;
+}
+
+/* May these bytes be restored into this instance? If so, slot[] holds the sets of its slots. */
+static pen_status_t check(const pen_model_t *model, const pen_tuning_t *tuning, pen_set_t slot[2], const uint8_t byte[], size_t size)
 {
     const uint32_t banks = (tuning->bank[0] != NULL) ? 1U : 0U;
     const uint32_t initial = place_of(model, tuning, tuning->initial.value); /* if in a bank, restoring it must not change it */
@@ -180,7 +191,7 @@ static pen_status_t check(const pen_model_t *model, const pen_tuning_t *tuning, 
     } else if ((pen_serial_get(&byte[0]) != MAGIC) || (pen_serial_get(&byte[4]) != FORM) ||
                (pen_serial_get(&byte[8]) != model->source) || (pen_serial_get(&byte[12]) != banks) ||
                (pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||
-               (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) || !sets_fit(model, tuning, byte)) {
+               (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) || !sets_fit(model, tuning, slot, byte)) {
         status = PEN_SET_LAYOUT;
     } else {
         /* good */
@@ -188,7 +199,7 @@ static pen_status_t check(const pen_model_t *model, const pen_tuning_t *tuning, 
     return status;
 }
 
-static void get_tuning(const pen_model_t *model, pen_instance_t *self, const uint8_t byte[], size_t *at)
+static void get_tuning(const pen_model_t *model, pen_instance_t *self, const pen_set_t slot[2], const uint8_t byte[], size_t *at)
 {
     pen_tuning_t *const tuning = &self->tuning;
 
@@ -201,10 +212,10 @@ static void get_tuning(const pen_model_t *model, pen_instance_t *self, const uin
     tuning->settled = get(byte, at);
     tuning->open = get(byte, at);
     tuning->fill = get(byte, at);
-    *at += 20U; /* the set given to init is the instance's own */
+    *at += 60U; /* the set given to init is the instance's own; those of the slots were read by check() */
     for (uint32_t i = 0U; i < 2U; i++) {
-        get_set(model, tuning, &tuning->slot[i], byte, at);
-        pen_set_copy(&tuning->slot_check[i], &tuning->slot[i]);
+        pen_set_copy(&tuning->slot[i], &slot[i]);
+        pen_set_copy(&tuning->slot_check[i], &slot[i]);
     }
     get_set(model, tuning, &tuning->previous, byte, at);
     get_set(model, tuning, &tuning->replaced, byte, at);
@@ -217,14 +228,15 @@ static void get_tuning(const pen_model_t *model, pen_instance_t *self, const uin
 pen_status_t pen_restore(const pen_model_t *model, pen_instance_t *self, uint32_t rows, pen_real_t row[], uint32_t inputs,
                          pen_real_t u[], const uint8_t byte[], size_t size)
 {
+    pen_set_t slot[2];
     pen_status_t status = PEN_SET_BADARG;
 
     if (pen_usable(model, self) && (byte != NULL) && (size == size_of(model, rows, inputs))) {
-        status = check(model, &self->tuning, byte, size);
+        status = check(model, &self->tuning, slot, byte, size);
     }
     if (status == PEN_OK) {
         size_t at = 16U;
-        get_tuning(model, self, byte, &at);
+        get_tuning(model, self, slot, byte, &at);
         get_values(rows, row, byte, &at);
         get_values(inputs, u, byte, &at);
         for (uint32_t i = 0U; (i < 2U) && (self->tuning.bank[i] != NULL); i++) {

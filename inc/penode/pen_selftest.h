@@ -59,19 +59,24 @@ static inline uint32_t pen_selftest(void)
     return pen_selftest_of(PEN_SELFTEST_TYPE);
 }
 
-/** Contraction in the including file: a b + c is 0 with two roundings, else eps^2. @return 0 or PEN_SELFTEST_CONTRACTED */
-static inline uint32_t pen_selftest_contracted(void)
+/** Is one of these, 0 with two roundings, +eps^2 or -eps^2? @return 0 or PEN_SELFTEST_CONTRACTED */
+static inline uint32_t pen_selftest_fused(pen_real_t sum, pen_real_t difference)
 {
-    const volatile pen_real_t given[2] = { (pen_real_t)1 + PEN_REAL_EPSILON, (pen_real_t)-1 - ((pen_real_t)2 * PEN_REAL_EPSILON) };
-    const pen_real_t a = given[0];
-    const pen_real_t c = given[1];
-    const pen_real_t sum = (a * a) + c;
-    const pen_real_t difference = -c - (a * a);
     const pen_real_t square = PEN_REAL_EPSILON * PEN_REAL_EPSILON;
     const bool fused = (sum >= square) && (sum <= square);
     const bool fused_minus = (difference <= -square) && (difference >= -square);
 
     return (fused || fused_minus) ? PEN_SELFTEST_CONTRACTED : 0U;
+}
+
+/** Does the file that includes this contract a * b + c, or c - a * b? @return 0 or PEN_SELFTEST_CONTRACTED */
+static inline uint32_t pen_selftest_contracted(void)
+{
+    const volatile pen_real_t given[2] = { (pen_real_t)1 + PEN_REAL_EPSILON, (pen_real_t)-1 - ((pen_real_t)2 * PEN_REAL_EPSILON) };
+    const pen_real_t a = given[0];
+    const pen_real_t c = given[1];
+
+    return pen_selftest_fused((a * a) + c, -c - (a * a));
 }
 
 /* ---- for the self-tests of the models ---- */

@@ -3,9 +3,10 @@
 
 /*
  * The interface of any generated quarter vehicle, whatever its method and networks: what it refuses, what it holds, what
- * it keeps, and that a step and a step with derivatives are one. coverage.py builds it once for each model; REFUSED is
- * what the model says to a set with more pieces than it has room for, UNFELT a number in memory that no step here meets,
- * OUT_OF_RANGE what a step raises for an input out of its range, ON_DAMAGE what follows when verify finds damage.
+ * it keeps, and that a step and a step with derivatives are one. coverage.py builds it once for each model; REFUSED(i) is
+ * what the model says to a set with more pieces than it has room for, in its first network, the second, or both; UNFELT a
+ * number in memory that no step here meets, OUT_OF_RANGE what a step raises for an input out of its range, ON_DAMAGE what
+ * follows when verify finds damage.
  */
 #include <stddef.h>
 #include <stdint.h>
@@ -65,6 +66,11 @@ void test_no_instance_and_one_that_was_not_initialised(void)
     value[3] += (pen_real_t)1;
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_CHECKSUM, MODEL(init)(&model, &set, &banks));
     refuse_all(&model);
+}
+
+void test_the_model_tests_itself(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(0U, MODEL(selftest)(&model));
 }
 
 void test_missing_arguments(void)
@@ -242,14 +248,14 @@ void test_more_pieces_than_room(void)
             memcpy(value, MODEL(set_default).value, sizeof value);
         }
         make_saw(at[i]);
-        TEST_ASSERT_EQUAL_HEX32(REFUSED, MODEL(tune_select)(&model, &set));
-        TEST_ASSERT_EQUAL_HEX32(REFUSED, MODEL(tune_select)(&twin, &set));
-        TEST_ASSERT_EQUAL_HEX32((REFUSED == PEN_OK) ? PEN_ADOPTED : PEN_OK, step_both() & ~PEN_OUTSIDE);
+        TEST_ASSERT_EQUAL_HEX32(REFUSED(i), MODEL(tune_select)(&model, &set));
+        TEST_ASSERT_EQUAL_HEX32(REFUSED(i), MODEL(tune_select)(&twin, &set));
+        TEST_ASSERT_EQUAL_HEX32((REFUSED(i) == PEN_OK) ? PEN_ADOPTED : PEN_OK, step_both() & ~PEN_OUTSIDE);
         TEST_ASSERT_EQUAL_HEX32(PEN_OK, MODEL(sensors)(&model, &z) & ~PEN_OUTSIDE);
         step_away(1);
         step_away(-1);
     }
-    TEST_ASSERT_EQUAL_HEX32(REFUSED, MODEL(init)(&model, &set, NULL));
+    TEST_ASSERT_EQUAL_HEX32(REFUSED(2U), MODEL(init)(&model, &set, NULL));
 }
 
 void test_an_input_out_of_its_range(void)

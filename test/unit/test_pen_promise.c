@@ -9,8 +9,8 @@
 
 #define LOOKS 400U
 
-static pen_real_t work[80]; /* of ten neurons */
-static bool active[16];
+static pen_real_t work[8U * 17U];
+static bool active[17];
 static pen_breach_t breach;
 
 void setUp(void) { }
@@ -201,6 +201,39 @@ void test_kinks_closer_than_their_errors(void)
     TEST_ASSERT_FALSE(stairs_keep(8U, PEN_PROMISE_MAX_SLOPE, (pen_real_t)0.69F));
     TEST_ASSERT_TRUE(stairs_keep(2U, PEN_PROMISE_MAX_SLOPE, (pen_real_t)1.31F)); /* only the second on */
     TEST_ASSERT_TRUE(stairs_keep(8U, PEN_PROMISE_MAX_SLOPE, (pen_real_t)4.31F)); /* every other one */
+}
+
+/* 17 neurons, a block of 16 rows and one of its own: sum of i max(0, x + i + 1) for i < 16, and 100 max(0, x + 17). */
+void test_a_layer_of_seventeen(void)
+{
+    static const pen_layer_t layer[2] = { { PEN_LAYER_RELU, 1U, 17U }, { PEN_LAYER_DENSE, 17U, 1U } };
+    static const pen_chain_t chain = { layer, 2U, 17U, 17U };
+    pen_real_t p[2U + 34U + 18U] = { (pen_real_t)-2, (pen_real_t)4 };
+
+    for (size_t i = 0U; i < 17U; i++) {
+        const size_t at = (i < 16U) ? (2U + i) : (2U + 32U);
+        p[at] = (pen_real_t)(i + 1U);
+        p[at + ((i < 16U) ? 16U : 1U)] = (pen_real_t)1;
+        p[2U + 34U + 1U + i] = (i < 16U) ? (pen_real_t)i : (pen_real_t)100;
+    }
+    TEST_ASSERT_TRUE(kept(&chain, p, false, PEN_PROMISE_MAX_SLOPE, (pen_real_t)220.01F)); /* 0 + 1 + ... + 15 + 100 */
+    TEST_ASSERT_FALSE(kept(&chain, p, false, PEN_PROMISE_MAX_SLOPE, (pen_real_t)219.99F));
+    TEST_ASSERT_TRUE(kept(&chain, p, true, PEN_PROMISE_MAX_FORCE, (pen_real_t)3940.1F)); /* 120 * 4 + 1360 + 100 * 21 */
+    TEST_ASSERT_FALSE(kept(&chain, p, true, PEN_PROMISE_MAX_FORCE, (pen_real_t)3939.9F));
+}
+
+/* A neuron whose input cancels, to within its rounding: it may go either way, and a large weight shows it. */
+void test_slopes_that_cancel(void)
+{
+    static const pen_layer_t layer[3] = { { PEN_LAYER_RELU, 1U, 2U }, { PEN_LAYER_RELU, 2U, 1U }, { PEN_LAYER_DENSE, 1U, 1U } };
+    static const pen_chain_t chain = { layer, 3U, 2U, 3U };
+    const pen_real_t p[11] = {
+        (pen_real_t)-2, (pen_real_t)4, (pen_real_t)3, (pen_real_t)1, (pen_real_t)3, (pen_real_t)1, /* twice x + 3 */
+        (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1 / PEN_REAL_EPSILON
+    };
+
+    TEST_ASSERT_TRUE(kept(&chain, p, true, PEN_PROMISE_MAX_SLOPE, (pen_real_t)50)); /* (4 + 12 + 11) EPS times 2 / EPS */
+    TEST_ASSERT_FALSE(kept(&chain, p, true, PEN_PROMISE_MAX_SLOPE, (pen_real_t)0.5F));
 }
 
 /* Infinite intermediate results prove nothing. */

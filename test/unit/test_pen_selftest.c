@@ -142,3 +142,19 @@ void test_the_hash_is_that_of_the_bytes_low_byte_first(void)
     TEST_ASSERT_EQUAL_HEX32(PEN_SELFTEST_SEED, pen_selftest_hash(PEN_SELFTEST_SEED, 0U, &one));
     TEST_ASSERT_EQUAL_HEX32((sizeof(pen_real_t) == 4U) ? 0x1b587698U : 0x8c6a9878U, pen_selftest_hash(PEN_SELFTEST_SEED, 1U, &one));
 }
+
+/* What only a contracted file computes, in each of the two forms; and what another rounding mode makes of them is something else. */
+void test_one_rounding_instead_of_two(void)
+{
+    const pen_real_t zero = (pen_real_t)0;
+    const pen_real_t square = PEN_REAL_EPSILON * PEN_REAL_EPSILON;
+    const pen_real_t large = PEN_REAL_EPSILON;
+
+    TEST_ASSERT_EQUAL_HEX32(0U, pen_selftest_contracted());
+    TEST_ASSERT_EQUAL_HEX32(0U, pen_selftest_fused(zero, zero));
+    TEST_ASSERT_EQUAL_HEX32(0U, pen_selftest_fused(large, -large));
+    TEST_ASSERT_EQUAL_HEX32(0U, pen_selftest_fused(-square, square));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SELFTEST_CONTRACTED, pen_selftest_fused(square, zero));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SELFTEST_CONTRACTED, pen_selftest_fused(zero, -square));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SELFTEST_CONTRACTED, pen_selftest_fused(square, -square));
+}

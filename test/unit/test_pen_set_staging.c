@@ -249,6 +249,17 @@ void test_bytes_may_not_leave_the_set(void)
     TEST_ASSERT_TRUE((below[N - 1U] == (pen_real_t)-1) && (above[0] == (pen_real_t)-1));
 }
 
+/* A flipped bit in `fill` must not open the way out of the bank. */
+void test_bytes_behind_a_damaged_fill(void)
+{
+    const uint8_t byte[1] = { 0U };
+
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_begin(&tuning, LAYOUT, N, &other.head));
+    tuning.fill = 0x80000000U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_RANGE, pen_tuning_write_bytes(&tuning, N, 0x7fffffffU, byte, 1U));
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_SHORT, commit());
+}
+
 /* 4 or 8 times such an offset is 0 again: it must not count as the start of the set. */
 void test_values_far_beyond_do_not_come_round(void)
 {
