@@ -18,7 +18,7 @@
  *   report    only the flag
  *   hold      the step also holds, until NAME_tune_hold(self, false)
  *   rollback  the rollback set is published, or the set given to init if that is damaged as well; else the step holds
- * While a set is open or pending, the guard only reports.
+ * While a set is open or pending, the guard only reports; which slot runs is checked while none is pending.
  */
 #ifndef PEN_INSTANCE_H
 #define PEN_INSTANCE_H
