@@ -82,22 +82,23 @@ def told(model: str) -> list[str]:
             f"-DON_DAMAGE=PEN_DAMAGE_{chosen(model, 'on_damage').upper()}"]  # fmt: skip
 
 
-def zeros(build: str) -> str:
-    """The checksum of a set of zeros."""
-    return f"-DZEROS=0x{zlib.crc32(bytes(LENGTH * (8 if build == 'double' else 4))):08x}U"
+def of_model(build: str, test: Path, model: str) -> tuple[list[Path], list[str]]:
+    """What a test of coverage_*.c is linked with, and how it is told of a model and its sets."""
+    zeros = zlib.crc32(bytes(LENGTH * (8 if build == "double" else 4)))  # the checksum of a set of zeros
+    words = [*told(model), f"-DSET(name)={eva.owner(model)}_set_##name", f"-DZEROS=0x{zeros:08x}U"]
+    names = [model, f"{model}_selftest"]
+    if test.stem != "coverage_model_selftest":  # that has sets of its own
+        names.append(f"{eva.owner(model)}_params")
+    return [MODELS / f"{name}.c" for name in names], words
 
 
 def model_tests(build: str) -> list[Path]:
     """The tests of coverage_model*.c for each model, those of coverage_promise.c for each that promises something."""
-    programs = []
-    for test in sorted(gate.HERE.glob("coverage_*.c")):
-        for model in eva.PROMISED if test.stem == "coverage_promise" else ALL:
-            files = [MODELS / f"{model}.c", MODELS / f"{model}_selftest.c"]
-            words = [*told(model), zeros(build), f"-DSET(name)={eva.owner(model)}_set_##name"]
-            if test.stem != "coverage_model_selftest":  # that has a default set of its own
-                files.append(MODELS / f"{eva.owner(model)}_params.c")
-            programs.append(program(build, f"{test.stem}_{model}", test, files, words))
-    return programs
+    return [
+        program(build, f"{test.stem}_{model}", test, *of_model(build, test, model))
+        for test in sorted(gate.HERE.glob("coverage_*.c"))
+        for model in (eva.PROMISED if test.stem == "coverage_promise" else ALL)
+    ]
 
 
 def export(build: str, programs: list[Path], *words: str) -> str:

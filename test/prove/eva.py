@@ -34,7 +34,7 @@ MODELS = {
     "fading": ['method = "ros2"', 'outside = "fade"', "fade_width = 0.5", 'on_damage = "hold"'],
     "folded_or_not": ['method = "euler"', 'outside = "clamp"', "pieces = 96", 'more_pieces = "layers"', 'on_damage = "rollback"'],
 }
-# Sets of their own, for a promise changes the layout: coverage.py builds these as well. Eva: see README.md.
+# With sets of their own. For coverage.py: Eva does not analyse them.
 PROMISED = {
     "promised": ['outside = "clamp"', 'method = "heun"', "trial = 8", *PROMISES],
     "folded_and_promised": ['outside = "clamp"', "pieces = 96", "trial = 8", 'on_damage = "rollback"', *PROMISES],

@@ -108,14 +108,15 @@ def bench(name: str, flags: list[str]) -> Bench:
     shared = [stop, unity / "src" / "unity.c", coverage.UNIT / "unity_output.c", gate.ROOT / "port" / "host" / "board.c"]
     wanted = [(test, None) for test in sorted(coverage.UNIT.glob("test_*.c"))]
     wanted += [(test, model) for test in sorted(gate.HERE.glob("coverage_model*.c")) for model in ("nqvm_folded", "fading", "implicit")]
+    wanted += [(gate.HERE / "coverage_promise.c", "promised")]
     for test, model in wanted:
-        told = coverage.told(model) if model else []
+        files, told = coverage.of_model("float", test, model) if model else ([], [])
         needs = re.search(r"needs: (.*) \*/", test.read_text())
-        needed = [f"{model}.c", "nqvm_params.c"] if model else [Path(n).name for n in (needs[1].split() if needs else [])]
+        files += [coverage.MODELS / Path(n).name for n in (needs[1].split() if needs else [])]
         out = place / (f"{test.stem}_{model}" if model else test.stem)
         runner = f"{out}_runner.c"
         gate.make(["ruby", unity / "auto" / "generate_test_runner.rb", test, runner])
-        sources = [runner, test, *shared, *(coverage.MODELS / file for file in needed)]
+        sources = [runner, test, *shared, *files]
         gate.make(["gcc", "-O1", *FLAGS, *words, *told, *flags, "-o", out, *sources, *linked])
         made.programs[out.name] = [out]
     out = place / "accuracy"
