@@ -106,7 +106,7 @@ SEEDS = [
     Seed("pen_verify.c", "} else if (set->value == NULL) {", "} else if (false) {", Run("implicit", "corrupted")),
     Seed("pen_saved.c", "((place - KNOWN) < model->sets)", "((place - KNOWN) <= model->sets)", MODEL),
     Seed("pen_saved.c", "(byte != NULL) && (size == ", "(size == ", MODEL),
-    Seed("pen_saved.c", "(found != NULL) ? found : tuning->initial.value;\n    return (found != NULL) && ", "found;\n    return ", ORDER),
+    Seed("pen_saved.c", "(found != NULL) ? found : tuning->initial.value;\n    return none || ((found != NULL) && ", "found;\n    return none || (", ORDER),
     Seed("pen_instance.c", "return (self != NULL) && ", "return ", MODEL),
     Seed("pen_status.c", "i < PEN_STATUS_FLAGS", "i <= PEN_STATUS_FLAGS", MODEL),
     Seed("pen_step.h", "self->scrub % round", "self->scrub", MODEL),
