@@ -262,13 +262,14 @@ def measure(kept: Figures) -> Figures:
     } | measure_ours()
 
 
-# What is promised of the whole step on the Cortex-M4F in float, whatever was kept.
+# What is promised of the whole step on the Cortex-M4F in float, whatever was kept. 22 instructions of it are for the range of
+# the input, its counter and the withdrawal of a set.
 PROMISED = {
     ("RK4", "layered", "-O2"): {"instructions": 11_600, "cycles": 17_500, "stack bound": 288, "ram": 0},
     ("RK4", "layered", "-Os"): {"instructions": 9_200, "text": 1_200, "stack bound": 288, "ram": 0},
     ("RK4", "folded", "-O2"): {"instructions": 790, "cycles": 1_100, "stack bound": 288, "ram": 0},
     ("Rosenbrock 1", "layered", "-O2"): {"instructions": 7_700},
-    ("Rosenbrock 1", "folded", "-O2"): {"instructions": 550},
+    ("Rosenbrock 1", "folded", "-O2"): {"instructions": 572},
 }
 
 
