@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * Copyright (c) 2026 the penode authors */
 
-/* A model with promises and a trial: which sets are refused, and what is said of them. */
+/* A model with promises and a trial: which sets are refused, and with which breach. */
 
 #include <stddef.h>
 #include <stdint.h>
