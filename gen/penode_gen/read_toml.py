@@ -55,31 +55,8 @@ class _Reader(NetworkTables):
             if key not in (*SECTIONS, "model", "elements", "equations", "sets"):
                 near = difflib.get_close_matches(key, [*SECTIONS, "model", "elements", "equations", "sets"], 1)
                 self.problem((key,), "unknown section", f"did you mean [{near[0]}]?" if near else "remove it")
-        head = self.table(("model",), MODEL, self.data.get("model", {}), ("name", "sample_time"))
+        head, sample_time = self.head()
         name = head.get("name", "model")
-        if not _MODEL_NAME.fullmatch(name) or name.endswith("_"):
-            self.problem(("model", "name"), f"{show(name)} cannot prefix C names", "use up to 40 lower-case letters, digits and _")
-        elif name in _MODEL_WORDS or name.startswith("pen_") or C_PATTERN.fullmatch(f"{name}_t"):
-            self.problem(("model", "name"), f"'{name}' has a meaning of its own in C", "choose another name")
-        sample_time = self.quantity(("model", "sample_time"), head.get("sample_time", "1 s"), "s")
-        if sample_time < 1e-9 or sample_time > 86400.0:
-            self.problem(("model", "sample_time"), f"{head['sample_time']} is out of range", "give a time from 1 ns to 1 day, such as '1 ms'")
-        for key, default, choices in (
-            ("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS),
-            ("outside", "extrapolate", m.OUTSIDE), ("more_pieces", "refuse", m.MORE_PIECES),
-            ("out_of_range", "report", m.OUT_OF_RANGE), ("on_damage", "report", m.ON_DAMAGE),
-        ):  # fmt: skip
-            if head.setdefault(key, default) not in choices:
-                self.problem(("model", key), f"'{head[key]}' is unknown", f"choose one of {', '.join(choices)}")
-        if not 1 <= head.setdefault("substeps", 1) <= 1000:
-            self.problem(("model", "substeps"), f"{head['substeps']} is out of range", "give 1 to 1000")
-        if not 1e-6 <= head.setdefault("fade_width", 0.1) <= 100.0:
-            self.problem(("model", "fade_width"), "is out of range", "give the fading distance in widths of the envelope, 1e-6 to 100")
-        if head.setdefault("pieces", 0) != 0 and not 4 <= head["pieces"] <= ROOM:
-            self.problem(("model", "pieces"), f"{head['pieces']} is out of range", f"give room for 4 to {ROOM} pieces, or 0 to evaluate layer by layer")
-        if not 0 <= head.setdefault("trial", 0) <= 10000:
-            self.problem(("model", "trial"), f"{head['trial']} is out of range", "give the number of last samples that a new set is tried on, up to 10000, or 0 for no trial")
-
         parameters = self.parameters()
         inputs = tuple(self.inputs())
         bodies = tuple(self.bodies(parameters))
@@ -110,6 +87,34 @@ class _Reader(NetworkTables):
             equations=equations, networks=networks, outputs=outputs, sensors=sensors, sets=sets, path=self.path,
             digest=self.digest.hexdigest(), guard=m.Guard(head["out_of_range"], head["on_damage"], head["trial"]), set_owner=self.set_owner,
         )  # fmt: skip
+
+    def head(self) -> tuple[dict[str, Any], float]:
+        """The table [model] with its defaults, and the sample time [s]."""
+        head = self.table(("model",), MODEL, self.data.get("model", {}), ("name", "sample_time"))
+        name = head.get("name", "model")
+        if not _MODEL_NAME.fullmatch(name) or name.endswith("_"):
+            self.problem(("model", "name"), f"{show(name)} cannot prefix C names", "use up to 40 lower-case letters, digits and _")
+        elif name in _MODEL_WORDS or name.startswith("pen_") or C_PATTERN.fullmatch(f"{name}_t"):
+            self.problem(("model", "name"), f"'{name}' has a meaning of its own in C", "choose another name")
+        sample_time = self.quantity(("model", "sample_time"), head.get("sample_time", "1 s"), "s")
+        if sample_time < 1e-9 or sample_time > 86400.0:
+            self.problem(("model", "sample_time"), f"{head['sample_time']} is out of range", "give a time from 1 ns to 1 day, such as '1 ms'")
+        for key, default, choices in (
+            ("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS),
+            ("outside", "extrapolate", m.OUTSIDE), ("more_pieces", "refuse", m.MORE_PIECES),
+            ("out_of_range", "report", m.OUT_OF_RANGE), ("on_damage", "report", m.ON_DAMAGE),
+        ):  # fmt: skip
+            if head.setdefault(key, default) not in choices:
+                self.problem(("model", key), f"'{head[key]}' is unknown", f"choose one of {', '.join(choices)}")
+        if not 1 <= head.setdefault("substeps", 1) <= 1000:
+            self.problem(("model", "substeps"), f"{head['substeps']} is out of range", "give 1 to 1000")
+        if not 1e-6 <= head.setdefault("fade_width", 0.1) <= 100.0:
+            self.problem(("model", "fade_width"), "is out of range", "give the fading distance in widths of the envelope, 1e-6 to 100")
+        if head.setdefault("pieces", 0) != 0 and not 4 <= head["pieces"] <= ROOM:
+            self.problem(("model", "pieces"), f"{head['pieces']} is out of range", f"give room for 4 to {ROOM} pieces, or 0 to evaluate layer by layer")
+        if not 0 <= head.setdefault("trial", 0) <= 10000:
+            self.problem(("model", "trial"), f"{head['trial']} is out of range", "give the number of last samples that a new set is tried on, up to 10000, or 0 for no trial")
+        return head, sample_time
 
     def parameters(self) -> dict[str, m.Parameter]:
         found = {}

@@ -13,7 +13,7 @@ import pytest
 from penode_gen import selftest
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE.parent / "prove")]  # models and graphs; the reference of prove-promise
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -17,11 +17,11 @@ from penode_gen import exact, promises
 from penode_gen.model import NetworkPort, Promises
 from penode_gen.networks import Affine, Dense, Network
 
-PROVE = Path(__file__).resolve().parents[1] / "prove"
-sys.path.insert(0, str(PROVE))
-import promise_check  # noqa: E402
-import promise_nets  # noqa: E402
-import promise_reference as reference  # noqa: E402
+import promise_check
+import promise_nets
+import promise_reference as reference
+
+PROVE = Path(promise_check.__file__).parent
 
 MODEL = """
 [model]
