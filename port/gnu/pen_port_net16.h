@@ -15,8 +15,8 @@
 
 #define PEN_PORT_NET16
 
-/* s0-s15, one row each, += weights times pen_column. VMUL and VADD take two cycles, VMLA three. */
-#define PEN_PORT_COLUMN \
+/* s16-s23 = the next eight weights times pen_column */
+#define PEN_PORT_PRODUCTS \
     "   vldmia   %[w]!, {s16-s23}\n" \
     "   vmul.f32 s16, s16, pen_column\n" \
     "   vmul.f32 s17, s17, pen_column\n" \
@@ -25,7 +25,11 @@
     "   vmul.f32 s20, s20, pen_column\n" \
     "   vmul.f32 s21, s21, pen_column\n" \
     "   vmul.f32 s22, s22, pen_column\n" \
-    "   vmul.f32 s23, s23, pen_column\n" \
+    "   vmul.f32 s23, s23, pen_column\n"
+
+/* s0-s15, one row each, += weights times pen_column. VMUL and VADD take two cycles, VMLA three. */
+#define PEN_PORT_COLUMN \
+    PEN_PORT_PRODUCTS \
     "   vadd.f32 s0, s0, s16\n" \
     "   vadd.f32 s1, s1, s17\n" \
     "   vadd.f32 s2, s2, s18\n" \
@@ -34,15 +38,7 @@
     "   vadd.f32 s5, s5, s21\n" \
     "   vadd.f32 s6, s6, s22\n" \
     "   vadd.f32 s7, s7, s23\n" \
-    "   vldmia   %[w]!, {s16-s23}\n" \
-    "   vmul.f32 s16, s16, pen_column\n" \
-    "   vmul.f32 s17, s17, pen_column\n" \
-    "   vmul.f32 s18, s18, pen_column\n" \
-    "   vmul.f32 s19, s19, pen_column\n" \
-    "   vmul.f32 s20, s20, pen_column\n" \
-    "   vmul.f32 s21, s21, pen_column\n" \
-    "   vmul.f32 s22, s22, pen_column\n" \
-    "   vmul.f32 s23, s23, pen_column\n" \
+    PEN_PORT_PRODUCTS \
     "   vadd.f32 s8, s8, s16\n" \
     "   vadd.f32 s9, s9, s17\n" \
     "   vadd.f32 s10, s10, s18\n" \
