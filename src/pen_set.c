@@ -175,17 +175,16 @@ pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t len
     return status;
 }
 
-static bool has_banks(const pen_tuning_t *tuning)
+bool pen_tuning_banks_known(const pen_tuning_t *tuning)
 {
-    return (tuning->bank[0] != NULL) && (tuning->bank[0] == tuning->bank_check[0]) &&
-           (tuning->bank[1] == tuning->bank_check[1]);
+    return (tuning->bank[0] == tuning->bank_check[0]) && (tuning->bank[1] == tuning->bank_check[1]);
 }
 
 pen_status_t pen_tuning_begin(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_head_t *head)
 {
     pen_status_t status;
 
-    if ((head == NULL) || !has_banks(tuning)) {
+    if ((head == NULL) || (tuning->bank[0] == NULL) || !pen_tuning_banks_known(tuning)) {
         status = PEN_SET_BADARG;
     } else if (!pen_tuning_settle(tuning)) {
         status = PEN_SET_BUSY;

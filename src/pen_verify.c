@@ -3,8 +3,6 @@
 
 #include "penode/pen_exact.h"
 
-#include <stddef.h>
-
 #include "penode/pen_instance.h"
 #include "penode/pen_port.h"
 #include "penode/pen_serial.h"
@@ -13,11 +11,10 @@
 static bool known(const pen_model_t *model, const pen_tuning_t *tuning, uint32_t slot)
 {
     const pen_set_t *const set = &tuning->slot[slot];
-    const bool banks = (tuning->bank[0] == tuning->bank_check[0]) && (tuning->bank[1] == tuning->bank_check[1]);
     const bool fits = (set->head.layout == model->layout) && (set->head.length == model->length);
     const bool same = pen_set_same(set, &tuning->slot_check[slot]);
 
-    return banks && fits && same && ((tuning->published != 0U) || (tuning->settled == pen_port_load(&tuning->active)));
+    return pen_tuning_banks_known(tuning) && fits && same && ((tuning->published != 0U) || (tuning->settled == pen_port_load(&tuning->active)));
 }
 
 uint32_t pen_piece_crc(uint32_t crc, const pen_piece_t *piece)
@@ -71,11 +68,10 @@ static bool look(const pen_model_t *model, const pen_set_t *set, const pen_piece
     return good;
 }
 
-/* Up to n values, at most a round. The same once more from the start if that finds fault: it may be with the guard itself. */
+/* Up to n values: are they as their checksums say? */
 static bool whole(const pen_model_t *model, const pen_set_t *set, const pen_piece_t piece[], pen_guard_t *guard, uint32_t n)
 {
-    const uint32_t round = model->length + (model->networks * model->pieces);
-    uint32_t left = (n < round) ? n : round;
+    uint32_t left = n;
     bool good = true;
 
     while (good && (left > 0U)) {
@@ -101,7 +97,8 @@ pen_status_t pen_verify(const pen_model_t *model, pen_instance_t *self, const pe
             self->guard.at = 0U;
             self->guard.crc = PEN_CRC_START;
         }
-        if (good && !whole(model, &tuning->slot[slot], own, &self->guard, n)) {
+        if (good && !whole(model, &tuning->slot[slot], own, &self->guard, (n < round) ? n : round)) {
+            /* all of it once more, from the start: the fault may be with the guard itself */
             self->guard.at = 0U;
             self->guard.crc = PEN_CRC_START;
             good = whole(model, &tuning->slot[slot], own, &self->guard, round);
@@ -119,20 +116,24 @@ pen_status_t pen_verify(const pen_model_t *model, pen_instance_t *self, const pe
 pen_status_t pen_fallback(const pen_model_t *model, pen_instance_t *self, uint32_t rank, pen_set_t *ready)
 {
     pen_tuning_t *const tuning = &self->tuning;
-    const pen_set_t *const set = (rank == 0U) ? &tuning->previous : &tuning->initial;
-    pen_status_t status;
+    pen_status_t status = PEN_SET_BUSY;
 
-    if (!pen_tuning_settle(tuning) || (tuning->open != 0U)) {
-        status = PEN_SET_BUSY;
-    } else if (set->value == NULL) {
-        status = PEN_SET_NO_PREVIOUS;
-    } else {
-        status = pen_set_check(set, model->layout, model->length);
-    }
-    if (status == PEN_OK) {
-        pen_set_copy(ready, set);
+    if (tuning->open == 0U) {
+        status = (rank == 0U) ? pen_tuning_rollback(tuning, model->layout, model->length, ready)
+                              : pen_tuning_select(tuning, model->layout, model->length, &tuning->initial, ready);
     }
     return status;
+}
+
+/* Banks that cannot be told from other memory are given up: else the guard would find them damaged again, without end. */
+static void give_up_banks(pen_tuning_t *tuning)
+{
+    const bool good = pen_tuning_banks_known(tuning);
+
+    for (uint32_t i = 0U; i < 2U; i++) {
+        tuning->bank[i] = good ? tuning->bank[i] : NULL;
+        tuning->bank_check[i] = tuning->bank[i];
+    }
 }
 
 void pen_recover(const pen_model_t *model, pen_instance_t *self, const pen_piece_t piece[], const pen_set_t *ready, pen_status_t found)
@@ -140,6 +141,7 @@ void pen_recover(const pen_model_t *model, pen_instance_t *self, const pen_piece
     if (found == PEN_OK) {
         (void)pen_tune_publish(model, self, piece, ready, PEN_OK);
         self->tuning.previous.value = NULL;
+        give_up_banks(&self->tuning);
     } else if (found != PEN_SET_BUSY) {
         pen_tuning_hold(&self->tuning, true);
     } else {

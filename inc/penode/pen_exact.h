@@ -17,8 +17,6 @@
  * - any other compiler gets the pragma of C99.
  *
  * What remains: clang obeys -ffp-contract=fast in spite of any pragma, and defines no macro for -fno-signed-zeros.
- *
- * Cost: none.
  */
 #ifndef PEN_EXACT_H
 #define PEN_EXACT_H

@@ -128,8 +128,6 @@ pen_status_t pen_tune_breach(const pen_model_t *model, const pen_instance_t *sel
 /** Read and clear the counters. Any one context; counts nothing itself. @return PEN_OK; PEN_BADARG */
 pen_status_t pen_instance_status(const pen_model_t *model, pen_instance_t *self, pen_status_report_t *report);
 
-/* ---- the guard ---- */
-
 /** Add a piece to a CRC-32, as pen_crc_values; checksum of all pieces of a slot, [networks * pieces]. */
 uint32_t pen_piece_crc(uint32_t crc, const pen_piece_t *piece);
 uint32_t pen_pieces_crc(const pen_model_t *model, const pen_piece_t piece[]);
@@ -148,7 +146,10 @@ pen_status_t pen_verify(const pen_model_t *model, pen_instance_t *self, const pe
  */
 pen_status_t pen_fallback(const pen_model_t *model, pen_instance_t *self, uint32_t rank, pen_set_t *ready);
 
-/** PEN_OK: publish the fallback; PEN_SET_BUSY: do nothing; else hold. The damaged set is not kept for rollback. */
+/**
+ * PEN_OK: publish the fallback; PEN_SET_BUSY: do nothing; else hold. The damaged set is not kept for rollback. Banks whose
+ * address is damaged are given up: sets can only be selected until the next init.
+ */
 void pen_recover(const pen_model_t *model, pen_instance_t *self, const pen_piece_t piece[], const pen_set_t *ready, pen_status_t found);
 
 #ifdef __cplusplus

@@ -168,6 +168,9 @@ void pen_set_copy(pen_set_t *to, const pen_set_t *from);
 /** True if head and address are equal. */
 bool pen_set_same(const pen_set_t *a, const pen_set_t *b);
 
+/** Are the addresses of the banks those given to init? */
+bool pen_tuning_banks_known(const pen_tuning_t *tuning);
+
 /** CRC-32 of n values, as in pen_set_head_t. */
 uint32_t pen_set_checksum(const pen_real_t value[], uint32_t n);
 

@@ -9,11 +9,9 @@
  * twice, whichever context pre-empts another.
  *
  * NaN and Inf in memory: a step whose result is affected reports it. But a bound of a trust envelope is only compared,
- * and only one piece of a folded network is in use. So each step also checks one value of the running set and one piece
- * of each folded network, the next step the next ones: the scrub. Any NaN or Inf is reported within NAME_SCRUB steps, a
- * constant of the generated header: the length of a set, or the capacity for pieces if that is more. Where steps read
- * pieces only, it checks pieces only. A good set may have pieces so far out that they overflow: that is reported too.
- * The scrub always costs the same. Damage that stays finite is found by NAME_verify: penode/pen_instance.h.
+ * and only one piece of a folded network is in use. So each step also checks, at constant cost, one value of the running
+ * set, if steps read values, and one piece of each folded network: the scrub, a round of NAME_SCRUB steps. Pieces of a
+ * good set that overflow far out are reported too. Damage that stays finite is found by NAME_verify: pen_instance.h.
  */
 #ifndef PEN_STATUS_H
 #define PEN_STATUS_H

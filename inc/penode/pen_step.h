@@ -28,8 +28,7 @@ extern "C" {
 #define PEN_ROW_LAST 1U
 #define PEN_ROW_NOW  2U
 
-/* n is at least 1 in the next two. */
-
+/** n >= 1, here and in pen_step_check. */
 static inline void pen_step_copy(size_t n, const pen_real_t from[], pen_real_t to[])
 {
     size_t i = 0U;

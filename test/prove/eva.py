@@ -103,7 +103,7 @@ SEEDS = [
     Seed("pen_verify.c", "while ((*n > 0U) && (guard->at < length)) {", "while (*n > 0U) {", MODEL),
     Seed("pen_verify.c", "while ((*n > 0U) && (guard->at < end)) {", "while (*n > 0U) {", Run("nqvm_folded", "corrupted")),
     Seed("pen_saved.c", "(tuning->bank[i] != NULL) ? tuning->bank[i]", "banks ? tuning->bank[i]", MODEL),
-    Seed("pen_verify.c", "} else if (set->value == NULL) {", "} else if (false) {", Run("implicit", "corrupted")),
+    Seed("pen_set.c", "} else if (tuning->previous.value == NULL) {", "} else if (false) {", Run("implicit", "corrupted")),
     Seed("pen_saved.c", "((place - KNOWN) < model->sets)", "((place - KNOWN) <= model->sets)", MODEL),
     Seed("pen_saved.c", "(byte != NULL) && (size == ", "(size == ", MODEL),
     Seed("pen_saved.c", "(found != NULL) ? found : tuning->initial.value;\n    return none || ((found != NULL) && ", "found;\n    return none || (", ORDER),

@@ -10,6 +10,10 @@
 
 #include "saved_fixture.inc"
 
+static world_t b;
+static uint8_t byte[SIZE];
+static uint8_t again[SIZE];
+
 void setUp(void)
 {
     fill(&first, first_value, 1U);
