@@ -278,7 +278,7 @@ def objects(folder: Path, machine: str, flags: list[str], source: Path = ROOT, m
     folder.mkdir()
     (folder / "main.c").write_text(MAIN)
     files = [folder / "main.c", *sorted((source / "src").glob("*.c")), *(model / f"nqvm{end}.c" for end in ("", "_params", "_selftest"))]
-    command = [ROOT / "port" / "cortex-m" / "cc", MACHINES[machine], "-std=gnu17", "-O2", f"-I{source}/inc", f"-I{model}", *flags, "-c"]
+    command = [ROOT / "port" / "cortex-m" / "cc", MACHINES[machine], "-std=gnu17", "-O2", "-iquote", source / "inc", f"-I{model}", *flags, "-c"]
     subprocess.run([*command, *files], check=True, cwd=folder)
     return {path.stem: folder / f"{path.stem}.o" for path in files}
 
