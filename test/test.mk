@@ -135,7 +135,7 @@ KERNELS := test_pen_net test_pen_net16
 UNITS   := $(patsubst test/unit/%.c,%,$(wildcard test/unit/test_*.c))
 needs    = $(shell sed -n 's|.*needs: \(.*\) \*/.*|\1|p' test/unit/$(1).c)
 objects  = $(patsubst %.c,build/unit/$(1)/%.o,$(2))
-UNIT_CFLAGS := -std=c99 -g -Wall -Wextra $(INCLUDE) -Itest/unit -Ibuild/unity/src -include unity_config.h
+UNIT_CFLAGS := -std=c99 -g -Wall -Wextra -Werror $(INCLUDE) -Itest/unit -Ibuild/unity/src -include unity_config.h
 
 unit: $(foreach v,$(VARIANTS),$(UNITS:%=unit-$v-%)) $(foreach t,$(KERNELS),$(FPUS:%=unit-small-%-$t)) ## The C unit tests, on this machine and on the emulated ones
 
