@@ -20,7 +20,7 @@ SOURCES = [path for path in sorted((gate.ROOT / "src").glob("*.c")) if path != S
 RACE = 66  # exit code of ThreadSanitizer
 FAULTS = {
     "begin while a set waits": ("    return done;", 0, "    return done || true;"),
-    "pending before the slot is written": ("    pen_set_copy(&tuning->slot[slot], ready);", 0, "    pen_port_store(&tuning->pending, command(ADOPT, slot));\n    pen_set_copy(&tuning->slot[slot], ready);"),
+    "slot written after pending": ("    pen_port_store(&tuning->pending, tuning->published);", 0, "    pen_port_store(&tuning->pending, tuning->published);\n    pen_set_copy(&tuning->slot[slot], ready);"),
     "active not flipped": ("            active = other;", 0, ""),
     "withdrawn by the tuning context itself": ("pen_port_store(&tuning->pending, command(WITHDRAW, slot));", 0, "pen_port_store(&tuning->pending, 0U);"),
 }  # of pen_set.c: see gate.faulty
