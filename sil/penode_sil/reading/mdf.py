@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import UserError, hint
+from ..errors import UserError, hint
 
 Group = tuple[dict[str, str | None], dict[str, NDArray[np.float64]]]  # units and columns, by channel; one is time [s]
 
