@@ -1,106 +1,123 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""CSV text as a table: a header with units, then rows of numbers."""
+"""Text as a table: whatever stands around them, columns of cells under names, with a unit where one is written."""
 
 from __future__ import annotations
 
 import csv
 import io
-import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UserError
+from . import cells, header, layout
+from .decode import read_text
 from .table import Recording
 
 Array = NDArray[np.float64]
-HEADER = re.compile(r"^\s*([A-Za-z_]\w*)\s*(?:\[(.*)\]|\((.*)\))?\s*$")
-
-
-def _number(text: str, decimal: str) -> float:
-    return float(text.replace(decimal, ".")) if text.strip() else float("nan")
+Lines = NDArray[np.int64]
 
 
 def read_csv(path: Path) -> Recording:
-    """Read a recording; UserError if the file cannot be read or is no table of numbers under a header."""
+    """Read a recording; UserError if the file cannot be read or is no table. Cells are judged when a channel is asked for."""
+    text, encoding = read_text(path)
+    lines = _joined(text).split("\n")
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            text = file.read()
-        first = next((line for line in io.StringIO(text) if not line.isspace()), "")
-        separator = next((s for s in ";\t" if s in first and "," not in first), ",")
-        numbers = _numbers(text, separator)
-        reader = csv.reader(io.StringIO(text, newline="") if numbers is None else [first], delimiter=separator)
-        rows, lines = [], []
-        for row in reader:
-            if any(map(str.strip, row)):
-                rows.append(row)
-                lines.append(reader.line_num)
-    except OSError as exc:
-        raise UserError(f"{path}: {exc.strerror or exc}; name a CSV file that can be read") from exc
-    except (UnicodeDecodeError, csv.Error) as exc:
+        found = layout.find(lines)
+        if found is None:
+            raise UserError(f'{path}: it is empty; the first row must be a header like "time [s],z_road [m]"')
+        if not found.names:
+            what = " | ".join(layout.split(lines[found.body], found.separator)[:8])
+            raise UserError(f'{path}:{found.body + 1}: there is no header above "{what}"; write one like "time [s],z_road [m]"')
+        form = f"{encoding}, columns between {layout.NAMED.get(found.separator, found.separator)}, decimal {'commas' if found.decimal == ',' else 'points'}"
+        named = _named(found)
+        values = _fast(lines[found.body :], found, len(named))
+        if values is not None:
+            columns = dict(zip((c.key for c in named), values.T.copy()))
+            return _table(path, found, named, np.arange(found.body, found.body + len(values)) + 1, columns, form)
+        return _slow(path, lines, found, named, form)
+    except csv.Error as exc:
         raise UserError(f"{path}: it is no CSV text ({exc}); give a comma-separated file") from exc
-    if not rows:
-        raise UserError(f'{path}: it is empty; the first row must be a header like "time [s],z_road [m]"')
-    problems: list[str] = []
-    units: dict[str, str | None] = {}
-    for cell in rows[0]:
-        match = HEADER.match(cell)
-        if match is None:
-            problems.append(f'{path}:1: "{cell.strip()}" is no channel; write a name and its unit, like "z_road [m]"')
-        elif match[1] in units:
-            problems.append(f"{path}:1: channel {match[1]} is there twice; rename or remove one")
-        else:
-            units[match[1]] = match[2] if match[2] is not None else match[3]
-    if problems:
-        raise UserError(*problems)
-    names, decimal = list(units), "." if separator == "," else ","
-    if numbers is not None:
-        return Recording(path, np.arange(2, len(numbers) + 2), units, dict(zip(names, numbers.T.copy())))
-    del rows[0], lines[0]
-    for line, row in zip(lines, rows):
-        if len(row) != len(names):
-            raise UserError(
-                f"{path}:{line}: {len(row)} values for {len(names)} channels; "
-                f"give one value a channel, separated by {'commas' if separator == ',' else 'the same sign'}"
-            )
-    try:
-        columns = [_column(cells, decimal) for cells in zip(*rows)] or [np.empty(0) for _ in names]
-    except ValueError:
-        raise UserError(*_no_numbers(path, lines, rows, names, decimal)) from None
-    return Recording(path, np.array(lines, dtype=np.int64), units, dict(zip(names, columns)))
 
 
-def _numbers(text: str, separator: str) -> Array | None:
-    """The numbers [rows, channels] under a header in the first line, five times sooner than row by row; None if there is anything
-    else in a text, which is then looked at closely."""
-    head, _, body = text.partition("\n")
-    if not head.strip() or not body.strip():
+def _joined(text: str) -> str:
+    """The text with line ends inside of quoted cells of its first lines made blanks, as Excel has them in headers."""
+    head = text[:20000]
+    if '"' not in head or "\n" not in head:
+        return text
+    inside, out = False, []
+    for c in head:
+        inside ^= c == '"'
+        out.append(" " if c == "\n" and inside else c)
+    return text if inside else "".join(out) + text[len(head) :]
+
+
+def _named(found: layout.Layout) -> list[header.Cell]:
+    """The columns; names without any column at the end of the header are left out, as a separator at the line's end makes them."""
+    names, units = list(found.names), found.units
+    while len(names) > max(1, found.width) and not names[-1].strip():
+        names.pop()
+    while len(names) > 1 and not names[-1].strip() and len(names) > found.width - 1:
+        names.pop()
+    return header.cells(names, units)
+
+
+def _table(
+    path: Path, found: layout.Layout, named: Sequence[header.Cell], lines: Lines, columns: object, form: str, stamped: frozenset[str] = frozenset()
+) -> Recording:
+    units = {cell.key: "s" if cell.key in stamped else cell.unit for cell in named}
+    texts = {cell.key: (cell.name, cell.text) for cell in named}
+    return Recording(path, lines, units, columns, {}, found.header + 1, texts, form)  # type: ignore[arg-type]
+
+
+def _fast(body: Sequence[str], found: layout.Layout, width: int) -> Array | None:
+    """The numbers [rows, channels] if there is nothing else, five times sooner than row by row; None if there is."""
+    text = "\n".join(body).rstrip()
+    if found.decimal == ",":
+        if "." in text or found.separator == ",":
+            return None
+        text = text.replace(",", ".")
+    if not text or "_" in text:
         return None
+    delimiter = None if found.separator == layout.BLANKS else found.separator
     try:
-        found = np.loadtxt(io.StringIO(body), delimiter=separator, comments=None, ndmin=2)
+        values = np.loadtxt(io.StringIO(text), delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
         return None
-    return found if found.shape == (body.rstrip().count("\n") + 1, head.count(separator) + 1) else None
+    return values if values.shape == (text.count("\n") + 1, width) else None
 
 
-def _column(cells: tuple[str, ...], decimal: str) -> Array:
-    try:
-        return np.fromiter(map(float, cells), np.float64, len(cells))
-    except ValueError:  # an empty cell, a decimal comma or no number
-        return np.fromiter((_number(cell, decimal) for cell in cells), np.float64, len(cells))
+def _slow(path: Path, lines: Sequence[str], found: layout.Layout, named: Sequence[header.Cell], form: str) -> Recording:
+    """The same cell by cell."""
+    width = len(named)
+    rows: list[list[str]] = []
+    where: list[int] = []
+    for line, row in _rows(lines, found):
+        if len(row) > width and any(cell.strip() for cell in row[width:]):
+            what = f"{path}:{line}: {len(row)} values for {width} channels"
+            if found.separator == "," and layout.looks_unseparated(named, row):
+                raise UserError(f"{what}: commas part columns and decimals; export with semicolons or decimal points")
+            raise UserError(f"{what}; give one value a channel, separated by {layout.NAMED.get(found.separator, found.separator)}")
+        rows.append(row)
+        where.append(line)
+    numbers = np.array(where, dtype=np.int64)
+    short = {k: len(row) for k, row in enumerate(rows) if len(row) < width}
+    texts = {c.key: [row[k] if k < len(row) else None for row in rows] for k, c in enumerate(named)}
+    first = {key: next((cell for cell in column if cell and cell.strip()), "") for key, column in texts.items()}
+    stamped = frozenset(key for key, cell in first.items() if cells.STAMP.fullmatch(cell))
+    columns = cells.Columns(texts, found.decimal, stamped, lambda row: f"{path}:{numbers[row]}", short)
+    return _table(path, found, named, numbers, columns, form, stamped)
 
 
-def _no_numbers(path: Path, lines: list[int], rows: list[list[str]], names: list[str], decimal: str) -> list[str]:
-    """What is wrong in the first row that holds anything else than numbers."""
-    for line, row in zip(lines, rows):
-        problems = []
-        for name, cell in zip(names, row):
-            try:
-                _number(cell, decimal)
-            except ValueError:
-                problems.append(f'{path}:{line}: channel {name}: "{cell.strip()}" is no number; correct the cell')
-        if problems:
-            return problems
-    raise AssertionError("a cell failed before")
+def _rows(lines: Sequence[str], found: layout.Layout) -> list[tuple[int, list[str]]]:
+    """Rows of cells with the lines [1, ...] that they end in; without blank lines and comments."""
+    first = found.body
+    if found.separator == layout.BLANKS:
+        some = [(k, line.split()) for k, line in enumerate(lines[first:], first + 1)]
+    else:
+        reader = csv.reader([line + "\n" for line in lines[first:]], delimiter=found.separator, skipinitialspace=True)
+        some = [(reader.line_num + first, row) for row in reader]
+    return [(k, row) for k, row in some if any(map(str.strip, row)) and not (row[0][:1] in "#%" and row[0])]

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,13 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UserError, hint
-from ..units import UnitError, factor
+from ..units import UnitError
+from . import named, unit_text
 
 Array = NDArray[np.float64]
 GAP = 1.5  # an interval longer than this many usual (median) intervals is a gap
 TIME = ("time", "t", "Time")
-# what a column's name may end in; what follows the first is divided by: m_s2 is m/s^2
-SUFFIX = re.compile(r"(?:_(?:[mu]?s|[cmuk]?m|k?N|k?g|rad|deg|m?V|m?A|k?Pa|bar|K|Hz)\d?)+$")
+OTHER_TIMES = ("time", "t", "zeit", "timestamp", "timestamps", "time_stamp", "time_stamps", "zeitstempel", "elapsed_time", "time_axis",
+               "x_value", "uhrzeit", "datetime", "date_time", "temps", "tiempo", "tempo")  # fmt: skip
+# what a column's name may end in; signs between them part or multiply: m_s2 is m/s^2, N_s_m is N*s/m
+PART = r"(?:[mun]?s|min|h|[cmuk]?m|[mkM]?N|Nm|Ns|k?g|mg|rad|deg|rpm|dps|kmh|kph|m?V|m?A|[kM]?Pa|bar|K|k?Hz|kW|W|J|pct)\d?"
+SUFFIX = re.compile(rf"(?:[ _]{PART})+$")
+WRITTEN = re.compile(rf"[ _./,:-]+({PART}(?:[/*^]{PART})*)$")
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +32,18 @@ class Recording:
     """A table as it was read, with one clock: per column its unit text (None if it has none) and values (NaN if empty).
 
     `lines` is the line of the file that each row came from, None if it has no lines; `aliases` gives, for names of the
-    model, the names that the file uses instead.
+    model, what the user calls them: `column`, `column [unit]`, `column@10ms`. `texts` gives for a column its name and all
+    the text of its header cell; a name that stands there several times has the keys name#1, name#2.
     """
 
     path: Path
     lines: NDArray[np.int64] | None
     units: dict[str, str | None]
-    columns: dict[str, Array]
+    columns: Mapping[str, Array]
     aliases: Mapping[str, str] = field(default_factory=dict)
+    header_line: int = 1
+    texts: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    form: str = ""  # encoding and signs, for people
 
     def place(self, row: int) -> str:
         """Where a row stands, for messages."""
@@ -43,39 +52,91 @@ class Recording:
     @property
     def header(self) -> str:
         """Where names and units stand, for messages."""
-        return str(self.path) if self.lines is None else f"{self.path}:1"
+        return str(self.path) if self.lines is None else f"{self.path}:{self.header_line}"
+
+    def name_of(self, key: str) -> str:
+        """The name of a column as the file has it, without its unit."""
+        return self.texts.get(key, (key, key))[0]
 
     def find(self, name: str, unit: str) -> str | None:
         """The column that holds channel `name`, None if there is none; UserError if there are several."""
-        wanted = self.aliases.get(name, name)
-        if wanted in self.columns:
-            return wanted
-        stems = TIME if wanted == "time" else (wanted,)
-        found = [c for c in self.columns if c in stems or any(self._spelt(c, stem, unit) for stem in stems)]
-        if len(found) > 1:
-            raise UserError(f"{self.header}: channel {name} may be {' or '.join(found)}; rename or remove one")
-        return found[0] if found else None
+        if name in self.aliases:
+            return self._only(name, named.columns(self.aliases[name], self.units, self.texts), unit)
+        for found in self._candidates(name, unit):
+            if found:
+                return self._only(name, found, unit)
+        return None
+
+    def _candidates(self, name: str, unit: str) -> Iterator[list[str]]:
+        """Columns that may be a channel, the closest first: its name; with a unit behind it; in other letters."""
+        yield [key for key in self.columns if name in (key, self.name_of(key))]
+        stems = TIME if name == "time" else (name,)
+        yield [c for c in self.columns if self.name_of(c) in stems or any(self._spelt(c, stem, unit) for stem in stems)]
+        stems = OTHER_TIMES if name == "time" else (named.plain(name),)
+        yield [c for c in self.columns if named.plain(self.name_of(c)) in stems]
+        low = {c: named.plain(self.name_of(c)) for c in self.columns if self.units[c] is None}
+        yield [c for c, text in low.items() if any(text.startswith(s + "_") and self._behind(c, len(s), unit) for s in stems)]
+        if name == "time":
+            yield self._rising()
+
+    def _behind(self, key: str, size: int, unit: str) -> bool:
+        return _suffix(self.name_of(key)[size:], unit) is not None
+
+    def _rising(self) -> list[str]:
+        """Columns with a unit of time that increase from row to row."""
+        found = []
+        for key, unit in self.units.items():
+            try:
+                if unit is not None and unit_text.scale(unit, "s") > 0.0 and np.all(np.diff(self.columns[key]) > 0.0):
+                    found.append(key)
+            except (UnitError, UserError):
+                continue
+        return found
+
+    def _only(self, name: str, found: list[str], unit: str) -> str | None:
+        """The only one of several columns, the first if they hold the same; UserError in doubt."""
+        if len(found) < 2:
+            return found[0] if found else None
+        if len({self.name_of(key) for key in found}) == 1:
+            first = self.columns[found[0]]
+            if all(np.array_equal(first, self.columns[key], equal_nan=True) for key in found[1:]):
+                return found[0]
+            says = " or ".join(named.option(name, key) for key in found)
+            often = "twice" if len(found) == 2 else f"{len(found)} times"
+            raise UserError(f"{self.header}: channel {name} is there {often}; rename or remove one, or say {says}")
+        says = " or ".join(named.option(name, self.name_of(key)) for key in found)
+        raise UserError(f"{self.header}: channel {name} may be {' or '.join(found)}; rename or remove one, or say {says}")
 
     def _spelt(self, column: str, stem: str, unit: str) -> bool:
         """Is the column's name `stem`_UNIT with a unit that measures what `unit` does?"""
-        ending = column.removeprefix(stem)
-        return self.units[column] is None and ending != column and _suffix(ending, ending, unit) is not None
+        ending = self.name_of(column).removeprefix(stem)
+        return self.units[column] is None and ending != self.name_of(column) and _suffix(ending, unit) is not None
+
+    def unit_of(self, name: str, key: str, unit: str) -> str | None:
+        """The unit text of a column that holds channel `name`: the user's, the header's, or the end of its name."""
+        alias = self.aliases.get(name)
+        given = None if alias is None else named.unit(alias, self.units, self.texts)
+        given = self.units[key] if given is None else given
+        if given is None and self.name_of(key) != name:
+            endings = _endings(self.name_of(key))
+            given = next((u for u in (_suffix(e, unit) for e in endings) if u is not None), None)
+        return given
 
     def channel(self, name: str, unit: str, finite: bool = True) -> Array:
         """One channel in SI, which must measure what `unit` does and be finite; UserError names line and channel."""
         column = self.find(name, unit)
         if column is None:
             raise UserError(f"{self.path}: there is no channel {name}; {hint(name, self.columns)}")
-        given = self.units[column]
-        if given is None and column != name:
-            given = next((u for u in (_suffix(column, e, unit) for e in _endings(column)) if u is not None), None)
-        if given is None:
-            where = f'"{name} [{unit or "1"}]" in the header' if self.lines is not None else "it into the file"
-            raise UserError(f"{self.header}: channel {name} has no unit; write {where}")
+        given = self.unit_of(name, column, unit)
+        called = self.aliases[name] if name in self.aliases else column
+        option = named.option(name, named.with_unit(called, unit, self.units, self.texts))
+        if given is None or (given.strip() in ("", "-", "?") and not _plain(unit)):
+            where = f'"{self.name_of(column)} [{unit or "1"}]" in the header' if self.lines is not None else "it into the file"
+            raise UserError(f"{self.header}: channel {name} has no unit; write {where}, or say {option}")
         try:
-            scale = _scale(given, unit)
+            scale = unit_text.scale(given, unit)
         except UnitError as exc:
-            raise UserError(f"{self.header}: channel {name}: {exc}") from exc
+            raise UserError(f"{self.header}: channel {name}: {exc}, or say its true unit, like {option}") from exc
         values = self.columns[column]
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size and finite:
@@ -83,7 +144,8 @@ class Recording:
                 f"{self.place(bad[0])}: channel {name} has no finite value there"
                 f"{more(bad.size)}; cut the recording or fill the value in"
             )
-        return values if scale == 1.0 else values * scale
+        with np.errstate(over="ignore"):
+            return values if scale == 1.0 else values * scale
 
     def time(self) -> Array:
         """The times [s], checked: increasing, without gaps. UserError lists each kind of trouble once."""
@@ -115,28 +177,28 @@ def more(count: int) -> str:
     return f" (and in {count - 1} more rows)" if count > 1 else ""
 
 
+def _plain(unit: str) -> bool:
+    return unit.strip() in ("", "-", "1", "%")
+
+
 def _endings(column: str) -> list[str]:
     """v_m_s -> [_m_s, _s]: all that may be the unit in a column's name."""
-    return [column[k:] for k, letter in enumerate(column) if letter == "_"]
+    return [column[k:] for k, letter in enumerate(column) if letter in "_ ./,:-"]
 
 
-def _suffix(column: str, ending: str, unit: str) -> str | None:
-    """The unit that a name's ending stands for, if it measures what `unit` does: _m_s2 -> m/s^2."""
-    if not column.endswith(ending) or not SUFFIX.fullmatch(ending):
+def _suffix(ending: str, unit: str) -> str | None:
+    """The unit that a name's ending stands for, if it measures what `unit` does: _m_s2 -> m/s^2; None if none or several do."""
+    if SUFFIX.fullmatch(ending):
+        words = [re.sub(r"(?<=\D)(\d)$", r"^\1", part) for part in re.split("[ _]", ending[1:])]
+        texts = ["/".join(words)] + ["*".join(words[:k]) + "/" + "/".join(words[k:]) for k in range(2, len(words))]
+    elif match := WRITTEN.fullmatch(ending):
+        texts = [match[1]]
+    else:
         return None
-    text = "/".join(re.sub(r"(\d)$", r"^\1", part) for part in ending[1:].split("_"))
-    try:
-        _scale(text, unit)
-    except UnitError:
-        return None
-    return text
-
-
-def _scale(given: str, unit: str) -> float:
-    """How many SI units one `given` is; g is the acceleration of gravity where an acceleration is asked for."""
-    if given.strip() == "g":
+    fitting = {}
+    for text in texts:
         try:
-            return factor("g_n", unit)
+            fitting.setdefault(unit_text.scale(text, unit), text)
         except UnitError:
-            pass
-    return factor(given, unit)
+            continue
+    return next(iter(fitting.values())) if len(fitting) == 1 else None
