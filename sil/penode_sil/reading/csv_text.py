@@ -29,9 +29,6 @@ def read_csv(path: Path) -> Recording:
         found = layout.find(lines)
         if found is None:
             raise UserError(f'{path}: it is empty; the first row must be a header like "time [s],z_road [m]"')
-        if not found.names:
-            what = " | ".join(layout.split(lines[found.body], found.separator)[:8])
-            raise UserError(f'{path}:{found.body + 1}: there is no header above "{what}"; write one like "time [s],z_road [m]"')
         form = f"{encoding}, columns between {layout.NAMED.get(found.separator, found.separator)}, decimal {'commas' if found.decimal == ',' else 'points'}"
         named = _named(found)
         values = _fast(lines[found.body :], found, len(named))
@@ -48,19 +45,22 @@ def _joined(text: str) -> str:
     head = text[:20000]
     if '"' not in head or "\n" not in head:
         return text
-    inside, out = False, []
-    for c in head:
-        inside ^= c == '"'
+    inside, opened, out = False, 0, []
+    for k, c in enumerate(head):
+        if c == '"':
+            inside = not inside
+            opened = k if inside else opened
         out.append(" " if c == "\n" and inside else c)
-    return text if inside else "".join(out) + text[len(head) :]
+    closed = opened if inside else len(head)
+    return "".join(out[:closed]) + text[closed:]
 
 
 def _named(found: layout.Layout) -> list[header.Cell]:
     """The columns; names without any column at the end of the header are left out, as a separator at the line's end makes them."""
     names, units = list(found.names), found.units
-    while len(names) > max(1, found.width) and not names[-1].strip():
+    while len(names) > max(1, found.width) and not names[-1].strip() and found.header < found.body:
         names.pop()
-    while len(names) > 1 and not names[-1].strip() and len(names) > found.width - 1:
+    while len(names) > max(1, found.width - 1) and not names[-1].strip() and found.header < found.body:
         names.pop()
     return header.cells(names, units)
 

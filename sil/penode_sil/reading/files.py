@@ -36,7 +36,7 @@ def read(path: Path, names: Iterable[str] | None = None, pairs: Mapping[str, str
         tables, known = _read_mdf(path, asked, pairs)
     else:
         tables = _by_clock(_clocked(read_csv(path), rate))
-        known = [text for table in tables for _, text in table.texts.values()]
+        known = [name for table in tables for name, _ in table.texts.values()]
     named.check(pairs, tables, path, asked, known)
     if not tables:
         what = f"none of the channels {', '.join(sorted({*asked} - {'time'}))}" if asked else "no channel with numbers"

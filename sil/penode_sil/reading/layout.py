@@ -98,13 +98,13 @@ def _placed(lines: Sequence[str], first: int, separator: str, decimal: str, samp
     body = next((k for k in range(first, upto) if _is_body(lines[k], separator, width, columns)), None)
     if body is None:  # no values
         return Layout(separator, decimal, _cells(lines[first], separator), first, None, first, first + 1, width)
-    above = [k for k in range(first, body) if lines[k].strip()]
+    above = [k for k in range(first, body) if lines[k].strip() and _values(_cells(lines[k], separator)) < 1.0]
     grid = {k: _cells(lines[k], separator, width) for k in above}
     fitting = [k for k in above if abs(len(grid[k]) - width) <= 1 and any(c.strip() for c in grid[k])]
     if not fitting:
         fitting = above[-1:]
     if not fitting:
-        return Layout(separator, decimal, [], body, None, body, body, width)
+        return Layout(separator, decimal, [""] * width, body, None, body, body, width)
     fitting = _together(fitting, above)
     at = _names(fitting, grid)
     units = next((k for k in fitting if k > at and header.are_units(grid[k])), None)
@@ -164,5 +164,5 @@ def _is_body(line: str, separator: str, width: int, columns: set[int]) -> bool:
 
 
 def looks_unseparated(names: Sequence[str], row: Sequence[str]) -> bool:
-    """Has a row twice as many whole numbers as there are names: do commas part both cells and decimals?"""
-    return len(row) == 2 * len(names) and all(NUMBER.fullmatch(cell) for cell in row)
+    """Has a row more values than there are names, most of them whole numbers: do commas part both cells and decimals?"""
+    return len(names) < len(row) <= 2 * len(names) and all(NUMBER.fullmatch(cell) for cell in row) and "." not in "".join(row)

@@ -7,6 +7,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from ..errors import UserError, hint
 
@@ -107,12 +109,12 @@ def clock(text: str) -> float | None:
     return float(match[2]) * SECONDS[match[3]] if match and not match[1] else None
 
 
-def check(pairs: Mapping[str, str], tables: Sequence[object], path: object, names: Iterable[str] | None, known: Iterable[str]) -> None:
+def check(pairs: Mapping[str, str], tables: Sequence[Any], path: Path, names: Iterable[str] | None, known: Iterable[str]) -> None:
     """UserError if the file has no column that an alias names; `known` are the file's columns."""
     every = list(known)
     problems = []
     for name, text in pairs.items():
-        if (names is None or name in names) and not any(columns(text, t.units, t.texts) for t in tables):  # type: ignore[attr-defined]
+        if (names is None or name in names) and not any(columns(text, t.units, t.texts) for t in tables):
             wanted = next((one.name for one in readings(text)[1:2]), text)
             problems.append(f"{path}: there is no column \"{wanted}\" for {option(name, text)}; {hint(wanted, every)}")
     if problems:
