@@ -55,7 +55,7 @@ def people(found: look.Look) -> list[str]:
         clock = f"{table.rows} rows"
         if math.isfinite(table.interval):
             clock += f", {table.interval * 1e3:.6g} ms apart, from {table.start:.6g} s to {table.end:.6g} s"
-            clock += f", {table.gaps} gaps" if table.gaps else ", no gaps"
+            clock += f", {table.gaps or 'no'} gap{'s' * (table.gaps != 1)}"
         lines += ["", f"table {k} of {len(found.tables)}: {clock}" if len(found.tables) > 1 else clock]
         lines += [f"  note: {note}" for note in table.notes]
         lines += _aligned([("channel", "unit", "least", "largest", "quality"), *map(_row, table.channels)])

@@ -16,7 +16,7 @@ from . import quality
 from .errors import UserError
 from .raster import clock_of
 from .reading import named, similar, unit_text
-from .recording import Recording, pick, read
+from .recording import GAP, Recording, pick, read
 from .units import UnitError
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def _table(table: Recording) -> Table:
         time = table.find("time", "s")
         clock = clock_of(table, notes)
         start, end, interval = float(clock.time[0]), float(clock.time[-1]), clock.interval
-        gaps, order = len(clock.parts) - 1, clock.rows
+        gaps, order = int(np.sum(np.diff(clock.time) > GAP * clock.interval)), clock.rows
     except UserError as exc:
         notes += exc.problems
     for key in table.columns:

@@ -21,12 +21,11 @@ KINDS = (
     "t time zeit", "p pressure druck", "u voltage spannung", "i current strom",
 )  # fmt: skip
 SAME = [frozenset(kind.split()) for kind in KINDS]
-LIKE = 0.4  # of the letters of a name, at least, to propose a column by its name
 
 
-def proposals(missing: Mapping[str, str], free: Mapping[str, str | None], names: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+def proposals(missing: Mapping[str, str], free: Mapping[str, str | None], names: Mapping[str, str], least: float = 0.4) -> dict[str, tuple[str, str]]:
     """For names of a model (name -> unit), of columns (key -> unit; key -> name): the column to propose and why, where there is
-    one. Each column once; those that measure something else never."""
+    one. Each column once; those that measure something else never. A column is proposed by its name if it repeats the share `least`."""
     wanted, columns = list(missing), list(free)
     if not wanted or not columns:
         return {}
@@ -35,7 +34,7 @@ def proposals(missing: Mapping[str, str], free: Mapping[str, str | None], names:
     score = np.where(fits < 0, -10.0, like + 0.3 * np.maximum(fits, 0))
     found: dict[str, tuple[str, str]] = {}
     for i, j in zip(*linear_sum_assignment(-score)):
-        if fits[i, j] >= 0 and like[i, j] >= LIKE:
+        if fits[i, j] >= 0 and like[i, j] >= least:
             found[wanted[i]] = (columns[j], "by its name")
     used = {column for column, _ in found.values()}
     for i, name in enumerate(wanted):
