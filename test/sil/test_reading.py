@@ -25,14 +25,14 @@ from penode_sil.units import UnitError
 TURN, DEGREE, G = math.tau, math.tau / 360.0, 9.80665
 # as written in a file; what the model asks for; SI units per unit
 UNITS = [
-    *((text, "m/s^2", 1.0) for text in ("m/s2", "m/s²", "m/s/s", "m s-2", "m.s^-2", "ms-2", "m·s⁻²", "m/(s^2)", "m/sec2", "M/S^2", "m/s**2", "m/(s*s)")),
+    *((text, "m/s^2", 1.0) for text in ("m/s2", "m/s²", "m/s/s", "m s-2", "m.s^-2", "ms-2", "m·s⁻²", "m/(s^2)", "m/sec2", "M/S^2", "m/s**2", "m/(s*s)", "ms2", "mps2")),
     *((text, "m/s^2", G) for text in ("g", "G", "gn", "gee")), ("mg", "m/s^2", 1e-3 * G), ("g", "kg", 1e-3), ("mg", "kg", 1e-6),
     *((text, "N*m", 1.0) for text in ("Nm", "N m", "N.m", "N-m", "NM", "J")), ("kNm", "N*m", 1e3), ("mNm", "N*m", 1e-3), ("Nmm", "N*m", 1e-3),
     ("nm", "m", 1e-9), ("Nm/deg", "N*m/rad", 1.0 / DEGREE), ("Nms/rad", "N*m*s/rad", 1.0), ("Ns/m", "N*s/m", 1.0), ("N/(m/s)", "N*s/m", 1.0),
     *((text, "rad/s", TURN / 60.0) for text in ("1/min", "rpm", "RPM", "U/min", "min-1", "min^-1", "/min", "rev/min", "r/min")),
     *((text, "rad/s", DEGREE) for text in ("deg/s", "°/s", "dps", "deg/sec", "Grad/s")), ("rev/s", "rad/s", TURN), ("Hz", "rad/s", TURN),
     ("1/min", "Hz", 1.0 / 60.0), ("rpm", "Hz", 1.0 / 60.0), ("1/s", "Hz", 1.0), ("rpm/s", "rad/s^2", TURN / 60.0), ("deg/s2", "rad/s^2", DEGREE),
-    *((text, "m/s", 1.0 / 3.6) for text in ("km/h", "kph", "kmh", "km/hr", "KM/H")), ("%", "1", 0.01), ("pct", "1", 0.01), ("-", "1", 1.0), ("", "1", 1.0),
+    *((text, "m/s", 1.0 / 3.6) for text in ("km/h", "kph", "kmh", "km/hr", "KM/H")), *((text, "m/s", 1.0) for text in ("mps", "m/sec")), ("%", "1", 0.01), ("pct", "1", 0.01), ("-", "1", 1.0), ("", "1", 1.0),
     ("µs", "s", 1e-6), ("msec", "s", 1e-3), ("S", "s", 1.0), ("KN", "N", 1e3), ("kgm2", "kg*m^2", 1.0), ("N/mm", "N/m", 1e3), ("Grad", "rad", DEGREE),
 ]  # fmt: skip
 
@@ -67,6 +67,22 @@ def test_a_cell_that_nobody_needs_refuses_nothing(tmp_path):
     assert channel(path, "x", "m").tolist() == [1.0, 2.0, 3.0]
     with pytest.raises(UserError, match=r':2: channel y: "oops" is no number; correct the cell'):
         channel(path, "y", "m")
+
+
+@pytest.mark.parametrize(
+    "header", ["time_sec,x_cm,y_m_s2", "time_s_,x_cm_,y_m_s_2_", "Time_[s],X_[cm],y_[m/s2]", "t (s),x; cm,y m/s²", "s,cm,m/s^2\ntime,x,y", "time,x,y\ns,cm,m/s2\nbool,digits,n. a."]
+)
+def test_headers_of_other_programs(tmp_path, header):
+    (tmp_path / "r.csv").write_text(f"{header}\n0,10,1\n1,20,2\n2,30,3\n", encoding="utf-8")
+    assert channel(tmp_path / "r.csv", "x", "m").tolist() == pytest.approx([0.1, 0.2, 0.3], rel=1e-15)
+    assert channel(tmp_path / "r.csv", "y", "m/s^2").tolist() == [1.0, 2.0, 3.0]
+
+
+def test_text_with_commas_at_the_end_of_a_row_is_text(tmp_path):
+    path = write(tmp_path, "time [s],x [m],note\n0,1,RUN\n1,2,idle, cold, wet\n2,3,\n")
+    assert channel(path, "x", "m").tolist() == [1.0, 2.0, 3.0]
+    with pytest.raises(UserError, match=":3: 4 values for 3 channels; give one value a channel, separated by commas"):
+        channel(write(tmp_path, "time [s],x [m],y [m]\n0,1,2\n1,2,3,4\n2,3,4\n"), "x", "m")
 
 
 def test_the_option_is_asked_before_anything_is_refused(tmp_path):

@@ -96,9 +96,9 @@ def _slow(path: Path, lines: Sequence[str], found: layout.Layout, named: Sequenc
     rows: list[list[str]] = []
     where: list[int] = []
     for line, row in _rows(lines, found):
-        if len(row) > width and any(cell.strip() for cell in row[width:]):
+        if len(row) > width and any(cell.strip() for cell in row[width:]) and cells.is_number(row[width - 1]):  # no text with commas
             what = f"{path}:{line}: {len(row)} values for {width} channels"
-            if found.separator == "," and layout.looks_unseparated(named, row):
+            if found.separator == "," and found.width > width and layout.looks_unseparated(named, row):
                 raise UserError(f"{what}: commas part columns and decimals; export with semicolons or decimal points")
             raise UserError(f"{what}; give one value a channel, separated by {layout.NAMED.get(found.separator, found.separator)}")
         rows.append(row)

@@ -48,8 +48,8 @@ def cells(texts: Sequence[str], below: Sequence[str] | None = None) -> list[Cell
 def _parted(text: str) -> tuple[str, str | None]:
     """Name and unit of one cell. In square brackets there is always a unit, elsewhere only what can be one."""
     match = BRACKET.match(text)
-    if match and match[1].strip():
-        return match[1].strip(), match[3].strip()
+    if match and match[1].strip(" _"):
+        return match[1].strip().rstrip("_"), match[3].strip()
     match = OTHER.match(text)
     if match and match[1].strip():
         inside = next(group for group in match.groups()[2:] if group is not None).strip()
@@ -61,7 +61,8 @@ def _parted(text: str) -> tuple[str, str | None]:
     return text, None
 
 
-def are_units(texts: Sequence[str]) -> bool:
-    """Can all cells of a row be units, and at least one of them no placeholder?"""
-    some = [text.strip() for text in texts]
-    return any(text.strip("[]()- 1") for text in some) and all(unit_text.is_unit(text) for text in some)
+def are_units(texts: Sequence[str], share: float = 1.0) -> bool:
+    """Can this share of a row's cells be units, and at least one of them no placeholder?"""
+    some = [text.strip() for text in texts if text.strip()]
+    units = [text for text in some if unit_text.is_unit(text)]
+    return any(text.strip("[]()- 1") for text in units) and len(units) >= share * len(some)

@@ -107,7 +107,7 @@ def _placed(lines: Sequence[str], first: int, separator: str, decimal: str, samp
         return Layout(separator, decimal, [""] * width, body, None, body, body, width)
     fitting = _together(fitting, above)
     at = _names(fitting, grid)
-    units = next((k for k in fitting if k > at and header.are_units(grid[k])), None)
+    units = next((k for k in fitting if k > at and header.are_units(grid[k], 0.5)), None)
     if units is None and at != fitting[0] and header.are_units(grid[fitting[fitting.index(at) - 1]]):
         units = fitting[fitting.index(at) - 1]
     return Layout(separator, decimal, grid[at], at, None if units is None else grid[units], at if units is None else units, body, width)

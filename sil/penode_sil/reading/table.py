@@ -22,9 +22,9 @@ TIME = ("time", "t", "Time")
 OTHER_TIMES = ("time", "t", "zeit", "timestamp", "timestamps", "time_stamp", "time_stamps", "zeitstempel", "elapsed_time", "time_axis",
                "x_value", "uhrzeit", "datetime", "date_time", "temps", "tiempo", "tempo")  # fmt: skip
 # what a column's name may end in; signs between them part or multiply: m_s2 is m/s^2, N_s_m is N*s/m
-PART = r"(?:[mun]?s|min|h|[cmuk]?m|[mkM]?N|Nm|Ns|k?g|mg|rad|deg|rpm|dps|kmh|kph|m?V|m?A|[kM]?Pa|bar|K|k?Hz|kW|W|J|pct)\d?"
+PART = r"(?:[mun]?s|[mu]?sec|mps|min|h|[cmuk]?m|[mkM]?N|Nm|Ns|k?g|mg|rad|deg|rpm|dps|kmh|kph|m?V|m?A|[kM]?Pa|bar|K|k?Hz|kW|W|J|pct)\d?"
 SUFFIX = re.compile(rf"(?:[ _]{PART})+$")
-WRITTEN = re.compile(rf"[ _./,:-]+({PART}(?:[/*^]{PART})*)$")
+WRITTEN = re.compile(rf"[ _./,:-]+({PART}(?:[/*^]{PART})*)$|\s+(\S*[/^²³°%·*]\S*)$")
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,11 +188,12 @@ def _endings(column: str) -> list[str]:
 
 def _suffix(ending: str, unit: str) -> str | None:
     """The unit that a name's ending stands for, if it measures what `unit` does: _m_s2 -> m/s^2; None if none or several do."""
+    ending = re.sub(r"(?<=s)_2$", "2", ending.rstrip("_"))  # _m_s_2_ as MATLAB makes it of [m/s^2]
     if SUFFIX.fullmatch(ending):
         words = [re.sub(r"(?<=\D)(\d)$", r"^\1", part) for part in re.split("[ _]", ending[1:])]
         texts = ["/".join(words)] + ["*".join(words[:k]) + "/" + "/".join(words[k:]) for k in range(2, len(words))]
     elif match := WRITTEN.fullmatch(ending):
-        texts = [match[1]]
+        texts = [match[1] or match[2]]
     else:
         return None
     fitting = {}

@@ -31,6 +31,7 @@ WORDS = {
     **dict.fromkeys("kph kmh kmph".split(), ("(km/h)",)),
     **dict.fromkeys("rev revs r u umdr upm rounds".split(), ("turn",)),
     **dict.fromkeys("dps degps".split(), ("(deg/s)",)),
+    "mps": ("(m/s)",),
     **dict.fromkeys("rads radps".split(), ("(rad/s)",)),
     **dict.fromkeys("g gn gee gees".split(), ("g_n",)),
     **dict.fromkeys("pct percent prozent".split(), ("%",)),
@@ -54,7 +55,22 @@ GLUED = ("kN", "MN", "mN", "N", "mm", "cm", "km", "m", "kg", "ms", "s", "rad", "
 
 def scale(given: str, asked: str) -> float:
     """How many SI units one `given` is, read as what `asked` measures; UnitError if nothing or more than one thing fits."""
-    asked = "1" if asked.strip() in ("", "-") else asked
+    found = _scale(given, asked)
+    if isinstance(found, str):
+        raise UnitError(found)
+    return found
+
+
+@cache
+def _scale(given: str, asked: str) -> float | str:
+    """The factor, or what is wrong."""
+    try:
+        return _read(given, "1" if asked.strip() in ("", "-") else asked)
+    except UnitError as exc:
+        return str(exc)
+
+
+def _read(given: str, asked: str) -> float:
     special = _rotation(_plain(given), asked)
     if special is not None:
         return special
@@ -64,7 +80,7 @@ def scale(given: str, asked: str) -> float:
             raise UnitError(f"{given.strip()} may be {' or '.join(fits.values())}; say which")
         if fits:
             return next(iter(fits))
-    if _units.dimension(asked) == _units.NONE and ANGLE.search(asked) and is_unit(given):
+    if _known(asked) and _units.dimension(asked) == _units.NONE and ANGLE.search(asked) and is_unit(given):
         raise UnitError(f"{given.strip() or 'no unit'} is no angle; give rad or deg")
     return factor(given.strip(), asked)  # says why it does not fit
 
@@ -134,6 +150,7 @@ def _levels(given: str) -> Iterator[list[str]]:
     for alternatives in (_words, _cases, _parts):
         yield list(_replaced(text, alternatives))
     yield list(_replaced(text, lambda word: [*_words(word), *_cases(word), *_parts(word)]))
+    yield [re.sub(r"^([cmk]?m)(?:ps\^?|s\^)2$|^mpss$", lambda m: f"{m[1] or 'm'}/s^2", text)]  # ms2, mps2
     above, slash, below = text.partition("/")
     if slash and re.search(r"[*/]", below) and "(" not in text:
         yield [f"{above}/({below.replace('/', '*')})"]
