@@ -69,6 +69,14 @@ def test_a_cell_that_nobody_needs_refuses_nothing(tmp_path):
         channel(path, "y", "m")
 
 
+def test_rows_without_a_clock_may_be_given_one(tmp_path):
+    path = write(tmp_path, "nr,x [m],note\n7,1,\n8,2,a\n9,3,\n")
+    with pytest.raises(UserError, match=r'there is no channel time; .*, or say --channel "time=@1ms" if rows are 1 ms apart'):
+        read(path)[0].time()
+    (table,) = read(path, ["x", "time"], aliases(["time=@20ms"], ["x"]))
+    assert table.time() == pytest.approx([0.0, 0.02, 0.04]) and table.channel("x", "m").tolist() == [1.0, 2.0, 3.0]
+
+
 @pytest.mark.parametrize(
     "header", ["time_sec,x_cm,y_m_s2", "time_s_,x_cm_,y_m_s_2_", "Time_[s],X_[cm],y_[m/s2]", "t (s),x; cm,y m/s²", "s,cm,m/s^2\ntime,x,y", "time,x,y\ns,cm,m/s2\nbool,digits,n. a."]
 )
@@ -183,3 +191,11 @@ def test_numpy_warns_nobody(tmp_path):
     code = "import numpy as np; from penode_sil.guard import guarded; guarded(lambda: np.float64(1.0) / np.float64(0.0))"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
     assert run.returncode == 0 and not re.search("warning", run.stderr, re.IGNORECASE) and not run.stderr
+
+
+def test_a_channel_that_is_not_found_gets_an_option_that_works(tmp_path):
+    path = write(tmp_path, "time [s],Ground z [mm],q [V],y\n0,1,2,3\n1,2,3,4\n")
+    with pytest.raises(UserError, match=r'there is no channel z_road; use one of: Ground z, q, y, or say --channel "z_road=Ground z" if it is that'):
+        pick(read(path), "z_road", "m")
+    with pytest.raises(UserError, match=r'there is no channel w; .*, or say --channel "w=COLUMN" if it is one of these'):
+        pick(read(path), "w", "rad/s")

@@ -57,7 +57,7 @@ def _joined(text: str) -> str:
 
 def _named(found: layout.Layout) -> list[header.Cell]:
     """The columns; names without any column at the end of the header are left out, as a separator at the line's end makes them."""
-    names, units = list(found.names), found.units
+    names, units = list(found.names) or [""], found.units
     while len(names) > max(1, found.width) and not names[-1].strip() and found.header < found.body:
         names.pop()
     while len(names) > max(1, found.width - 1) and not names[-1].strip() and found.header < found.body:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import UserError, hint
-from . import mdf, named
+from . import mdf, named, similar
 from .csv_text import read_csv
 from .table import Recording
 
@@ -29,7 +30,7 @@ def read(path: Path, names: Iterable[str] | None = None, pairs: Mapping[str, str
     except OSError as exc:
         raise UserError(f"{path}: {exc.strerror or exc}; name a CSV file that can be read") from exc
     rate = named.clock(pairs["time"]) if "time" in pairs else None
-    if rate is not None and pairs["time"] == f"@{pairs['time'].lstrip('@')}":
+    if rate is not None:
         del pairs["time"]
     if start in (b"MDF     ", b"UnFinMF ") or path.suffix.lower() in (".mf4", ".mdf"):
         pairs.pop("time", None)  # each group has its own
@@ -46,10 +47,9 @@ def read(path: Path, names: Iterable[str] | None = None, pairs: Mapping[str, str
 
 def _clocked(table: Recording, rate: float | None) -> Recording:
     """The table with a time of so many seconds a row, if the user gives one."""
-    if rate is None:
+    if rate is None or table.lines is None:
         return table
-    rows = next((table.lines.size for _ in [0] if table.lines is not None), 0)
-    columns = {"time": np.arange(rows) * rate} | {key: table.columns[key] for key in table.columns if key != "time"}
+    columns = ChainMap({"time": np.arange(table.lines.size) * rate}, table.columns)  # type: ignore[arg-type]
     return replace(table, columns=columns, units={**table.units, "time": "s"}, texts={**table.texts, "time": ("time", "time")})
 
 
@@ -76,8 +76,8 @@ def pick(tables: list[Recording], name: str, unit: str) -> Recording:
     """The table that holds a channel, of several the one with the finest raster; UserError if none does, or in doubt."""
     holding = [table for table in tables if table.find(name, unit) is not None]
     if not holding:
-        known = sorted({c for table in tables for c in table.columns} - {"time"})
-        raise UserError(f"{tables[0].path}: there is no channel {name}; {hint(name, known)}")
+        known = {c: table.units[c] for table in tables for c in sorted(table.columns) if c != "time"}
+        raise UserError(f"{tables[0].path}: there is no channel {name}; {hint(name, known)}, or {similar.remedy(name, unit, known)}")
     if len(holding) == 1:
         return holding[0]
     called = None

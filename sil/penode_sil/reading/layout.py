@@ -16,7 +16,7 @@ from .cells import NUMBER, decimal_sign, is_number
 BLANKS = " "  # the separator of tables whose columns stand between blanks
 SEPARATORS = (",", ";", "\t", "|", BLANKS)
 NAMED = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
-STATED = re.compile(r'^\s*"?sep=(.|\\t)"?\s*$', re.IGNORECASE)
+STATED = re.compile(r'^\s*"?sep=([^\w"\'.+\-]|\\t)"?\s*$', re.IGNORECASE)
 COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s*")
 HEAD, TAIL = 400, 60  # lines looked at from both ends
 TIMES = frozenset("time t zeit timestamp timestamps time_stamp time_stamps zeitstempel elapsed_time time_axis x_value uhrzeit datetime "

@@ -8,10 +8,9 @@ import re
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from ..units import UnitError
-from . import unit_text
+from . import named, unit_text
 
 # words for one quantity; the first letters of a word count as well
 KINDS = (
@@ -26,6 +25,8 @@ SAME = [frozenset(kind.split()) for kind in KINDS]
 def proposals(missing: Mapping[str, str], free: Mapping[str, str | None], names: Mapping[str, str], least: float = 0.4) -> dict[str, tuple[str, str]]:
     """For names of a model (name -> unit), of columns (key -> unit; key -> name): the column to propose and why, where there is
     one. Each column once; those that measure something else never. A column is proposed by its name if it repeats the share `least`."""
+    from scipy.optimize import linear_sum_assignment  # slow to load
+
     wanted, columns = list(missing), list(free)
     if not wanted or not columns:
         return {}
@@ -44,6 +45,15 @@ def proposals(missing: Mapping[str, str], free: Mapping[str, str | None], names:
             found[name] = (left[0], "the only one left with such a unit")
             used.add(left[0])
     return found
+
+
+def remedy(name: str, unit: str, free: Mapping[str, str | None]) -> str:
+    """What to say for a channel that is not found: the option for the most similar of the columns (key -> unit), or for any."""
+    likely = proposals({name: unit}, free, {key: key for key in free})
+    if name not in likely:
+        return f"say {named.option(name, 'COLUMN')} if it is one of these"
+    column, _ = likely[name]
+    return f"say {named.option(name, column if free[column] is not None else f'{column} [{unit or 1}]')} if it is that"
 
 
 def fit(given: str | None, asked: str) -> int:

@@ -126,7 +126,8 @@ class Recording:
         """One channel in SI, which must measure what `unit` does and be finite; UserError names line and channel."""
         column = self.find(name, unit)
         if column is None:
-            raise UserError(f"{self.path}: there is no channel {name}; {hint(name, self.columns)}")
+            clock = f", or say {named.option('time', '@1ms')} if rows are 1 ms apart" if name == "time" else ""
+            raise UserError(f"{self.path}: there is no channel {name}; {hint(name, self.columns)}{clock}")
         given = self.unit_of(name, column, unit)
         called = self.aliases[name] if name in self.aliases else column
         option = named.option(name, named.with_unit(called, unit, self.units, self.texts))
