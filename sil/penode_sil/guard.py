@@ -51,8 +51,8 @@ def guarded(command: Callable[[], object]) -> None:
         sys.exit(3)
 
 
-def _crashed(exc: Exception) -> str:
-    """Write the traceback to a file; the line that says what to send."""
+def crash_file(exc: Exception) -> tuple[str, Path | None]:
+    """What happened, in one line, and the file with the traceback that was written for it; None if none could be."""
     what = " ".join(f"{type(exc).__name__}: {exc}".split())
     call = shlex.join(["penode", *sys.argv[1:]])
     text = f"penode {penode_gen.VERSION}, Python {sys.version.split()[0]}, {sys.platform}\n{call}\n\n{''.join(traceback.format_exception(exc))}"
@@ -62,5 +62,12 @@ def _crashed(exc: Exception) -> str:
             path.write_text(text, encoding="utf-8", errors="backslashreplace")
         except OSError:
             continue
-        return f"penode: a fault of penode, not of yours ({what}); send us {path} and the files that the command names"
-    return f"penode: a fault of penode, not of yours ({what}); send us this line, the command ({call}) and the files that it names"
+        return what, path
+    return what, None
+
+
+def _crashed(exc: Exception) -> str:
+    """The line that says what to send."""
+    what, path = crash_file(exc)
+    send = f"{path} and the files that the command names" if path else "this line, the command and the files that it names"
+    return f"penode: a fault of penode, not of yours ({what}); send us {send}"

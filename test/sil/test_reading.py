@@ -199,3 +199,16 @@ def test_a_channel_that_is_not_found_gets_an_option_that_works(tmp_path):
         pick(read(path), "z_road", "m")
     with pytest.raises(UserError, match=r'there is no channel w; .*, or say --channel "w=COLUMN" if it is one of these'):
         pick(read(path), "w", "rad/s")
+
+
+def test_a_crash_of_one_recording_is_a_line_too(tmp_path, monkeypatch):
+    from penode_sil.diagnosis import files, folder
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(files, "run", lambda *given, **options: 1 // 0)
+    for name in ("m.toml", "r.csv"):
+        (tmp_path / name).touch()
+    answer, line = folder.attempt(files.Job(tmp_path / "m.toml", (tmp_path / "r.csv",), (), tmp_path / "out"))
+    (path,) = tmp_path.glob("penode-crash-*.txt")
+    assert answer is None and "\n" not in line and "ZeroDivisionError" in line and f"send us {path}" in line
+    assert "Traceback" in path.read_text()
