@@ -162,6 +162,7 @@ FORMS: dict[str, Form] = {
     "dates and times": Form(table(BARE[:1] + SI[1:], stamp=_iso)),
     "dates with points": Form(table(BARE[:1] + SI[1:], ";", ",", stamp=_german)),
     "times of day": Form(table(stamp=lambda time: _iso(time)[11:])),
+    "dates beside times of day": Form(table(["Date;Time", *SI[1:]], ";", ",", stamp=lambda time: _german(time).replace(" ", ";"))),
     "seconds since 1970": Form(table(stamp=lambda time: f"{1.7e9 + time:.3f}"), tolerance=1e-5),  # 2.4e-7 s of 1.7e9 s, times 8 rad/s, 6 values
     "rows without a clock": Form(table(["nr", *SI[1:]], stamp=lambda time: str(round(time / STEP))), ("time=@5ms",)),
     "a number for each row": Form(b"\n".join(b",".join((str(k - 1).encode() if k else b"", line)) for k, line in enumerate(table().strip().split(b"\n")))),

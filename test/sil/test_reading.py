@@ -106,7 +106,7 @@ def test_the_option_is_asked_before_anything_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     "text, first",
-    [("time [s];x [m]\n0;1,5\n1;-\n", 1.5), ("time [s];x [m]\n0;1.5\n1;n/a\n", 1.5), ("time [s];x [m]\n0;1,25D-1\n1;\n", 0.125), ("time [s],x [m]\n0,\u22121.5\n1,#N/A\n", -1.5)],
+    [("time [s];x [m]\n0;1,5\n1;-\n", 1.5), ("time [s];x [m]\n0;1.5\n1;n/a\n", 1.5), ("time [s];x [m]\n0;1,25D-1\n1;\n", 0.125), ("time [s];x [m]\n0,5;1'234,5\n1,5;-\n", 1234.5), ("time [s],x [m]\n0,\u22121.5\n1,#N/A\n", -1.5)],
 )  # fmt: skip
 def test_signs_for_missing_values_and_other_notations(tmp_path, text, first):
     (tmp_path / "r.csv").write_text(text, encoding="utf-8")

@@ -21,7 +21,8 @@ GROUPS = re.compile(r"[+-]?\d{1,3}(?:['\u2019\u00a0\u202f ]\d{3})+(?:[.,]\d+)?")
 NUMBER = re.compile(r"\s*[+-]?(?:\d+([.,]?)\d*|([.,])\d+)(?:[eEdD][+-]?\d+)?\s*")
 DAY = r"(?:(?P<y>\d{4})[-/.](?P<m>\d\d?)[-/.](?P<d>\d\d?)|(?P<a>\d\d?)[-/.](?P<b>\d\d?)[-/.](?P<c>\d{4}))"
 CLOCK = r"(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d))?(?:[.,:](?P<f>\d{1,9}))?\s*(?P<half>[AaPp][Mm])?"
-STAMP = re.compile(rf"\s*(?:{DAY}[T_ ,;]+)?{CLOCK}\s*(?:Z|UTC|[+-]\d\d:?\d\d)?\s*")
+DATE = re.compile(rf"\s*{DAY}\s*")
+STAMP = re.compile(rf"\s*(?:{DAY}[T_ ,]+)?{CLOCK}\s*(?:Z|UTC|[+-]\d\d:?\d\d)?\s*")
 
 
 def number(text: str, decimal: str = ".") -> float:
@@ -50,7 +51,7 @@ def decimal_sign(some: Sequence[Sequence[str]]) -> str:
 
 def is_number(text: str) -> bool:
     """May a cell be a value: a number, a stamp of time?"""
-    return bool(NUMBER.fullmatch(text) or STAMP.fullmatch(text)) or text.strip().casefold() in ("nan", "inf", "-inf")
+    return any(kind.fullmatch(text) for kind in (NUMBER, STAMP, DATE, GROUPS)) or text.strip().casefold() in ("nan", "inf", "-inf")
 
 
 def numbers(texts: Sequence[str | None], decimal: str) -> Array:

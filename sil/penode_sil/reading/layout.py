@@ -14,7 +14,7 @@ from . import header, named
 from .cells import NUMBER, decimal_sign, is_number
 
 BLANKS = " "  # the separator of tables whose columns stand between blanks
-SEPARATORS = (",", ";", "\t", "|", BLANKS)
+SEPARATORS = (";", "\t", "|", ",", BLANKS)  # where two part a text equally well, the first
 NAMED = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
 STATED = re.compile(r'^\s*"?sep=([^\w"\'.+\-]|\\t)"?\s*$', re.IGNORECASE)
 COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s*")
