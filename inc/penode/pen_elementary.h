@@ -19,7 +19,7 @@
  * pen_atan, pen_log and pen_sqrt are monotone. No branch depends on the argument.
  *
  * Sine and cosine take angles up to PEN_ANGLE_MAX either way, in float as in double: that is 1303 turns, where two
- * neighbouring floats are 1 mrad apart. Beyond it they give NaN, so that the step reports it (PEN_NONFINITE) and holds:
+ * neighbouring floats are 1 mrad apart. Beyond it they give NaN, so that the step reports it (PEN_STEP_NONFINITE) and holds:
  * an angle that grows without end belongs wrapped, or counted in turns, before it loses its digits.
  *
  * NaN gives NaN. Infinity gives NaN in pen_sin, pen_cos and pen_atan, which would hide it, and itself in the others.
