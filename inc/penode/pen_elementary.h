@@ -10,10 +10,10 @@
  * (test/accuracy/ measures both):
  *
  *                    float   double
- *   pen_sin           0.97     0.82
- *   pen_cos           0.98     0.82
- *   pen_atan          1.16     1.05
- *   pen_log           0.84     0.82
+ *   pen_sin           0.97     0.79
+ *   pen_cos           0.98     0.81
+ *   pen_atan          1.16     0.97
+ *   pen_log           0.84     0.77
  *   pen_sqrt          0.50     0.50   correctly rounded
  *
  * pen_atan, pen_log and pen_sqrt are monotone. No branch depends on the argument.

@@ -163,3 +163,16 @@ def test_start_states_of_an_extending_file(folder):
     (folder / "o.toml").write_text((HERE / "models" / "oscillator.toml").read_text())
     (folder / "p.toml").write_text('[model]\nextends = "o.toml"\n[bodies]\nmass = { start_position = "3 mm" }\n')
     assert penode_gen.load(folder / "p.toml").start == (0.003, 0.0)
+
+
+def test_recording_without_inputs_takes_its_times_from_the_sensors(folder):
+    """Two sensors on clocks of their own in one file; a gap in one of them is no fault of a simulation."""
+    from types import SimpleNamespace
+
+    signals = (SimpleNamespace(name="a", unit="rad"), SimpleNamespace(name="b", unit="mm"))
+    model = SimpleNamespace(inputs=(), sensors=signals, outputs=(), sets={"default": None}, name="free", sample_time=0.005)
+    rows = [(0.1 + 0.01 * k, f"{k}", f"{10 * k}" if k > 4 else "") for k in range(50) if k not in (20, 21, 22)]
+    (folder / "free.csv").write_text("time [s],a [rad],b [mm]\n" + "".join(f"{t:.2f},{a},{b}\n" for t, a, b in rows))
+    one = replay.load(folder / "free.csv", model, None, (), "linear", print)
+    assert one.u.shape == (89, 0) and one.offset == pytest.approx(0.15) and one.times[-1] == pytest.approx(0.44)
+    assert one.sensed["a"].values.size == 47 and one.sensed["b"].values[0] == pytest.approx(0.05)
