@@ -13,6 +13,7 @@ from . import layout, promises, selftest, sets, units
 from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
 from .emit_networks import NetworkCode, by_value, hidden16, network_code, network_lines, second_lines, slope_lines
+from .functions import CALLS
 from .jacobian import Derivatives
 from .model import Model
 from .networks import Dense
@@ -116,6 +117,7 @@ class _Emitter:
             "functions": functions, "constants": self._constants(), "networks": self.networks,
             "network_lines": {c.name: network_lines(model, c) for c in self.networks},
             "second_lines": {c.name: by_value(c, second_lines(model, c)) for c in self.networks if self._needs_second(c, functions)},
+            "elementary": self._mentions(functions, tuple(f"{call}(" for call in CALLS.values())),
             "called": {f"{c.name}{part}" for c in self.networks for part in ("", "_slope", "_or_pieces", "_or_pieces_slope") if self._mentions(functions, (f" {c.name}{part}(", f"){c.name}{part}("))},
             "slope_lines": {c.name: by_value(c, slope_lines(model, c)) for c in self.networks},
             "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),

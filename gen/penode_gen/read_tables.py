@@ -54,6 +54,13 @@ REQUIRED = {
 }
 
 
+def _base(tables: dict[str, Any]) -> str:
+    """What a file says that it extends; empty if nothing."""
+    head = tables.get("model")
+    found = head.get("extends") if isinstance(head, dict) else None
+    return found if isinstance(found, str) else ""
+
+
 class Tables:
     """A model file, with the one that it extends, and what is wrong with them."""
 
@@ -64,18 +71,20 @@ class Tables:
         self.digest = hashlib.sha256(raw)
         self.places = [(path, lines)]
         self.set_owner = ""  # the model that this one shares its sets with
-        head = self.data.get("model")
-        if isinstance(head, dict) and isinstance(head.get("extends"), str):
-            base = path.parent / head["extends"]
-            place = f"{path}:{lines.of(('model', 'extends'))}: model.extends"
-            tables, raw, lines = parse(base, place)
-            if isinstance(tables.get("model"), dict) and "extends" in tables["model"]:
-                raise m.ModelError([one_line(f"{place}: {base} itself extends a file; extend that one")])
-            if not {"parameters", "networks", "sets"} & set(self.data) and isinstance(tables.get("model"), dict):
-                self.set_owner = str(tables["model"].get("name", ""))
-            self.data = merge(tables, self.data)
+        own, shares = self.data, True
+        while base := _base(own):
+            before = self.places[-1][0]
+            place = f"{before}:{lines.of(('model', 'extends'))}: model.extends"
+            if len(self.places) > 2:
+                raise m.ModelError([one_line(f"{place}: this would be the third file that extends another; extend {base} by at most two in a row")])
+            base_path = before.parent / base
+            shares = shares and not {"parameters", "networks", "sets"} & set(own)
+            own, raw, lines = parse(base_path, place)
+            if shares and isinstance(own.get("model"), dict):
+                self.set_owner = str(own["model"].get("name", self.set_owner))
+            self.data = merge(own, self.data)
             self.digest.update(raw)
-            self.places.append((base, lines))
+            self.places.append((base_path, lines))
 
     def place(self, where: tuple[str, ...]) -> tuple[Path, Lines]:
         """The file that says something about this key."""

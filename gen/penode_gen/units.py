@@ -12,6 +12,7 @@ import pint
 import sympy as sp
 
 from . import expressions as ex
+from . import functions
 
 
 
@@ -124,6 +125,8 @@ def dimension_of(expr: sp.Expr, of: Callable[[sp.Basic], Dimension]) -> Dimensio
         return (parts[0] or NONE) ** float(exponent)
     if isinstance(expr, ex.Absolute):
         return parts[0]
+    if isinstance(expr, functions.Root):
+        return (parts[0] or NONE) ** 0.5
     if isinstance(expr, ex.Sign):
         return NONE
     for part in parts:  # exp, tanh, ...

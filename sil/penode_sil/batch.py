@@ -228,7 +228,8 @@ def _build(model: penode_gen.Model, code: BatchCode, dtype: type, per_run: bool,
         *(["-DWEIGHTS_PER_RUN"] if per_run else []),
         *(f"-I{ROOT}/{folder}" for folder in ("sil/firmware", "src", "inc", "port/gnu")),
     ]
-    parts = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes.h"), ("src", "pen_math.c"))
+    functions = (("src", f"pen_{name}.c") for name in ("math", "trig", "atan", "log", "root"))
+    parts = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes*.h"), *functions)
     folding = []
     if "LANES_PIECES" in code.text:
         own = [ROOT / "src" / name for name in ("pen_fold.c", "pen_net.c")]

@@ -430,8 +430,10 @@ def test_extends(folder):
     assert "good.toml:27: elements.push: " in problems(write(""))[0]
     (folder / "good.toml").write_text(GOOD.replace('name = "good"', "name = good"))
     assert "good.toml:2: is not valid TOML" in problems(write(""))[0]
-    (folder / "good.toml").write_text('[model]\nextends = "other.toml"\n')
-    assert "extended.toml:2: model.extends: " in problems(write(""))[0] and "itself extends a file; extend that one" in problems(write(""))[0]
+    for name, base in (("good", "other"), ("other", "third"), ("third", "fourth")):
+        (folder / f"{name}.toml").write_text(f'[model]\nextends = "{base}.toml"\n')
+    found = problems(write(""))
+    assert len(found) == 1 and "other.toml:2: model.extends: " in found[0] and "at most two in a row" in found[0]
     (folder / "good.toml").unlink()
     found = problems(write(""))
     assert len(found) == 1 and "extended.toml:2: model.extends: " in found[0] and "good.toml: cannot be read (No such file" in found[0]

@@ -11,6 +11,7 @@ long functions     more than 60 lines: C from brace to brace, Python from `def` 
 circular imports   modules of penode_gen and penode_sil, and C headers, that import themselves by way of others
 named thresholds   module-level numbers with an UPPER_CASE name in penode_sil: NAME = number, or arithmetic of numbers
 runtime lines      lines of inc/penode and src together; no ratchet but a budget: only more than the kept number fails
+elementary lines   the same of the functions that only some models call (pen_elementary.h), which no other program links
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ FOLDERS = ("inc", "src", "gen", "sil", "port", "test")
 KINDS = {".c", ".h", ".py", ".j2", ".mk", ".pml"}
 FILE_LINES = 400
 FUNCTION_LINES = 60
-BUDGETS = {"runtime lines"}
+BUDGETS = {"runtime lines", "elementary lines"}
+ELEMENTARY = {"pen_elementary.h", "pen_parts.h", "pen_trig.c", "pen_atan.c", "pen_log.c", "pen_root.c"}
 
 Found = dict[str, list[str]]
 
@@ -130,9 +132,9 @@ def circular(edges: dict[str, set[str]]) -> list[str]:
 
 def look(root: Path) -> tuple[dict[str, int], Found]:
     """The counts, and what each of them is made of."""
-    found: Found = {"long files": [], "long functions": [], "circular imports": [], "named thresholds": [], "runtime lines": []}
+    found: Found = {"long files": [], "long functions": [], "circular imports": [], "named thresholds": [], "runtime lines": [], "elementary lines": []}
     files = sources(root)
-    runtime = 0
+    runtime = {"runtime lines": 0, "elementary lines": 0}
     for path in files:
         name, text = path.relative_to(root).as_posix(), path.read_text()
         lines = text.count("\n")
@@ -143,12 +145,12 @@ def look(root: Path) -> tuple[dict[str, int], Found]:
         if name.startswith("sil/penode_sil/") and path.suffix == ".py":
             found["named thresholds"] += [f"{name}:{line}" for line in thresholds(text)]
         if name.startswith(("inc/penode/", "src/")):
-            runtime += lines
+            runtime["elementary lines" if path.name in ELEMENTARY else "runtime lines"] += lines
     for package in ("gen/penode_gen", "sil/penode_sil"):
         if (root / package).is_dir():
             found["circular imports"] += circular(python_imports(root, root / package))
     found["circular imports"] += circular(header_includes(files))
-    return {kind: len(items) for kind, items in found.items()} | {"runtime lines": runtime}, found
+    return {kind: len(items) for kind, items in found.items()} | runtime, found
 
 
 def compare(kept: dict[str, int], counts: dict[str, int], found: Found) -> list[str]:
