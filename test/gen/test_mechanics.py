@@ -203,7 +203,7 @@ damper = { between = ["load", "ram"], law = "linear_damper", damping = "9 N*s/m"
 [outputs]
 torque = { value = "torque", unit = "N*m" }
 [sensors]
-der_omega = { value = "der(omega_drum)", unit = "rad/s^2" }
+alpha = { value = "der(omega_drum)", unit = "rad/s^2" }
 rate = { value = "v_damper", unit = "m/s" }
 """
 
@@ -271,4 +271,4 @@ def test_free_swing(load):
         expected = expected + power
     assert np.max(np.abs(jacobian[:4].reshape(2, 2) - expected)) < 1e-14
     assert not jacobian[4:8].any()
-    assert instance.get_input().size == 0 and sil.function("selftest_of")  # the self-test is linked
+    assert instance.get_input().size == 0
