@@ -20,10 +20,9 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
-from . import absorb, echo, extension, nameless, naming, noise, plausible, residual, search, steady
+from . import absorb, echo, extension, nameless, naming, noise, plant, plausible, residual, search, steady
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
-from .plant import placeless
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
 from .search import Explanation
 from .study import MOVING, Study, begin, look
@@ -124,7 +123,7 @@ def diagnose(
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
-    notes: list[str] = list(filter(None, [placeless(study.places)]))
+    notes = list(filter(None, [plant.placeless(study.places)]))
     if behind:
         notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
     if changed and verdict == "unexplained":

@@ -4,7 +4,7 @@
 
 What a simulation misses moves by the plant linearised about it, driven by an unknown force at one place. That force wanders: itself,
 or its rate, is a random walk, of the strength under which the recordings are most likely. A Kalman filter gives the likelihood and
-a smoother the force (Rauch, Tung and Striebel 1965), both stationary, mode by mode. The free values of the fit (parameters within
+a smoother the force (Bryson and Frazier 1963), both stationary, mode by mode. The free values of the fit (parameters within
 their tolerance, start states) are estimated beside it.
 """
 
@@ -25,7 +25,9 @@ from .plant import Place
 from .study import Study
 
 Array = NDArray[np.float64]
-STRENGTHS = np.logspace(-5.0, 4.0, 10)  # of the walk per second, in what the residual suggests; then finer around the best
+STRENGTHS = np.logspace(-2.0, 8.0, 11)  # of the walk: its variance after a second, in squares of `_unit`; then finer around the best
+FINER = np.logspace(-0.75, 0.75, 7)
+PACE = 1e3  # [1/s^2] variance of a force's rate over that of the force: strengths of both orders are then alike
 ORDERS = (1, 2)  # random walk of the force, or of its rate
 FORGETS = 10.0  # recordings after which a walk has forgotten where it was: accelerations do not show a constant force
 SHIFT = 0.02  # units by which free values are moved for derivatives
@@ -56,9 +58,9 @@ class Walk:
 
     step: Array  # of the prediction from one sample to the next, f (1 - k h)
     gain: Array  # f k
-    update: Array  # k
     out: Array  # h
-    back: Array  # gain of the smoother
+    spread: Array  # covariance of the prediction
+    precision: Array  # of innovations
     root: Array  # turns innovations white
     volume: float  # log determinant of their covariance
 
@@ -68,14 +70,16 @@ class Walk:
         try:
             p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
             s = h @ p @ h.T + np.eye(len(h))
-            k = np.linalg.solve(s, h @ p).T
-            filtered = p - k @ h @ p
-            back = np.linalg.solve(p.T + 1e-300 * np.eye(len(p)), f @ filtered.T).T
             low = np.linalg.cholesky(s)
         except (np.linalg.LinAlgError, ValueError):
             return None
         root = linalg.solve_triangular(low, np.eye(len(s)), lower=True)
-        return Walk(f - f @ k @ h, f @ k, k, h, back, root, 2.0 * float(np.sum(np.log(np.diag(low)))))
+        precision = root.T @ root
+        gain = f @ p @ h.T @ precision
+        step = f - gain @ h
+        if not np.max(np.abs(np.linalg.eigvals(step))) < 1.0:
+            return None
+        return Walk(step, gain, h, p, precision, root, 2.0 * float(np.sum(np.log(np.diag(low)))))
 
     def predictions(self, y: Array) -> Array:
         """States [n, x] foretold before each sample of y [n, sensors]."""
@@ -86,11 +90,10 @@ class Walk:
         return (y - self.predictions(y) @ self.out.T) @ self.root.T
 
     def smoothed(self, y: Array) -> Array:
-        """States [n, x] as they most likely were."""
+        """States [n, x] as they most likely were, by the innovations still to come: no covariance is inverted."""
         before = self.predictions(y)
-        filtered = before + (y - before @ self.out.T) @ self.update.T
-        late = filtered - np.vstack([before[1:] @ self.back.T, np.zeros((1, before.shape[1]))])
-        return recursion(self.back, late[::-1])[::-1]
+        pulls = (y - before @ self.out.T) @ self.precision @ self.out
+        return before + recursion(self.step.T, pulls[::-1])[::-1] @ self.spread
 
 
 def recursion(a: Array, drive: Array) -> Array:
@@ -151,21 +154,17 @@ def _of(f: Free, k: int) -> Free:
 
 
 def _at(study: Study, place: int, parts: Sequence[_Recording], nothing: float, count: int) -> Missing | None:
-    """The force at one place, under the likeliest walk."""
-    best: tuple[float, float, int] | None = None
-    for order in ORDERS:
-        tried = [(x, q) for q in STRENGTHS if (x := _likelihood(study, place, parts, order, q)) is not None]
-        if tried:
-            centre = min(tried)[1]
-            tried += [(x, q) for q in centre * np.logspace(-0.5, 0.5, 5) if (x := _likelihood(study, place, parts, order, q)) is not None]
-            best = min([(*min(tried), order), *([best] if best else [])])
-    if best is None:
+    """The force at one place, under the walk that is likeliest for what the fit leaves."""
+    tried = [(_volume(study, place, parts, order, q), q, order) for order in ORDERS for q in STRENGTHS]
+    _, centre, order = min(tried)
+    tried += [(_volume(study, place, parts, order, q), q, order) for q in centre * FINER]
+    least, strength, order = min(tried)
+    if not np.isfinite(least):
         return None
-    left, strength, order = best
-    shift = _shift(study, place, parts, order, strength)
+    walks = [_walk(study, place, p, order, strength) for p in parts]
+    left, shift = _regressed(study, parts, walks)
     forces, rest = [], 0.0
-    for p in parts:
-        walk = _walk(study, place, p, order, strength)
+    for p, walk in zip(parts, walks):
         y = p.residual - np.tensordot(shift, p.slopes, 1)
         x = walk.smoothed(y)
         forces.append(x[:, len(study.linear.a)] * _unit(study, place, p))
@@ -174,11 +173,23 @@ def _at(study: Study, place: int, parts: Sequence[_Recording], nothing: float, c
     return Missing(study.places[place], tuple(forces), left, float(np.clip(share, 0.0, 1.0)))
 
 
+def _volume(study: Study, place: int, parts: Sequence[_Recording], order: int, strength: float) -> float:
+    """-2 log likelihood of a walk, free values as they are; infinite where there is none."""
+    total = 0.0
+    for p in parts:
+        walk = _walk(study, place, p, order, strength)
+        if walk is None:
+            return np.inf
+        total += float(np.sum(walk.innovations(p.residual) ** 2)) + len(p.residual) * walk.volume
+    return total if np.isfinite(total) else np.inf
+
+
 def _unit(study: Study, place: int, p: _Recording) -> float:
-    """The force that the sensors see as one deviation, where they see it best: walks are counted in it."""
+    """The force that would make so much of a residual where sensors see it best: walks are counted in it."""
     f = p.experiment.frequencies[1 : p.experiment.band]
     seen = study.linear.transfer(p.experiment.frequencies)[1 : p.experiment.band, list(p.sensors), study.linear.n_inputs + place]
-    return 1.0 / max(float(np.max(np.abs(seen) / p.sigma)), 1e-300) if len(f) else 1.0
+    most = float(np.max(np.abs(seen) / p.sigma)) if len(f) else 0.0
+    return max(float(np.sqrt(np.mean(p.residual**2))), 1.0) / most if most > 0.0 else 1.0
 
 
 def _walk(study: Study, place: int, p: _Recording, order: int, strength: float) -> Walk | None:
@@ -203,33 +214,19 @@ def _walk(study: Study, place: int, p: _Recording, order: int, strength: float) 
     into[:n] = next_ * into[n]
     h = np.zeros((len(p.sensors), n + order))
     h[:, :n], h[:, n] = linear.c[list(p.sensors)] / p.sigma[:, None], d / p.sigma
-    return Walk.of(f, strength * step ** (2 * order - 1) * np.outer(into, into), h)
+    return Walk.of(f, strength * step * (PACE * step**2) ** (order - 1) * np.outer(into, into), h)
 
 
-def _whitened(study: Study, place: int, p: _Recording, walk: Walk) -> tuple[Array, Array]:
-    """Innovations of the residual [rows], and of what free values do to it [rows, free]."""
-    return walk.innovations(p.residual).ravel(), np.stack([walk.innovations(s).ravel() for s in p.slopes], axis=1) if len(p.slopes) else np.zeros((p.residual.size, 0))
-
-
-def _regressed(study: Study, place: int, parts: Sequence[_Recording], order: int, strength: float) -> tuple[float, Array] | None:
+def _regressed(study: Study, parts: Sequence[_Recording], walks: Sequence[Walk]) -> tuple[float, Array]:
     """-2 log likelihood, and the shifts of the free values under which it is least, within their priors."""
-    walks = [_walk(study, place, p, order, strength) for p in parts]
-    if any(w is None for w in walks):
-        return None
-    both = [_whitened(study, place, p, w) for p, w in zip(parts, walks)]
-    precision = np.array([f.unit / f.sigma for f in study.null.free])
-    rows = np.vstack([s for _, s in both] + [np.diag(precision)])
-    r = np.concatenate([e for e, _ in both] + [-np.array([f.offset for f in study.null.free])])
-    shift = np.linalg.lstsq(rows, r, rcond=1e-12)[0] if rows.shape[1] else np.zeros(0)
-    left = r - rows @ shift
-    return float(left @ left) + sum(len(p.residual) * w.volume for p, w in zip(parts, walks)), shift
-
-
-def _likelihood(study: Study, place: int, parts: Sequence[_Recording], order: int, strength: float) -> float | None:
-    found = _regressed(study, place, parts, order, strength)
-    return found[0] if found and np.isfinite(found[0]) else None
-
-
-def _shift(study: Study, place: int, parts: Sequence[_Recording], order: int, strength: float) -> Array:
-    found = _regressed(study, place, parts, order, strength)
-    return found[1] if found else np.zeros(len(study.null.free))
+    free = study.null.free
+    rows = [np.stack([w.innovations(s).ravel() for s in p.slopes], axis=1) for p, w in zip(parts, walks)] if free else []
+    r = np.concatenate([w.innovations(p.residual).ravel() for p, w in zip(parts, walks)])
+    volume = sum(len(p.residual) * w.volume for p, w in zip(parts, walks))
+    if not free:
+        return float(r @ r) + volume, np.zeros(0)
+    whole = np.vstack([*rows, np.diag([f.unit / f.sigma for f in free])])
+    r = np.concatenate([r, [-f.offset for f in free]])
+    shift = np.linalg.lstsq(whole, r, rcond=1e-12)[0]
+    left = r - whole @ shift
+    return float(left @ left) + volume, shift
