@@ -2,8 +2,8 @@
 # Copyright (c) 2026 the penode authors
 """The force that is missing at each place, sample by sample and without a law, and how much of the residual it explains alone.
 
-What a simulation misses moves by the plant linearised about it, driven by an unknown force at one place. That force wanders: itself,
-or its rate, is a random walk, of the strength under which the recordings are most likely. A Kalman filter gives the likelihood and
+What a simulation misses moves by the plant linearised about it, driven by an unknown force at one place. Its rate is a
+random walk, of the strength under which the recordings are most likely. A Kalman filter gives the likelihood and
 a smoother the force (Bryson and Frazier 1963), both stationary, mode by mode. The free values of the fit (parameters within
 their tolerance, start states) are estimated beside it.
 """
@@ -21,16 +21,17 @@ from scipy.signal import lfilter
 
 from .fit import Free, Problem
 from .noise import Experiment
-from .plant import Place
+from .plant import Linear, Place, linearise
 from .study import Study
 
 Array = NDArray[np.float64]
-STRENGTHS = np.logspace(-2.0, 8.0, 11)  # of the walk: its variance after a second, in squares of `_unit`; then finer around the best
-FINER = np.logspace(-0.75, 0.75, 7)
-PACE = 1e3  # [1/s^2] variance of a force's rate over that of the force: strengths of both orders are then alike
-ORDERS = (1, 2)  # random walk of the force, or of its rate
+STRENGTHS = np.logspace(0.0, 7.5, 6)  # of the walk: variance of the rate after a second, in squares of `_unit`, times PACE
+FINER = np.logspace(-0.75, 0.75, 3)  # around the best
+PACE = 1e3  # [1/s^2]
 FORGETS = 10.0  # recordings after which a walk has forgotten where it was: accelerations do not show a constant force
 SHIFT = 0.02  # units by which free values are moved for derivatives
+REFINED = 2  # places that explain most are looked at again, about the free values found there, so many times each
+AGAIN = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +83,13 @@ class Walk:
         return Walk(step, gain, h, p, precision, root, 2.0 * float(np.sum(np.log(np.diag(low)))))
 
     def predictions(self, y: Array) -> Array:
-        """States [n, x] foretold before each sample of y [n, sensors]."""
-        return recursion(self.step, np.vstack([np.zeros((1, len(self.step))), y[:-1] @ self.gain.T]))
+        """States [n, x, any] foretold before each sample of y [n, sensors, any]."""
+        drive = np.einsum("xs,ns...->nx...", self.gain, y[:-1])
+        return recursion(self.step, np.concatenate([np.zeros_like(drive[:1]), drive]))
 
     def innovations(self, y: Array) -> Array:
-        """White [n, sensors] if y is what the walk makes."""
-        return (y - self.predictions(y) @ self.out.T) @ self.root.T
+        """White [n, sensors, any] if y is what the walk makes."""
+        return np.einsum("rs,ns...->nr...", self.root, y - np.einsum("sx,nx...->ns...", self.out, self.predictions(y)))
 
     def smoothed(self, y: Array) -> Array:
         """States [n, x] as they most likely were, by the innovations still to come: no covariance is inverted."""
@@ -97,13 +99,13 @@ class Walk:
 
 
 def recursion(a: Array, drive: Array) -> Array:
-    """x[k] = a x[k-1] + drive[k] from rest, [n, x]: mode by mode."""
+    """x[k] = a x[k-1] + drive[k] from rest, [n, x, any]: mode by mode."""
     values, modes = np.linalg.eig(a)
     if np.linalg.cond(modes) < 1e10:
-        parts = np.linalg.solve(modes, drive.T.astype(complex))
-        found = np.stack([lfilter([1.0], [1.0, -value], part) for value, part in zip(values, parts)])
-        return np.real(modes @ found).T
-    x, found = np.zeros(len(a)), np.empty_like(drive)
+        parts = np.tensordot(np.linalg.inv(modes), drive.astype(complex), (1, 1))  # [x, n, any]
+        found = np.stack([lfilter([1.0], [1.0, -value], part, axis=0) for value, part in zip(values, parts)])
+        return np.moveaxis(np.real(np.tensordot(modes, found, 1)), 0, 1)
+    x, found = np.zeros_like(drive[0]), np.empty_like(drive)
     for k, d in enumerate(drive):
         x = found[k] = a @ x + d
     return found
@@ -111,39 +113,73 @@ def recursion(a: Array, drive: Array) -> Array:
 
 def missing_forces(study: Study) -> tuple[Missing, ...]:
     """For all places, those that explain most first."""
-    parts = [_Recording.of(study, k) for k in range(len(study.experiments))]
-    nothing = sum(float(np.sum(p.residual**2)) for p in parts)
-    count = sum(p.residual.size for p in parts)
-    found = [m for k in range(len(study.places)) if (m := _at(study, k, parts, nothing, count)) is not None]
-    return tuple(sorted(found, key=lambda m: m.left))
+    parts = [_Recording.of(study, k, study.null.free) for k in range(len(study.experiments))]
+    nothing = sum(float(np.sum(p.residual**2)) for p in parts), sum(p.residual.size for p in parts)
+    known = [(study.linear, study.linear.n_inputs + k) for k in range(len(study.places))]
+    found = [_at(place, *way, study.null.free, parts, STRENGTHS) for place, way in zip(study.places, known)]
+    ranked = sorted((f for f in found if f is not None), key=lambda f: f.left)
+    ranked[:REFINED] = [_again(study, f) for f in ranked[:REFINED]]
+    return tuple(f.result(nothing) for f in sorted(ranked, key=lambda f: f.left))
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A force at a place under the likeliest walk, and the free values beside it."""
+
+    place: Place
+    left: float
+    strength: float
+    free: tuple[Free, ...]
+    forces: tuple[Array, ...]
+    rest: float
+
+    def result(self, nothing: tuple[float, int]) -> Missing:
+        share = (nothing[0] - self.rest) / max(nothing[0] - nothing[1], 1.0)
+        return Missing(self.place, self.forces, self.left, float(np.clip(share, 0.0, 1.0)))
+
+
+def _again(study: Study, found: _Found) -> _Found:
+    """The same about the free values that were found: parameters change the plant."""
+    for _ in range(AGAIN):
+        values = {f.target: f.value for f in found.free if isinstance(f.target, str)}
+        known = {n: replace(p, value=values.get(n, p.value)) for n, p in study.model.parameters.items()}
+        model = replace(study.model, parameters=known)
+        parts = [_Recording.of(study, k, found.free) for k in range(len(study.experiments))]
+        x, u = np.array([study.model.start]), study.experiments[0].u[:1]
+        linear = linearise(model, [found.place], x, u) if not model.networks else study.linear
+        column = linear.n_inputs + (0 if not model.networks else study.places.index(found.place))
+        better = _at(found.place, linear, column, found.free, parts, found.strength * FINER)
+        if better is None:
+            return found
+        found = better
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class _Recording:
-    """What a fit leaves of a recording, in deviations of its sensors' noise [n, measured], and what free values [free] do to that."""
+    """What a fit leaves of a recording, in deviations of its sensors' noise [n, measured], and what free values do to that."""
 
     experiment: Experiment
     sensors: tuple[int, ...]
     sigma: Array
     residual: Array
-    slopes: Array  # [free, n, measured]
+    slopes: Array  # [n, measured, free]
 
     @staticmethod
-    def of(study: Study, k: int) -> _Recording:
-        e, fit = study.experiments[k], study.null
+    def of(study: Study, k: int, free: Sequence[Free]) -> _Recording:
+        e = study.experiments[k]
         own = tuple(j for j in range(e.y.shape[1]) if e.good[:, j].any())
         declared = np.array([s.noise for s in study.model.sensors])
         quiet = np.sqrt(np.min(study.levels[k], axis=0))  # a force that is missing is no noise
         sigma = np.where(declared > 0.0, declared, quiet)[list(own)]
-        problem = Problem(study.model, [e], (), study.set_name, study.linear.fastest, fit.faults)
-        free = [_of(f, k) for f in fit.free]
+        problem = Problem(study.model, [e], (), study.set_name, study.linear.fastest, study.null.faults)
         moves = np.vstack([np.zeros(len(free)), SHIFT * np.eye(len(free))])
-        z = problem.simulate(0, free, moves)[0][:, :, list(own)] / sigma
+        z = problem.simulate(0, [replace(_of(f, k), low=-np.inf, high=np.inf) for f in free], moves)[0][:, :, list(own)] / sigma
         rest = e.y[:, list(own)] / sigma - z[0]
         at = np.arange(len(rest))
         for c, j in enumerate(own):
             rest[:, c] = np.interp(at, at[e.good[:, j]], rest[e.good[:, j], c])
-        return _Recording(e, own, sigma, rest, (z[1:] - z[0]) / SHIFT)
+        return _Recording(e, own, sigma, rest, np.moveaxis((z[1:] - z[0]) / SHIFT, 0, -1))
 
 
 def _of(f: Free, k: int) -> Free:
@@ -153,80 +189,70 @@ def _of(f: Free, k: int) -> Free:
     return replace(f, target=("start", 0 if f.target[1] == k else -1, f.target[2]))
 
 
-def _at(study: Study, place: int, parts: Sequence[_Recording], nothing: float, count: int) -> Missing | None:
-    """The force at one place, under the walk that is likeliest for what the fit leaves."""
-    tried = [(_volume(study, place, parts, order, q), q, order) for order in ORDERS for q in STRENGTHS]
-    _, centre, order = min(tried)
-    tried += [(_volume(study, place, parts, order, q), q, order) for q in centre * FINER]
-    least, strength, order = min(tried)
-    if not np.isfinite(least):
+def _at(
+    place: Place, linear: Linear, column: int, free: tuple[Free, ...], parts: Sequence[_Recording], strengths: Array
+) -> _Found | None:
+    """The force of one place, column of the inputs of a plant, under the likeliest walk; None where no sensor sees it."""
+    units = [_unit(linear, column, p) for p in parts]
+    best: tuple[float, float, Array, list[Walk]] | None = None
+    for strength in strengths:
+        walks = [_walk(linear, column, p, unit, strength) for p, unit in zip(parts, units)]
+        if any(w is None for w in walks):
+            continue
+        left, shift = _regressed(free, parts, walks)
+        if np.isfinite(left) and (best is None or left < best[0]):
+            best = left, float(strength), shift, walks
+    if best is None:
         return None
-    walks = [_walk(study, place, p, order, strength) for p in parts]
-    left, shift = _regressed(study, parts, walks)
+    left, strength, shift, walks = best
     forces, rest = [], 0.0
-    for p, walk in zip(parts, walks):
-        y = p.residual - np.tensordot(shift, p.slopes, 1)
+    for p, walk, unit in zip(parts, walks, units):
+        y = p.residual - p.slopes @ shift
         x = walk.smoothed(y)
-        forces.append(x[:, len(study.linear.a)] * _unit(study, place, p))
+        forces.append(x[:, len(linear.a)] * unit)
         rest += float(np.sum((y - x @ walk.out.T) ** 2))
-    share = (nothing - rest) / max(nothing - count, 1.0)
-    return Missing(study.places[place], tuple(forces), left, float(np.clip(share, 0.0, 1.0)))
+    moved = tuple(replace(f, value=float(f.at(s))) for f, s in zip(free, shift))
+    return _Found(place, left, strength, moved, tuple(forces), rest)
 
 
-def _volume(study: Study, place: int, parts: Sequence[_Recording], order: int, strength: float) -> float:
-    """-2 log likelihood of a walk, free values as they are; infinite where there is none."""
-    total = 0.0
-    for p in parts:
-        walk = _walk(study, place, p, order, strength)
-        if walk is None:
-            return np.inf
-        total += float(np.sum(walk.innovations(p.residual) ** 2)) + len(p.residual) * walk.volume
-    return total if np.isfinite(total) else np.inf
-
-
-def _unit(study: Study, place: int, p: _Recording) -> float:
+def _unit(linear: Linear, column: int, p: _Recording) -> float:
     """The force that would make so much of a residual where sensors see it best: walks are counted in it."""
     f = p.experiment.frequencies[1 : p.experiment.band]
-    seen = study.linear.transfer(p.experiment.frequencies)[1 : p.experiment.band, list(p.sensors), study.linear.n_inputs + place]
+    seen = linear.transfer(p.experiment.frequencies)[1 : p.experiment.band, list(p.sensors), column]
     most = float(np.max(np.abs(seen) / p.sigma)) if len(f) else 0.0
     return max(float(np.sqrt(np.mean(p.residual**2))), 1.0) / most if most > 0.0 else 1.0
 
 
-def _walk(study: Study, place: int, p: _Recording, order: int, strength: float) -> Walk | None:
-    """The plant under a wandering force at a place: states, then the force and, of order 2, its change in a sample."""
-    linear, step = study.linear, p.experiment.step
-    unit, n = _unit(study, place, p), len(linear.a)
-    b, d = linear.b[:, linear.n_inputs + place] * unit, linear.d[list(p.sensors), linear.n_inputs + place] * unit
+def _walk(linear: Linear, column: int, p: _Recording, unit: float, strength: float) -> Walk | None:
+    """The plant under a wandering force: its states, then the force and its change in a sample."""
+    step, n = p.experiment.step, len(linear.a)
+    b, d = linear.b[:, column] * unit, linear.d[list(p.sensors), column] * unit
     block = np.zeros((n + 2, n + 2))  # a force that goes straight from sample to sample
     block[:n, :n], block[:n, n], block[n, n + 1] = linear.a * step, b * step, 1.0
     whole = linalg.expm(block)
-    now, next_ = whole[:n, n] - whole[:n, n + 1], whole[:n, n + 1]
-    keep = np.exp(-step / (FORGETS * step * len(p.residual)))
-    f, into = np.zeros((n + order, n + order)), np.zeros(n + order)
+    now, after = whole[:n, n] - whole[:n, n + 1], whole[:n, n + 1]
+    keep = np.exp(-1.0 / (FORGETS * len(p.residual)))
+    f = np.zeros((n + 2, n + 2))
     f[:n, :n] = whole[:n, :n] * keep
-    f[n, n] = keep
-    into[n] = 1.0
-    if order == 2:
-        f[n, n + 1] = f[n + 1, n + 1] = keep
-        into[n] = into[n + 1] = 1.0
-    f[:n, n:] = np.outer(next_, f[n, n:])
+    f[n, n] = f[n, n + 1] = f[n + 1, n + 1] = keep
+    f[:n, n:] = np.outer(after, f[n, n:])
     f[:n, n] += now
-    into[:n] = next_ * into[n]
-    h = np.zeros((len(p.sensors), n + order))
+    into = np.concatenate([after, [1.0, 1.0]])
+    h = np.zeros((len(p.sensors), n + 2))
     h[:, :n], h[:, n] = linear.c[list(p.sensors)] / p.sigma[:, None], d / p.sigma
-    return Walk.of(f, strength * step * (PACE * step**2) ** (order - 1) * np.outer(into, into), h)
+    return Walk.of(f, strength * PACE * step**3 * np.outer(into, into), h)
 
 
-def _regressed(study: Study, parts: Sequence[_Recording], walks: Sequence[Walk]) -> tuple[float, Array]:
+def _regressed(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[Walk]) -> tuple[float, Array]:
     """-2 log likelihood, and the shifts of the free values under which it is least, within their priors."""
-    free = study.null.free
-    rows = [np.stack([w.innovations(s).ravel() for s in p.slopes], axis=1) for p, w in zip(parts, walks)] if free else []
     r = np.concatenate([w.innovations(p.residual).ravel() for p, w in zip(parts, walks)])
     volume = sum(len(p.residual) * w.volume for p, w in zip(parts, walks))
     if not free:
         return float(r @ r) + volume, np.zeros(0)
+    rows = [w.innovations(p.slopes).reshape(-1, len(free)) for p, w in zip(parts, walks)]
     whole = np.vstack([*rows, np.diag([f.unit / f.sigma for f in free])])
     r = np.concatenate([r, [-f.offset for f in free]])
-    shift = np.linalg.lstsq(whole, r, rcond=1e-12)[0]
+    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    shift = np.linalg.solve((whole / size).T @ (whole / size) + 1e-12 * np.eye(len(free)), (whole / size).T @ r) / size
     left = r - whole @ shift
     return float(left @ left) + volume, shift
