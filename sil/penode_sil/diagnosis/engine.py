@@ -191,7 +191,7 @@ def diagnose(
         notes += more
     tell(0.9, "showing what is wrong")
     whole = named is not None and (named is unnamed or best is not None and bool(causes))
-    shown = residual.show(study, named.fit if whole else None, extended if whole else None, held)
+    shown = residual.show(study, named.fit if whole else None, extended if whole else None, held, verdict == "unexplained")
     data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(

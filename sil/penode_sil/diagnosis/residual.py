@@ -291,12 +291,12 @@ class Shown:
         }
 
 
-def show(study: Study, fit: Fit | None, extended: Model | None, holdout: Sequence[Channel]) -> Shown:
+def show(study: Study, fit: Fit | None, extended: Model | None, holdout: Sequence[Channel], nameless: bool = False) -> Shown:
     """What the model gets wrong in training; `fit` and `extended`: the model with the named causes, if there are
-    any."""
+    any; `nameless`: what has no name is shown as the force that is missing at each place."""
     train: list[Channel] = []
     for k, e in enumerate(study.experiments):
         train += channels(
             e, study.model, study.null.simulated[k], fit.simulated[k] if fit else None, noise_floor(study, k)
         )
-    return Shown(tuple(train), tuple(holdout), tuple(surfaces(study, extended, fit)), missing_forces(study))
+    return Shown(tuple(train), tuple(holdout), tuple(surfaces(study, extended, fit)), missing_forces(study) if nameless else ())
