@@ -19,19 +19,32 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.signal import lfilter
 
+from penode_gen.model import Element, Input, Model
+
 from .fit import Free, Problem
 from .noise import Experiment
-from .plant import Linear, Place, linearise
+from .plant import Linear, Place, extend, linearise
 from .study import Study
 
 Array = NDArray[np.float64]
-STRENGTHS = np.logspace(0.0, 7.5, 6)  # of the walk: variance of the rate after a second, in squares of `_unit`, times PACE
-FINER = np.logspace(-0.75, 0.75, 3)  # around the best
-PACE = 1e3  # [1/s^2]
-FORGETS = 10.0  # recordings after which a walk has forgotten where it was: accelerations do not show a constant force
-SHIFT = 0.02  # units by which free values are moved for derivatives
-REFINED = 2  # places that explain most are looked at again, about the free values found there, so many times each
-AGAIN = 2
+
+@dataclass(frozen=True)
+class Effort:
+    """How a walk is looked for. `strengths`: variance of a force's rate after a second, in squares of `_unit` times `pace` [1/s^2];
+    `finer`: factors around the best. `forgets`: recordings after which a walk has forgotten where it was, for accelerations do not show a
+    constant force. `shift`: units by which free values are moved for derivatives. The `refined` places that explain most are looked at
+    `again`, about the free values found there, so many times each."""
+
+    strengths: tuple[float, ...] = (1.0, 30.0, 1e3, 3e4, 1e6, 3e7)
+    finer: tuple[float, ...] = (0.18, 1.0, 5.6)
+    pace: float = 1e3
+    forgets: float = 10.0
+    shift: float = 0.02
+    refined: int = 2
+    again: int = 3
+
+
+EFFORT = Effort()
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +82,7 @@ class Walk:
     def of(f: Array, noise: Array, h: Array) -> Walk | None:
         """None where there is none: a walk that no sensor sees."""
         try:
-            p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
+            p = _riccati(f, noise, h)
             s = h @ p @ h.T + np.eye(len(h))
             low = np.linalg.cholesky(s)
         except (np.linalg.LinAlgError, ValueError):
@@ -98,6 +111,19 @@ class Walk:
         return before + recursion(self.step.T, pulls[::-1])[::-1] @ self.spread
 
 
+def _riccati(f: Array, noise: Array, h: Array) -> Array:
+    """Covariance of stationary predictions. States are counted in their deviations, which differ by many powers of ten. Raises LinAlgError."""
+    p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
+    size = np.sqrt(np.maximum(np.diag(p), 1e-300))
+    f, h, noise = f * size / size[:, None], h * size, noise / np.outer(size, size)
+    p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
+    for _ in range(50):  # what rounding has left
+        k = np.linalg.solve(h @ p @ h.T + np.eye(len(h)), h @ p).T
+        rest = np.eye(len(f)) - k @ h
+        p = f @ (rest @ p @ rest.T + k @ k.T) @ f.T + noise
+    return 0.5 * (p + p.T) * np.outer(size, size)
+
+
 def recursion(a: Array, drive: Array) -> Array:
     """x[k] = a x[k-1] + drive[k] from rest, [n, x, any]: mode by mode."""
     values, modes = np.linalg.eig(a)
@@ -116,9 +142,9 @@ def missing_forces(study: Study) -> tuple[Missing, ...]:
     parts = [_Recording.of(study, k, study.null.free) for k in range(len(study.experiments))]
     nothing = sum(float(np.sum(p.residual**2)) for p in parts), sum(p.residual.size for p in parts)
     known = [(study.linear, study.linear.n_inputs + k) for k in range(len(study.places))]
-    found = [_at(place, *way, study.null.free, parts, STRENGTHS) for place, way in zip(study.places, known)]
+    found = [_at(place, *way, study.null.free, parts, EFFORT.strengths) for place, way in zip(study.places, known)]
     ranked = sorted((f for f in found if f is not None), key=lambda f: f.left)
-    ranked[:REFINED] = [_again(study, f) for f in ranked[:REFINED]]
+    ranked[: EFFORT.refined] = [_again(study, f) for f in ranked[: EFFORT.refined]]
     return tuple(f.result(nothing) for f in sorted(ranked, key=lambda f: f.left))
 
 
@@ -139,20 +165,37 @@ class _Found:
 
 
 def _again(study: Study, found: _Found) -> _Found:
-    """The same about the free values that were found: parameters change the plant."""
-    for _ in range(AGAIN):
+    """The same about the free values and along the motion that were found: what a parameter does depends on both."""
+    probe = Element("missing", found.place.ends, "expression", expression="missing_force")
+    acting = extend(study.model, [probe], {}, [found.place])
+    acting = replace(acting, inputs=(*acting.inputs, Input("missing_force", found.place.unit("N"))))
+    for again in range(EFFORT.again):
         values = {f.target: f.value for f in found.free if isinstance(f.target, str)}
         known = {n: replace(p, value=values.get(n, p.value)) for n, p in study.model.parameters.items()}
-        model = replace(study.model, parameters=known)
-        parts = [_Recording.of(study, k, found.free) for k in range(len(study.experiments))]
-        x, u = np.array([study.model.start]), study.experiments[0].u[:1]
-        linear = linearise(model, [found.place], x, u) if not model.networks else study.linear
-        column = linear.n_inputs + (0 if not model.networks else study.places.index(found.place))
-        better = _at(found.place, linear, column, found.free, parts, found.strength * FINER)
+        if study.model.networks:
+            linear, column = study.linear, study.linear.n_inputs + study.places.index(found.place)
+        else:
+            start = np.array([study.model.start])
+            linear = linearise(replace(study.model, parameters=known), [found.place], start, study.experiments[0].u[:1])
+            column = linear.n_inputs
+        parts = [_Recording.of(study, k, found.free, acting, force) for k, force in enumerate(found.forces)]
+        parts = [replace(p, residual=p.residual + _answer(linear, column, p, force)) for p, force in zip(parts, found.forces)]
+        strengths = EFFORT.strengths if again < EFFORT.again - 1 else tuple(found.strength * x for x in EFFORT.finer)
+        better = _at(found.place, linear, column, found.free, parts, strengths)
         if better is None:
             return found
         found = better
     return found
+
+
+def _answer(linear: Linear, column: int, p: _Recording, force: Array) -> Array:
+    """What the linear plant makes of a force [n], in deviations of the sensors [n, measured]."""
+    f, h = _discrete(linear, column, p, 1.0)
+    n = len(linear.a)
+    after = np.append(force[1:], force[-1])
+    drive = np.outer(force, f[:n, n] - f[:n, n + 1]) + np.outer(after, f[:n, n + 1])
+    x = recursion(f[:n, :n], np.vstack([np.zeros((1, n)), drive[:-1]]))
+    return x @ h[:, :n].T + np.outer(force, h[:, n])
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,20 +209,29 @@ class _Recording:
     slopes: Array  # [n, measured, free]
 
     @staticmethod
-    def of(study: Study, k: int, free: Sequence[Free]) -> _Recording:
+    def of(study: Study, k: int, free: Sequence[Free], acting: Model | None = None, force: Array | None = None) -> _Recording:
+        """About free values; `acting`: a model with one more input, `force` [n]."""
         e = study.experiments[k]
         own = tuple(j for j in range(e.y.shape[1]) if e.good[:, j].any())
         declared = np.array([s.noise for s in study.model.sensors])
         quiet = np.sqrt(np.min(study.levels[k], axis=0))  # a force that is missing is no noise
         sigma = np.where(declared > 0.0, declared, quiet)[list(own)]
-        problem = Problem(study.model, [e], (), study.set_name, study.linear.fastest, study.null.faults)
-        moves = np.vstack([np.zeros(len(free)), SHIFT * np.eye(len(free))])
+        driven = e if force is None else replace(
+            e, u=_beside(e.u, force), drive=_beside(e.drive, force), rate=_beside(e.rate, np.gradient(force, e.step)),
+            unsure=_beside(e.unsure, np.zeros(len(e.unsure))),
+        )  # fmt: skip
+        problem = Problem(acting or study.model, [driven], (), study.set_name, study.linear.fastest, study.null.faults)
+        moves = np.vstack([np.zeros(len(free)), EFFORT.shift * np.eye(len(free))])
         z = problem.simulate(0, [replace(_of(f, k), low=-np.inf, high=np.inf) for f in free], moves)[0][:, :, list(own)] / sigma
         rest = e.y[:, list(own)] / sigma - z[0]
         at = np.arange(len(rest))
         for c, j in enumerate(own):
             rest[:, c] = np.interp(at, at[e.good[:, j]], rest[e.good[:, j], c])
-        return _Recording(e, own, sigma, rest, np.moveaxis((z[1:] - z[0]) / SHIFT, 0, -1))
+        return _Recording(e, own, sigma, rest, np.moveaxis((z[1:] - z[0]) / EFFORT.shift, 0, -1))
+
+
+def _beside(columns: Array, more: Array) -> Array:
+    return np.hstack([columns, more[:, None]])
 
 
 def _of(f: Free, k: int) -> Free:
@@ -190,7 +242,7 @@ def _of(f: Free, k: int) -> Free:
 
 
 def _at(
-    place: Place, linear: Linear, column: int, free: tuple[Free, ...], parts: Sequence[_Recording], strengths: Array
+    place: Place, linear: Linear, column: int, free: tuple[Free, ...], parts: Sequence[_Recording], strengths: Sequence[float]
 ) -> _Found | None:
     """The force of one place, column of the inputs of a plant, under the likeliest walk; None where no sensor sees it."""
     units = [_unit(linear, column, p) for p in parts]
@@ -223,24 +275,28 @@ def _unit(linear: Linear, column: int, p: _Recording) -> float:
     return max(float(np.sqrt(np.mean(p.residual**2))), 1.0) / most if most > 0.0 else 1.0
 
 
-def _walk(linear: Linear, column: int, p: _Recording, unit: float, strength: float) -> Walk | None:
-    """The plant under a wandering force: its states, then the force and its change in a sample."""
+def _discrete(linear: Linear, column: int, p: _Recording, unit: float) -> tuple[Array, Array]:
+    """The plant from sample to sample under a force that goes straight between them: states, the force and its change in a sample; and
+    what the sensors see of these, in their deviations."""
     step, n = p.experiment.step, len(linear.a)
-    b, d = linear.b[:, column] * unit, linear.d[list(p.sensors), column] * unit
-    block = np.zeros((n + 2, n + 2))  # a force that goes straight from sample to sample
-    block[:n, :n], block[:n, n], block[n, n + 1] = linear.a * step, b * step, 1.0
+    block = np.zeros((n + 2, n + 2))
+    block[:n, :n], block[:n, n], block[n, n + 1] = linear.a * step, linear.b[:, column] * unit * step, 1.0
     whole = linalg.expm(block)
-    now, after = whole[:n, n] - whole[:n, n + 1], whole[:n, n + 1]
-    keep = np.exp(-1.0 / (FORGETS * len(p.residual)))
     f = np.zeros((n + 2, n + 2))
-    f[:n, :n] = whole[:n, :n] * keep
-    f[n, n] = f[n, n + 1] = f[n + 1, n + 1] = keep
-    f[:n, n:] = np.outer(after, f[n, n:])
-    f[:n, n] += now
-    into = np.concatenate([after, [1.0, 1.0]])
+    f[:n, :n], f[:n, n], f[:n, n + 1] = whole[:n, :n], whole[:n, n], whole[:n, n + 1]
+    f[n, n] = f[n, n + 1] = f[n + 1, n + 1] = 1.0
     h = np.zeros((len(p.sensors), n + 2))
-    h[:, :n], h[:, n] = linear.c[list(p.sensors)] / p.sigma[:, None], d / p.sigma
-    return Walk.of(f, strength * PACE * step**3 * np.outer(into, into), h)
+    h[:, :n], h[:, n] = linear.c[list(p.sensors)], linear.d[list(p.sensors), column] * unit
+    return f, h / p.sigma[:, None]
+
+
+def _walk(linear: Linear, column: int, p: _Recording, unit: float, strength: float) -> Walk | None:
+    """The plant under a wandering force, which forgets in the end."""
+    f, h = _discrete(linear, column, p, unit)
+    n, step = len(linear.a), p.experiment.step
+    into = np.concatenate([f[:n, n + 1], [1.0, 1.0]])
+    forgetting = f * np.exp(-1.0 / (EFFORT.forgets * len(p.residual)))
+    return Walk.of(forgetting, strength * EFFORT.pace * step**3 * np.outer(into, into), h)
 
 
 def _regressed(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[Walk]) -> tuple[float, Array]:

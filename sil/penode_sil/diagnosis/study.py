@@ -22,9 +22,8 @@ from .score import Regression, Seen, collect, smooth
 Array = NDArray[np.float64]
 SKEW = 0.001  # of a sample: channels are never sampled at quite the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
-VAGUE = 0.5  # tolerance beyond which a plant is not that of the file
+VAGUE = 0.5  # a parameter known no better may itself make a plant of another kind
 FEW = 4  # studies with other noise that are kept: the next step of a search may ask for one again
-GUESSED = 1e3  # times as much or as little: what an unknown parameter may be
 SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 
 
@@ -47,14 +46,15 @@ class Study:
     nothing: float = 0.0  # loss of the null fit, see `loss`
 
 
-def uncertain(p: Parameter) -> Free:
-    """A parameter within its tolerance. One that may be nothing, or is unknown, keeps its sign and moves by ratios."""
+def uncertain(p: Parameter, guessed: float = 1e3) -> Free:
+    """A parameter within its tolerance. One that may be nothing, or is unknown, keeps its sign and moves by ratios; an unknown one is at
+    most `guessed` times as large or small as the file has it."""
     size, most = abs(p.value), LIMIT * p.tolerance
     if most < 1.0:
         sigma, far = size * p.tolerance * SHARE, size * most
         return Free(p.name, p.value, sigma, sigma=sigma, origin=p.value, low=p.value - far, high=p.value + far)
     known = np.isfinite(most)
-    ends = sorted((p.value / (GUESSED if not known else 1.0 + most), p.value * (GUESSED if not known else 1.0 + most)))
+    ends = sorted((p.value / (guessed if not known else 1.0 + most), p.value * (guessed if not known else 1.0 + most)))
     sigma = size * p.tolerance * SHARE if known else np.inf
     return Free(p.name, p.value, size, log=True, sigma=sigma, origin=p.value, low=ends[0], high=ends[1])
 
