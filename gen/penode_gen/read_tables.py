@@ -33,9 +33,10 @@ MACROS = (  # that each generated model defines, behind its name
 _COMMENT = re.compile(r"(?:(?!\*/|/\*)[^\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\\]){0,200}")
 
 SECTIONS: dict[str, dict[str, type | tuple[type, ...]]] = {
-    "parameters": {"value": (int, float), "unit": str, "tolerance": (int, float), "tunable": bool, "description": str},
+    "parameters": {"value": (int, float), "unit": str, "tolerance": (int, float, str), "exact": bool, "tunable": bool, "description": str},
     "inputs": {"unit": str, "min": (int, float), "max": (int, float), "noise": (int, float), "description": str},
-    "bodies": {"mass": str, "position": str, "velocity": str, "start_position": str, "start_velocity": str},
+    "bodies": {"mass": str, "inertia": str, "position": str, "velocity": str, "start_position": str, "start_velocity": str},
+    "actuators": {"input": str, "law": str, "gain": str, "time": str, "start": str, "description": str},
     "states": {"unit": str, "start": (int, float), "description": str},
     "variables": {"unit": str},
     "networks": {"inputs": list, "output": str, "description": str} | promises.KEYS,
@@ -45,7 +46,8 @@ SECTIONS: dict[str, dict[str, type | tuple[type, ...]]] = {
 REQUIRED = {
     "parameters": ("value", "unit"),
     "inputs": ("unit",),
-    "bodies": ("mass", "position", "velocity"),
+    "bodies": (),
+    "actuators": ("input", "law"),
     "states": ("unit",),
     "variables": ("unit",),
     "networks": ("inputs", "output"),
@@ -204,4 +206,6 @@ def _type_name(kind: Any) -> str:
     names = {str: "a text", bool: "true or false", list: "a list", dict: "a table", int: "a whole number"}
     if kind in ((int, float), (bool, str)):
         return "a number" if kind == (int, float) else "true, false or a text"
+    if kind == (int, float, str):
+        return "a number or \"unknown\""
     return names.get(kind, "a text or a table")

@@ -15,7 +15,6 @@ from . import expressions as ex
 from . import functions
 
 
-
 def _known() -> pint.UnitRegistry:
     """All units, as pint keeps them beside its own bytecode (the user's cache would name the files of one installation for all); read
     anew where it cannot, or another process is about to write there."""
@@ -73,6 +72,11 @@ def dimension(text: str) -> Dimension:
 def same_dimension(a: str, b: str) -> bool:
     """Do two units measure the same kind of thing?"""
     return dimension(a) == dimension(b)
+
+
+def is_angle(text: str) -> bool:
+    """Is it a radian, a degree, a turn or a multiple of these?"""
+    return dict(_registry.Quantity(1.0, _unit(text)).to_base_units().unit_items()) == {"radian": 1}
 
 
 def quantity(text: str) -> tuple[float, str]:

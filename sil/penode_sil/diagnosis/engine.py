@@ -20,7 +20,7 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
-from . import absorb, echo, extension, nameless, naming, noise, plausible, residual, search, steady
+from . import absorb, echo, extension, nameless, naming, noise, plant, plausible, residual, search, steady
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
@@ -123,7 +123,7 @@ def diagnose(
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
-    notes: list[str] = []
+    notes = list(filter(None, [plant.placeless(study.places)]))
     if behind:
         notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
     if changed and verdict == "unexplained":
@@ -191,7 +191,7 @@ def diagnose(
         notes += more
     tell(0.9, "showing what is wrong")
     whole = named is not None and (named is unnamed or best is not None and bool(causes))
-    shown = residual.show(study, named.fit if whole else None, extended if whole else None, held)
+    shown = residual.show(study, named.fit if whole else None, extended if whole else None, held, verdict == "unexplained")
     data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(

@@ -107,7 +107,7 @@ def prepare(
             share = share + further
             unsure[:, k] = sigma * np.sqrt(share)[: 2 * len(unsure) : 2][: len(unsure)]
     whole = fft.irfft(spectra, 2 * n, axis=0)[:n] + trend
-    rate = CubicSpline(time, whole)(time, 1)
+    rate = CubicSpline(time, whole)(time, 1) if u.shape[1] else whole
     f = fft.rfftfreq(n, step)
     quiet = np.stack([np.full(len(f), np.nan) if law is None else law.density(f, step) / (2.0 * step) for law in laws], axis=1)
     return Experiment(name, time, u, y, good, whole, rate, unsure, quiet, last - float(time[-1]))
