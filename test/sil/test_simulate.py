@@ -12,7 +12,8 @@ from conftest import HERE
 from test_cli import MODEL, penode, table  # noqa: F401
 
 import penode_gen
-from penode_sil import mdf, replay, starts
+from penode_sil import replay, starts
+from penode_sil.reading import mdf
 
 SWING = """
 [model]
@@ -130,7 +131,7 @@ def test_several_recordings_are_compiled_once_and_written_to_folders(penode, fol
     penode("simulate", "swing.toml", "--input", "a.csv", "b.csv", "-o", "out/{name}_seen.mf4")
     assert sorted(p.name for p in (folder / "out").iterdir()) == ["a_seen.mf4", "b_seen.mf4"]
     header, values = table(folder / "far" / "away" / "a.csv")
-    [(units, columns)] = mdf.read(folder / "out" / "a_seen.mf4", None)
+    [(units, columns, _)], _ = mdf.read(folder / "out" / "a_seen.mf4", None)
     assert {f"{n} [{u}]" for n, u in units.items()} == set(header)
     for name, column in zip(header, values.T):
         assert np.allclose(columns[name.partition(" ")[0]], column, rtol=1e-8)  # nine digits in the text
@@ -141,7 +142,10 @@ def test_replays_differ_between_rows_only(folder):
     kernel's 0.1 % where it has rows on both sides, lines are off by up to (w T)^2 / 8 = 13 %, held by w T = 1."""
     model = penode_gen.load(folder / "swing.toml")
     t = np.arange(200) * 0.02
-    sine = lambda t: np.sin(2 * np.pi * 8 * t)  # noqa: E731
+
+    def sine(t):
+        return np.sin(2 * np.pi * 8 * t)
+
     (folder / "r.csv").write_text("time [s],push [rad/s^2]\n" + "".join(f"{a:.2f},{sine(a):.12g}\n" for a in t))
     seen = {how: replay.load(folder / "r.csv", model, None, (), how, lambda text: None) for how in replay.HOW}
     for one in seen.values():
