@@ -21,12 +21,12 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
-import penode_gen  # noqa: E402
-from mechanisms.generator import KINDS, WHERE, Case, cases  # noqa: E402
-from penode_gen.model import GROUND, Model  # noqa: E402
-from penode_sil.diagnosis import noise, study  # noqa: E402
-from penode_sil.diagnosis.engine import judge  # noqa: E402
-from penode_sil.diagnosis.missing import missing_forces  # noqa: E402
+import penode_gen
+from mechanisms.generator import KINDS, WHERE, Case, cases
+from penode_gen.model import GROUND, Model
+from penode_sil.diagnosis import noise, study
+from penode_sil.diagnosis.engine import judge
+from penode_sil.diagnosis.missing import missing_forces
 
 LIMIT = 0.05  # of the RMS of the true hidden force
 

@@ -9,7 +9,7 @@ import json
 import numpy as np
 import pytest
 from conftest import HERE
-from test_cli import MODEL, penode, table  # noqa: F401
+from test_cli import MODEL, table
 
 import penode_gen
 from penode_sil import replay, starts
@@ -62,7 +62,7 @@ def record(path, start, noise=0.0, n=600, unit="rad", scale=1.0):
     path.write_text(f"time [s],push [rad/s^2],angle [{unit}]\n" + "\n".join(rows) + "\n")
 
 
-def test_fitted_start_finds_the_true_one(penode, folder):  # noqa: F811
+def test_fitted_start_finds_the_true_one(penode, folder):
     """Noise of 1 mrad over n = 100 samples: angle to about 1 mrad * 2 / sqrt(n) = 0.2 mrad, rate to that times w0 = 6.3/s. Held to
     four standard deviations; and from there the prediction is off by no more than the noise and what is left of the start."""
     record(folder / "a.csv", (1.2, -3.0), noise=1e-3)
@@ -78,7 +78,7 @@ def test_fitted_start_finds_the_true_one(penode, folder):  # noqa: F811
     assert away["start"] == "" and away["instances"][0]["rmse"]["angle"]["value"] > 0.3
 
 
-def test_given_start_is_converted_and_stays(penode, folder):  # noqa: F811
+def test_given_start_is_converted_and_stays(penode, folder):
     record(folder / "a.csv", (0.5, 0.0), unit="deg", scale=180 / np.pi)
     words = ["simulate", "swing.toml", "--input", "a.csv", "--on", "mil", "-o", "p.csv", "--json", "--start"]
     out = json.loads(penode(*words, "phi=28.64788975654116 deg", "omega = 0 rad/s"))
@@ -106,7 +106,7 @@ def test_given_start_is_converted_and_stays(penode, folder):  # noqa: F811
         (["--input", "bare.csv", "--start", "measured"], "needs a sensor of the model"),
     ],
 )
-def test_wrong_words_are_refused_and_nothing_is_made(penode, folder, words, expected):  # noqa: F811
+def test_wrong_words_are_refused_and_nothing_is_made(penode, folder, words, expected):
     for name in ("a", "b"):
         record(folder / f"{name}.csv", (0.1, 0.0), n=30)
     (folder / "bare.csv").write_text("time [s],push [rad/s^2]\n" + "".join(f"{k / 200},0\n" for k in range(30)))
@@ -117,7 +117,7 @@ def test_wrong_words_are_refused_and_nothing_is_made(penode, folder, words, expe
     assert sorted(p.name for p in folder.rglob("*")) == before
 
 
-def test_several_recordings_are_compiled_once_and_written_to_folders(penode, folder, monkeypatch):  # noqa: F811
+def test_several_recordings_are_compiled_once_and_written_to_folders(penode, folder, monkeypatch):
     from penode_sil import simulate
 
     made = []
