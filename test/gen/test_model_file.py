@@ -256,7 +256,7 @@ FAULTS = [
     ('lag = "der(F_lag)*tau = g - F_lag"', "lag = 3", "equations.lag: is not one equation"),
     ("g - F_lag", "g - F_leg", "equations.lag: 'g - F_leg' uses 'F_leg'"),
     ("g - F_lag", "g - F_lag)", "cannot be read as an expression (unmatched ')')"),
-    ("g - F_lag", "sin(g) - F_lag", "calls 'sin'; known are abs"),
+    ("g - F_lag", "cosh(g) - F_lag", "calls 'cosh'; known are abs"),
     ("g - F_lag", "max(g) - F_lag", "max with 1 argument(s); it takes 2"),
     ("g - F_lag", "net2(q) - F_lag", "net2 with 1 argument(s); it takes 2"),
     ("g - F_lag", "g - F_lag^0.5", "has the power '0.5'; whole powers up to 8"),
