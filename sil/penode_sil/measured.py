@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import noise, quality
+from . import clocks, noise, quality
 from .errors import UserError
-from .raster import BRIDGE, SHORTEST, Clock, clock_of, filled, on_raster, stretches
+from .raster import BRIDGE, SHORTEST, Clock, clock_of, filled, held_on_raster, on_raster, parted, steadied, stretches
 from .recording import Recording, aliases, more, pick, read
 from .units import factor
 
@@ -46,6 +46,7 @@ class Channel:
     quantum: float  # 0 if there is none
     constant: bool
     noise: noise.Noise | None  # of the samples on the raster; of the rows, if these are slower; None: too few to tell
+    how: str = ""  # "held", "lines", "sparse": what rows between its samples are, see clocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,8 @@ class Measured:
     """A recording without a gap in its inputs, SI, on the model's raster: n samples, sample_time apart.
 
     `mask` is True where a sensor's sample was measured and is sound; a sensor slower than the raster counts once per
-    row. Elsewhere `z` is bridged or bad. `rest` is True where inputs and sensors stand still.
+    sample. Elsewhere `z` is bridged or bad. `shown` is True where the file has a value that was measured, sound or not. `rest`
+    is True where inputs and sensors stand still.
     """
 
     path: Path
@@ -70,6 +72,7 @@ class Measured:
     u: Array  # [n, inputs]
     z: dict[str, Array]  # [n] each
     mask: dict[str, Flags]
+    shown: dict[str, Flags]
     rest: Flags
     quality: Quality
 
@@ -143,25 +146,69 @@ def _load(path: Path, model: Any, pairs: dict[str, str]) -> list[Measured]:
         sensors = ", ".join(n for n in signals if n not in inputs)
         errors.append(f"{path}: it holds no sensor of the model; record at least one of: {sensors}")
     notes: list[str] = []
-    clocks: dict[int, Clock] = {}
+    bases: dict[int, Clock] = {}
     for table in {id(t): t for t in where.values()}.values() or tables[:1]:
         try:
-            clocks[id(table)] = clock_of(table, notes)
+            bases[id(table)] = clock_of(table, notes)
         except UserError as exc:
             errors += exc.problems
     if errors:
         raise UserError(*errors)
-    raster = _raster(path, model.sample_time, [clocks[id(where[name])] for name in inputs or where])
+    own = {name: _own(signals[name], table, bases[id(table)], name in inputs) for name, table in where.items()}
+    for table in {id(t): t for t in where.values()}.values():
+        _steady(own, [name for name, t in where.items() if t is table], bases[id(table)], path, notes)
+    raster = _raster(path, model.sample_time, [own[name].clock for name in inputs or where])
     taken: dict[str, _Taken] = {}
     for name, table in where.items():
         try:
-            one = _take(raster, model.sample_time, signals[name], table, clocks[id(table)], name in inputs, notes)
+            one = _take(raster, model.sample_time, signals[name], table, own[name], name in inputs, notes)
             taken |= {name: one} if one is not None else {}
         except UserError as exc:
             errors += exc.problems
     if errors:
         raise UserError(*errors)
     return _parts(path, model.sample_time, raster, inputs, taken, notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Own:
+    """A channel's samples as they were measured: its clock, values in the file's units and in SI, and SI per unit of the file."""
+
+    clock: Clock
+    raw: Array
+    rows: Array
+    scale: float
+    how: str = ""
+    every: float = 1.0  # rows per sample
+
+
+def _own(signal: Any, table: Recording, base: Clock, driving: bool) -> _Own:
+    """A channel on its own clock, if its table has another one."""
+    si = table.channel(signal.name, signal.unit, finite=False)[base.rows]
+    raw = table.columns[table.find(signal.name, signal.unit)][base.rows]
+    good = np.flatnonzero(np.isfinite(raw) & (raw != 0.0))
+    scale = float(si[good[0]] / raw[good[0]]) if good.size else 1.0
+    even = steadied(base, "", [], [])
+    found = clocks.own_samples(even.time, raw, driving)
+    if found is not None:
+        clock = parted(base.rows[found.rows], found.time)
+        return _Own(clock, found.values, found.values * scale, scale, found.how, found.every)
+    finite = np.flatnonzero(np.isfinite(raw))
+    if even is base and 1 < finite.size < raw.size:  # stamps of several clocks: no cell is missing
+        return _Own(parted(base.rows[finite], base.time[finite]), raw[finite], si[finite], scale, "sparse", raw.size / finite.size)
+    return _Own(base, raw, si, scale)
+
+
+def _steady(own: dict[str, _Own], names: list[str], base: Clock, path: Path, notes: list[str]) -> None:
+    """Channels that share a table's clock, and those with one of their own, on its regular instants if they were sampled there."""
+    shared = [name for name in names if own[name].clock is base]
+    groups = [shared] * bool(shared) + [[name] for name in names if name not in shared]
+    for group in groups:
+        clock = own[group[0]].clock
+        place = str(path) if group is shared else f"{path}: channel {group[0]}"
+        even = steadied(clock, place, [own[name].rows for name in group], notes)
+        for name in group:
+            own[name] = replace(own[name], clock=even)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +221,8 @@ class _Taken:
     clock: Clock
     values: Array
     usable: Flags
+    shown: Flags
+    how: str
 
 
 def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
@@ -190,14 +239,11 @@ def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
 
 
 def _take(
-    raster: Array, step: float, signal: Any, table: Recording, clock: Clock, driving: bool, notes: list[str]
+    raster: Array, step: float, signal: Any, table: Recording, own: _Own, driving: bool, notes: list[str]
 ) -> _Taken | None:
     """One channel on the raster; None if it cannot be used, which is noted, or a UserError if it drives the model."""
-    rows = table.channel(signal.name, signal.unit, finite=False)[clock.rows]
-    raw = table.columns[table.find(signal.name, signal.unit)][clock.rows]
-    faults = quality.examine(raw)
-    good = np.flatnonzero(np.isfinite(raw) & (raw != 0.0))
-    scale = float(rows[good[0]] / raw[good[0]]) if good.size else 1.0
+    clock, rows, scale = own.clock, own.rows, own.scale
+    faults = quality.examine(own.raw)
     bad = faults.missing | faults.spikes if driving else faults.any
     if np.mean(bad) > 0.9 or (faults.constant and not driving):
         what = "does not change" if faults.constant else "has hardly a sound sample"
@@ -206,11 +252,30 @@ def _take(
             raise UserError(f"{place}, but it drives the model; record it anew")
         notes.append(f"{place}; it is left out")
         return None
+    notes += [_origin(table, signal.name, own, driving)] if own.how else []
     _tell(notes, table, clock, signal, faults, scale, driving)
-    values, usable = on_raster(raster, step, clock, rows, bad, driving)
+    if driving and own.how == "held":
+        values, usable = held_on_raster(raster, step, clock, rows, bad)
+    else:
+        values, usable = on_raster(raster, step, clock, rows, bad, driving)
+    shown = usable
+    if faults.any.any() and not driving:
+        shown = on_raster(raster, step, clock, filled(rows, ~faults.missing), faults.missing, driving)[1]
     if driving and usable.any():
         _check_range(table.path, signal, values[usable], notes)
-    return _Taken(rows, faults, scale, clock, values, usable)
+    return _Taken(rows, faults, scale, clock, values, usable, shown, own.how)
+
+
+def _origin(table: Recording, name: str, own: _Own, driving: bool) -> str:
+    """What rows between a channel's samples are, and what is made of them."""
+    clock = f"{1e3 * own.clock.interval:.6g} ms, every {own.every:.4g} rows"
+    if own.how == "held":
+        text, done = "repeats its last value between samples", "simulated as held" if driving else "each sample counts once"
+    elif own.how == "lines":
+        text, done = "is joined by straight lines between samples", "only the samples count"
+    else:
+        text, done = "has empty cells between samples", "joined by straight lines" if driving else "only the samples count"
+    return f"{table.path}: channel {name} {text} ({clock}); {done}"
 
 
 def _parts(
@@ -229,7 +294,7 @@ def _parts(
             f"{path}: no sensor has {SHORTEST} sound samples beside those of the inputs; record at least so many",
             *notes,
         )
-    _tell_resampling(path, step, {id(t.clock): t.clock for t in taken.values()}, notes)
+    _tell_resampling(path, step, {id(t.clock): t.clock for t in taken.values() if not t.how}, notes)
     lost = raster.size - sum(b - a for a, b in parts)
     if lost:
         notes.append(
@@ -249,6 +314,7 @@ def _parts(
             u[a:b],
             {name: taken[name].values[a:b] for name in sensors},
             {name: taken[name].usable[a:b] for name in sensors},
+            {name: taken[name].shown[a:b] for name in sensors},
             still[a:b],
             info,
         )
@@ -261,7 +327,7 @@ def _channel(name: str, taken: _Taken, law: noise.Noise | None) -> Channel:
     counts = [int(np.sum(flags)) for flags in (f.missing, f.saturated, f.held, f.spikes)]
     low, high = (None if edge is None else edge * scale for edge in (f.low, f.high))
     quantum = f.quantum * abs(scale)
-    return Channel(name, taken.clock.interval, taken.rows.size, *counts, low, high, quantum, f.constant, law)
+    return Channel(name, taken.clock.interval, taken.rows.size, *counts, low, high, quantum, f.constant, law, taken.how)
 
 
 def _noise(

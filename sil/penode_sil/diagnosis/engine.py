@@ -59,7 +59,10 @@ def experiment(m: Measured, model: Model) -> Experiment:
     good = np.column_stack([m.mask.get(k, np.zeros(n, bool)) for k in names])
     laws = [m.quality.channels[k].noise if k in m.quality.channels else None for k in names]
     declared = np.array([i.noise for i in model.inputs])
-    return noise.prepare(m.title, m.time, m.u, np.where(good, y, 0.0), good, declared, laws)
+    channels = [m.quality.channels.get(k) for k in names]
+    slow = [c.interval if c is not None else 0.0 for c in channels]
+    held = np.array([c.interval if (c := m.quality.channels.get(i.name)) and c.how == "held" else 0.0 for i in model.inputs])
+    return noise.prepare(m.title, m.time, m.u, np.where(good, y, 0.0), good, declared, laws, slow, held)
 
 
 def diagnose(
@@ -266,7 +269,7 @@ def broken_sensors(
             total += len(m.mask[sensor.name])
             quantum = max(quantum, channel.quantum)
             sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
-            flagged = ~m.mask[sensor.name][:n]
+            flagged = (m.shown[sensor.name] & ~m.mask[sensor.name])[:n]  # what the file itself calls lost is no fault of the sensor
             away = np.abs(m.z[sensor.name][:n] - simulated[k][:, j])
             off = away > 4.0 * sigma
             railing = np.zeros(n, bool)
@@ -281,15 +284,15 @@ def broken_sensors(
                     rails[name] = rail
                 else:  # a rail that the signal was not near
                     railed += np.count_nonzero(at)
-            bad, wrong = channel.held + channel.missing + channel.spikes, flagged & off & ~railing
+            bad, wrong = channel.held + channel.spikes, flagged & off & ~railing
             still = channel.held > max(FEW, STILL * n) and channel.quantum < 0.3 * sigma  # noise does not repeat itself
-            proven |= bad > 0 and bool(channel.missing or still or np.count_nonzero(wrong) > 0.2 * bad)
+            proven |= bad > 0 and bool(still or np.count_nonzero(wrong) > 0.2 * bad)
             far += int(np.count_nonzero(wrong & (away > FAR[1] * sigma))) if channel.quantum < 0.3 * sigma else 0
             lost += bad * len(m.mask[sensor.name]) / channel.rows  # of a file that may be parted, or slower
             burst = bursts[k][:n, j] if len(bursts) > k else np.zeros(n, bool)
             dropped += int(np.count_nonzero(burst))
             y = m.z[sensor.name][:n]
-            again = noise.repeats(y, simulated[k][:, j], ~flagged, channel.quantum, sigma) & ~burst
+            again = noise.repeats(y, simulated[k][:, j], m.mask[sensor.name][:n], channel.quantum, sigma) & ~burst
             more += int(np.count_nonzero(again))
             holes += int(np.count_nonzero(np.diff((wrong | burst | again).astype(np.int8), prepend=0) > 0))
             met = np.zeros(n, bool)

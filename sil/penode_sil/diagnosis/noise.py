@@ -61,10 +61,17 @@ class Experiment:
     unsure: Array
     quiet: Array  # variance per sample that a sensor's own record shows, [f, n_z]; NaN where it shows none
     left: float = 0.0  # [s] for which it goes on after the last sample here
+    held: NDArray[np.bool_] | None = None  # inputs [n_u] that keep their value from sample to sample; None: none of them
 
     @property
     def step(self) -> float:
         return float(self.time[1] - self.time[0])
+
+    @cached_property
+    def duty(self) -> Array:
+        """Share of the samples that are good [n_z]; 1 for a sensor that has none."""
+        share = np.mean(self.good, axis=0)
+        return np.where(share > 0.0, share, 1.0)
 
     @property
     def frequencies(self) -> Array:
@@ -78,9 +85,11 @@ class Experiment:
 
 
 def prepare(
-    name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_], noise: Array, laws: Sequence[Noise | None]
-) -> Experiment:
-    """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors.
+    name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_], noise: Array, laws: Sequence[Noise | None],
+    slow: Sequence[float] = (), held: Array | None = None,
+) -> Experiment:  # fmt: skip
+    """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors; `slow` are the intervals
+    [s] of those whose samples are farther apart than these, `held` [n_u] those of inputs that keep their value in between, or 0.
 
     Where the noise exceeds the input's own spectrum, the measured input is damped to what is likely (Wiener), and the rest
     is unsure; but a bump, or where a sweep is at a time, is kept. The number of samples becomes one that Fourier transforms like.
@@ -94,8 +103,11 @@ def prepare(
     rest = u - trend
     spectra = fft.rfft(np.concatenate([rest, -rest[::-1]]), axis=0)  # turned round: no jump at the ends
     unsure = np.zeros((n // 2 + 1, u.shape[1]))
+    held = np.zeros(u.shape[1]) if held is None else held
     for k, sigma in enumerate(noise):
-        if sigma > 0.0:
+        if held[k] > 0.0:  # its steps are there; noise of a sample stays until the next
+            unsure[:, k] = sigma * np.sqrt(held[k] / step) * np.abs(np.sinc(fft.rfftfreq(n, step) * held[k]))
+        elif sigma > 0.0:
             power = _smoothed(np.abs(spectra[:, k]) ** 2 / (2 * n), f[1])
             floor = float(np.median(power[int(0.6 * len(f)) : int(0.95 * len(f))]))  # there is no road left
             sigma = min(1.25 * sigma, np.sqrt(floor))
@@ -109,8 +121,12 @@ def prepare(
     whole = fft.irfft(spectra, 2 * n, axis=0)[:n] + trend
     rate = CubicSpline(time, whole)(time, 1)
     f = fft.rfftfreq(n, step)
-    quiet = np.stack([np.full(len(f), np.nan) if law is None else law.density(f, step) / (2.0 * step) for law in laws], axis=1)
-    return Experiment(name, time, u, y, good, whole, rate, unsure, quiet, last - float(time[-1]))
+    quiet = np.full((len(f), len(laws)), np.nan)
+    for j, law in enumerate(laws):
+        own = slow[j] if slow and slow[j] > 1.001 * step else step  # a law is of the samples at their own interval
+        if law is not None:
+            quiet[:, j] = law.density(f, own) / (2.0 * own)
+    return Experiment(name, time, u, y, good, whole, rate, unsure, quiet, last - float(time[-1]), held > 0.0 if held.any() else None)
 
 
 def _blows(taken: Array, sigma: float, f: Array, share: Array, power: Array, step: float) -> tuple[Array, Array]:
@@ -270,8 +286,10 @@ def sensor_levels(
     shapes, means = _slow(n, band, wide)
     found = np.empty((band, residual.shape[1]))
     for j, sigma in enumerate(declared):
-        road = np.sum(np.abs(through[:, j, :] * e.unsure) ** 2, axis=1)
-        base = e.quiet[:, j]
+        duty = float(e.duty[j])  # of white noise so much power is left where the other samples are 0, of a slow signal the square
+        sigma = sigma * np.sqrt(duty)
+        road = np.sum(np.abs(through[:, j, :] * e.unsure) ** 2, axis=1) * duty**2
+        base = e.quiet[:, j] * duty
         if not np.all(np.isfinite(base)):
             raw = float(np.mean(power[high, j]))
             base = np.full(len(f), max(raw - float(np.median(road[high])), 0.05 * raw, 1e-300))
@@ -307,7 +325,7 @@ def _slow(n: int, band: int, wide: int) -> tuple[Array, Array]:
 
 def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Metric:
     """The metric of a recording: levels [f, sensors] and the transfer [f, sensors, inputs] of the inputs' noise."""
-    g = through[: e.band] * e.unsure[: e.band, None, :]
+    g = through[: e.band] * e.unsure[: e.band, None, :] * e.duty[None, :, None]
     s = g @ np.conj(np.swapaxes(g, 1, 2)) + levels[:, :, None] * np.eye(levels.shape[1])
     root = np.linalg.inv(np.linalg.cholesky(s)) * np.sqrt(2.0 / len(e.time))
     return Metric(len(e.time), root)
@@ -326,7 +344,8 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
     found = []
     for e, z in zip(experiments, simulated):
         r = np.where(e.good, e.y - z, 0.0)
-        rough = np.abs(np.diff(r, 2, axis=0, prepend=r[:1], append=r[-1:]))
+        smooth = _bridged(r, e.good)
+        rough = np.abs(np.diff(smooth, 2, axis=0, prepend=smooth[:1], append=smooth[-1:]))
         # at least a tenth of the samples of a coarse sensor steps by a quantum
         usual = np.maximum(1.4826 * np.median(rough, axis=0), np.quantile(rough, 0.9, axis=0) / 1.645) + 1e-300
         wild = rough > 14.0 * usual
@@ -339,6 +358,15 @@ def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> lis
         found.append(((alone & few & many) | _sunken(e, z, r) | _frozen(e, z, r) | _decayed(e.y)) & often & e.good)
         found[-1][0] |= (rough[0] > 14.0 * usual) & often & e.good[0]  # what begins just then may be in it or not
     return found
+
+
+def _bridged(r: Array, good: NDArray[np.bool_]) -> Array:
+    """Residuals [n, n_z] with straight lines where samples are not good: a hole in them is not rough."""
+    out = r.copy()
+    rows = np.arange(len(r))
+    for j in np.flatnonzero(~good.all(axis=0) & good.any(axis=0)):
+        out[:, j] = np.interp(rows, rows[good[:, j]], r[good[:, j], j])
+    return out
 
 
 def _usual(e: Experiment, r: Array) -> Array:
