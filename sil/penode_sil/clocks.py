@@ -75,11 +75,12 @@ def own_samples(time: Array, values: Array, driving: bool = False) -> Samples | 
         return None
     if finite.size < values.size and (sparse := _sparse(time, values, finite)) is not None:
         return sparse
+    usual = _usual(time)
     time, values = time[finite], values[finite]
     found = _held(time, values) or (None if driving else _joined(time, values))
     if found is None:
         return None
-    return Samples(found.how, finite[found.rows], found.time, found.values, found.interval, found.every)
+    return Samples(found.how, finite[found.rows], found.time, found.values, found.interval, found.interval / usual)
 
 
 def _usual(time: Array) -> float:
@@ -104,7 +105,7 @@ def _sparse(time: Array, values: Array, finite: Index) -> Samples | None:
 
 def _held(time: Array, values: Array) -> Samples | None:
     """The rows that show a new value, if there are new values only at instants of a clock."""
-    marks = np.concatenate(([True], np.diff(values) != 0.0))
+    marks = np.concatenate(([False], np.diff(values) != 0.0))  # nobody knows since when the first one is held
     raster = regular(time, marks)
     if raster is None:
         return None
@@ -193,13 +194,14 @@ class _Marks:
         """The clock moved to the marks: the interval by the line through most of them, the start where it catches most."""
         tick, at = np.rint((self.at - raster.start) / raster.interval), self.at
         slope = raster.interval
-        for near in (0.5 * raster.interval, 2.0 * self.usual, 1.05 * self.usual):
+        for near in (0.5 * raster.interval, 2.0 * self.usual, 1.05 * self.usual, None, None):
             if at.size < FEWEST or np.ptp(tick) == 0.0:
                 return raster
             line = np.polynomial.polynomial.polyfit(tick, at - raster.start, 1)
             slope = float(line[1])
             off = np.abs(at - raster.start - line[0] - slope * tick)
-            tick, at = tick[off <= near], at[off <= near]
+            kept = off <= (near or 4.0 * np.median(off) + 1e-9 * self.usual)  # marks spread over one row at the most
+            tick, at = tick[kept], at[kept]
         found = Raster(self._start(raster.start, slope), slope, 0.0)
         old = Raster(raster.start, raster.interval, self.surprise(raster))
         new = Raster(found.start, found.interval, self.surprise(found))

@@ -15,8 +15,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 COARSE = 0.05  # of an interval: stamps in finer steps are as good as exact
-OFF = 0.02  # of a step: stamps that all are so near to multiples of it are in such steps; by chance with 0.04^n
+OFF = 0.1  # of a step: stamps that all are so near to multiples of it are in such steps; by chance with 0.2^n
 SLACK = 0.05  # of a step or interval beyond rounding: what printing in other digits adds
+MOST = 100.0  # rows that share a stamp
+JITTER = 0.25  # of an interval beyond rounding: a row that is lost moves all later ones by a whole one, half of it to either side
+NEARER = 1.0  # squares of a step that a lost row must explain: half of the rows of one stamp alone explain 1/4
+LOST = 64  # places at which rows are lost
 GAP = 1.5  # intervals beyond a step of the stamps from which on rows are missing
 RARE = 0.02  # of the intervals: so few that differ from the others are faults, not rounding
 HUGE = 1e12  # [s] what is later is no time
@@ -57,39 +61,46 @@ def evened(time: Array) -> Evened | None:
     steps = _steps(time, usual)
     if np.max(steps) < COARSE * usual:
         return None
-    for _ in range(2):  # a gap makes the mean interval too long
-        cuts = np.flatnonzero(np.diff(time) > GAP * usual + (1.0 + SLACK) * np.maximum(steps[:-1], steps[1:])) + 1
-        bounds = [0, *cuts.tolist(), time.size]
-        long = max(zip(bounds, bounds[1:]), key=lambda ab: ab[1] - ab[0])
-        part = time[slice(*long)]
-        if part.size < LEAST:
-            return None
-        slope, _, off = _line(part)
-        usual = slope
-    if not slope > 0.0 or off > (0.5 + SLACK) * np.max(steps) + SLACK * slope:
+    number = _numbers(time, steps, usual)
+    slope, level, off = _line(time, number)
+    for _ in range(LOST):  # rows that are lost here and there
+        rest = np.cumsum(time - slope * number - np.mean(time - slope * number))
+        tries = [(number + n * (np.arange(time.size) > k)) for n, k in ((1, int(np.argmin(rest))), (-1, int(np.argmax(rest))))]
+        tries = [t for t in tries if np.all(np.diff(t) >= 1)] or [number]
+        squares = [_squares(time, t) for t in (number, *tries)]
+        if min(squares) > squares[0] - NEARER * np.max(steps) ** 2:
+            break
+        number = tries[int(np.argmin(squares[1:]))]
+        slope, level, off = _line(time, number)
+    if off > 0.5 * np.max(steps) + JITTER * slope or not slope > 0.0 or number[-1] > 2 * time.size + 1e6:
         return None
-    out = np.empty(time.size)
-    worst = 0.0
-    for a, b in zip(bounds, bounds[1:]):
-        rest = time[a:b] - np.arange(b - a) * slope
-        level = 0.5 * float(np.min(rest) + np.max(rest))
-        if a:  # whole intervals after the part before
-            level = out[a - 1] + max(1.0, np.rint((level - out[a - 1]) / slope)) * slope
-        else:
-            level = _line(time[a:b])[1] if b - a >= LEAST else level
-        out[a:b] = level + np.arange(b - a) * slope
-        worst = max(worst, float(np.max(np.abs(out[a:b] - time[a:b]))))
-    jitter = worst - 0.5 * float(np.max(steps))
-    return Evened(out, float(np.max(steps)), float(slope), worst, jitter if jitter > SLACK * slope else 0.0)
+    jitter = off - 0.5 * float(np.max(steps))
+    return Evened(level + slope * number, float(np.max(steps)), slope, off, jitter if jitter > SLACK * slope else 0.0)
 
 
-def _line(time: Array) -> tuple[float, float, float]:
+def _numbers(time: Array, steps: Array, usual: float) -> Array:
+    """The number of each row on a regular clock, by whole rows where stamps show a gap; `usual` [s] is the mean interval."""
+    between = np.diff(time)
+    for _ in range(2):  # a gap makes the mean too long
+        gap = between > GAP * usual + (1.0 + SLACK) * np.maximum(steps[:-1], steps[1:])
+        kept = float(np.mean(between[~gap])) if not gap.all() else 0.0
+        usual = kept if kept > 0.0 else usual
+    return np.concatenate(([0.0], np.cumsum(np.where(gap, np.maximum(1.0, np.rint(between / usual)), 1.0))))
+
+
+def _line(time: Array, number: Array) -> tuple[float, float, float]:
     """Slope and level of the line through times over their numbers, and the largest distance from it, half of the range."""
-    number = np.arange(time.size) - 0.5 * (time.size - 1)
-    slope = float(number @ (time - time[0]) / (number @ number))
-    rest = time - slope * np.arange(time.size)
+    centred = number - np.mean(number)
+    slope = float(centred @ (time - time[0]) / (centred @ centred))
+    rest = time - slope * number
     low, high = float(np.min(rest)), float(np.max(rest))
     return slope, 0.5 * (low + high), 0.5 * (high - low)
+
+
+def _squares(time: Array, number: Array) -> float:
+    """Sum of the squares of what stamps are off the line."""
+    slope = _line(time, number)[0]
+    return float(time.size * np.var(time - slope * number))
 
 
 def _steps(time: Array, usual: float) -> Array:
@@ -115,7 +126,7 @@ def _steps(time: Array, usual: float) -> Array:
 
 def _multiples(values: Array, step: Array, usual: float) -> bool:
     off = np.abs(values - np.rint(values / step) * step)
-    return bool(np.all(off < OFF * np.minimum(step, usual)))
+    return bool(np.max(step) < MOST * usual and np.all(off < OFF * step))
 
 
 def sampled_evenly(time: Array, even: Array, columns: list[Array]) -> bool:
