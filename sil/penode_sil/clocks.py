@@ -67,6 +67,7 @@ class Raster:
         return self.start + np.arange(low, high + 2) * self.interval
 
 
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def own_samples(time: Array, values: Array, driving: bool = False) -> Samples | None:
     """The samples of a channel [n] at increasing times [n, s], NaN where a cell is empty; None if every row is one, or is lost at
     random. Of a channel that drives the model, lines stay lines."""

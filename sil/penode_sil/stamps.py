@@ -50,6 +50,7 @@ class Evened:
         )
 
 
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def evened(time: Array) -> Evened | None:
     """Rows spread evenly whose stamps [n, s], which never go back, are in coarser steps; None if stamps are fine, or of no clock."""
     if time.size < LEAST or not time[-1] > time[0]:
