@@ -145,7 +145,7 @@ def parse(text: str, names: Collection[str], networks: dict[str, int], moving: C
 def _parse(text: str, names: frozenset[str], calls: frozenset[tuple[str, int]], moving: frozenset[str]) -> sp.Expr:
     """The same of those names that the text has."""
     networks = dict(calls)
-    shown = text if len(text) <= 60 else f"{text[:57]}..."
+    shown = text if len(text) <= 300 else f"an expression of {len(text)} characters"
 
     def refuse(what: str) -> ExpressionError:
         return ExpressionError(f"'{shown}' {what}")

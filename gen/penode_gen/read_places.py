@@ -65,7 +65,7 @@ def show(value: object) -> str:
         text = repr(value)
     except ValueError:  # an integer of thousands of digits
         return "a huge number"
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return text if len(text) <= 300 else f"a text of {len(text)} characters"
 
 
 def parse(path: Path, called: str = "") -> tuple[dict[str, Any], bytes, Lines]:

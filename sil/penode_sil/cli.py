@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The `penode` command. Exit code 0: done; 2: wrong use or bad input, with one line for each problem on stderr."""
+"""The `penode` command. Exit code 0: done; 2: wrong use or bad input, a line each on stderr; 3: a fault of ours."""
 
 from __future__ import annotations
 
@@ -20,10 +20,12 @@ from numpy.typing import NDArray
 
 import penode_gen
 
-from . import mil, recording, scenario as scenarios, status, units
+from . import inspection, mil, recording, scenario as scenarios, status, units
 from .errors import UserError, hint
+from .guard import guarded
 from .output import Column, check_writable, write_csv
 from .schedule import instance_calls
+from .several import Several
 from .signals import Samples
 from .targets import MACHINES, Pil, Run, Sil
 
@@ -90,22 +92,7 @@ def cli() -> None:
     """Physics-enhanced neural ODEs: from a model file to checked C, in the loop on host and Cortex-M."""
 
 
-class _Several(click.Command):
-    """A command whose options of several values take all words up to the next option: --data a.csv b.csv."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        several = {name for p in self.params if isinstance(p, click.Option) and p.multiple for name in p.opts}
-        spread: list[str] = []
-        current = ""
-        for word in args:
-            if word.startswith("-"):
-                current = word if word in several else ""
-                spread.append(word)
-            elif current and spread[-1] != current:
-                spread += [current, word]
-            else:
-                spread.append(word)
-        return super().parse_args(ctx, spread)
+cli.add_command(inspection.inspect)
 
 
 @cli.command()
@@ -122,7 +109,7 @@ def generate(model: Path, output: Path) -> None:
         click.echo(str(path))
 
 
-@cli.command(cls=_Several)
+@cli.command(cls=Several)
 @click.argument("model", type=FILE)
 @click.option("--scenario", type=FILE, help="Scenario file (TOML) to run.")
 @click.option("--input", "record", type=FILE, help="Recording (CSV with units, or MDF) whose inputs drive the model.")
@@ -199,7 +186,7 @@ def simulate(
     click.echo(json.dumps(summary, indent=2) if as_json else _sentences(summary))
 
 
-@cli.command(cls=_Several)
+@cli.command(cls=Several)
 @click.argument("model", type=FILE)
 @click.option("--data", type=FILE, multiple=True, required=True, help="Recordings (CSV or MDF4), or folders of them.")
 @click.option("--each", is_flag=True, help="Diagnose each recording by itself, as in a folder.")
@@ -417,24 +404,5 @@ def _sentences(summary: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Entry point: turns errors that a user can mend into lines and exit code 2."""
-    try:
-        cli.main(standalone_mode=False)
-    except (UserError, penode_gen.ModelError) as exc:
-        for problem in exc.problems:
-            click.echo(f"penode: {problem}", err=True)
-        sys.exit(2)
-    except click.exceptions.Abort:
-        sys.exit(130)
-    except click.UsageError as exc:
-        where = exc.ctx.command_path if exc.ctx else "penode"
-        click.echo(f"penode: {exc.format_message()} See {where} --help", err=True)
-        sys.exit(2)
-    except BrokenPipeError:
-        sys.stderr.close()
-        sys.exit(0)
-    except OSError as exc:
-        click.echo(
-            f"penode: {exc.filename or 'a file'}: {exc.strerror or exc}; check the path and its permissions", err=True
-        )
-        sys.exit(2)
+    """Entry point."""
+    guarded(lambda: cli.main(standalone_mode=False))

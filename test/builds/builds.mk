@@ -9,5 +9,5 @@ BUILDS := flags contraction dialects linked copies
 builds: $(BUILDS:%=builds-%) ## Wrong flags stop the compiler, default flags do not contract, C99 to C2x and C++17, a whole program for Cortex-M0
 $(BUILDS:%=builds-%): builds-%: | $(READY)
 	@$(PYTHON) test/builds/builds.py $*
-builds-long: | $(READY) ## 100 000 layered steps on RISC-V and Armv6-M too, in software floats: the same bits
-	@PENODE_LONG=1 $(PYTHON) -m pytest -q test/sil/test_other_cores.py
+builds-long: | $(READY) ## 100 000 layered steps on each core, RISC-V, s390x and Armv6-M included: the same bits
+	@PENODE_LONG=1 $(PYTHON) -m pytest -q test/sil/test_other_cores.py test/sil/test_targets.py -k "chirp or everywhere"

@@ -54,7 +54,7 @@ prove-promises: | $(READY) ## PROMISES.md: each promise, the test that shows it,
 
 # -- the same in full -------------------------------------------------------------------------------------------------
 
-CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-readers campaign-flip campaign-longrun campaign-accuracy
+CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-readers campaign-recordings campaign-flip campaign-longrun campaign-accuracy
 .PHONY: campaign-proofs $(CAMPAIGN)
 
 campaign-proofs: setup build/setup/proof ## The long proofs: all floats, 10^7 sequences of calls, every bit, a whole day
@@ -67,6 +67,8 @@ campaign-fuzz: | $(READY)
 	@$(PYTHON) test/prove/fuzz_check.py --runs 5000000 --as "fuzz campaign"
 campaign-readers: | $(READY)
 	@$(PYTHON) test/prove/readers_check.py --files 20000 --seed 2 --as "readers campaign"
+campaign-recordings: | $(READY)
+	@$(PYTHON) test/prove/readers_check.py --files 50000 --seed 3 --only recording forms --as "recordings campaign"
 campaign-flip: | $(READY)
 	@$(PYTHON) test/prove/flip_check.py --every 1 --as "flip campaign"
 campaign-longrun: | $(READY)

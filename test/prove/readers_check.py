@@ -17,10 +17,11 @@ import sys
 import tempfile
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "sil"))
 import gate
 import numpy as np
 import onnx
@@ -28,8 +29,10 @@ import penode_gen
 from penode_gen.networks import NetworkError
 from penode_gen.read_json import read_json
 from penode_gen.read_onnx import read_onnx
-from penode_sil import measured, scenario
+import recording_forms
+from penode_sil import look, measured, scenario
 from penode_sil.errors import UserError
+from penode_sil.recording import on_raster, read
 
 REFUSED = (penode_gen.ModelError, NetworkError, UserError)
 LIMIT = 20  # [s] of the processor for one file
@@ -185,18 +188,31 @@ def readers(folder: Path) -> list[Reader]:
         Reader("scenario", ".toml", lambda path: scenario.load(path, nqvm, length),
                [path.read_bytes() for path in sorted((gate.ROOT / "sil" / "scenarios").glob("*.toml"))]),
         Reader("recording", ".csv", lambda path: measured.load([path], nqvm), [csv, german]),
+        Reader("forms", ".csv", lambda path: (look.look(path, nqvm), _channels(path)), small_forms()),
     ]  # fmt: skip
+
+
+def small_forms() -> list[bytes]:
+    """Recordings in many forms, the first rows of each: whole lines, or whole characters of four bytes at most."""
+    every = [form.data for form in recording_forms.FORMS.values()]
+    short = [data[: max(2400, 2000 + 2000 * data[:400].count(0) // 200) // 4 * 4] for data in every]
+    return [data if b"\0" in data else data.rpartition(b"\n")[0] or data for data in short]
+
+
+def _channels(path: Path) -> object:
+    return on_raster(read(path, [*recording_forms.UNITS, "time"]), recording_forms.UNITS, recording_forms.STEP)
 
 
 def _too_long(*_: object) -> None:
     raise TimeoutError("it takes too long")
 
 
-def check(tries: int, seed: int = 1) -> tuple[list[str], dict[str, dict[str, int]]]:
-    """So many files for each reader: failures, and per reader how many files were tried and taken, and messages seen."""
+def check(tries: int, seed: int = 1, only: Collection[str] = ()) -> tuple[list[str], dict[str, dict[str, int]]]:
+    """So many files for each reader (or those of these names): failures, and per reader how many files were tried and taken, and
+    messages seen."""
     signal.signal(signal.SIGPROF, _too_long)
     with tempfile.TemporaryDirectory() as place:
-        every = readers(Path(place))
+        every = [reader for reader in readers(Path(place)) if not only or reader.name in only]
         good = [f"{reader.name}: a good file is refused" for reader in every if failure(reader, _put(reader, Path(place))) or not reader.taken]
         found = good + [problem for reader in every for problem in search(reader, tries, Path(place), seed)]
     return found, {r.name: {"files": r.tried, "taken": r.taken, "messages": len(r.messages)} for r in every}
@@ -246,9 +262,10 @@ def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--files", type=int, default=2000, help="for each reader")
     options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--only", nargs="*", default=(), help="readers; all if not given")
     options.add_argument("--as", dest="key", default="readers", help="key in figures.json")
     given = options.parse_args()
-    problems, seen = check(given.files, given.seed)
+    problems, seen = check(given.files, given.seed, given.only)
     total = sum(row["files"] for row in seen.values())
     good = gate.report(f"readers: {total} damaged files: all taken or refused in words", problems[:20])
     missed = faults_missed()

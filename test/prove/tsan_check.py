@@ -18,9 +18,11 @@ WORK = gate.BUILD / "tsan"
 SET = gate.ROOT / "src" / "pen_set.c"
 SOURCES = [path for path in sorted((gate.ROOT / "src").glob("*.c")) if path != SET]
 RACE = 66  # exit code of ThreadSanitizer
+WRITE, STORE = "    pen_set_copy(&tuning->slot[slot], ready);\n", "    pen_port_store(&tuning->pending, tuning->published);\n"
+LATE = re.search(re.escape(WRITE) + "(.*?)" + re.escape(STORE), SET.read_text(), re.S)
 FAULTS = {
     "begin while a set waits": ("    return done;", 0, "    return done || true;"),
-    "pending before the slot is written": ("    pen_set_copy(&tuning->slot[slot], ready);", 0, "    pen_port_store(&tuning->pending, command(ADOPT, slot));\n    pen_set_copy(&tuning->slot[slot], ready);"),
+    "slot written after pending": (LATE[0], 0, LATE[1] + STORE + WRITE) if LATE else (WRITE + STORE, 0, ""),
     "active not flipped": ("            active = other;", 0, ""),
     "withdrawn by the tuning context itself": ("pen_port_store(&tuning->pending, command(WITHDRAW, slot));", 0, "pen_port_store(&tuning->pending, 0U);"),
 }  # of pen_set.c: see gate.faulty
@@ -50,11 +52,11 @@ def main() -> int:
         counts = [int(n) for n in re.findall(r"(\d+) (?:adopted|steps|torn|withdrawn)", said)]
         good &= gate.report(f"tsan: {model}: {sets} sets, no race, none torn, lost or out of order", [said] if code or counts[:1] != [sets] or counts[3:] == [0] else [])
         figures[model] = {"sets": sets, "races": int(code == RACE), "torn": counts[2] if len(counts) == 4 else None, "withdrawn": counts[3] if len(counts) == 4 else None}
-    faults = {"plain volatile instead of the port's atomic words": torture("small", 2000, "template")[0]}
+    faults = {"plain volatile instead of the port's atomic words": torture("small_layers", 2000, "template")[0]}
     for k, (fault, change) in enumerate(FAULTS.items()):
         copy = WORK / f"fault{k}.c"
         copy.write_text(gate.faulty(SET.read_text(), change))
-        faults[fault] = torture("small", 2000, pen_set=copy)[0]
+        faults[fault] = torture("small_layers", 2000, pen_set=copy)[0]
     missed = [f"not found: {fault}" for fault, code in faults.items() if code == 0]
     good &= gate.report(f"tsan: {len(faults) - len(missed)} of {len(faults)} faults found", missed)
     gate.keep("tsan", figures | {"faults": list(faults), "faults found": len(faults) - len(missed)})

@@ -149,8 +149,9 @@ def test_what_cannot_be_a_recording_of_the_model_is_refused(diagnose, tmp_path):
     assert "h.csv: its 50 samples of 2 ms are too few for a diagnosis; record at least 100" in line
     broken = tmp_path / "b.csv"
     broken.write_text("time [s],z_road [m]\n0,nothing\n")
-    (line,) = diagnose(broken)
+    line, rows = diagnose(broken)
     assert 'b.csv:2: channel z_road: "nothing" is no number; correct the cell' in line
+    assert "it has 1 rows with a time of their own" in rows
 
 
 def test_a_truncated_mdf_file_is_refused(diagnose, tmp_path):

@@ -10,6 +10,7 @@
 #include "unity.h"
 
 #define LAYOUT   0x13579bdU
+#define SOURCE   0x2468ace0U
 #define NETWORK  9U
 #define N        (2U * NETWORK)
 #define ROOM     8U
@@ -38,7 +39,7 @@ void setUp(void)
     for (uint32_t i = 0U; i < N; i++) {
         value[i] = bow[i % NETWORK];
     }
-    const pen_model_t plain = { LAYOUT, N, PEN_DAMAGE_REPORT, true, false, 0U, NETWORKS, network, 0U, NULL };
+    const pen_model_t plain = { LAYOUT, N, SOURCE, PEN_DAMAGE_REPORT, true, false, 0U, NETWORKS, network, 0U, NULL };
     model = plain;
     breach.network = 9U;
     breach.kind = 9U;

@@ -188,6 +188,22 @@ void test_slots_that_lead_nowhere(void)
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, restore(&b, byte));
 }
 
+/* The sets to roll back to, before and after a withdrawal: there may be none, but none that is nowhere. */
+void test_rollback_sets_that_lead_nowhere(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, save(&a, byte));
+    for (uint32_t k = 2U; k < 4U; k++) {
+        uint8_t *const place = &byte[SLOT0 + (20U * k) + 16U];
+        const uint32_t kept = pen_serial_get(place);
+        pen_serial_put(UINT32_MAX, place);
+        seal(byte);
+        expect_refused(PEN_SET_LAYOUT, byte, SIZE);
+        pen_serial_put(kept, place);
+    }
+    seal(byte);
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, restore(&b, byte));
+}
+
 /* A set that restore would not find: refused while it runs, waits or can be rolled back to, and no longer. */
 void test_set_that_is_nowhere_cannot_be_saved(void)
 {

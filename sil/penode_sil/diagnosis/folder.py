@@ -26,6 +26,7 @@ from typing import Any
 import penode_gen
 
 from ..errors import UserError
+from ..guard import crash_file
 from . import files, table
 from .files import Job
 from .table import Row
@@ -123,8 +124,8 @@ def attempt(job: Job) -> Answer:
         more = len(exc.problems) - 1
         return None, exc.problems[0] + (f" (and {more} more)" if more else "")
     except Exception as exc:  # a defect in one diagnosis must not take the others along
-        what = next(iter(str(exc).splitlines()), "")[:200]
-        return None, f"{job.data[0]}: the diagnosis failed ({type(exc).__name__}: {what}); report it with the recording"
+        what, path = crash_file(exc)
+        return None, f"{job.data[0]}: the diagnosis failed ({what}); send us {path or 'this line'} and the recording"
 
 
 def _in_processes(jobs: Sequence[Job], count: int) -> Iterator[tuple[int, Answer]]:

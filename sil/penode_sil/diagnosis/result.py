@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -171,13 +172,22 @@ def sentences(model: Any, d: Diagnosis, output: Path) -> str:
             )
     body += [f"  note: {n}" for n in d.notes]
     body += [f"  {r.name}: {p}" for r in d.data for p in r.problems]
-    room = HEIGHT - len(head) - 2
-    if len(body) > room:
-        body = [*body[: room - 1], f"  ... {len(body) - room + 1} more lines in the report"]
+    body = _fitted(body, HEIGHT - len(head) - 2)
     tail = (
         [f"  {d.explained:.1%} of the avoidable residual explained, {d.seconds:.1f} s"]
         if d.verdict != "no_discrepancy"
         else [f"  {d.seconds:.1f} s"]
     )
-    lines = [line if len(line) <= WIDTH else line[: WIDTH - 3] + "..." for line in [*head, *body, *tail]]
-    return "\n".join([*lines, f"  -> {output / 'report.html'}"])
+    return "\n".join([*head, *body, *tail, f"  -> {output / 'report.html'}"])
+
+
+def _fitted(items: list[str], room: int) -> list[str]:
+    """Items on so many lines of WIDTH columns, each of them whole; how many have no room there is the last line."""
+    lines: list[str] = []
+    for k, item in enumerate(items):
+        more = textwrap.wrap(item, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False) if len(item) > WIDTH else [item]
+        last = k + 1 == len(items)
+        if len(lines) + len(more) > room - (not last):
+            return [*lines, f"  {len(items) - k} more in the report"]
+        lines += more
+    return lines

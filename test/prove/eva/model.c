@@ -93,8 +93,8 @@ static void call(void)
 
 void in_order(void)
 {
-    /*@ dynamic_split instance.head.ready; */
-    /*@ dynamic_split instance.head.tuning.open; */
+    /*@ dynamic_split instance.head.ready == 0; */
+    /*@ dynamic_split instance.head.tuning.open == 0; */
     /*@ dynamic_split instance.head.tuning.bank[0] == (void *)0; */
     /*@ dynamic_split instance.head.tuning.bank[1] == (void *)0; */
     while (any != 0U) {

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""`penode inspect`: what is in a recording, how good it is, and how it maps to a model."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+import penode_gen
+
+from . import look
+from .reading import named
+from .several import Several
+
+FILE = click.Path(path_type=Path)
+
+
+@click.command(cls=Several)
+@click.argument("file", type=FILE)
+@click.argument("model", type=FILE, required=False)
+@click.option("--channel", multiple=True, help="What the file calls a signal: x=pos_mm, or x=Weg [mm], or x=pos@10ms.")
+@click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
+def inspect(file: Path, model: Path | None, channel: tuple[str, ...], as_json: bool) -> None:
+    """List the channels of the recording FILE with units, clock and quality; and which signals of MODEL they are."""
+    loaded = None if model is None else penode_gen.load(model)
+    known = [s.name for s in (*loaded.inputs, *loaded.sensors, *loaded.outputs)] if loaded is not None else []
+    found = look.look(file, loaded, named.aliases(channel, known))
+    click.echo(json.dumps(machine(found), indent=2) if as_json else "\n".join(people(found)))
+
+
+def machine(found: look.Look) -> dict[str, Any]:
+    """All that was found, for programs; None where a number is not finite."""
+    plain = asdict(found) | {"path": str(found.path), "options": found.options}
+
+    def finite(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: finite(one) for key, one in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [finite(one) for one in value]
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return finite(plain)
+
+
+def people(found: look.Look) -> list[str]:
+    """Lines for people; nothing is cut off."""
+    lines = [f"{found.path}: {found.form}"]
+    for k, table in enumerate(found.tables, 1):
+        clock = f"{table.rows} rows"
+        if math.isfinite(table.interval):
+            clock += f", {table.interval * 1e3:.6g} ms apart, from {table.start:.6g} s to {table.end:.6g} s"
+            clock += f", {table.gaps or 'no'} gap{'s' * (table.gaps != 1)}"
+        lines += ["", f"table {k} of {len(found.tables)}: {clock}" if len(found.tables) > 1 else clock]
+        lines += [f"  note: {note}" for note in table.notes]
+        lines += _aligned([("channel", "unit", "least", "largest", "quality"), *map(_row, table.channels)])
+    if found.signals:
+        lines += ["", f"of the model {found.model}"]
+        lines += _aligned([(f"{s.kind} {s.name} [{s.unit or '1'}]", _verdict(s)) for s in found.signals])
+    if found.options:
+        lines += ["", "to paste:", "  " + " ".join(found.options)]
+    return lines
+
+
+def _row(c: look.Channel) -> tuple[str, ...]:
+    if c.text:
+        return c.name, c.unit or "none", "", "", f"holds no numbers ({c.text.partition(': channel ')[0]})"
+    counts = {"missing": c.missing, "held": c.held, "cut off": c.clipped, "spikes": c.spikes}
+    parts = [f"{count} {what}" for what, count in counts.items() if count]
+    parts += [f"steps of {c.quantum:.4g}"] if c.quantum else []
+    parts += ["constant"] if c.constant else []
+    low, high = (f"{value:.5g}" if math.isfinite(value) else "" for value in (c.low, c.high))
+    return c.name, "none" if c.unit is None else c.unit or "1", low, high, ", ".join(parts) or "good"
+
+
+def _verdict(s: look.Signal) -> str:
+    says = f": say {s.option} ({s.why})" if s.option else ""
+    if s.problem:
+        return f"{s.problem}{says}"
+    if s.column is not None:
+        return f"is {s.column}" if s.column != s.name else "found"
+    return f"not found{says}"
+
+
+def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]) - 1)]
+    return ["  " + "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths)), row[-1]]).rstrip() for row in rows]

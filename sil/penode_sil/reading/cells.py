@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Cells of a table as numbers: decimal points and commas, missing values, dates and times of day."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import date
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UserError
+
+Array = NDArray[np.float64]
+MISSING = frozenset(["", "-", "--", "---", "?", "*", ".", "na", "n/a", "#n/a", "#na", "#nv", "nil", "null", "none", "nan", "<na>", "(null)",
+                     "-nan", "+nan", "1.#qnan", "-1.#ind", "1.#inf", "-1.#inf", "#div/0!", "#num!", "#value!", "nan(ind)", "-nan(ind)"])  # fmt: skip
+FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))[dD]([+-]?\d+)")
+GROUPS = re.compile(r"[+-]?\d{1,3}(?:['\u2019\u00a0\u202f ]\d{3})+(?:[.,]\d+)?")
+NUMBER = re.compile(r"\s*[+-]?(?:\d+([.,]?)\d*|([.,])\d+)(?:[eEdD][+-]?\d+)?\s*")
+DAY = r"(?:(?P<y>\d{4})[-/.](?P<m>\d\d?)[-/.](?P<d>\d\d?)|(?P<a>\d\d?)[-/.](?P<b>\d\d?)[-/.](?P<c>\d{4}))"
+CLOCK = r"(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d))?(?:[.,:](?P<f>\d{1,9}))?\s*(?P<half>[AaPp][Mm])?"
+DATE = re.compile(rf"\s*{DAY}\s*")
+STAMP = re.compile(rf"\s*(?:{DAY}[T_ ,]+)?{CLOCK}\s*(?:Z|UTC|[+-]\d\d:?\d\d)?\s*")
+
+
+def number(text: str, decimal: str = ".") -> float:
+    """One cell; NaN if it is empty or a sign for a missing value. ValueError if it is no number in this notation."""
+    text = text.strip()
+    if decimal == "," and "," in text:
+        if "." in text:
+            raise ValueError(text)
+        text = text.replace(",", ".")
+    try:
+        return float(text)
+    except ValueError:
+        if text.casefold() in MISSING:
+            return float("nan")
+    text = text.replace("\u2212", "-")
+    if GROUPS.fullmatch(text):
+        text = re.sub(r"['\u2019\u00a0\u202f ]", "", text)
+    return float(FORTRAN.sub(r"\1e\2", text))
+
+
+def decimal_sign(some: Sequence[Sequence[str]]) -> str:
+    """What parts whole numbers from fractions in rows of cells: a comma if there are some and no points."""
+    signs = {m[1] or m[2] for row in some for cell in row if (m := NUMBER.fullmatch(cell))} - {"", None}
+    return "," if signs == {","} else "."
+
+
+def is_number(text: str) -> bool:
+    """May a cell be a value: a number, a stamp of time?"""
+    return any(kind.fullmatch(text) for kind in (NUMBER, STAMP, DATE, GROUPS)) or text.strip().casefold() in ("nan", "inf", "-inf")
+
+
+def numbers(texts: Sequence[str | None], decimal: str) -> Array:
+    """A column; ValueError(index, text) at the first cell that is no number, (index, None) where a row has no such cell."""
+    if decimal == ".":
+        try:
+            return np.fromiter(map(float, texts), np.float64, len(texts))  # type: ignore[arg-type]
+        except (ValueError, TypeError):
+            pass
+    out = np.empty(len(texts))
+    for k, text in enumerate(texts):
+        try:
+            out[k] = number(text, decimal)  # type: ignore[arg-type]
+        except (ValueError, AttributeError):
+            raise ValueError(k, text) from None
+    return out
+
+
+def stamps(texts: Sequence[str | None]) -> Array:
+    """Dates and times of day in s since the first day's midnight; ValueError as for `numbers`. NaN where a cell is empty."""
+    found = [None if not text or not text.strip() else STAMP.fullmatch(text) for text in texts]
+    for k, (match, text) in enumerate(zip(found, texts)):
+        if match is None and text and text.strip():
+            raise ValueError(k, text)
+    seconds = np.array([np.nan if match is None else _of_day(match) for match in found])
+    spans = [days + seconds for days in _days(found)]
+    best = min(spans, key=lambda time: np.nanmax(time) - np.nanmin(time) if np.isfinite(time).any() else 0.0)
+    if not any(match is not None and (match["y"] or match["c"]) for match in found):  # past midnight
+        known = np.flatnonzero(np.isfinite(best))
+        best[known] += 86400.0 * np.cumsum(np.diff(best[known], prepend=best[known[:1]]) < -43200.0)
+    return best
+
+
+def _of_day(match: re.Match[str]) -> float:
+    hour, minute, second, part = int(match["h"]), int(match["min"]), match["s"], match["f"]
+    fraction = int(part) / 10.0 ** len(part) if part else 0.0
+    if second is None and part:  # minutes and seconds, as Excel shows them
+        return 60.0 * hour + minute + fraction
+    if match["half"]:
+        hour = hour % 12 + 12 * (match["half"].lower() == "pm")
+    return 3600.0 * hour + 60.0 * minute + int(second or 0) + fraction
+
+
+def _days(found: Sequence[re.Match[str] | None]) -> Iterator[Array]:
+    """Whole days [s] since the first one, in every order of day and month that has such days."""
+    for first, second in (("b", "a"), ("a", "b")):
+        try:
+            days = [np.nan if m is None else _day(m, first, second) for m in found]
+        except ValueError:
+            continue
+        known = [day for day in days if day == day]
+        yield (np.array(days) - (known[0] if known else 0.0)) * 86400.0
+        if not any(m is not None and m["c"] for m in found):
+            return
+    yield np.zeros(len(found))
+
+
+def _day(match: re.Match[str], month: str, day: str) -> int:
+    if match["y"]:
+        return date(int(match["y"]), int(match["m"]), int(match["d"])).toordinal()
+    return date(int(match["c"]), int(match[month]), int(match[day])).toordinal() if match["c"] else 0
+
+
+class Columns(Mapping[str, Array]):
+    """Columns of text cells that become numbers when they are asked for; a cell that nobody needs refuses nothing.
+
+    A cell is None where its row is too short; `short` has the number of cells of such rows, `place` says where a row is.
+    """
+
+    def __init__(
+        self,
+        texts: Mapping[str, Sequence[str | None]],
+        decimal: str,
+        stamped: frozenset[str],
+        place: Callable[[int], str],
+        short: Mapping[int, int],
+    ):
+        self._texts, self._decimal, self._stamped, self._place, self._short = texts, decimal, stamped, place, short
+        self._ready: dict[str, Array] = {}
+
+    def __getitem__(self, key: str) -> Array:
+        if key not in self._ready:
+            texts = self._texts[key]
+            try:
+                self._ready[key] = stamps(texts) if key in self._stamped else numbers(texts, self._decimal)
+            except ValueError as exc:
+                row, text = exc.args
+                raise UserError(f"{self._place(row)}: {self._what(key, row, text)}") from None
+        return self._ready[key]
+
+    def _what(self, key: str, row: int, text: str | None) -> str:
+        if text is None:
+            return f"{self._short[row]} values for {len(self)} channels, none for {key}; give one value a channel"
+        shown = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+        if key in self._stamped:
+            return f'channel {key}: "{shown}" is no time; correct the cell'
+        other = "," if self._decimal == "." else "."
+        if other in shown and NUMBER.fullmatch(shown):
+            point = "points" if self._decimal == "." else "commas"
+            return f'channel {key}: "{shown}" is no number beside decimal {point}; write all numbers in one way'
+        return f'channel {key}: "{shown}" is no number; correct the cell'
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._texts)
+
+    def __len__(self) -> int:
+        return len(self._texts)
