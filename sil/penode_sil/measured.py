@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import clocks, noise, quality
+from . import noise, quality
 from .errors import UserError
-from .raster import BRIDGE, SHORTEST, Clock, clock_of, filled, held_on_raster, on_raster, parted, steadied, stretches
+from .raster import BRIDGE, SHORTEST, Clock, clock_of, filled, held_on_raster, on_raster, stretches
 from .recording import Recording, aliases, more, pick, read
+from .sampled import Own, origin, own_of, steady
 from .units import factor
 
 Array = NDArray[np.float64]
@@ -75,6 +76,7 @@ class Measured:
     shown: dict[str, Flags]
     rest: Flags
     quality: Quality
+    smooth: Array | None = None  # [n, inputs] with what the file repeats between samples joined to a band-limited curve; None: nothing
 
     @property
     def title(self) -> str:
@@ -154,9 +156,9 @@ def _load(path: Path, model: Any, pairs: dict[str, str]) -> list[Measured]:
             errors += exc.problems
     if errors:
         raise UserError(*errors)
-    own = {name: _own(signals[name], table, bases[id(table)], name in inputs) for name, table in where.items()}
+    own = {name: own_of(signals[name], table, bases[id(table)], name in inputs) for name, table in where.items()}
     for table in {id(t): t for t in where.values()}.values():
-        _steady(own, [name for name, t in where.items() if t is table], bases[id(table)], path, notes)
+        steady(own, [name for name, t in where.items() if t is table], bases[id(table)], path, notes)
     raster = _raster(path, model.sample_time, [own[name].clock for name in inputs or where])
     taken: dict[str, _Taken] = {}
     for name, table in where.items():
@@ -171,47 +173,6 @@ def _load(path: Path, model: Any, pairs: dict[str, str]) -> list[Measured]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Own:
-    """A channel's samples as they were measured: its clock, values in the file's units and in SI, and SI per unit of the file."""
-
-    clock: Clock
-    raw: Array
-    rows: Array
-    scale: float
-    how: str = ""
-    every: float = 1.0  # rows per sample
-
-
-def _own(signal: Any, table: Recording, base: Clock, driving: bool) -> _Own:
-    """A channel on its own clock, if its table has another one."""
-    si = table.channel(signal.name, signal.unit, finite=False)[base.rows]
-    raw = table.columns[table.find(signal.name, signal.unit)][base.rows]
-    good = np.flatnonzero(np.isfinite(raw) & (raw != 0.0))
-    scale = float(si[good[0]] / raw[good[0]]) if good.size else 1.0
-    even = steadied(base, "", [], [])
-    found = clocks.own_samples(even.time, raw, driving)
-    if found is not None:
-        clock = parted(base.rows[found.rows], found.time)
-        return _Own(clock, found.values, found.values * scale, scale, found.how, found.every)
-    finite = np.flatnonzero(np.isfinite(raw))
-    if even is base and 1 < finite.size < raw.size:  # stamps of several clocks: no cell is missing
-        return _Own(parted(base.rows[finite], base.time[finite]), raw[finite], si[finite], scale, "sparse", raw.size / finite.size)
-    return _Own(base, raw, si, scale)
-
-
-def _steady(own: dict[str, _Own], names: list[str], base: Clock, path: Path, notes: list[str]) -> None:
-    """Channels that share a table's clock, and those with one of their own, on its regular instants if they were sampled there."""
-    shared = [name for name in names if own[name].clock is base]
-    groups = [shared] * bool(shared) + [[name] for name in names if name not in shared]
-    for group in groups:
-        clock = own[group[0]].clock
-        place = str(path) if group is shared else f"{path}: channel {group[0]}"
-        even = steadied(clock, place, [own[name].rows for name in group], notes)
-        for name in group:
-            own[name] = replace(own[name], clock=even)
-
-
-@dataclass(frozen=True, eq=False)
 class _Taken:
     """One channel: its rows in SI, what is wrong with them, and the same on the raster."""
 
@@ -223,6 +184,7 @@ class _Taken:
     usable: Flags
     shown: Flags
     how: str
+    smooth: Array | None = None  # of a held input
 
 
 def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
@@ -239,7 +201,7 @@ def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
 
 
 def _take(
-    raster: Array, step: float, signal: Any, table: Recording, own: _Own, driving: bool, notes: list[str]
+    raster: Array, step: float, signal: Any, table: Recording, own: Own, driving: bool, notes: list[str]
 ) -> _Taken | None:
     """One channel on the raster; None if it cannot be used, which is noted, or a UserError if it drives the model."""
     clock, rows, scale = own.clock, own.rows, own.scale
@@ -252,10 +214,13 @@ def _take(
             raise UserError(f"{place}, but it drives the model; record it anew")
         notes.append(f"{place}; it is left out")
         return None
-    notes += [_origin(table, signal.name, own, driving)] if own.how else []
+    notes += [origin(table, signal.name, own, driving)] if own.how else []
     _tell(notes, table, clock, signal, faults, scale, driving)
+    smooth = None
     if driving and own.how == "held":
         values, usable = held_on_raster(raster, step, clock, rows, bad)
+        smooth, curved = on_raster(raster, step, clock, rows, bad, driving, curved=True)
+        usable &= curved
     else:
         values, usable = on_raster(raster, step, clock, rows, bad, driving)
     shown = usable
@@ -263,19 +228,7 @@ def _take(
         shown = on_raster(raster, step, clock, filled(rows, ~faults.missing), faults.missing, driving)[1]
     if driving and usable.any():
         _check_range(table.path, signal, values[usable], notes)
-    return _Taken(rows, faults, scale, clock, values, usable, shown, own.how)
-
-
-def _origin(table: Recording, name: str, own: _Own, driving: bool) -> str:
-    """What rows between a channel's samples are, and what is made of them."""
-    clock = f"{1e3 * own.clock.interval:.6g} ms, every {own.every:.4g} rows"
-    if own.how == "held":
-        text, done = "repeats its last value between samples", "simulated as held" if driving else "each sample counts once"
-    elif own.how == "lines":
-        text, done = "is joined by straight lines between samples", "only the samples count"
-    else:
-        text, done = "has empty cells between samples", "joined by straight lines" if driving else "only the samples count"
-    return f"{table.path}: channel {name} {text} ({clock}); {done}"
+    return _Taken(rows, faults, scale, clock, values, usable, shown, own.how, smooth)
 
 
 def _parts(
@@ -301,6 +254,10 @@ def _parts(
             f"{path}: {lost} of {raster.size} samples lie in or beside gaps of the inputs; parts: {len(parts)}"
         )
     u = np.column_stack([np.zeros((raster.size, 0)), *(taken[name].values for name in inputs)])
+    smooth = None
+    if any(taken[name].smooth is not None for name in inputs):
+        both = (taken[name] for name in inputs)
+        smooth = np.column_stack([t.values if t.smooth is None else t.smooth for t in both])
     rest = {name: _standstill(u, taken[name].values, sound & taken[name].usable, step) for name in sensors}
     still = np.logical_and.reduce(list(rest.values()))
     kept: noise.Kept = {}
@@ -317,6 +274,7 @@ def _parts(
             {name: taken[name].shown[a:b] for name in sensors},
             still[a:b],
             info,
+            None if smooth is None else smooth[a:b],
         )
         for k, (a, b) in enumerate(parts, start=1)
     ]

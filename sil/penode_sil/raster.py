@@ -129,11 +129,11 @@ def held_on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Fla
     return si[last], (age > -1e-3 * step) & (age < (BRIDGE + GAP) * clock.interval)
 
 
-def on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags, driving: bool) -> tuple[Array, Flags]:
+def on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags, driving: bool, curved: bool = False) -> tuple[Array, Flags]:
     """Rows of one channel on the raster, NaN outside of them; True where a sound row stands behind the sample.
 
     Of a channel that drives the model, up to BRIDGE bad rows in a row are bridged. Rows faster than the raster, or
-    beside it, are low-passed without phase.
+    beside it, are low-passed without phase. `curved`: slower rows are joined by a band-limited curve, not by straight lines.
     """
     bridge = BRIDGE if driving else 0
     values, usable = np.full(raster.size, np.nan), np.zeros(raster.size, dtype=bool)
@@ -165,12 +165,12 @@ def on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags, d
         even[unknown] = np.interp(np.flatnonzero(unknown), known, even[known])
         end = start + (even.size - 1) * interval
         inside = slice(*np.searchsorted(raster, (start - 1e-3 * step, end + 1e-3 * step)))
-        values[inside], usable[inside] = _move(raster[inside], step, start, interval, even, wrong, driving)
+        values[inside], usable[inside] = _move(raster[inside], step, start, interval, even, wrong, driving, curved or not driving)
     return values, usable
 
 
 def _move(
-    raster: Array, step: float, start: float, interval: float, even: Array, wrong: Flags, driving: bool
+    raster: Array, step: float, start: float, interval: float, even: Array, wrong: Flags, driving: bool, curved: bool
 ) -> tuple[Array, Flags]:
     """Evenly spaced samples to a raster within them."""
     place = (raster - start) / interval
@@ -182,7 +182,7 @@ def _move(
             usable &= np.abs(place - nearest) <= 0.5 * step / interval + 1e-9
         between = np.abs(place[usable] - nearest[usable]) > 1e-2
         values = np.interp(place, np.arange(even.size), even)
-        if not driving and between.any():  # rows beside the raster: by all of what they show, not by chords
+        if curved and between.any():  # rows beside the raster: by all of what they show, not by chords
             values[usable] = Kernel(raster[usable], start, interval, even.size, step).apply(even[:, None])[:, 0]
         return values, usable
     if interval > 0.999 * step and np.all(np.abs(place - nearest) < 1e-2):

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from penode_sil.diagnosis import noise
+from penode_sil.diagnosis.dropouts import bursts, repeats
 from penode_sil.diagnosis.engine import WILD, still_wild
-from penode_sil.diagnosis.noise import Experiment, bursts, repeats
+from penode_sil.diagnosis.noise import Experiment
 
 STEP, N = 2e-3, 10_000
 T = np.arange(N) * STEP

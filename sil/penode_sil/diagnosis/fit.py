@@ -435,11 +435,7 @@ def _drive(e: Experiment, fine: int) -> Array:
     else:
         parts[:, 2] = u[1:] - h * e.rate[1:] / 3.0
         parts[:, 1] = 3.0 * whole - 0.5 * (u[:-1] + u[1:]) - parts[:, 2]
-    if e.held is not None:  # they step at the samples, and the integral is that of the value before
-        before, after = u[:-1, e.held], u[1:, e.held]
-        parts[:, 1:, e.held] = before[:, None]
-        parts[:, -1, e.held] += 0.5 * (before - after)
-    return np.concatenate([parts.reshape(-1, u.shape[1]), u[-1:]])
+    return np.concatenate([e.stepped(parts).reshape(-1, u.shape[1]), u[-1:]])
 
 
 def drifted(signals: Array, drift: Array) -> Array:
