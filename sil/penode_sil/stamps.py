@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 COARSE = 0.05  # of an interval: stamps in finer steps are as good as exact
 OFF = 0.1  # of a step: stamps that all are so near to multiples of it are in such steps; by chance with 0.2^n
 SLACK = 0.05  # of a step or interval beyond rounding: what printing in other digits adds
@@ -21,6 +22,8 @@ MOST = 100.0  # rows that share a stamp
 JITTER = 0.25  # of an interval beyond rounding: a row that is lost moves all later ones by a whole one, half of it to either side
 NEARER = 1.0  # squares of a step that a lost row must explain: half of the rows of one stamp alone explain 1/4
 LOST = 64  # places at which rows are lost
+PATIENCE = 5  # places that are tried together
+FURTHER = 20.0  # intervals and steps from which on a gap is so long that a clock may have started anew
 GAP = 1.5  # intervals beyond a step of the stamps from which on rows are missing
 RARE = 0.02  # of the intervals: so few that differ from the others are faults, not rounding
 HUGE = 1e12  # [s] what is later is no time
@@ -62,46 +65,101 @@ def evened(time: Array) -> Evened | None:
     steps = _steps(time, usual)
     if np.max(steps) < COARSE * usual:
         return None
-    number = _numbers(time, steps, usual)
-    slope, level, off = _line(time, number)
-    for _ in range(LOST):  # rows that are lost here and there
-        rest = np.cumsum(time - slope * number - np.mean(time - slope * number))
-        tries = [(number + n * (np.arange(time.size) > k)) for n, k in ((1, int(np.argmin(rest))), (-1, int(np.argmax(rest))))]
-        tries = [t for t in tries if np.all(np.diff(t) >= 1)] or [number]
-        squares = [_squares(time, t) for t in (number, *tries)]
-        if min(squares) > squares[0] - NEARER * np.max(steps) ** 2:
-            break
-        number = tries[int(np.argmin(squares[1:]))]
-        slope, level, off = _line(time, number)
-    if off > 0.5 * np.max(steps) + JITTER * slope or not slope > 0.0 or number[-1] > 2 * time.size + 1e6:
+    rows = _numbered(time, steps, usual)
+    if np.max(rows.number) > 2 * time.size + 1e6:
+        return None
+    rows = _missed(rows, NEARER * float(np.max(steps)) ** 2)
+    off = rows.off
+    if off > 0.5 * np.max(steps) + JITTER * rows.slope or not rows.slope > 0.0:
         return None
     jitter = off - 0.5 * float(np.max(steps))
-    return Evened(level + slope * number, float(np.max(steps)), slope, off, jitter if jitter > SLACK * slope else 0.0)
+    return Evened(rows.even, float(np.max(steps)), rows.slope, off, jitter if jitter > SLACK * rows.slope else 0.0)
 
 
-def _numbers(time: Array, steps: Array, usual: float) -> Array:
-    """The number of each row on a regular clock, by whole rows where stamps show a gap; `usual` [s] is the mean interval."""
-    between = np.diff(time)
+class _Rows:
+    """Stamps [n, s] over the numbers [n] of their rows on a regular clock, which starts anew in each part [n], 0, 1, ..."""
+
+    def __init__(self, time: Array, number: Array, part: Index):
+        self.time, self.number, self.part = time, number, part
+        self.size = np.bincount(part)
+        self.centred = self._centred(number)
+        square = float(self.centred @ self.centred)
+        self.slope = float(self.centred @ (time - time[0]) / square) if square > 0.0 else 0.0
+        self.rest = self._centred(time - self.slope * number)
+
+    def _centred(self, values: Array) -> Array:
+        values = values - values[0]
+        return values - (np.bincount(self.part, values) / self.size)[self.part]
+
+    @property
+    def squares(self) -> float:
+        """Of what stamps are off the lines."""
+        return float(self.rest @ self.rest)
+
+    def _range(self) -> tuple[Array, Array]:
+        starts = np.concatenate(([0], np.cumsum(self.size)[:-1]))
+        return np.minimum.reduceat(self.rest, starts), np.maximum.reduceat(self.rest, starts)
+
+    @property
+    def off(self) -> float:
+        """Largest distance of a stamp from the line in the middle of all of its part [s]."""
+        low, high = self._range()
+        return float(np.max(0.5 * (high - low)))
+
+    @property
+    def even(self) -> Array:
+        """The times of the rows on these lines [n, s]."""
+        low, high = self._range()
+        return self.time - self.rest + (0.5 * (low + high))[self.part]
+
+    def shifted(self, row: int, count: int) -> _Rows:
+        """The same with rows behind one up to the end of its part that many further on."""
+        behind = (np.arange(self.time.size) > row) & (self.part == self.part[row])
+        return _Rows(self.time, self.number + count * behind, self.part)
+
+    def nearer(self) -> tuple[int, int]:
+        """The row behind which one that was lost explains most, or (-1) one less."""
+        ahead = np.arange(1, self.time.size + 1) - (np.cumsum(self.size) - self.size)[self.part]
+        behind = self.size[self.part] - ahead
+        # all rows behind one, but for what level and slope make of them
+        square = behind * ahead / self.size[self.part]
+        square = square - np.cumsum(self.centred) ** 2 / max(float(self.centred @ self.centred), 1e-300)
+        along = 2.0 * np.cumsum(self.rest) * self.slope  # of each part they sum up to 0
+        more, less = (square * self.slope**2 + sign * along for sign in (1.0, -1.0))
+        less = np.where(np.append(np.diff(self.number) >= 2.0, False), less, np.inf)
+        low = [(int(np.argmin(x)), count) for x, count in ((more, 1), (less, -1))]
+        return min(low, key=lambda found: (more if found[1] > 0 else less)[found[0]])
+
+
+def _numbered(time: Array, steps: Array, usual: float) -> _Rows:
+    """Each row's number, by whole rows where stamps show a gap, anew behind a long one; `usual` [s] is the mean interval."""
+    between, coarse = np.diff(time), np.maximum(steps[:-1], steps[1:])
     for _ in range(2):  # a gap makes the mean too long
-        gap = between > GAP * usual + (1.0 + SLACK) * np.maximum(steps[:-1], steps[1:])
+        gap = between > GAP * usual + (1.0 + SLACK) * coarse
         kept = float(np.mean(between[~gap])) if not gap.all() else 0.0
         usual = kept if kept > 0.0 else usual
-    return np.concatenate(([0.0], np.cumsum(np.where(gap, np.maximum(1.0, np.rint(between / usual)), 1.0))))
+    number = np.concatenate(([0.0], np.cumsum(np.where(gap, np.maximum(1.0, np.rint(between / usual)), 1.0))))
+    part = np.concatenate(([0], np.cumsum(between > FURTHER * (usual + coarse))))
+    return _Rows(time, number, part)
 
 
-def _line(time: Array, number: Array) -> tuple[float, float, float]:
-    """Slope and level of the line through times over their numbers, and the largest distance from it, half of the range."""
-    centred = number - np.mean(number)
-    slope = float(centred @ (time - time[0]) / (centred @ centred))
-    rest = time - slope * number
-    low, high = float(np.min(rest)), float(np.max(rest))
-    return slope, 0.5 * (low + high), 0.5 * (high - low)
-
-
-def _squares(time: Array, number: Array) -> float:
-    """Sum of the squares of what stamps are off the line."""
-    slope = _line(time, number)[0]
-    return float(time.size * np.var(time - slope * number))
+def _missed(rows: _Rows, worth: float) -> _Rows:
+    """Rows that were lost here and there, each of which lessens the squares by `worth`, but together: one of several alone need not."""
+    best, least, since = rows, rows.squares, 0
+    moves: list[tuple[int, int]] = []
+    for _ in range(LOST):
+        row, count = rows.nearer()
+        moves.append((row, count))
+        rows = rows.shifted(row, count)
+        for k, (row, count) in enumerate(moves[:-1] if len(moves) <= PATIENCE else []):  # with the others known
+            rows = rows.shifted(row, -count)
+            moves[k] = rows.nearer()
+            rows = rows.shifted(*moves[k])
+        if rows.squares + worth * len(moves) < least and np.all(np.diff(rows.number) >= 1.0):
+            best, least, since = rows, rows.squares + worth * len(moves), len(moves)
+        elif len(moves) - since >= PATIENCE:
+            break
+    return best
 
 
 def _steps(time: Array, usual: float) -> Array:
