@@ -23,19 +23,28 @@ from .quality import quantisation
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Index = NDArray[np.int64]
-CHANCE = 1e-6  # that rows which have nothing to do with a clock show one, in a whole channel
-FEWEST = 20  # marks; fewer do not make a clock
-EXACT = 0.95  # share of the marks that must stand at the clock: a few are faults of the sensor itself
-SLOWER = 1.05  # rows per sample from which on a clock is another one than that of the rows
-SEARCHED = 4096  # rows in which a clock is looked for, before it is followed to the end of the recording
-FINE = 8  # bins per row in which its frequency is looked for
-PADDED = 8  # times the length of the rows: a frequency is then known to 1/32 of a turn over all of them
-STANDS_OUT = 30.0  # times the mean that a line of a clock has in the spectrum of the marks; noise reaches it with exp(-30) a bin
-TRIED = 24  # frequencies, the slowest of those that stand out, for the others are their multiples
-STAMPED = 0.2  # of its interval: a clock with stamps of its own is as near to regular instants
-ALIKE = 0.8  # share of kinks or steps of one size from which on they are of a square, a ramp or a triangle, not of samples
-DOUBLE = 1e-11  # of the largest value, by which lines may be off that were computed in double precision
-ROUNDED = 0.5  # of the last digit: RMS by which rounding moves a row off a line; 0.29 for one rounding, 0.41 for two
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What makes a clock of marks, and samples of its instants."""
+
+    chance: float = 1e-6  # that rows which have nothing to do with a clock show one, in a whole channel
+    fewest: int = 20  # marks; fewer do not make a clock
+    exact: float = 0.95  # share of the marks that must stand at the clock: a few are faults of the sensor itself
+    slower: float = 1.05  # rows per sample from which on a clock is another one than that of the rows
+    searched: int = 4096  # rows in which a clock is looked for, before it is followed to the end of the recording
+    fine: int = 8  # bins per row in which its frequency is looked for
+    padded: int = 8  # times the length of the rows: a frequency is then known to 1/32 of a turn over all of them
+    stands_out: float = 30.0  # times the mean that a line of a clock has in the spectrum of the marks; noise reaches it with exp(-30) a bin
+    tried: int = 24  # frequencies, the slowest of those that stand out, for the others are their multiples
+    stamped: float = 0.2  # of its interval: a clock with stamps of its own is as near to regular instants
+    alike: float = 0.8  # share of kinks or steps of one size from which on they are of a square, a ramp or a triangle, not of samples
+    double: float = 1e-11  # of the largest value, by which lines may be off that were computed in double precision
+    rounded: float = 0.5  # of the last digit: RMS by which rounding moves a row off a line; 0.29 for one rounding, 0.41 for two
+
+
+RULES = Rules()
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +81,7 @@ def own_samples(time: Array, values: Array, driving: bool = False) -> Samples | 
     """The samples of a channel [n] at increasing times [n, s], NaN where a cell is empty; None if every row is one, or is lost at
     random. Of a channel that drives the model, lines stay lines."""
     finite = np.flatnonzero(np.isfinite(values))
-    if finite.size < FEWEST:
+    if finite.size < RULES.fewest:
         return None
     if finite.size < values.size and (sparse := _sparse(time, values, finite)) is not None:
         return sparse
@@ -99,7 +108,7 @@ def _sparse(time: Array, values: Array, finite: Index) -> Samples | None:
         return None
     at = raster.instants(time[0], time[-1])
     off = time[finite] - at[np.searchsorted(at, time[finite] - 0.5 * raster.interval).clip(0, at.size - 1)]
-    if np.ptp(off) > STAMPED * raster.interval:
+    if np.ptp(off) > RULES.stamped * raster.interval:
         return None  # every tenth cell is lost: that is no clock of nine rows in ten
     return Samples("sparse", finite, time[finite], values[finite], raster.interval, raster.interval / _usual(time))
 
@@ -127,7 +136,7 @@ def _of_one_size(steps: Array) -> bool:
     if not size.size:
         return True
     middle = np.median(size)
-    return bool(np.mean(np.abs(size - middle) < 1e-3 * middle) > ALIKE)
+    return bool(np.mean(np.abs(size - middle) < 1e-3 * middle) > RULES.alike)
 
 
 # -- clocks of marks ---------------------------------------------------------------------------------------------------
@@ -142,11 +151,11 @@ def regular(time: Array, marks: Flags, wide: bool = False) -> Raster | None:
     of which one is chosen.
     """
     count = int(np.sum(marks))
-    if count < FEWEST or count > time.size / SLOWER:
+    if count < RULES.fewest or count > time.size / RULES.slower:
         return None
-    some = slice(0, SEARCHED if np.sum(marks[:SEARCHED]) >= FEWEST else time.size)
+    some = slice(0, RULES.searched if np.sum(marks[:RULES.searched]) >= RULES.fewest else time.size)
     first = _Marks(time[some], marks[some], wide)
-    least = first.usual * (2.0 if wide else SLOWER)  # lines show their corners if two rows lie on each
+    least = first.usual * (2.0 if wide else RULES.slower)  # lines show their corners if two rows lie on each
     found = [first.clock(interval) for interval in first.intervals() if interval > 0.99 * least]
     if not found:
         return None
@@ -157,8 +166,8 @@ def regular(time: Array, marks: Flags, wide: bool = False) -> Raster | None:
         best = _Marks(time[:size], marks[:size], wide).refined(best)
     every = best.interval / first.usual
     caught = np.sum(marks[_Marks(time, marks, wide).rows(best)])
-    limit = np.log(CHANCE) - 2.0 * np.log(time.size)
-    return best if every > 0.99 * least / first.usual and best.surprise < limit and caught >= EXACT * count else None
+    limit = np.log(RULES.chance) - 2.0 * np.log(time.size)
+    return best if every > 0.99 * least / first.usual and best.surprise < limit and caught >= RULES.exact * count else None
 
 
 class _Marks:
@@ -170,20 +179,20 @@ class _Marks:
 
     def intervals(self) -> list[float]:
         """Intervals that the marks may have, by what stands out of their spectrum over the rows'."""
-        place = np.rint((self.time - self.time[0]) / self.usual * FINE)
-        if place[-1] > 64 * FINE * self.time.size:
+        place = np.rint((self.time - self.time[0]) / self.usual * RULES.fine)
+        if place[-1] > 64 * RULES.fine * self.time.size:
             return []
         density = np.bincount(place.astype(np.int64), weights=self.marks - np.mean(self.marks))
-        size = next_fast_len(PADDED * density.size, real=True)
+        size = next_fast_len(RULES.padded * density.size, real=True)
         power = np.abs(rfft(density, size)) ** 2
-        top = min(int(size / (FINE * SLOWER)), power.size - 2)
+        top = min(int(size / (RULES.fine * RULES.slower)), power.size - 2)
         inner = power[1 : top + 1]
         peak = 1 + np.flatnonzero((inner >= power[:top]) & (inner >= power[2 : top + 2]) & (inner > 0.2 * np.max(inner, initial=0.0)))
-        if not peak.size or np.max(power[peak]) < STANDS_OUT * np.mean(inner):
+        if not peak.size or np.max(power[peak]) < RULES.stands_out * np.mean(inner):
             return []
         left, here, right = (power[peak + k] for k in (-1, 0, 1))
         exact = peak + 0.5 * (left - right) / (left - 2.0 * here + right - 1e-300)
-        return (size / FINE * self.usual / exact[exact > PADDED][:TRIED]).tolist()
+        return (size / RULES.fine * self.usual / exact[exact > RULES.padded][:RULES.tried]).tolist()
 
     def clock(self, interval: float) -> Raster:
         """The clock of about this interval that catches most marks."""
@@ -196,7 +205,7 @@ class _Marks:
         tick, at = np.rint((self.at - raster.start) / raster.interval), self.at
         slope = raster.interval
         for near in (0.5 * raster.interval, 2.0 * self.usual, 1.05 * self.usual, None, None):
-            if at.size < FEWEST or np.ptp(tick) == 0.0:
+            if at.size < RULES.fewest or np.ptp(tick) == 0.0:
                 return raster
             line = np.polynomial.polynomial.polyfit(tick, at - raster.start, 1)
             slope = float(line[1])
@@ -256,7 +265,7 @@ def grain(values: Array) -> Array:
     """How finely each value [n] is written: the last of so many digits or decimals that all of them have, single precision, or
     the step of the sensor; the coarsest of these that holds for all."""
     size = np.abs(values)
-    fine = np.full(values.size, DOUBLE * np.max(size))
+    fine = np.full(values.size, RULES.double * np.max(size))
     single = values.astype(np.float32)
     if np.array_equal(single.astype(np.float64), values):
         fine = np.maximum(fine, np.spacing(np.abs(single)).astype(np.float64))
@@ -286,7 +295,7 @@ def _unsure(time: Array) -> Array:
 def _joined(time: Array, values: Array) -> Samples | None:
     """The corners of straight lines through the rows, if these stand at instants of a clock: between them the rows lie on the lines
     to the last digit."""
-    if values.size < 4 * FEWEST or np.ptp(values) == 0.0:
+    if values.size < 4 * RULES.fewest or np.ptp(values) == 0.0:
         return None
     slope = np.abs(np.gradient(values, time))
     fine = np.hypot(grain(values), np.maximum(slope, np.roll(slope, 1)) * _unsure(time))
@@ -306,15 +315,15 @@ def _joined(time: Array, values: Array) -> Samples | None:
 
 def _fitted(time: Array, values: Array, raster: Raster, fine: Array) -> Samples | None:
     """Lines between instants near those of a clock, fitted to the rows; None if they miss them by more than rounding."""
-    usual, best, size = _usual(time), raster, SEARCHED
+    usual, best, size = _usual(time), raster, RULES.searched
     while True:
         part = slice(0, size)
         best, loss = _nearer(time[part], values[part], best, fine[part], 0.6 * usual)
-        if loss > ROUNDED:
+        if loss > RULES.rounded:
             return None
         if size >= time.size:
             found = _Lines(time, values, best, fine).samples()
-            return found if found.rows.size >= FEWEST else None
+            return found if found.rows.size >= RULES.fewest else None
         size *= 2
 
 
@@ -323,7 +332,7 @@ def _nearer(time: Array, values: Array, raster: Raster, fine: Array, reach: floa
     best, loss, least = raster, _Lines(time, values, raster, fine).loss, 1e-10 * reach
     middle = time[0] + 0.5 * (time[-1] - time[0])
     span = (time[-1] - time[0]) / raster.interval
-    while reach > least and loss > ROUNDED:
+    while reach > least and loss > RULES.rounded:
         tries = []
         for move, turn in ((a, b) for a in (-1.0, 0.0, 1.0) for b in (-1.0, 0.0, 1.0) if a or b):
             interval = best.interval + turn * reach / span

@@ -15,21 +15,30 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-COARSE = 0.05  # of an interval: stamps in finer steps are as good as exact
-OFF = 0.1  # of a step: stamps that all are so near to multiples of it are in such steps; by chance with 0.2^n
-SLACK = 0.05  # of a step or interval beyond rounding: what printing in other digits adds
-MOST = 100.0  # rows that share a stamp
-JITTER = 0.25  # of an interval beyond rounding: a row that is lost moves all later ones by a whole one, half of it to either side
-NEARER = 1.0  # squares of a step that a lost row must explain: half of the rows of one stamp alone explain 1/4
-LOST = 64  # places at which rows are lost
-PATIENCE = 5  # places that are tried together
-FURTHER = 20.0  # intervals and steps from which on a gap is so long that a clock may have started anew
-GAP = 1.5  # intervals beyond a step of the stamps from which on rows are missing
-RARE = 0.02  # of the intervals: so few that differ from the others are faults, not rounding
-HUGE = 1e12  # [s] what is later is no time
-LEAST = 16  # rows that show a clock
-SURE = 5.0  # standard deviations; chance 3e-7
 STEPS = sorted({m * 10.0**-k for m in (1, 2, 5) for k in range(-1, 10)} | {2.0**-k for k in range(-3, 31)}, reverse=True)
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What makes coarse stamps of a regular clock."""
+
+    coarse: float = 0.05  # of an interval: stamps in finer steps are as good as exact
+    off: float = 0.1  # of a step: stamps that all are so near to multiples of it are in such steps; by chance with 0.2^n
+    slack: float = 0.05  # of a step or interval beyond rounding: what printing in other digits adds
+    most: float = 100.0  # rows that share a stamp
+    jitter: float = 0.25  # of an interval beyond rounding: a row that is lost moves all later ones by a whole one, half of it to either side
+    nearer: float = 1.0  # squares of a step that a lost row must explain: half of the rows of one stamp alone explain 1/4
+    lost: int = 64  # places at which rows are lost
+    patience: int = 5  # places that are tried together
+    further: float = 20.0  # intervals and steps from which on a gap is so long that a clock may have started anew
+    gap: float = 1.5  # intervals beyond a step of the stamps from which on rows are missing
+    rare: float = 0.02  # of the intervals: so few that differ from the others are faults, not rounding
+    huge: float = 1e12  # [s] what is later is no time
+    least: int = 16  # rows that show a clock
+    sure: float = 5.0  # standard deviations; chance 3e-7
+
+
+RULES = Rules()
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,24 +65,24 @@ class Evened:
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def evened(time: Array) -> Evened | None:
     """Rows spread evenly whose stamps [n, s], which never go back, are in coarser steps; None if stamps are fine, or of no clock."""
-    if time.size < LEAST or not time[-1] > time[0]:
+    if time.size < RULES.least or not time[-1] > time[0]:
         return None
     usual = float(time[-1] - time[0]) / (time.size - 1)
     between = np.diff(time)
-    if np.mean(np.abs(between - np.median(between)) > COARSE * usual) < RARE or np.max(np.abs(time)) > HUGE:
+    if np.mean(np.abs(between - np.median(between)) > RULES.coarse * usual) < RULES.rare or np.max(np.abs(time)) > RULES.huge:
         return None  # as they are, but for some faults
     steps = _steps(time, usual)
-    if np.max(steps) < COARSE * usual:
+    if np.max(steps) < RULES.coarse * usual:
         return None
     rows = _numbered(time, steps, usual)
     if np.max(rows.number) > 2 * time.size + 1e6:
         return None
-    rows = _missed(rows, NEARER * float(np.max(steps)) ** 2)
+    rows = _missed(rows, RULES.nearer * float(np.max(steps)) ** 2)
     off = rows.off
-    if off > 0.5 * np.max(steps) + JITTER * rows.slope or not rows.slope > 0.0:
+    if off > 0.5 * np.max(steps) + RULES.jitter * rows.slope or not rows.slope > 0.0:
         return None
     jitter = off - 0.5 * float(np.max(steps))
-    return Evened(rows.even, float(np.max(steps)), rows.slope, off, jitter if jitter > SLACK * rows.slope else 0.0)
+    return Evened(rows.even, float(np.max(steps)), rows.slope, off, jitter if jitter > RULES.slack * rows.slope else 0.0)
 
 
 class _Rows:
@@ -135,11 +144,11 @@ def _numbered(time: Array, steps: Array, usual: float) -> _Rows:
     """Each row's number, by whole rows where stamps show a gap, anew behind a long one; `usual` [s] is the mean interval."""
     between, coarse = np.diff(time), np.maximum(steps[:-1], steps[1:])
     for _ in range(2):  # a gap makes the mean too long
-        gap = between > GAP * usual + (1.0 + SLACK) * coarse
+        gap = between > RULES.gap * usual + (1.0 + RULES.slack) * coarse
         kept = float(np.mean(between[~gap])) if not gap.all() else 0.0
         usual = kept if kept > 0.0 else usual
     number = np.concatenate(([0.0], np.cumsum(np.where(gap, np.maximum(1.0, np.rint(between / usual)), 1.0))))
-    part = np.concatenate(([0], np.cumsum(between > FURTHER * (usual + coarse))))
+    part = np.concatenate(([0], np.cumsum(between > RULES.further * (usual + coarse))))
     return _Rows(time, number, part)
 
 
@@ -147,17 +156,17 @@ def _missed(rows: _Rows, worth: float) -> _Rows:
     """Rows that were lost here and there, each of which lessens the squares by `worth`, but together: one of several alone need not."""
     best, least, since = rows, rows.squares, 0
     moves: list[tuple[int, int]] = []
-    for _ in range(LOST):
+    for _ in range(RULES.lost):
         row, count = rows.nearer()
         moves.append((row, count))
         rows = rows.shifted(row, count)
-        for k, (row, count) in enumerate(moves[:-1] if len(moves) <= PATIENCE else []):  # with the others known
+        for k, (row, count) in enumerate(moves[:-1] if len(moves) <= RULES.patience else []):  # with the others known
             rows = rows.shifted(row, -count)
             moves[k] = rows.nearer()
             rows = rows.shifted(*moves[k])
         if rows.squares + worth * len(moves) < least and np.all(np.diff(rows.number) >= 1.0):
             best, least, since = rows, rows.squares + worth * len(moves), len(moves)
-        elif len(moves) - since >= PATIENCE:
+        elif len(moves) - since >= RULES.patience:
             break
     return best
 
@@ -167,7 +176,7 @@ def _steps(time: Array, usual: float) -> Array:
     found = np.zeros(time.size)
     for given in (time, time - time[0]):
         for step in STEPS:
-            if step < COARSE * usual:
+            if step < RULES.coarse * usual:
                 break
             if _multiples(given, np.full(time.size, step), usual):
                 found = np.maximum(found, step)
@@ -185,7 +194,7 @@ def _steps(time: Array, usual: float) -> Array:
 
 def _multiples(values: Array, step: Array, usual: float) -> bool:
     off = np.abs(values - np.rint(values / step) * step)
-    return bool(np.max(step) < MOST * usual and np.all(off < OFF * step))
+    return bool(np.max(step) < RULES.most * usual and np.all(off < RULES.off * step))
 
 
 def sampled_evenly(time: Array, even: Array, columns: list[Array]) -> bool:
@@ -197,7 +206,7 @@ def sampled_evenly(time: Array, even: Array, columns: list[Array]) -> bool:
         better += int(np.sum(regular < own))
         worse += int(np.sum(regular > own))
     # errors of neighbours share rows: a quarter of them count
-    return better - worse > SURE * 2.0 * np.sqrt(better + worse) if better + worse else False
+    return better - worse > RULES.sure * 2.0 * np.sqrt(better + worse) if better + worse else False
 
 
 def _foretold(time: Array, values: Array) -> Array:

@@ -21,9 +21,6 @@ from .fit import moving
 from .noise import Experiment
 from .study import Study, begin, loss, refit
 
-NEAR = 0.1  # of a sample: the leads by which a parabola through three costs is laid
-ROUNDS = 2  # of it
-
 
 def experiment(m: Measured, model: Model, smooth: bool = False) -> Experiment:
     """A recording as the diagnosis sees it; sensors that it does not have count as not good. `smooth`: no input is held."""
@@ -68,12 +65,12 @@ def settled(
 
 def _led(model: Model, experiments: Sequence[Experiment], set_name: str) -> tuple[Study, float]:
     """The study of the experiments with the lead of their steps, in samples, with which the model fits best."""
-    lead = 0.5  # the row before does not show it yet
-    for _ in range(ROUNDS):
+    lead, near = 0.5, 0.1  # anywhere between two rows, at first; a parabola goes through the costs that far to either side
+    for _ in range(2):
         study = begin(model, [_ahead(e, lead) for e in experiments], set_name)[0]
-        before, here, after = (_cost(study, lead + d) for d in (-NEAR, 0.0, NEAR))
+        before, here, after = (_cost(study, lead + d) for d in (-near, 0.0, near))
         bend = before - 2.0 * here + after
-        move = 0.5 * NEAR * (before - after) / bend if bend > 0.0 else np.sign(before - after)
+        move = 0.5 * near * (before - after) / bend if bend > 0.0 else np.sign(before - after)
         lead = float(np.clip(lead + move, 0.0, 1.0))
     return begin(model, [_ahead(e, lead) for e in experiments], set_name)[0], lead
 
