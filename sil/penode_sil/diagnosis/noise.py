@@ -302,9 +302,9 @@ def sensor_levels(
     found = np.empty((band, residual.shape[1]))
     for j, sigma in enumerate(declared):
         duty = float(e.duty[j])  # of white noise so much power is left where the other samples are 0, of a slow signal the square
-        sigma = sigma * np.sqrt(duty)
-        road = np.sum(np.abs(through[:, j, :] * e.unsure) ** 2, axis=1) * duty**2
-        base = e.quiet[:, j] * duty
+        power[:, j] /= duty  # the level stays that of a sample: then chi2 counts each good one once
+        road = np.sum(np.abs(through[:, j, :] * e.unsure) ** 2, axis=1) * duty
+        base = e.quiet[:, j]
         if not np.all(np.isfinite(base)):
             raw = float(np.mean(power[high, j]))
             base = np.full(len(f), max(raw - float(np.median(road[high])), 0.05 * raw, 1e-300))
@@ -340,7 +340,7 @@ def _slow(n: int, band: int, wide: int) -> tuple[Array, Array]:
 
 def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Metric:
     """The metric of a recording: levels [f, sensors] and the transfer [f, sensors, inputs] of the inputs' noise."""
-    g = through[: e.band] * e.unsure[: e.band, None, :] * e.duty[None, :, None]
+    g = through[: e.band] * e.unsure[: e.band, None, :] * np.sqrt(e.duty)[None, :, None]
     s = g @ np.conj(np.swapaxes(g, 1, 2)) + levels[:, :, None] * np.eye(levels.shape[1])
     root = np.linalg.inv(np.linalg.cholesky(s)) * np.sqrt(2.0 / len(e.time))
     return Metric(len(e.time), root)
