@@ -72,6 +72,8 @@ def _row(c: look.Channel) -> tuple[str, ...]:
     parts = [f"{count} {what}" for what, count in counts.items() if count]
     parts += [f"steps of {c.quantum:.4g}"] if c.quantum else []
     parts += ["constant"] if c.constant else []
+    hows = {"held": "repeated between samples", "lines": "joined by lines between samples", "sparse": "empty between samples"}
+    parts += [f"{hows[c.how]} {1e3 * c.interval:.6g} ms apart"] if c.how else []
     low, high = (f"{value:.5g}" if math.isfinite(value) else "" for value in (c.low, c.high))
     return c.name, "none" if c.unit is None else c.unit or "1", low, high, ", ".join(parts) or "good"
 

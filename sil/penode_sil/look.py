@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import quality
+from .clocks import own_samples
 from .errors import UserError
-from .raster import clock_of
+from .raster import Clock, clock_of, steadied
 from .reading import named, similar, unit_text
 from .recording import GAP, Recording, pick, read
 from .units import UnitError
@@ -38,6 +39,8 @@ class Channel:
     spikes: int = 0
     quantum: float = 0.0
     constant: bool = False
+    how: str = ""  # "held", "lines", "sparse": it has a clock of its own, and what the rows between its samples are
+    interval: float = float("nan")  # [s] of that clock
 
 
 @dataclass(frozen=True)
@@ -94,33 +97,34 @@ def _table(table: Recording) -> Table:
     time, rows = None, 0
     channels = []
     start = end = interval = float("nan")
-    gaps, order = 0, None
+    gaps, clock = 0, None
     try:
         time = table.find("time", "s")
         clock = clock_of(table, notes)
         start, end, interval = float(clock.time[0]), float(clock.time[-1]), clock.interval
-        gaps, order = int(np.sum(np.diff(clock.time) > GAP * clock.interval)), clock.rows
+        gaps = int(np.sum(np.diff(clock.time) > GAP * clock.interval))
     except UserError as exc:
         notes += exc.problems
     for key in table.columns:
-        channel = _channel(table, key, order)
+        channel = _channel(table, key, clock)
         rows = max(rows, channel.rows)
         if key != time:
             channels.append(channel)
     return Table(rows, start, end, interval, gaps, tuple(notes), tuple(channels))
 
 
-def _channel(table: Recording, key: str, order: NDArray[np.int64] | None) -> Channel:
+def _channel(table: Recording, key: str, clock: Clock | None) -> Channel:
     unit = table.units[key]
     try:
         values = table.columns[key]
     except UserError as exc:
         return Channel(key, unit, exc.problems[0])
-    faults = quality.examine(values if order is None else values[order])
+    own = None if clock is None else own_samples(steadied(clock, "", [], []).time, values[clock.rows])
+    faults = quality.examine(own.values if own else values if clock is None else values[clock.rows])
     good = values[np.isfinite(values)]
     low, high = (float(good.min()), float(good.max())) if good.size else (float("nan"), float("nan"))
     counts = [int(np.sum(flags)) for flags in (faults.missing, faults.held, faults.saturated, faults.spikes)]
-    return Channel(key, unit, "", values.size, low, high, *counts, faults.quantum, faults.constant)
+    return Channel(key, unit, "", values.size, low, high, *counts, faults.quantum, faults.constant, *((own.how, own.interval) if own else ()))
 
 
 def _signals(tables: Sequence[Recording], model: Any) -> tuple[Signal, ...]:

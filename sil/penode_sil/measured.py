@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from . import noise, quality
 from .errors import UserError
-from .raster import BRIDGE, SHORTEST, Clock, clock_of, filled, on_raster, stretches
+from .raster import BRIDGE, SHORTEST, Clock, clock_of, filled, held_on_raster, on_raster, stretches
 from .recording import Recording, aliases, more, pick, read
+from .sampled import Own, origin, own_of, steady
 from .units import factor
 
 Array = NDArray[np.float64]
@@ -46,6 +47,7 @@ class Channel:
     quantum: float  # 0 if there is none
     constant: bool
     noise: noise.Noise | None  # of the samples on the raster; of the rows, if these are slower; None: too few to tell
+    how: str = ""  # "held", "lines", "sparse": what rows between its samples are, see clocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,8 @@ class Measured:
     """A recording without a gap in its inputs, SI, on the model's raster: n samples, sample_time apart.
 
     `mask` is True where a sensor's sample was measured and is sound; a sensor slower than the raster counts once per
-    row. Elsewhere `z` is bridged or bad. `rest` is True where inputs and sensors stand still.
+    sample. Elsewhere `z` is bridged or bad. `shown` is True where the file has a value that was measured, sound or not. `rest`
+    is True where inputs and sensors stand still.
     """
 
     path: Path
@@ -70,8 +73,10 @@ class Measured:
     u: Array  # [n, inputs]
     z: dict[str, Array]  # [n] each
     mask: dict[str, Flags]
+    shown: dict[str, Flags]
     rest: Flags
     quality: Quality
+    smooth: Array | None = None  # [n, inputs] with what the file repeats between samples joined to a band-limited curve; None: nothing
 
     @property
     def title(self) -> str:
@@ -143,19 +148,22 @@ def _load(path: Path, model: Any, pairs: dict[str, str]) -> list[Measured]:
         sensors = ", ".join(n for n in signals if n not in inputs)
         errors.append(f"{path}: it holds no sensor of the model; record at least one of: {sensors}")
     notes: list[str] = []
-    clocks: dict[int, Clock] = {}
+    bases: dict[int, Clock] = {}
     for table in {id(t): t for t in where.values()}.values() or tables[:1]:
         try:
-            clocks[id(table)] = clock_of(table, notes)
+            bases[id(table)] = clock_of(table, notes)
         except UserError as exc:
             errors += exc.problems
     if errors:
         raise UserError(*errors)
-    raster = _raster(path, model.sample_time, [clocks[id(where[name])] for name in inputs or where])
+    own = {name: own_of(signals[name], table, bases[id(table)], name in inputs) for name, table in where.items()}
+    for table in {id(t): t for t in where.values()}.values():
+        steady(own, [name for name, t in where.items() if t is table], bases[id(table)], path, notes)
+    raster = _raster(path, model.sample_time, [own[name].clock for name in inputs or where])
     taken: dict[str, _Taken] = {}
     for name, table in where.items():
         try:
-            one = _take(raster, model.sample_time, signals[name], table, clocks[id(table)], name in inputs, notes)
+            one = _take(raster, model.sample_time, signals[name], table, own[name], name in inputs, notes)
             taken |= {name: one} if one is not None else {}
         except UserError as exc:
             errors += exc.problems
@@ -174,6 +182,9 @@ class _Taken:
     clock: Clock
     values: Array
     usable: Flags
+    shown: Flags
+    how: str
+    smooth: Array | None = None  # of a held input
 
 
 def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
@@ -190,14 +201,11 @@ def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
 
 
 def _take(
-    raster: Array, step: float, signal: Any, table: Recording, clock: Clock, driving: bool, notes: list[str]
+    raster: Array, step: float, signal: Any, table: Recording, own: Own, driving: bool, notes: list[str]
 ) -> _Taken | None:
     """One channel on the raster; None if it cannot be used, which is noted, or a UserError if it drives the model."""
-    rows = table.channel(signal.name, signal.unit, finite=False)[clock.rows]
-    raw = table.columns[table.find(signal.name, signal.unit)][clock.rows]
-    faults = quality.examine(raw)
-    good = np.flatnonzero(np.isfinite(raw) & (raw != 0.0))
-    scale = float(rows[good[0]] / raw[good[0]]) if good.size else 1.0
+    clock, rows, scale = own.clock, own.rows, own.scale
+    faults = quality.examine(own.raw)
     bad = faults.missing | faults.spikes if driving else faults.any
     if np.mean(bad) > 0.9 or (faults.constant and not driving):
         what = "does not change" if faults.constant else "has hardly a sound sample"
@@ -206,11 +214,21 @@ def _take(
             raise UserError(f"{place}, but it drives the model; record it anew")
         notes.append(f"{place}; it is left out")
         return None
+    notes += [origin(table, signal.name, own, driving)] if own.how else []
     _tell(notes, table, clock, signal, faults, scale, driving)
-    values, usable = on_raster(raster, step, clock, rows, bad, driving)
+    smooth = None
+    if driving and own.how == "held":
+        values, usable = held_on_raster(raster, step, clock, rows, bad)
+        smooth, curved = on_raster(raster, step, clock, rows, bad, driving, curved=True)
+        usable &= curved
+    else:
+        values, usable = on_raster(raster, step, clock, rows, bad, driving)
+    shown = usable
+    if faults.any.any() and not driving:
+        shown = on_raster(raster, step, clock, filled(rows, ~faults.missing), faults.missing, driving)[1]
     if driving and usable.any():
         _check_range(table.path, signal, values[usable], notes)
-    return _Taken(rows, faults, scale, clock, values, usable)
+    return _Taken(rows, faults, scale, clock, values, usable, shown, own.how, smooth)
 
 
 def _parts(
@@ -229,13 +247,17 @@ def _parts(
             f"{path}: no sensor has {SHORTEST} sound samples beside those of the inputs; record at least so many",
             *notes,
         )
-    _tell_resampling(path, step, {id(t.clock): t.clock for t in taken.values()}, notes)
+    _tell_resampling(path, step, {id(t.clock): t.clock for t in taken.values() if not t.how}, notes)
     lost = raster.size - sum(b - a for a, b in parts)
     if lost:
         notes.append(
             f"{path}: {lost} of {raster.size} samples lie in or beside gaps of the inputs; parts: {len(parts)}"
         )
     u = np.column_stack([np.zeros((raster.size, 0)), *(taken[name].values for name in inputs)])
+    smooth = None
+    if any(taken[name].smooth is not None for name in inputs):
+        both = (taken[name] for name in inputs)
+        smooth = np.column_stack([t.values if t.smooth is None else t.smooth for t in both])
     rest = {name: _standstill(u, taken[name].values, sound & taken[name].usable, step) for name in sensors}
     still = np.logical_and.reduce(list(rest.values()))
     kept: noise.Kept = {}
@@ -249,8 +271,10 @@ def _parts(
             u[a:b],
             {name: taken[name].values[a:b] for name in sensors},
             {name: taken[name].usable[a:b] for name in sensors},
+            {name: taken[name].shown[a:b] for name in sensors},
             still[a:b],
             info,
+            None if smooth is None else smooth[a:b],
         )
         for k, (a, b) in enumerate(parts, start=1)
     ]
@@ -261,7 +285,7 @@ def _channel(name: str, taken: _Taken, law: noise.Noise | None) -> Channel:
     counts = [int(np.sum(flags)) for flags in (f.missing, f.saturated, f.held, f.spikes)]
     low, high = (None if edge is None else edge * scale for edge in (f.low, f.high))
     quantum = f.quantum * abs(scale)
-    return Channel(name, taken.clock.interval, taken.rows.size, *counts, low, high, quantum, f.constant, law)
+    return Channel(name, taken.clock.interval, taken.rows.size, *counts, low, high, quantum, f.constant, law, taken.how)
 
 
 def _noise(

@@ -174,10 +174,12 @@ def _runs(x: Array, quantum: float) -> tuple[Index, Index, Flags, Flags]:
 def _spikes(x: Array, grain: float) -> Flags:
     """Single samples far from the line between their neighbours, measured by how far others around them are."""
     found = np.zeros(x.size, dtype=bool)
-    off = np.zeros(x.size)
-    off[1:-1] = np.nan_to_num(x[1:-1] - 0.5 * (x[:-2] + x[2:]))
+    off = np.full(x.size, np.nan)  # beside what is lost, nothing is known
+    off[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
+    if np.all(np.isnan(off)):
+        return found
     size, sign = np.abs(off), np.sign(off)
     alone = np.minimum(-sign[1:-1] * off[:-2], -sign[1:-1] * off[2:]) > 0.25 * size[1:-1]  # 1/2 if it is one sample
-    peak = 1 + np.flatnonzero(alone & (size[1:-1] > max(4.0 * grain, SPIKE * np.median(size))))
+    peak = 1 + np.flatnonzero(alone & (size[1:-1] > max(4.0 * grain, SPIKE * np.nanmedian(size))))
     found[peak[size[peak] > SPIKE * 1.4826 * _median(off, _near(peak, peak, x.size))]] = True
     return found

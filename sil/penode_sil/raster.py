@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .errors import UserError
 from .recording import GAP, Kernel, Recording, more
+from .stamps import evened, sampled_evenly
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -45,6 +46,10 @@ def clock_of(table: Recording, notes: list[str]) -> Clock:
             raise UserError(f"{place}, and times repeat; split the recording where its clock starts anew")
         rows = rows[order]
         notes.append(f"{place}; rows are sorted by time")
+    if (even := evened(time[rows])) is not None:
+        notes.append(f"{table.path}: {even.note}")
+        time = time.copy()
+        time[rows] = even.time
     again = np.flatnonzero(np.diff(time[rows]) == 0.0)
     if again.size:
         notes.append(
@@ -62,19 +67,41 @@ def clock_of(table: Recording, notes: list[str]) -> Clock:
             f"{table.place(rows[gaps[0] + 1])}: channel time has a gap of {steps[gaps[0]]:.6g} s before that row "
             f"(rows are usually {interval:.6g} s apart){more(gaps.size)}; no sample there is used"
         )
-    cuts = np.flatnonzero(steps > (BRIDGE + GAP) * interval) + 1
+    return parted(rows, time[rows])
+
+
+def parted(rows: NDArray[np.int64], time: Array) -> Clock:
+    """The clock of rows at increasing times [s], parted at its gaps."""
+    interval = float(np.median(np.diff(time)))
+    cuts = np.flatnonzero(np.diff(time) > (BRIDGE + GAP) * interval) + 1
     bounds = [0, *cuts.tolist(), rows.size]
     parts = [(a, b) for a, b in zip(bounds, bounds[1:]) if b - a > 1]
-    lengths = [int(_ticks(time[rows][a:b], interval)[-1]) for a, b in parts]
+    lengths = [int(_ticks(time[a:b], interval)[-1]) for a, b in parts]
     if sum(lengths):
-        interval = sum(float(time[rows][b - 1] - time[rows][a]) for a, b in parts) / sum(lengths)
-    scatter = max((_line(time[rows][a:b], interval)[2] for a, b in parts), default=0.0)
-    if scatter > SCATTER:
-        notes.append(
-            f"{table.path}: time stamps are off a regular clock of {interval:.6g} s by up to {100.0 * scatter:.2g} % "
-            "of that; samples are joined by straight lines at their own times"
-        )
-    return Clock(rows, time[rows], interval, parts)
+        interval = sum(float(time[b - 1] - time[a]) for a, b in parts) / sum(lengths)
+    return Clock(rows, time, interval, parts)
+
+
+def scatter(clock: Clock) -> float:
+    """The largest distance of a stamp from a regular clock, in intervals."""
+    return max((_line(clock.time[a:b], clock.interval)[2] for a, b in clock.parts), default=0.0)
+
+
+def steadied(clock: Clock, place: str, columns: list[Array], notes: list[str]) -> Clock:
+    """The clock on its regular instants if its stamps scatter by little, or if the columns [rows of the clock] were sampled there."""
+    off = scatter(clock)
+    even = clock.time.copy()
+    for a, b in clock.parts:
+        start, interval, _ = _line(clock.time[a:b], clock.interval)
+        even[a:b] = start + _ticks(clock.time[a:b], clock.interval) * interval
+    if off <= SCATTER:
+        return Clock(clock.rows, even, clock.interval, clock.parts)
+    text = f"{place}: time stamps are off a regular clock of {clock.interval:.6g} s by up to {100.0 * off:.2g} % of that"
+    if off < 0.5 and sampled_evenly(clock.time, even, columns):
+        notes.append(f"{text}; samples were taken by that clock, as their values show")
+        return Clock(clock.rows, even, clock.interval, clock.parts)
+    notes.append(f"{text}; samples are joined by straight lines at their own times")
+    return clock
 
 
 def _ticks(time: Array, interval: float) -> NDArray[np.int64]:
@@ -93,11 +120,20 @@ def _line(time: Array, interval: float) -> tuple[float, float, float]:
     return float(start), float(slope), float(np.max(np.abs(start + ticks * slope - time)) / slope)
 
 
-def on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags, driving: bool) -> tuple[Array, Flags]:
+def held_on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags) -> tuple[Array, Flags]:
+    """The last sample of a channel that is held until the next one; up to BRIDGE bad samples are passed over."""
+    good = np.flatnonzero(~bad)
+    last = np.searchsorted(clock.time[good], raster + 1e-3 * step, side="right") - 1
+    last = good[np.maximum(last, 0)] if good.size else np.zeros(raster.size, dtype=np.int64)
+    age = raster - clock.time[last]
+    return si[last], (age > -1e-3 * step) & (age < (BRIDGE + GAP) * clock.interval)
+
+
+def on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags, driving: bool, curved: bool = False) -> tuple[Array, Flags]:
     """Rows of one channel on the raster, NaN outside of them; True where a sound row stands behind the sample.
 
     Of a channel that drives the model, up to BRIDGE bad rows in a row are bridged. Rows faster than the raster, or
-    beside it, are low-passed without phase.
+    beside it, are low-passed without phase. `curved`: slower rows are joined by a band-limited curve, not by straight lines.
     """
     bridge = BRIDGE if driving else 0
     values, usable = np.full(raster.size, np.nan), np.zeros(raster.size, dtype=bool)
@@ -129,12 +165,12 @@ def on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags, d
         even[unknown] = np.interp(np.flatnonzero(unknown), known, even[known])
         end = start + (even.size - 1) * interval
         inside = slice(*np.searchsorted(raster, (start - 1e-3 * step, end + 1e-3 * step)))
-        values[inside], usable[inside] = _move(raster[inside], step, start, interval, even, wrong, driving)
+        values[inside], usable[inside] = _move(raster[inside], step, start, interval, even, wrong, driving, curved or not driving)
     return values, usable
 
 
 def _move(
-    raster: Array, step: float, start: float, interval: float, even: Array, wrong: Flags, driving: bool
+    raster: Array, step: float, start: float, interval: float, even: Array, wrong: Flags, driving: bool, curved: bool
 ) -> tuple[Array, Flags]:
     """Evenly spaced samples to a raster within them."""
     place = (raster - start) / interval
@@ -144,7 +180,11 @@ def _move(
         usable = ~(wrong[before.clip(0, even.size - 1)] | wrong[after.clip(0, even.size - 1)])
         if not driving:  # one sample of the raster for each row
             usable &= np.abs(place - nearest) <= 0.5 * step / interval + 1e-9
-        return np.interp(place, np.arange(even.size), even), usable
+        between = np.abs(place[usable] - nearest[usable]) > 1e-2
+        values = np.interp(place, np.arange(even.size), even)
+        if curved and between.any():  # rows beside the raster: by all of what they show, not by chords
+            values[usable] = Kernel(raster[usable], start, interval, even.size, step).apply(even[:, None])[:, 0]
+        return values, usable
     if interval > 0.999 * step and np.all(np.abs(place - nearest) < 1e-2):
         return even[nearest], ~wrong[nearest]
     kernel = Kernel(raster, start, interval, even.size, step)

@@ -9,9 +9,10 @@ from types import SimpleNamespace as Simple
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import noise
+from penode_sil.diagnosis import dropouts
+from penode_sil.diagnosis.dropouts import bursts, repeats
 from penode_sil.diagnosis.engine import WILD, still_wild
-from penode_sil.diagnosis.noise import Experiment, bursts, repeats
+from penode_sil.diagnosis.noise import Experiment
 
 STEP, N = 2e-3, 10_000
 T = np.arange(N) * STEP
@@ -66,7 +67,7 @@ def test_what_a_filter_forgets_is_found_however_near(falls, quantum, found):
     if quantum:
         y[3001 : 3001 + falls, 0] = np.round(y[3001 : 3001 + falls, 0] / quantum) * quantum
     y[5000:5400:2, 1], y[5001:5400:2, 1] = 0.01, -0.01  # about nothing, from step to step
-    told = noise._decayed(y)
+    told = dropouts._decayed(y)
     assert told[3002 : 3000 + falls, 0].all() == found and told.any() == found
 
 

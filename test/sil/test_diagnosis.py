@@ -17,7 +17,7 @@ from scipy.signal import lfilter, lsim
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import build, echo, extension, hypotheses, naming, noise, plant, score, search, steady, study
+from penode_sil.diagnosis import build, dropouts, echo, extension, hypotheses, naming, noise, plant, score, search, steady, study
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.engine import experiment
 from penode_sil.diagnosis.fit import Problem, delayed, longest, railed
@@ -203,7 +203,7 @@ def test_bursts_are_of_samples_that_count():
     y = np.random.default_rng(1).standard_normal((n, 1))
     y[495:515] += 100.0
     e = noise.prepare("", STEP * np.arange(n), np.zeros((n, 1)), y, good, np.zeros(1), [None])
-    burst = noise.bursts([e], [np.zeros((n, 1))])[0]
+    burst = dropouts.bursts([e], [np.zeros((n, 1))])[0]
     assert burst[[496, 513], 0].all() and not burst[500:510].any()
 
 

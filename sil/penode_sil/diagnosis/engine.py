@@ -20,7 +20,8 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
-from . import absorb, echo, extension, nameless, naming, noise, plant, plausible, residual, search, steady
+from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady
+from .driven import experiment, settled
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
@@ -52,16 +53,6 @@ AGAIN = 3  # times that bursts are looked for in what is left without them
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 
 
-def experiment(m: Measured, model: Model) -> Experiment:
-    """A recording as the diagnosis sees it; sensors that it does not have count as not good."""
-    n, names = len(m.time), [s.name for s in model.sensors]
-    y = np.column_stack([m.z.get(k, np.zeros(n)) for k in names])
-    good = np.column_stack([m.mask.get(k, np.zeros(n, bool)) for k in names])
-    laws = [m.quality.channels[k].noise if k in m.quality.channels else None for k in names]
-    declared = np.array([i.noise for i in model.inputs])
-    return noise.prepare(m.title, m.time, m.u, np.where(good, y, 0.0), good, declared, laws)
-
-
 def diagnose(
     model: Model, train: Sequence[Measured], holdout: Sequence[Measured] = (), output: Path | None = None,
     set_name: str = "default", log: Callable[[str], None] = lambda text: None,
@@ -74,17 +65,17 @@ def diagnose(
     tell(0.0, "fitting the model as it is")
     both = told_of_rails([*train, *holdout])
     train, holdout = both[: len(train)], both[len(train) :]
-    experiments, unused = ([experiment(m, model) for m in ms] for ms in (train, holdout))
+    experiments, unused, remarks = settled(model, train, holdout, set_name)
     if problems := plausible.misfits(model, [*experiments, *unused], set_name):
         raise UserError(*problems)
     study, other = begin(model, experiments, set_name)
-    bursts = noise.bursts(study.experiments, study.null.simulated)
+    bursts = dropouts.bursts(study.experiments, study.null.simulated)
     more = bursts
     for _ in range(AGAIN):  # a fit that bursts have misled does not show all of them
         if not any(b.any() for b in more):
             break
         study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, more)], set_name)
-        more = noise.bursts(study.experiments, study.null.simulated)
+        more = dropouts.bursts(study.experiments, study.null.simulated)
         bursts = [b | m for b, m in zip(bursts, more)]
     faults = broken_sensors(model, train, study, study.null.simulated, bursts)
     tell(SEARCH[0], "looking for causes")
@@ -107,7 +98,7 @@ def diagnose(
         faults = [f for f in again if f.kind != "sensor_dropout" or f.where not in rails]
     tell(SEARCH[1], "weighing them against numerics")
     study = replace(study, seen=look(study, best.fit if best else study.null))
-    numbers, step = extension.numerics(study)
+    numbers, step = numerics.numerics(study)
     kinship, shared = noise.kinship(study.experiments, study.metrics, best.fit.simulated if best else study.null.simulated)
     log(f"kinship {kinship:.1f}, shared {shared:.0f}")
     tone = noise.tone(study.experiments, study.metrics, best.fit.simulated if best else study.null.simulated)
@@ -123,7 +114,7 @@ def diagnose(
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
-    notes = list(filter(None, [plant.placeless(study.places)]))
+    notes = [*remarks, *filter(None, [plant.placeless(study.places)])]
     if behind:
         notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
     if changed and verdict == "unexplained":
@@ -266,7 +257,7 @@ def broken_sensors(
             total += len(m.mask[sensor.name])
             quantum = max(quantum, channel.quantum)
             sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
-            flagged = ~m.mask[sensor.name][:n]
+            flagged = (m.shown[sensor.name] & ~m.mask[sensor.name])[:n]  # what the file itself calls lost is no fault of the sensor
             away = np.abs(m.z[sensor.name][:n] - simulated[k][:, j])
             off = away > 4.0 * sigma
             railing = np.zeros(n, bool)
@@ -281,15 +272,15 @@ def broken_sensors(
                     rails[name] = rail
                 else:  # a rail that the signal was not near
                     railed += np.count_nonzero(at)
-            bad, wrong = channel.held + channel.missing + channel.spikes, flagged & off & ~railing
+            bad, wrong = channel.held + channel.spikes, flagged & off & ~railing
             still = channel.held > max(FEW, STILL * n) and channel.quantum < 0.3 * sigma  # noise does not repeat itself
-            proven |= bad > 0 and bool(channel.missing or still or np.count_nonzero(wrong) > 0.2 * bad)
+            proven |= bad > 0 and bool(still or np.count_nonzero(wrong) > 0.2 * bad)
             far += int(np.count_nonzero(wrong & (away > FAR[1] * sigma))) if channel.quantum < 0.3 * sigma else 0
             lost += bad * len(m.mask[sensor.name]) / channel.rows  # of a file that may be parted, or slower
             burst = bursts[k][:n, j] if len(bursts) > k else np.zeros(n, bool)
             dropped += int(np.count_nonzero(burst))
             y = m.z[sensor.name][:n]
-            again = noise.repeats(y, simulated[k][:, j], ~flagged, channel.quantum, sigma) & ~burst
+            again = dropouts.repeats(y, simulated[k][:, j], m.mask[sensor.name][:n], channel.quantum, sigma) & ~burst
             more += int(np.count_nonzero(again))
             holes += int(np.count_nonzero(np.diff((wrong | burst | again).astype(np.int8), prepend=0) > 0))
             met = np.zeros(n, bool)

@@ -20,15 +20,15 @@ from penode_gen import units
 from penode_gen.laws import LAWS
 from penode_gen.model import INTERPOLATIONS, Model, Signal
 
-from ..batch import Batch
 from ..targets import Sil
+from . import stepped
 from .build import SPREAD, Term
+from .dropouts import bursts
 from .fit import BLUNT, Free, Problem, moving
 from .hypotheses import VALUED, Basis, Fault, size
-from .noise import Experiment, bursts, metric
-from .plant import anonymous
+from .noise import Experiment, metric
 from .residual import Channel, channels, noise_floor, noise_rms, rms
-from .result import Cause, Gain, Value
+from .result import Cause, Gain
 from .search import Explanation
 from .study import Study, watched, widened
 
@@ -183,18 +183,18 @@ def _joined(study: Study, text: str) -> tuple[str, Model]:
         return text, model
     start, exact = started(model, e, study)
     scale = np.sqrt(np.mean(study.levels[0], axis=0))
-    stepped = deployed(model, e, start, study.set_name)
+    joined = deployed(model, e, start, study.set_name)
     plain = text.replace('input = "linear"\n', "")
     for way in ways:
-        if np.max(np.sqrt(np.mean(((stepped - exact) / scale) ** 2, axis=0))) < ROUGH:
+        if np.max(np.sqrt(np.mean(((joined - exact) / scale) ** 2, axis=0))) < ROUGH:
             break
         better = plain.replace("sample_time =", f'input = "{way}"\nsample_time =', 1)
         curved = _load(better)
         finer = deployed(curved, e, start, study.set_name)
-        before, after = (rms(((z - e.y) * e.good / scale).ravel()) for z in (stepped, finer))
+        before, after = (rms(((z - e.y) * e.good / scale).ravel()) for z in (joined, finer))
         if after >= before:
             break
-        text, model, stepped = better, curved, finer
+        text, model, joined = better, curved, finer
     return text, model
 
 
@@ -308,10 +308,13 @@ def started(model: Model, e: Experiment, study: Study) -> tuple[Array, Array]:
 
 def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
     """Sensors [n, n_z] of the generated C (float) driven by the recorded inputs from a start state."""
-    instance = Sil(model).instance(set_name)
-    if len(start):
-        instance.set_state(start)
-    z = instance.run(e.u).z.astype(float)
+    def simulate(one: Model) -> Array:
+        instance = Sil(one).instance(set_name)
+        if len(start):
+            instance.set_state(start)
+        return instance.run(e.u).z.astype(float)
+
+    z = stepped.run(model, e, simulate)
     if moving(model):
         z[0] = 2.0 * z[1] - z[2]  # the step knows no rate of an input at its first sample
     return z
@@ -379,25 +382,3 @@ def followed(model: Model, e: Experiment, start: Array, study: Study) -> Array:
     problem = Problem(watched(model, study.places), [wide], study.metrics[:1], study.set_name, study.linear.fastest)
     free = tuple(Free(("start", 0, i), x, 1.0) for i, x in enumerate(start))
     return np.array(problem.simulate(0, free, np.zeros((1, len(free))))[0][0][:, -2 * len(study.places) :])
-
-
-COARSE = 0.02  # of a signal: what the deployed step may err by
-
-
-def numerics(study: Study) -> tuple[dict[str, object], Cause | None]:
-    """Error of the deployed step on the first training recording, against the exact solution of the same model with the same
-    start and input; and the cause `integration_error` if that is more than COARSE of a signal and more than its noise."""
-    model, e = study.model, study.experiments[0]
-    fixed = tuple(f for f in study.null.free if f.target[0] == "start")
-    start = np.array([next((f.value for f in fixed if f.target == ("start", 0, i)), x) for i, x in enumerate(model.start)])
-    problem = Problem(model, study.experiments[:1], study.metrics[:1], study.set_name, study.linear.fastest)
-    exact = problem.simulate(0, fixed, np.zeros((1, len(fixed))))[0][0]
-    stepped = Batch(anonymous(model)).run(e.drive, x0=start, set_name=study.set_name).z[0]
-    found: dict[str, object] = {}
-    parameters: dict[str, Value] = {}
-    for j, s in enumerate(model.sensors):
-        error, signal = float(np.sqrt(np.mean((stepped[:, j] - exact[:, j]) ** 2))), float(np.std(exact[:, j]))
-        found[s.name] = {"rms_error": error, "unit": units.si(s.unit), "share_of_signal": error / signal if signal else 0.0}
-        if error > COARSE * signal and error**2 > float(np.mean(study.levels[0][:, j])):
-            parameters[f"rms_error_{s.name}"] = Value(error, units.si(s.unit), (error, error))
-    return found, Cause("integration_error", model.name, parameters, 0.99) if parameters else None

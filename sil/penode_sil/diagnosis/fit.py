@@ -127,7 +127,7 @@ class Problem:
         self.model, self.experiments, self.metrics, self.set_name = model, experiments, metrics, set_name
         self.faults, self.fastest = faults, fastest
         self.moving = moving(model)
-        close = model.sample_time <= CLOSE
+        close = model.sample_time <= CLOSE and all(e.held is None for e in experiments)
         self.fine = 1 if close else 3 if self.moving else 2  # see _drive
         step = model.sample_time / self.fine
         least = max(longest(model), CLOSE if rough else 0.0)
@@ -157,7 +157,7 @@ class Problem:
 
     def _half(self, rough: bool = False) -> Problem | None:
         twice = 2.0 * self.model.sample_time
-        even = all(e.good.all() and len(e.time) % 2 == 0 for e in self.experiments)
+        even = all(e.good.all() and len(e.time) % 2 == 0 and e.held is None for e in self.experiments)
         if not even or twice > CLOSE * (1.0 + 1e-9):
             return None
         faults = [replace(f, series=tuple(x[::2] for x in f.series)) for f in self.faults]
@@ -435,7 +435,7 @@ def _drive(e: Experiment, fine: int) -> Array:
     else:
         parts[:, 2] = u[1:] - h * e.rate[1:] / 3.0
         parts[:, 1] = 3.0 * whole - 0.5 * (u[:-1] + u[1:]) - parts[:, 2]
-    return np.concatenate([parts.reshape(-1, u.shape[1]), u[-1:]])
+    return np.concatenate([e.stepped(parts).reshape(-1, u.shape[1]), u[-1:]])
 
 
 def drifted(signals: Array, drift: Array) -> Array:

@@ -61,10 +61,32 @@ class Experiment:
     unsure: Array
     quiet: Array  # variance per sample that a sensor's own record shows, [f, n_z]; NaN where it shows none
     left: float = 0.0  # [s] for which it goes on after the last sample here
+    held: NDArray[np.bool_] | None = None  # inputs [n_u] that move in steps; None: none of them
+    lead: float = 0.0  # of a sample, by which a step comes before the sample that shows it
 
     @property
     def step(self) -> float:
         return float(self.time[1] - self.time[0])
+
+    def stepped(self, parts: Array) -> Array:
+        """Samples [n - 1, fine, n_u] of the inputs from one to before the next, to be joined by straight lines; of those that move in
+        steps, such that the integral over each interval is that of the step."""
+        if self.held is not None:
+            own = self.drive[:, self.held]
+            parts[:, 1:, self.held] = own[:-1, None]
+            parts[:, -1, self.held] += (parts.shape[1] * self.lead - 0.5) * np.diff(own, axis=0)
+        return parts
+
+    def driven_at(self, s: Array, v: Array) -> Experiment:
+        """The same with deflections and rates [n, places] as further inputs, the first ones."""
+        held = None if self.held is None else np.concatenate([np.zeros(s.shape[1], dtype=bool), self.held])
+        return replace(self, held=held, drive=np.hstack([s, self.drive]), rate=np.hstack([v, self.rate]))
+
+    @cached_property
+    def duty(self) -> Array:
+        """Share of the samples that are good [n_z]; 1 for a sensor that has none."""
+        share = np.mean(self.good, axis=0)
+        return np.where(share > 0.0, share, 1.0)
 
     @property
     def frequencies(self) -> Array:
@@ -78,9 +100,11 @@ class Experiment:
 
 
 def prepare(
-    name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_], noise: Array, laws: Sequence[Noise | None]
-) -> Experiment:
-    """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors.
+    name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_], noise: Array, laws: Sequence[Noise | None],
+    slow: Sequence[float] = (), held: Array | None = None,
+) -> Experiment:  # fmt: skip
+    """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors; `slow` are the intervals
+    [s] of those whose samples are farther apart than these, `held` [n_u] those of inputs that keep their value in between, or 0.
 
     Where the noise exceeds the input's own spectrum, the measured input is damped to what is likely (Wiener), and the rest
     is unsure; but a bump, or where a sweep is at a time, is kept. The number of samples becomes one that Fourier transforms like.
@@ -94,8 +118,11 @@ def prepare(
     rest = u - trend
     spectra = fft.rfft(np.concatenate([rest, -rest[::-1]]), axis=0)  # turned round: no jump at the ends
     unsure = np.zeros((n // 2 + 1, u.shape[1]))
+    held = np.zeros(u.shape[1]) if held is None else held
     for k, sigma in enumerate(noise):
-        if sigma > 0.0:
+        if held[k] > 0.0:  # its steps are there; noise of a sample stays until the next
+            unsure[:, k] = sigma * np.sqrt(held[k] / step) * np.abs(np.sinc(fft.rfftfreq(n, step) * held[k]))
+        elif sigma > 0.0:
             power = _smoothed(np.abs(spectra[:, k]) ** 2 / (2 * n), f[1])
             floor = float(np.median(power[int(0.6 * len(f)) : int(0.95 * len(f))]))  # there is no road left
             sigma = min(1.25 * sigma, np.sqrt(floor))
@@ -109,8 +136,12 @@ def prepare(
     whole = fft.irfft(spectra, 2 * n, axis=0)[:n] + trend
     rate = CubicSpline(time, whole)(time, 1) if u.shape[1] else whole
     f = fft.rfftfreq(n, step)
-    quiet = np.stack([np.full(len(f), np.nan) if law is None else law.density(f, step) / (2.0 * step) for law in laws], axis=1)
-    return Experiment(name, time, u, y, good, whole, rate, unsure, quiet, last - float(time[-1]))
+    quiet = np.full((len(f), len(laws)), np.nan)
+    for j, law in enumerate(laws):
+        own = slow[j] if slow and slow[j] > 1.001 * step else step  # a law is of the samples at their own interval
+        if law is not None:
+            quiet[:, j] = law.density(f, own) / (2.0 * own)
+    return Experiment(name, time, u, y, good, whole, rate, unsure, quiet, last - float(time[-1]), held > 0.0 if held.any() else None)
 
 
 def _blows(taken: Array, sigma: float, f: Array, share: Array, power: Array, step: float) -> tuple[Array, Array]:
@@ -270,7 +301,9 @@ def sensor_levels(
     shapes, means = _slow(n, band, wide)
     found = np.empty((band, residual.shape[1]))
     for j, sigma in enumerate(declared):
-        road = np.sum(np.abs(through[:, j, :] * e.unsure) ** 2, axis=1)
+        duty = float(e.duty[j])  # of white noise so much power is left where the other samples are 0, of a slow signal the square
+        power[:, j] /= duty  # the level stays that of a sample: then chi2 counts each good one once
+        road = np.sum(np.abs(through[:, j, :] * e.unsure) ** 2, axis=1) * duty
         base = e.quiet[:, j]
         if not np.all(np.isfinite(base)):
             raw = float(np.mean(power[high, j]))
@@ -307,123 +340,13 @@ def _slow(n: int, band: int, wide: int) -> tuple[Array, Array]:
 
 def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Metric:
     """The metric of a recording: levels [f, sensors] and the transfer [f, sensors, inputs] of the inputs' noise."""
-    g = through[: e.band] * e.unsure[: e.band, None, :]
+    g = through[: e.band] * e.unsure[: e.band, None, :] * np.sqrt(e.duty)[None, :, None]
     s = g @ np.conj(np.swapaxes(g, 1, 2)) + levels[:, :, None] * np.eye(levels.shape[1])
     root = np.linalg.inv(np.linalg.cholesky(s)) * np.sqrt(2.0 / len(e.time))
     return Metric(len(e.time), root)
 
 
 ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
-CHANCE = 1e-3  # that a whole recording has one row of repeated samples as long
-EVEN = 1e-4  # of the square of a fall: falls that differ less are of the same share
-STEADY = 6  # falls in a row, of eight samples: of noise, fewer than one in a hundred is so even
-LESS = 0.5  # of the motion: a sensor that shows more of it is no silent one
-LAST = 8  # samples: so far the end of a spline is felt
-
-
-def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> list[NDArray[np.bool_]]:
-    """Samples [n, n_z] of short bursts that one sensor alone shows: against neighbours far beyond its usual roughness."""
-    found = []
-    for e, z in zip(experiments, simulated):
-        r = np.where(e.good, e.y - z, 0.0)
-        rough = np.abs(np.diff(r, 2, axis=0, prepend=r[:1], append=r[-1:]))
-        # at least a tenth of the samples of a coarse sensor steps by a quantum
-        usual = np.maximum(1.4826 * np.median(rough, axis=0), np.quantile(rough, 0.9, axis=0) / 1.645) + 1e-300
-        wild = rough > 14.0 * usual
-        wild[: max(20, int(0.1 / e.step))] = wild[-LAST:] = False  # where start states and rates of inputs are not well known
-        wide = np.stack([np.convolve(w, np.ones(9), "same") > 0 for w in wild.T], axis=1)
-        alone = wide & (np.sum(wide, axis=1, keepdims=True) == 1) if wide.shape[1] > 1 else wide
-        few = np.mean(wild & alone, axis=0) < 0.03
-        many = np.sum(wild & alone, axis=0) >= np.where(np.max(rough, axis=0) > 30.0 * usual, 2, 5)
-        often = np.mean(e.good, axis=0) > 0.5  # a sensor slower than the raster has no neighbours to be far beyond
-        found.append(((alone & few & many) | _sunken(e, z, r) | _frozen(e, z, r) | _decayed(e.y)) & often & e.good)
-        found[-1][0] |= (rough[0] > 14.0 * usual) & often & e.good[0]  # what begins just then may be in it or not
-    return found
-
-
-def _usual(e: Experiment, r: Array) -> Array:
-    """How far each sensor usually is from the model. At rest a coarse one shows its model's zero: in motion it is a quarter of a
-    quantum off, in the median."""
-    gaps = [np.diff(np.unique(y)) for y in e.y.T]
-    quanta = np.array([np.median(g) if g.size else 0.0 for g in gaps])
-    return 1.4826 * np.maximum(np.median(np.abs(r), axis=0), 0.25 * quanta) + 1e-300
-
-
-def _frozen(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
-    """Samples that repeat a value while the model moves by more than any coarse sensor would let pass."""
-    usual = _usual(e, r)
-    found = np.zeros(r.shape, dtype=bool)
-    for j in range(r.shape[1]):
-        same = np.concatenate([[0], (np.diff(e.y[:, j]) == 0.0).astype(np.int8), [0]])
-        edges = np.flatnonzero(np.diff(same))
-        for a, b in zip(edges[::2], edges[1::2]):
-            if b - a >= 4 and np.ptp(z[a : b + 1, j]) > 6.0 * usual[j] and e.good[a : b + 1, j].any():
-                found[a + 1 : b + 1, j] = True
-        if np.mean(found[:, j]) > 0.2:  # that is no sensor at all, or slower than the raster
-            found[:, j] = False
-    return found
-
-
-def repeats(y: Array, z: Array, good: NDArray[np.bool_], quantum: float, sigma: float) -> NDArray[np.bool_]:
-    """Good samples [n] of a sensor that repeat the one before in rows too long for its noise and quantum, while the model z
-    moves. Of zeros, which is what lost samples are mostly set to, the first one counts as well."""
-    same = np.diff(y) == 0.0
-    edges = np.flatnonzero(np.diff(same.astype(np.int8), prepend=0, append=0))
-    usual = max(quantum / (2.0 * np.sqrt(np.pi) * sigma), float(np.mean(same & good[1:])))  # chance of the same twice
-    found = np.zeros(len(y), dtype=bool)
-    for a, b in zip(edges[::2], edges[1::2] + 1):
-        if len(y) * usual ** (b - a - 1) < CHANCE and np.ptp(z[a:b]) > quantum:
-            found[a + (y[a] != 0.0) : b] = True
-    return found & good
-
-
-def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
-    """Samples of short stretches in which a sensor sinks towards zero while the model goes on."""
-    usual = _usual(e, r)
-    longest = int(0.5 / e.step)
-    found = np.zeros(r.shape, dtype=bool)
-    for j in range(r.shape[1]):
-        far = np.abs(r[:, j]) > 6.0 * usual[j]
-        wide = np.convolve(far, np.ones(9), "same") > 0
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], wide.astype(np.int8), [0]])))
-        empty = []
-        for a, b in zip(edges[::2], edges[1::2]):
-            inside = far[a:b]
-            y, model = e.y[a:b, j][inside], z[a:b, j][inside]
-            sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2) | (np.abs(y) < 0.05 * np.max(np.abs(model)))
-            less = y @ model < LESS * (model @ model)  # a model that is a little wrong is followed, though by less
-            fades = _discharges(y)  # from where it was, which may be of the other sign
-            deep = np.min(np.abs(y)) < 0.25 * np.max(np.abs(model))
-            if a > int(0.1 / e.step) and b - a < longest and (fades or less and np.mean(sinks) > 0.95) and deep and np.count_nonzero(inside) > 4:
-                found[a:b, j] = True
-                empty.append(fades)
-        if np.mean(found[:, j]) > (0.06 if np.mean(empty or [False]) > 0.5 else 0.02):  # that often, only what discharges
-            found[:, j] = False
-    return found
-
-
-def _discharges(y: Array) -> bool:
-    """Does a signal fall by the same share in each sample, as no motion does: what is left of a sensor without supply?"""
-    if len(y) < 12 or np.any(y == 0.0):
-        return False
-    falls = -np.diff(np.log(np.abs(y)))
-    usual = float(np.median(falls))
-    return usual > 0.0 and float(np.median(np.abs(falls - usual))) < 0.05 * usual
-
-
-def _decayed(y: Array) -> NDArray[np.bool_]:
-    """Samples [n, n_z] that fall to zero by the same share each, to four digits: a digital filter that has lost its input."""
-    found = np.zeros(y.shape, dtype=bool)
-    change = np.diff(y, axis=0)
-    even = np.abs(y[2:] * y[:-2] - y[1:-1] ** 2) < EVEN * change[1:] ** 2
-    less = (np.abs(y[1:]) < np.abs(y[:-1])) & (y[1:] * y[:-1] > 0.0)
-    falls = even & less[1:] & less[:-1]
-    for j in range(y.shape[1]):
-        edges = np.flatnonzero(np.diff(falls[:, j].astype(np.int8), prepend=0, append=0))
-        for a, b in zip(edges[::2], edges[1::2]):
-            if b - a >= STEADY:
-                found[a + 1 : b + 2, j] = True
-    return found
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surf
         motions.append((s, v))
         beside.append(change[:, h.shape[1] :])
         none = np.zeros((len(s), len(acting)))
-        rigs.append(replace(e, drive=np.hstack([s, e.drive]), rate=np.hstack([v, e.rate]), y=none, good=none > 0.0))
+        rigs.append(replace(e.driven_at(s, v), y=none, good=none > 0.0))
     known = tuple(f for f in study.null.free if isinstance(f.target, str))  # nominal is what the tolerance allows
     try:
         laws = [

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clocks import Samples, own_samples
 from ..errors import UserError
 from .files import pick
 from .table import Recording
@@ -24,34 +25,60 @@ def on_raster(tables: list[Recording], wanted: Mapping[str, str], sample_time: f
     UserError lists every gap, missing value or missing channel: this is for input that must be complete.
     """
     problems: list[str] = []
-    held: dict[int, tuple[Recording, list[str]]] = {}
+    notes: list[str] = []
+    found: dict[int, tuple[Recording, list[str]]] = {}
     for name, unit in wanted.items():
         try:
             table = pick(tables, name, unit)
-            table.channel(name, unit)
-            held.setdefault(id(table), (table, []))[1].append(name)
+            table.channel(name, unit, finite=False)
+            found.setdefault(id(table), (table, []))[1].append(name)
         except UserError as exc:
             problems += exc.problems
     clocks = {}
-    for key, (table, _) in held.items() or [(0, (tables[0], []))]:
+    for key, (table, _) in found.items() or [(0, (tables[0], []))]:
         try:
-            clocks[key] = table.time()
+            clocks[key] = table.time(notes)
         except UserError as exc:
             problems += exc.problems
+    samples = {}
+    for key, (table, names) in found.items():
+        for name in names:
+            values = table.channel(name, wanted[name], finite=False)
+            samples[name] = own_samples(clocks[key], values, driving=True) if key in clocks else None
+            if samples[name] is None or samples[name].how != "sparse":
+                try:
+                    table.channel(name, wanted[name])
+                except UserError as exc:
+                    problems += exc.problems
     if problems:
         raise UserError(*problems)
     first, last = max(t[0] for t in clocks.values()), min(t[-1] for t in clocks.values())
     if last <= first:
         raise UserError(f"{tables[0].path}: its channels share no time; record them together")
     columns: dict[str, Array] = {}
-    notes: list[str] = []
-    for key, (table, names) in held.items():
-        time = clocks[key]
-        values = np.column_stack([table.channel(name, wanted[name]) for name in names])
-        raster, values, note = resample(time, values, sample_time, first, last)
-        columns |= dict(zip(names, values.T))
-        notes += [note] if note else []
+    for key, (table, names) in found.items():
+        for name in names:
+            time, values, own = clocks[key], table.channel(name, wanted[name], finite=False), samples[name]
+            if own is None:
+                raster, column, note = resample(time, values[:, None], sample_time, first, last)
+            else:
+                raster, column, note = _of_samples(time, values, own, sample_time, first, last)
+                note = f"{name} {note}"
+            columns[name] = column[:, 0]
+            notes += [note] if note else []
     return raster, np.column_stack([columns[name] for name in wanted]), list(dict.fromkeys(notes))
+
+
+def _of_samples(time: Array, values: Array, own: Samples, sample_time: float, first: float, last: float) -> tuple[Array, Array, str]:
+    """A channel with a clock of its own on the raster: held where the table holds it, else its samples joined; values [n, 1]."""
+    clock = f"{1e3 * own.interval:.6g} ms, every {own.every:.4g} rows"
+    if own.how == "held":
+        raster = first + np.arange(int((last - first) / sample_time + 1e-3) + 1) * sample_time
+        at = np.searchsorted(time, raster + 1e-3 * sample_time, side="right") - 1
+        return raster, values[at.clip(0), None], f"repeats its last value between samples ({clock}): simulated as held"
+    whole = np.interp(time, own.time, own.values)  # beyond its samples, the first and the last one
+    raster, column, _ = resample(time, whole[:, None], sample_time, first, last)
+    return raster, column, f"has empty cells between samples ({clock}): joined by straight lines"
 
 
 def resample(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UserError, hint
+from ..stamps import evened
 from ..units import UnitError
 from . import named, unit_text
 
@@ -148,9 +149,14 @@ class Recording:
         with np.errstate(over="ignore"):
             return values if scale == 1.0 else values * scale
 
-    def time(self) -> Array:
-        """The times [s], checked: increasing, without gaps. UserError lists each kind of trouble once."""
+    def time(self, notes: list[str] | None = None) -> Array:
+        """The times [s], checked: increasing, without gaps; coarse stamps are spread evenly, which goes to the notes. UserError lists
+        each kind of trouble once."""
         time = self.channel("time", "s")
+        if np.all(np.diff(time) >= 0.0) and (even := evened(time)) is not None:
+            time = even.time
+            if notes is not None:
+                notes.append(even.note)
         if time.size < 2:
             raise UserError(f"{self.path}: it has {time.size} rows; at least 2 are needed")
         step = np.diff(time)
