@@ -12,7 +12,6 @@
 
 #define XCP_ANSWER    0xffU
 #define XCP_FAILURE   0xfeU
-#define XCP_EVENT     0xfdU
 #define XCP_CONNECT   0xffU
 #define XCP_FIRST     0xd0U /* of the commands in xcp_shape */
 #define XCP_CAL_FIRST 0xe4U
