@@ -70,6 +70,11 @@ const pen_real_t *pen_xcp_page(const pen_xcp_t *xcp);
 /** Write n bytes of the working page at the MTA, which is in it, and advance the MTA. */
 uint32_t pen_xcp_write(pen_xcp_t *xcp, const uint8_t byte[], uint32_t n);
 
+#define PEN_XCP_STAMP 0x10U /* mode of a DAQ list: time stamp */
+
+/** A command that changes DAQ lists, 0xd3 to 0xd6 and 0xe0 to 0xe3. @param number  of its list, below daq->lists; else 0 */
+uint32_t pen_xcp_list_command(pen_xcp_t *xcp, const uint8_t in[], uint32_t number);
+
 /** Drop the open set; the working page is that of the running set. */
 void pen_xcp_drop(pen_xcp_t *xcp);
 

@@ -72,7 +72,7 @@ void test_unknown_commands(void)
 
 void test_packets_that_are_too_short_or_too_long(void)
 {
-    static const uint8_t needs[48] = { 0, 0, 0, 6, 5, 4, 1, 4, 4, 1, 1, 1, 1, 2, 4, 4, 8, 8, 6, 4, 5, 3, 3, 4,
+    static const uint8_t needs[48] = { 0, 0, 0, 6, 5, 4, 1, 4, 0, 1, 1, 0, 1, 2, 4, 4, 8, 8, 6, 4, 5, 3, 3, 4,
                                        4, 1, 3, 4, 0, 0, 1, 2, 2, 0, 0, 8, 8, 2, 8, 2, 3, 2, 2, 1, 1, 1, 1, 2 };
     uint8_t in[17] = { 0U };
 
