@@ -143,9 +143,16 @@ static uint32_t xcp_execute(pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint
 /* What is wrong with a packet before its command is looked at. */
 static uint32_t xcp_refuse(const pen_xcp_t *xcp, uint8_t command, uint32_t n, uint32_t needs)
 {
-    const uint32_t resource = (command < XCP_CAL_FIRST) ? PEN_XCP_DAQ : ((command <= XCP_CAL_LAST) ? PEN_XCP_CAL : 0U);
+    uint32_t resource = 0U;
     uint32_t error = PEN_XCP_DONE;
 
+    if (command < XCP_CAL_FIRST) {
+        resource = PEN_XCP_DAQ;
+    } else if (command <= XCP_CAL_LAST) {
+        resource = PEN_XCP_CAL;
+    } else {
+        /* open to all */
+    }
     if ((n < needs) || (n > xcp->config->max_cto)) {
         error = PEN_XCP_SYNTAX;
     } else if ((xcp->locked & resource) != 0U) {

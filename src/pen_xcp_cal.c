@@ -200,17 +200,11 @@ static uint32_t xcp_set_page(pen_xcp_t *xcp, const uint8_t in[])
 
 static uint32_t xcp_get_page(const pen_xcp_t *xcp, uint32_t mode, uint8_t out[])
 {
-    uint32_t error = PEN_XCP_DONE;
-
     out[3] = xcp->page;
     if (mode == XCP_ECU) {
         out[3] = xcp_on_reference(xcp) ? XCP_REFERENCE : XCP_WORKING;
-    } else if (mode != XCP_TOOL) {
-        error = PEN_XCP_MODE_NOT_VALID;
-    } else {
-        /* that one */
     }
-    return error;
+    return ((mode == XCP_ECU) || (mode == XCP_TOOL)) ? PEN_XCP_DONE : PEN_XCP_MODE_NOT_VALID;
 }
 
 static uint32_t xcp_copy_page(pen_xcp_t *xcp, uint32_t from, uint32_t to)
@@ -265,7 +259,7 @@ static void xcp_processor_info(const pen_xcp_options_t *options, uint8_t out[])
 /* in[2] is the segment in all but COPY_CAL_PAGE, GET_PAG_PROCESSOR_INFO, and SET_CAL_PAGE for all segments. */
 uint32_t pen_xcp_page_command(pen_xcp_t *xcp, const uint8_t in[], uint8_t out[])
 {
-    uint32_t segment = in[2];
+    uint32_t segment = (in[0] != 0xe9U) ? in[2] : 0U; /* GET_PAG_PROCESSOR_INFO is one byte long */
     uint32_t error = PEN_XCP_DONE;
 
     switch (in[0]) {
@@ -277,10 +271,7 @@ uint32_t pen_xcp_page_command(pen_xcp_t *xcp, const uint8_t in[], uint8_t out[])
         break;
     case 0xe7U: error = xcp_page_info(in[3], out); break;
     case 0xe8U: error = xcp_segment_info(xcp, in, out); break;
-    case 0xe9U:
-        segment = 0U;
-        xcp_processor_info(xcp->config->options, out);
-        break;
+    case 0xe9U: xcp_processor_info(xcp->config->options, out); break;
     case 0xeaU: error = xcp_get_page(xcp, in[1], out); break;
     default:
         segment = (in[1] < XCP_ALL) ? segment : 0U;

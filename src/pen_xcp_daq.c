@@ -269,10 +269,9 @@ static uint32_t xcp_at_rest(pen_xcp_t *xcp, uint8_t command)
 uint32_t pen_xcp_daq_command(pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint8_t out[])
 {
     pen_xcp_daq_t *const daq = xcp->config->daq;
-    const uint32_t number = pen_xcp_get(&in[2], 2U); /* in most commands that of a list */
+    const uint32_t number = (n >= 4U) ? pen_xcp_get(&in[2], 2U) : 0U; /* in most commands that of a list */
     uint32_t error = xcp_at_rest(xcp, in[0]);
 
-    (void)n;
     if (error == PEN_XCP_DONE) {
         switch (in[0]) {
         case 0xd5U:

@@ -147,15 +147,15 @@ uint32_t pen_xcp_memory_command(pen_xcp_t *xcp, const uint8_t in[], uint8_t out[
     return error;
 }
 
-static uint32_t xcp_download(pen_xcp_t *xcp, const uint8_t byte[], uint32_t n, uint32_t now, uint32_t all)
+static uint32_t xcp_download(pen_xcp_t *xcp, const uint8_t byte[], uint32_t n, uint32_t now, uint32_t total)
 {
     uint32_t error;
 
-    if (all == 0U) {
+    if (total == 0U) {
         error = PEN_XCP_RANGE;
     } else if (n < now) {
         error = PEN_XCP_SYNTAX;
-    } else if (!pen_xcp_in_page(xcp, all)) {
+    } else if (!pen_xcp_in_page(xcp, total)) {
         error = PEN_XCP_ACCESS_DENIED;
     } else {
         error = pen_xcp_write(xcp, byte, now);
@@ -168,18 +168,18 @@ uint32_t pen_xcp_download_command(pen_xcp_t *xcp, const uint8_t in[], uint32_t n
     const bool max = (in[0] == 0xeeU);
     const uint32_t at = max ? 1U : 2U; /* where data begin */
     const uint32_t room = xcp->config->max_cto - at;
-    const uint32_t all = max ? room : in[1]; /* bytes of the block that are still to come */
-    const uint32_t now = (all < room) ? all : room;
+    const uint32_t total = max ? room : in[1]; /* bytes of the block that are still to come */
+    const uint32_t now = (total < room) ? total : room;
     uint32_t error = PEN_XCP_DONE;
 
-    if ((in[0] == 0xefU) && (all != xcp->block)) {
+    if ((in[0] == 0xefU) && (total != xcp->block)) {
         out[2] = xcp->block;
         xcp->block = 0U;
         error = PEN_XCP_SEQUENCE;
     } else {
-        xcp->block = (uint8_t)(all - now);
+        xcp->block = (uint8_t)(total - now);
         if (!xcp->refused) {
-            error = xcp_download(xcp, &in[at], n - at, now, all);
+            error = xcp_download(xcp, &in[at], n - at, now, total);
             xcp->refused = (error != PEN_XCP_DONE);
             if (!xcp->refused) {
                 xcp->torn = (xcp->block != 0U);

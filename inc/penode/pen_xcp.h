@@ -22,7 +22,8 @@
  * block is unfinished; refused: EV_USER, and NAME_status has the reason. Off (0) unless a tool expects it: a transfer
  * that pauses longer would come into force in parts. GET_CAL_PAGE(ECU) returns 1 while the reference runs,
  * else 0. Until a step has adopted a committed set, DOWNLOAD is answered by ERR_CMD_BUSY. All errors have 8 bytes: 0xfe,
- * code, the count expected (ERR_SEQUENCE), 0, and the pen_status_t (ERR_GENERIC), else 0.
+ * code, the count expected (ERR_SEQUENCE of a block), one that means nothing, and the pen_status_t of the tuning call that
+ * has refused (ERR_GENERIC, ERR_CMD_BUSY), else 0.
  *
  * Nothing but the open set can be written. Only the pages, the regions of the configuration and the texts of GET_ID can
  * be read; any other address is ERR_ACCESS_DENIED. The byte order is that of the core; CONNECT reports it.

@@ -112,9 +112,9 @@ uint32_t xcp_can_dlc(uint32_t length)
     return dlc;
 }
 
-uint32_t xcp_can_fill(uint32_t n, uint32_t max, bool full, uint8_t data[])
+uint32_t xcp_can_fill(uint32_t n, uint32_t max, bool padded, uint8_t data[])
 {
-    const uint32_t length = full ? max : xcp_can_length(xcp_can_dlc(n));
+    const uint32_t length = padded ? max : xcp_can_length(xcp_can_dlc(n));
 
     for (uint32_t i = n; i < length; i++) {
         data[i] = FILL;

@@ -47,8 +47,8 @@ uint32_t xcp_stream_take(xcp_stream_t *stream, uint8_t byte);
  */
 uint32_t xcp_stream_frame(xcp_stream_t *stream, uint32_t n, uint8_t message[]);
 
-/** Fill a packet for a CAN frame. @param full  fill to max: 8 or 64 @param data  [max] @return its length */
-uint32_t xcp_can_fill(uint32_t n, uint32_t max, bool full, uint8_t data[]);
+/** Fill a packet for a CAN frame. @param padded  fill to max: 8 or 64 @param data  [max] @return its length */
+uint32_t xcp_can_fill(uint32_t n, uint32_t max, bool padded, uint8_t data[]);
 
 /** DLC of a length that CAN FD has, and back. */
 uint32_t xcp_can_dlc(uint32_t length);

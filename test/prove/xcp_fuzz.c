@@ -1,0 +1,607 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+/*
+ * For libFuzzer: packets of all kinds to the XCP slave, steps, time and refusals between them. An oracle with pages of
+ * its own, plain arrays, predicts each answer of the calibration commands to the bit, the values and the id of the set that
+ * each step runs with, and that nothing else in memory has changed. Of the DAQ commands only form and bounds are checked.
+ */
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "penode/pen_xcp_daq.h"
+
+#define N       5U
+#define SIZE    20U
+#define LAYOUT  0x12345678U
+#define SEGMENT 0x8000U
+#define REGION  0x100U
+#define ROOM    8U
+#define FIRST   100U
+#define QUIET   50U
+#define SLOTS   6U
+
+static const pen_model_t model = { .layout = LAYOUT, .length = N };
+static pen_instance_t instance;
+static pen_real_t *bank[2]; /* of their own size: the sanitizer finds what is written beside them */
+static pen_real_t reference_value[N];
+static pen_set_t reference;
+static uint8_t memory[ROOM];
+static const uint8_t name_text[5] = { 'n', 'a', 'm', 'e', '!' };
+static const uint8_t step_text[4] = { 's', 't', 'e', 'p' };
+static uint8_t *name_memory, *region_memory;
+static pen_xcp_region_t region[1];
+static pen_xcp_region_t name;
+static pen_xcp_config_t config;
+static pen_xcp_t xcp;
+static pen_xcp_daq_t daq;
+static uint8_t *ring;
+static pen_status_t verdict;
+
+/* The oracle. */
+static struct {
+    bool connected, open, isref, pending, torn, refused;
+    uint8_t tool, ref[SIZE], latest[SIZE], work[SIZE], run[SIZE];
+    uint32_t mta, block, opened, id, latest_id, run_id, idle;
+    const uint8_t *text;
+    uint32_t left;
+} o;
+static uint8_t want[256];
+static uint32_t wanted;
+
+static const uint8_t *at;
+static size_t left;
+
+static uint8_t byte(void)
+{
+    const uint8_t b = (left > 0U) ? *at : 0U;
+
+    at += (left > 0U) ? 1U : 0U;
+    left -= (left > 0U) ? 1U : 0U;
+    return b;
+}
+
+static void expect(bool good, const char what[], uint32_t is, uint32_t should)
+{
+    if (!good) {
+        fprintf(stderr, "oracle: %s: %x, not %x\n", what, is, should);
+        abort();
+    }
+}
+
+static pen_status_t commit(void)
+{
+    pen_set_t ready;
+    const pen_status_t status = pen_tune_commit(&model, &instance, &ready);
+
+    return pen_tune_publish(&model, &instance, NULL, &ready, (status == PEN_OK) ? verdict : status);
+}
+
+static pen_status_t choose(const pen_set_t *set)
+{
+    pen_set_t ready;
+    const pen_status_t status = pen_tune_select(&model, &instance, set, &ready);
+
+    return pen_tune_publish(&model, &instance, NULL, &ready, status);
+}
+
+static void begin(uint32_t max_cto)
+{
+    for (uint32_t i = 0U; i < N; i++) {
+        reference_value[i] = (pen_real_t)(i + 1U);
+    }
+    bank[0] = malloc(sizeof(pen_real_t) * N);
+    bank[1] = malloc(sizeof(pen_real_t) * N);
+    ring = malloc(SLOTS * (max_cto + 1U));
+    name_memory = malloc(sizeof(name_text));
+    memcpy(name_memory, name_text, sizeof(name_text));
+    region_memory = malloc(ROOM);
+    for (uint32_t i = 0U; i < ROOM; i++) {
+        memory[i] = (uint8_t)(0xc0U + i);
+    }
+    memcpy(region_memory, memory, ROOM);
+    reference = (pen_set_t){ { LAYOUT, N, 1U, pen_set_checksum(reference_value, N) }, reference_value };
+    region[0] = (pen_xcp_region_t){ REGION, ROOM, region_memory };
+    name = (pen_xcp_region_t){ 0U, sizeof(name_text), name_memory };
+    config = (pen_xcp_config_t){ .instance = &instance, .layout = LAYOUT, .length = N, .reference = &reference, .commit = commit,
+        .select = choose, .address = SEGMENT, .id = FIRST, .quiet = QUIET, .max_cto = max_cto, .regions = 1U, .region = region,
+        .text = { NULL, &name }, .daq = &daq, .daq_command = pen_xcp_daq_command };
+    verdict = PEN_OK;
+    pen_xcp_daq_init(&daq, ring, SLOTS, max_cto, 1U, 6U);
+    expect(pen_ready(&model, &instance, NULL, pen_init(&model, &instance, &reference, bank[0], bank[1])) == PEN_OK, "init", 0U, 0U);
+    expect(pen_xcp_init(&xcp, &config) == PEN_OK, "slave", 0U, 0U);
+    memset(&o, 0, sizeof(o));
+    memcpy(o.ref, reference_value, SIZE);
+    memcpy(o.latest, o.ref, SIZE);
+    memcpy(o.work, o.ref, SIZE);
+    memcpy(o.run, o.ref, SIZE);
+    o.isref = true;
+    o.latest_id = 1U;
+    o.run_id = 1U;
+}
+
+/* -- what should be answered --------------------------------------------------------------------------------------------- */
+
+static uint32_t word(const uint8_t in[])
+{
+    uint32_t w;
+
+    memcpy(&w, in, 4U);
+    return w;
+}
+
+static void fail(uint32_t code)
+{
+    memset(want, 0, 8U);
+    want[0] = 0xfeU;
+    want[1] = (uint8_t)code;
+    wanted = 8U;
+}
+
+static void fail_with(pen_status_t status)
+{
+    fail(0x31U);
+    memcpy(&want[4], &status, 4U);
+}
+
+static void busy(void)
+{
+    const pen_status_t status = PEN_SET_BUSY;
+
+    fail(0x10U);
+    memcpy(&want[4], &status, 4U);
+}
+
+static uint32_t crc32(const uint8_t data[], uint32_t n)
+{
+    uint32_t crc = ~0U;
+
+    for (uint32_t i = 0U; i < n; i++) {
+        crc ^= data[i];
+        for (uint32_t k = 0U; k < 8U; k++) {
+            crc = ((crc & 1U) != 0U) ? ((crc >> 1U) ^ 0xedb88320U) : (crc >> 1U);
+        }
+    }
+    return ~crc;
+}
+
+/* The n bytes at the MTA, by 64-bit arithmetic. */
+static const uint8_t *readable(uint32_t n)
+{
+    const uint64_t end = (uint64_t)o.mta + n;
+
+    if (o.text != NULL) {
+        return (n <= o.left) ? o.text : NULL;
+    }
+    if ((o.mta >= SEGMENT) && (end <= (SEGMENT + SIZE))) {
+        return &((o.tool == 0U) ? o.work : o.ref)[o.mta - SEGMENT];
+    }
+    return ((o.mta >= REGION) && (end <= (REGION + ROOM))) ? &memory[o.mta - REGION] : NULL;
+}
+
+static void upload(uint32_t n)
+{
+    const uint8_t *const from = readable(n);
+
+    if ((n == 0U) || (n > (config.max_cto - 1U))) {
+        fail(0x22U);
+    } else if (from == NULL) {
+        fail(0x24U);
+    } else {
+        memcpy(&want[1], from, n);
+        wanted = n + 1U;
+        o.mta += n;
+        if (o.text != NULL) {
+            o.text += n;
+            o.left -= n;
+        }
+    }
+}
+
+static bool open_work(void)
+{
+    if (!o.open && o.pending) {
+        busy();
+        return false;
+    }
+    if (!o.open) {
+        o.open = true;
+        o.id = FIRST + o.opened;
+        o.opened++;
+    }
+    return true;
+}
+
+static bool try_commit(void)
+{
+    bool finite = true;
+
+    for (uint32_t i = 0U; i < N; i++) {
+        finite = finite && ((word(&o.work[4U * i]) & 0x7f800000U) != 0x7f800000U);
+    }
+    if (o.torn) {
+        fail(0x29U);
+    } else if (!finite) {
+        fail_with(PEN_SET_NONFINITE);
+    } else if (verdict != PEN_OK) {
+        fail_with(verdict);
+    } else {
+        memcpy(o.latest, o.work, SIZE);
+        o.latest_id = o.id;
+        o.isref = false;
+        o.open = false;
+        o.pending = true;
+        return true;
+    }
+    return false;
+}
+
+static void set_page(const uint8_t in[])
+{
+    if ((in[1] < 0x80U) && (in[2] != 0U)) {
+        fail(0x28U);
+    } else if ((in[1] & 3U) == 0U) {
+        fail(0x27U);
+    } else if (in[3] > 1U) {
+        fail(0x26U);
+    } else {
+        bool good = true;
+        if ((in[1] & 1U) != 0U) {
+            if (in[3] == 0U) {
+                good = (!o.isref || open_work()) && (!o.open || try_commit());
+            } else if (!o.isref) {
+                good = !o.pending;
+                if (good) {
+                    memcpy(o.latest, o.ref, SIZE);
+                    o.latest_id = 1U;
+                    o.isref = true;
+                    o.open = false;
+                    o.pending = true;
+                } else {
+                    busy();
+                }
+            }
+        }
+        if (good && ((in[1] & 2U) != 0U)) {
+            o.tool = in[3];
+        }
+    }
+}
+
+static void copy_page(const uint8_t in[])
+{
+    if ((in[1] != 0U) || (in[3] != 0U)) {
+        fail(0x28U);
+    } else if ((in[2] > 1U) || (in[4] > 1U)) {
+        fail(0x26U);
+    } else if (in[4] == 1U) {
+        fail(0x23U);
+    } else if (in[2] == 1U) {
+        o.open = false; /* a new set, with an id of its own */
+        o.torn = false;
+        o.idle = 0U;
+        if (open_work()) {
+            memcpy(o.work, o.ref, SIZE);
+        }
+    }
+}
+
+static void download(const uint8_t in[], uint32_t n, uint32_t head, uint32_t all)
+{
+    const uint32_t now = (all < (config.max_cto - head)) ? all : (config.max_cto - head);
+    const bool fits = (o.text == NULL) && (o.mta >= SEGMENT) && (((uint64_t)o.mta + all) <= (SEGMENT + SIZE));
+
+    o.block = all - now;
+    if (o.refused) {
+        wanted = 0U;
+        return;
+    }
+    o.refused = true;
+    if (all == 0U) {
+        fail(0x22U);
+    } else if (n < (head + now)) {
+        fail(0x21U);
+    } else if (!fits) {
+        fail(0x24U);
+    } else if (o.tool != 0U) {
+        fail(0x23U);
+    } else if (open_work()) {
+        memcpy(&o.work[o.mta - SEGMENT], &in[head], now);
+        o.mta += now;
+        o.idle = 0U;
+        o.torn = (o.block != 0U);
+        o.refused = false;
+        wanted = o.torn ? 0U : 1U;
+    }
+}
+
+static void session(bool connected)
+{
+    o.connected = connected;
+    o.open = false;
+    o.torn = false;
+    o.tool = 0U;
+    o.text = NULL;
+    o.mta = 0U;
+    o.block = 0U;
+    memcpy(o.work, o.latest, SIZE);
+}
+
+static void checksum(uint32_t n)
+{
+    const uint8_t *const from = readable(n);
+
+    if (n == 0U) {
+        fail(0x22U);
+    } else if ((from == NULL) || (o.text != NULL)) {
+        fail(0x24U);
+    } else {
+        const uint32_t crc = crc32(from, n);
+        want[1] = 9U;
+        memcpy(&want[4], &crc, 4U);
+        wanted = 8U;
+        o.mta += n;
+    }
+}
+
+static void get_id(uint32_t type)
+{
+    wanted = 8U;
+    if (type == 1U) {
+        want[4] = 5U;
+        o.text = name_text;
+        o.left = 5U;
+    }
+}
+
+static bool set_mta(const uint8_t in[])
+{
+    o.text = NULL;
+    o.mta = word(&in[4]);
+    if (in[3] != 0U) {
+        fail(0x24U);
+    }
+    return in[3] == 0U;
+}
+
+static uint32_t least(uint8_t command)
+{
+    static const uint8_t needs[32] = { [0xe4U - 0xe0U] = 5U, [7] = 4U, [8] = 4U, [9] = 1U, [10] = 3U, [11] = 4U, [14] = 1U, [15] = 2U,
+        [16] = 2U, [19] = 8U, [20] = 8U, [21] = 2U, [22] = 8U, [23] = 2U, [24] = 3U, [25] = 2U, [26] = 2U, [27] = 1U, [28] = 1U, [29] = 1U,
+        [30] = 1U, [31] = 2U, [5] = 3U, [6] = 3U };
+
+    return (command >= 0xe4U) ? needs[command - 0xe0U] : 0U;
+}
+
+/* False: not predicted. */
+static bool predict(const uint8_t in[], uint32_t n)
+{
+    memset(want, 0, sizeof(want));
+    want[0] = 0xffU;
+    wanted = 1U;
+    if ((n == 0U) || (in[0] < 0xc0U) || (!o.connected && (in[0] != 0xffU))) {
+        wanted = 0U;
+        return true;
+    }
+    if (in[0] != 0xefU) {
+        o.block = 0U;
+        o.refused = false;
+    }
+    if ((in[0] >= 0xd3U) && (in[0] <= 0xe3U)) {
+        return false;
+    }
+    if ((n < least(in[0])) || (n > config.max_cto)) {
+        fail(0x21U);
+        return true;
+    }
+    switch (in[0]) {
+    case 0xffU: session(true); return false; /* the answer is constant: a unit test */
+    case 0xfeU: session(false); break;
+    case 0xfdU:
+    case 0xfbU:
+    case 0xe7U:
+    case 0xe8U:
+    case 0xe9U: return false;
+    case 0xfcU: fail(0U); break;
+    case 0xfaU: get_id(in[1]); break;
+    case 0xf6U: (void)set_mta(in); break;
+    case 0xf5U: upload(in[1]); break;
+    case 0xf4U:
+        if (set_mta(in)) {
+            upload(in[1]);
+        }
+        break;
+    case 0xf3U: checksum(word(&in[4])); break;
+    case 0xf0U: download(in, n, 2U, in[1]); break;
+    case 0xeeU: download(in, n, 1U, config.max_cto - 1U); break;
+    case 0xefU:
+        if (in[1] != o.block) {
+            fail(0x29U);
+            want[2] = (uint8_t)o.block;
+            o.block = 0U;
+        } else {
+            download(in, n, 2U, in[1]);
+        }
+        break;
+    case 0xebU: set_page(in); break;
+    case 0xeaU:
+        want[3] = (in[1] == 1U) ? (o.isref ? 1U : 0U) : o.tool;
+        wanted = 4U;
+        if (in[2] != 0U) {
+            fail(0x28U);
+        } else if ((in[1] != 1U) && (in[1] != 2U)) {
+            fail(0x27U);
+        }
+        break;
+    case 0xe4U: copy_page(in); break;
+    default: fail(0x20U); break;
+    }
+    return true;
+}
+
+/* -- what is done ------------------------------------------------------------------------------------------------------- */
+
+static void send(const uint8_t packet[], uint32_t n)
+{
+    uint8_t *const in = malloc((n > 0U) ? n : 1U); /* of its own size: no byte behind it is read */
+    uint8_t *const out = malloc(config.max_cto);
+    const bool sure = predict(packet, n);
+    uint32_t answer;
+
+    memcpy(in, packet, n);
+    answer = pen_xcp_receive(&xcp, in, n, out);
+    if (getenv("SHOW") != NULL) {
+        fprintf(stderr, "%u:", n);
+        for (uint32_t i = 0U; i < n; i++) {
+            fprintf(stderr, " %02x", packet[i]);
+        }
+        fprintf(stderr, "  answer %u %02x %02x, wanted %u %02x %02x\n", answer, out[0], out[1], wanted, want[0], want[1]);
+    }
+    expect(!sure || (answer == wanted), "bytes of the answer", answer, wanted);
+    for (uint32_t i = 0U; sure && (i < answer); i++) {
+        const bool spare = (want[0] == 0xfeU) && ((i == 3U) || ((i == 2U) && (want[1] != 0x29U))); /* means nothing */
+        expect(spare || (out[i] == want[i]), "byte of the answer", out[i], want[i]);
+    }
+    expect((answer <= config.max_cto) && ((answer == 0U) || (out[0] >= 0xfeU)), "form", answer, 0U);
+    if (!sure && (packet[0] == 0xd7U) && (n >= 4U) && (n <= config.max_cto)) { /* GET_DAQ_EVENT_INFO */
+        o.text = step_text;
+        o.left = 4U;
+    }
+    free(in);
+    free(out);
+}
+
+static void step(void)
+{
+    uint32_t slot = 9U;
+    const pen_set_t *set;
+
+    (void)pen_tuning_adopt(&instance.tuning, &slot);
+    set = &instance.tuning.slot[slot];
+    if (o.pending) {
+        memcpy(o.run, o.latest, SIZE);
+        o.run_id = o.latest_id;
+        o.pending = false;
+    }
+    expect(set->head.id == o.run_id, "id in force", set->head.id, o.run_id);
+    expect(memcmp(set->value, o.run, SIZE) == 0, "values in force", 0U, 0U);
+    expect(memcmp(o.ref, reference_value, SIZE) == 0, "reference", 0U, 0U);
+    expect((memcmp(region_memory, memory, ROOM) == 0) && (memcmp(name_memory, name_text, 5U) == 0), "memory", 0U, 0U);
+    pen_xcp_sample(&xcp, slot);
+}
+
+static void drain(void)
+{
+    uint8_t *const out = malloc(config.max_cto);
+    uint32_t n = pen_xcp_daq_packet(&xcp, out);
+
+    expect(n <= config.max_cto, "DAQ packet", n, config.max_cto);
+    expect((n == 0U) || (out[0] < PEN_XCP_ODTS) || (out[0] == 0xfdU), "PID", out[0], 0U);
+    free(out);
+}
+
+static void elapse(uint32_t ms)
+{
+    uint8_t out[2];
+    uint32_t should = 0U;
+    uint32_t n;
+
+    if ((o.idle < QUIET) && o.open && !o.torn && !o.isref) {
+        o.idle = (ms >= (QUIET - o.idle)) ? QUIET : (o.idle + ms);
+        should = ((o.idle == QUIET) && !try_commit() && o.connected) ? 2U : 0U;
+    }
+    n = pen_xcp_elapse(&xcp, ms, out);
+    expect(n == should, "event", n, should);
+}
+
+/* A packet that is likely to mean something. */
+static void likely(void)
+{
+    static const uint8_t commands[] = { 0xffU, 0xfeU, 0xfaU, 0xf6U, 0xf6U, 0xf5U, 0xf4U, 0xf3U, 0xf0U, 0xf0U, 0xefU, 0xeeU, 0xebU, 0xebU,
+        0xeaU, 0xe4U, 0xe3U, 0xe2U, 0xe1U, 0xe0U, 0xdfU, 0xdeU, 0xddU, 0xd7U, 0xd6U, 0xd5U, 0xd4U, 0xd3U };
+    uint8_t in[256] = { commands[byte() % sizeof(commands)] };
+    const uint32_t n = config.max_cto;
+    uint32_t address = ((byte() % 4U) == 0U) ? (REGION + (byte() % 12U) - 2U) : (SEGMENT + (byte() % 28U) - 4U);
+
+    for (uint32_t i = 1U; i < n; i++) {
+        in[i] = byte();
+    }
+    switch (in[0]) {
+    case 0xf6U:
+    case 0xf4U:
+    case 0xe1U:
+        in[1] = (in[0] == 0xe1U) ? 0xffU : (in[1] % 18U);
+        in[2] %= 18U;
+        in[3] = 0U;
+        memcpy(&in[4], &address, 4U);
+        break;
+    case 0xf5U: in[1] %= 18U; break;
+    case 0xf3U:
+        address = in[4] % 22U;
+        memcpy(&in[4], &address, 4U);
+        break;
+    case 0xf0U: in[1] %= 22U; break;
+    case 0xefU: in[1] = ((in[1] % 8U) != 0U) ? (uint8_t)o.block : in[1]; break;
+    default:
+        for (uint32_t i = 1U; i < 8U; i++) {
+            in[i] %= 4U; /* modes, segments, pages, lists */
+        }
+        break;
+    }
+    if (in[0] == 0xebU) {
+        in[2] %= 2U;
+        in[3] %= 2U;
+    }
+    send(in, ((byte() % 16U) == 0U) ? (byte() % n) : n);
+}
+
+static void any(void)
+{
+    uint8_t in[40] = { 0U };
+    const uint32_t n = byte() % 20U;
+
+    for (uint32_t i = 0U; i < n; i++) {
+        in[i] = byte();
+    }
+    send(in, n);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static const uint8_t connect[2] = { 0xffU, 0U };
+
+    at = data;
+    left = size;
+    begin(((byte() % 2U) == 0U) ? 8U : 16U);
+    send(connect, 2U);
+    while (left > 0U) {
+        switch (byte() % 16U) {
+        case 0U:
+        case 1U:
+        case 2U: step(); break;
+        case 3U: elapse(byte()); break;
+        case 4U: drain(); break;
+        case 5U: any(); break;
+        case 6U: verdict = ((byte() % 4U) == 0U) ? PEN_SET_PROMISE : PEN_OK; break;
+        case 7U:
+            if ((byte() % 8U) == 0U) {
+                pen_xcp_disconnect(&xcp);
+                session(false);
+            }
+            break;
+        default: likely(); break;
+        }
+    }
+    step();
+    free(bank[0]);
+    free(bank[1]);
+    free(ring);
+    free(name_memory);
+    free(region_memory);
+    return 0;
+}
