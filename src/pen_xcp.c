@@ -66,7 +66,7 @@ static void xcp_connect(pen_xcp_t *xcp, uint8_t out[])
     out[1] = (uint8_t)((config->daq != NULL) ? (PEN_XCP_CAL | PEN_XCP_DAQ) : PEN_XCP_CAL);
     out[2] = (uint8_t)(0x80U | (pen_xcp_turn() & 1U)); /* GET_COMM_MODE_INFO is there; byte order */
     out[3] = (uint8_t)config->max_cto;
-    pen_xcp_put(&out[4], 2U, config->max_cto);
+    out[4U + (pen_xcp_turn() & 1U)] = out[3]; /* MAX_DTO, of two bytes */
     out[6] = 1U; /* protocol 1, transport 1 */
     out[7] = 1U;
 }
