@@ -241,6 +241,54 @@ static void any(void)
     send(in, n);
 }
 
+static void send8(uint8_t a, uint8_t b, uint8_t c, uint8_t d, uint32_t address)
+{
+    uint8_t in[8] = { a, b, c, d };
+
+    memcpy(&in[4], &address, 4U);
+    send(in, 8U);
+}
+
+/* An edit, the switch, the reference, and a look at the working page: chance alone seldom has this order. */
+static void pages(void)
+{
+    send8(0xf6U, 0U, 0U, 0U, SEGMENT + (byte() % SIZE));
+    send8(0xf0U, 1U, byte() % 64U, 0U, 0U);
+    send8(0xebU, 1U, 0U, 0U, 0U);
+    step();
+    send8(0xebU, 1U, 0U, byte() % 2U, 0U);
+    step();
+    send8(0xf6U, 0U, 0U, 0U, SEGMENT);
+    send8(0xf5U, 7U, 0U, 0U, 0U);
+}
+
+/* A list with one ODT, some of its entries written, some too large; started, sampled, changed while it runs or not. */
+static void list(void)
+{
+    const uint8_t entries = 1U + (byte() % 3U);
+
+    send8(0xd6U, 0U, 0U, 0U, 0U);
+    send8(0xd5U, 0U, 1U, 0U, 0U);
+    send8(0xd4U, 0U, 0U, 0U, 1U + (byte() % 3U));
+    send8(0xd3U, 0U, 0U, 0U, (uint32_t)entries << 8U);
+    send8(0xe2U, 0U, 0U, 0U, 0U);
+    for (uint32_t i = byte() % 5U; i > 0U; i--) {
+        send8(0xe1U, 0xffU, 1U + (byte() % ROOM), 0U, REGION);
+    }
+    send8(0xe0U, (uint8_t)(16U * (byte() % 2U)), 0U, 0U, 0x00010000U);
+    send8(0xdeU, 1U, 0U, 0U, 0U);
+    for (uint32_t i = byte() % 12U; i > 0U; i--) {
+        step();
+    }
+    if ((byte() % 2U) == 0U) {
+        drain();
+        expect((xcp.sampling == 0U) || (daq.lists == 1U), "lists", daq.lists, 1U);
+        send8(0xd3U, 0U, 0U, 0U, 0U);
+        send8(0xe3U, 0U, 0U, 0U, 0U);
+        step();
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -266,6 +314,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                 session(false);
             }
             break;
+        case 8U: pages(); break;
+        case 9U: list(); break;
         default: likely(); break;
         }
     }

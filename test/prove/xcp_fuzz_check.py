@@ -12,7 +12,7 @@ from pathlib import Path
 import gate
 
 WORK = gate.BUILD / "xcp_fuzz"
-FAULT_RUNS = 60_000  # the slowest of the faults below was found within 20 000
+FAULT_RUNS = 60_000
 
 # File, and fault: see gate.faulty.
 FAULTS = {
