@@ -165,7 +165,7 @@ static void step(void)
     pen_xcp_sample(&xcp, slot);
 }
 
-static void drain(void)
+static bool drain(void)
 {
     uint8_t *const out = malloc(config.max_cto);
     uint32_t n = pen_xcp_daq_packet(&xcp, out);
@@ -173,6 +173,7 @@ static void drain(void)
     expect(n <= config.max_cto, "DAQ packet", n, config.max_cto);
     expect((n == 0U) || (out[0] < PEN_XCP_ODTS) || (out[0] == 0xfdU), "PID", out[0], 0U);
     free(out);
+    return n > 0U;
 }
 
 static void elapse(uint32_t ms)
@@ -260,28 +261,44 @@ static void pages(void)
     step();
     send8(0xf6U, 0U, 0U, 0U, SEGMENT);
     send8(0xf5U, 7U, 0U, 0U, 0U);
+    if ((byte() % 4U) == 0U) {
+        send8(0xf6U, 0U, 0U, 0U, SEGMENT);
+        send8(0xf0U, 16U, 0U, 0U, 0U); /* the first packet of a block, or too short for one */
+        send8(0xebU, 1U, 0U, 0U, 0U);
+    }
 }
 
 /* A list with one ODT, some of its entries written, some too large; started, sampled, changed while it runs or not. */
 static void list(void)
 {
     const uint8_t entries = 1U + (byte() % 3U);
+    const uint32_t odts = 1U + (byte() % 3U);
+    const uint32_t steps = byte() % 12U;
+    const uint32_t room = (SLOTS - 1U) / odts; /* samples */
+    const uint32_t should = (steps > room) ? ((room * odts) + 1U) : (steps * odts); /* packets, and an event */
+    uint32_t packets = 0U;
 
     send8(0xd6U, 0U, 0U, 0U, 0U);
     send8(0xd5U, 0U, 1U, 0U, 0U);
-    send8(0xd4U, 0U, 0U, 0U, 1U + (byte() % 3U));
+    send8(0xd4U, 0U, 0U, 0U, odts);
     send8(0xd3U, 0U, 0U, 0U, (uint32_t)entries << 8U);
     send8(0xe2U, 0U, 0U, 0U, 0U);
     for (uint32_t i = byte() % 5U; i > 0U; i--) {
         send8(0xe1U, 0xffU, 1U + (byte() % ROOM), 0U, REGION);
     }
+    expect(!o.connected || (daq.at <= daq.entries), "entry", daq.at, daq.entries);
     send8(0xe0U, (uint8_t)(16U * (byte() % 2U)), 0U, 0U, 0x00010000U);
+    while (drain()) {
+    }
     send8(0xdeU, 1U, 0U, 0U, 0U);
-    for (uint32_t i = byte() % 12U; i > 0U; i--) {
+    for (uint32_t i = 0U; i < steps; i++) {
         step();
     }
+    while ((xcp.sampling != 0U) && drain()) {
+        packets++;
+    }
+    expect((xcp.sampling == 0U) || (packets == should), "packets", packets, should);
     if ((byte() % 2U) == 0U) {
-        drain();
         expect((xcp.sampling == 0U) || (daq.lists == 1U), "lists", daq.lists, 1U);
         send8(0xd3U, 0U, 0U, 0U, 0U);
         send8(0xe3U, 0U, 0U, 0U, 0U);
@@ -305,7 +322,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         case 1U:
         case 2U: step(); break;
         case 3U: elapse(byte()); break;
-        case 4U: drain(); break;
+        case 4U: (void)drain(); break;
         case 5U: any(); break;
         case 6U: verdict = ((byte() % 4U) == 0U) ? PEN_SET_PROMISE : PEN_OK; break;
         case 7U:
