@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "penode/pen_elementary.h"
 #include "penode/pen_math.h"
 
 #define EXPONENT UINT32_C(0x7f800000)
@@ -19,8 +20,9 @@ int main(void)
             const uint32_t bits = (sign << 31U) | EXPONENT | mantissa;
             float x;
             memcpy(&x, &bits, sizeof x);
-            const float y[] = { pen_exp(x), pen_tanh(x), pen_sigmoid(x), pen_softplus(x) };
-            for (size_t i = 0U; i < 4U; i++) {
+            const float y[] = { pen_exp(x), pen_tanh(x), pen_sigmoid(x), pen_softplus(x), pen_sin(x), pen_cos(x),
+                                pen_atan(x), pen_log(x), pen_sqrt(x) };
+            for (size_t i = 0U; i < (sizeof y / sizeof y[0]); i++) {
                 lost += (y[i] == y[i]) ? 1U : 0U; /* it must stay NaN */
             }
         }

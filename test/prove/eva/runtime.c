@@ -11,6 +11,7 @@
 
 #include "__fc_builtin.h"
 
+#include "penode/pen_elementary.h"
 #include "penode/pen_fold.h"
 #include "penode/pen_math.h"
 #include "penode/pen_net.h"
@@ -142,6 +143,28 @@ void elements(void)
     seen = (pen_real_t)pen_port_cycles();
 }
 
+#define BEYOND (3.4028235e38F * 2.0F) /* infinity */
+
+static void sines(pen_real_t x)
+{
+    seen = pen_sin(x);
+    seen = pen_cos(x);
+}
+
+/* Those that a program links only if a model calls them. Eva does not relate an argument to whether it is in range: one range
+ * after the other. 8192.001 is the float above 8192. */
+void elementary(void)
+{
+    sines((pen_real_t)Frama_C_float_interval(-8192.0F, 8192.0F));
+    sines((pen_real_t)Frama_C_float_interval(8192.001F, 3.4028235e38F));
+    sines((pen_real_t)Frama_C_float_interval(-3.4028235e38F, -8192.001F));
+    sines(BEYOND);
+    sines(-BEYOND);
+    seen = pen_atan(number());
+    seen = pen_log(number());
+    seen = pen_sqrt(number());
+}
+
 /* Also for the kernels of a size build. */
 void networks_of_16(void)
 {
@@ -238,6 +261,7 @@ void runtime(void)
 {
     all_layers();
     elements();
+    elementary();
     networks_of_16();
     systems();
     folding();
