@@ -65,7 +65,7 @@ def diagnose(
     tell(0.0, "fitting the model as it is")
     both = told_of_rails([*train, *holdout])
     train, holdout = both[: len(train)], both[len(train) :]
-    experiments, unused, told = settled(model, train, holdout, set_name)
+    experiments, unused, inputs = settled(model, train, holdout, set_name)
     if problems := plausible.misfits(model, [*experiments, *unused], set_name):
         raise UserError(*problems)
     study, other = begin(model, experiments, set_name)
@@ -114,7 +114,7 @@ def diagnose(
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
-    notes = [*told]
+    notes = [*inputs]
     if behind:
         notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
     if changed and verdict == "unexplained":
