@@ -51,6 +51,9 @@ campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings
 	    --command "PySINDy=build/rivals/bin/python test/diagnosis/rivals/sindy.py" \
 	    --command "neural=build/rivals/bin/python test/diagnosis/rivals/neural.py"
 
+hidden-mechanisms: setup ## Half-cars with pitch and two-mass drives with something hidden: places, missing forces, nulls; 20 cases of each, minutes
+	$(Q)$(PYTHON) test/diagnosis/mechanisms_campaign.py --cases 20
+
 dist: ## Packages for firmware, into build/dist: CMake, pkg-config, PlatformIO, Zephyr, CMSIS-Pack, one .c and one .h; no Python
 	$(Q)port/packages/dist.sh build/dist
 
@@ -60,7 +63,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test prove figures bench campaign campaign-diagnosis dist structure clean
+.PHONY: help setup run test prove figures bench campaign campaign-diagnosis hidden-mechanisms dist structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

@@ -181,7 +181,7 @@ cmock: build/setup/unity build/setup/cmock ## The order in which the library use
 STRIDE := 64 # 1: all 2^32 floats, five minutes
 ACCURACY := -std=c99 -O2 -ffp-contract=off -Iinc -Iport/gnu
 
-accuracy: accuracy-float accuracy-double accuracy-source ## Error of exp, tanh, sigmoid, softplus; STRIDE=1 takes all floats
+accuracy: accuracy-float accuracy-double accuracy-source accuracy-elementary ## Error of exp, tanh, sigmoid, softplus; STRIDE=1 takes all floats
 
 build/accuracy:
 	@mkdir -p $@
@@ -194,6 +194,7 @@ accuracy-double: | build/accuracy $(READY)
 	@test/check "accuracy double, dense sample" $(PYTHON) test/accuracy/double_error.py build/accuracy/double.so
 accuracy-source: | $(READY)
 	@test/check "accuracy coefficients are the derived ones" $(PYTHON) test/accuracy/coefficients.py --check src/pen_math.c
+include test/accuracy/elementary.mk
 
 # -- Python: generator, simulation, and this tally --------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ import numpy as np
 import sympy as sp
 
 from . import expressions as ex
+from . import functions
 
 
 def literal(value: float) -> str:
@@ -103,7 +104,7 @@ class Printer:
         sp.exp: "pen_exp", sp.tanh: "pen_tanh", ex.Sigmoid: "pen_sigmoid", ex.Softplus: "pen_softplus", ex.Absolute: "pen_port_abs",
         ex.Sign: "pen_sign", sp.Heaviside: "pen_heaviside", sp.Max: "pen_max", sp.Min: "pen_min",
         sp.Piecewise: "pen_where",
-    }  # fmt: skip
+    } | functions.CALLS  # fmt: skip
 
     def __init__(self, name: Callable[[sp.Symbol], str]):
         self._name = name

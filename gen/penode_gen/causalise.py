@@ -18,8 +18,8 @@ from sympy.core.relational import Relational
 
 from . import expressions as ex
 from . import units
-from .laws import LAWS
-from .model import GROUND, Body, Input, Model
+from .mechanics import Relation, aliases, balances, forces, kinematics, meanings
+from .model import Model
 
 Problem = tuple[tuple[str, ...], str, str]  # where (path of keys), what, remedy
 
@@ -93,26 +93,13 @@ class Causal:
         return {ex.symbol(b.position): ex.symbol(b.velocity) for b in self.model.bodies}
 
 
-@dataclass(frozen=True)
-class _Equation:
-    where: tuple[str, ...]
-    left: sp.Expr
-    right: sp.Expr
-    comment: str = ""
-
-    @property
-    def residual(self) -> sp.Expr:
-        return self.left - self.right
-
-
 def causalise(model: Model) -> Causal:
     """Order and solve the equations of a model. Raises CausaliseError."""
     problems: list[Problem] = []
     ports = {name: len(port.input_units) for name, port in model.networks.items()}
-    kinematic, unit_of = _kinematics(model)
-    unit_of |= {f"F_{e.name}": "N" for e in model.elements}
+    kinematic, unit_of = kinematics(model)
     names = set(unit_of)
-    moving = {*model.states, *(i.name for i in model.inputs)}
+    moving = {*model.states, *(i.name for i in model.inputs), *(p.name for p in model.points)}
 
     def parse(where: tuple[str, ...], text: str, extra: set[str] = frozenset()) -> sp.Expr:
         try:
@@ -121,47 +108,15 @@ def causalise(model: Model) -> Causal:
             problems.append((where, str(error), "mend the expression"))
             return sp.Integer(0)
 
-    equations = list(kinematic)
-    shared = _shared_ends(model)
-    for e in model.elements:
-        where = ("elements", e.name)
-        force = ex.symbol(f"F_{e.name}")
-        s, v = (ex.symbol(f"{k}_{shared[e.name]}") for k in "sv")
-        if e.law == "network":
-            kinds = {"deflection": s, "rate": v}
-            value = ex.network(e.network)(*(kinds.get(k, s) for k in e.network_inputs))
-            comment = f"force of {e.name}: network {e.network}"
-        else:
-            text = e.expression if e.law == "expression" else LAWS[e.law].force
-            own = LAWS[e.law].states if e.law in LAWS else {}
-            meant = {"s": s, "v": v} | {k: ex.symbol(p) for k, p in e.arguments.items()}
-            meant |= {k: ex.symbol(e.state(k)) for k in own}
-            value = parse(where, text, set(meant))
-            for name, state in own.items():
-                rate = parse(where, state.rate, set(meant)).xreplace({ex.symbol(k): to for k, to in meant.items()})
-                equations.append(_Equation(where, ex.derivative(e.state(name)), rate, f"{name} of {e.name}"))
-            if e.law == "expression":
-                for name in sorted({"s", "v"} & names & {a.name for a in value.free_symbols}):
-                    what = f"'{name}' is the {'deflection' if name == 's' else 'rate'} of this element, and a name of the model"
-                    problems.append((where, what, f"write {name}_{e.name} for the element's, or rename the other"))
-            value = value.xreplace({ex.symbol(k): to for k, to in meant.items()})
-            comment = f"force of {e.name}"
-        equations.append(_Equation(where, force, value, comment))
-    for b in model.bodies:
-        pull = sp.Add(*(_sign(e.ends, b.name) * ex.symbol(f"F_{e.name}") for e in model.elements))
-        equations.append(
-            _Equation(("bodies", b.name), ex.derivative(b.velocity), pull / ex.symbol(b.mass), f"acceleration of {b.name}")
-        )
+    equations = [*kinematic, *forces(model, parse, names, lambda *problem: problems.append(problem)), *balances(model)]
     for q in model.equations:
         left, right = (parse(("equations", q.name), side) for side in ex.sides(q.text))
-        equations.append(_Equation(("equations", q.name), left, right, q.name))
+        equations.append(Relation(("equations", q.name), left, right, q.name))
     signals = {
         section: [parse((section, s.name), s.expression) for s in getattr(model, section)] for section in ("outputs", "sensors")
     }
-    alias = {f"{k}_{e.name}": f"{k}_{shared[e.name]}" for e in model.elements for k in "sv"}
-    rename = {ex.symbol(a): ex.symbol(b) for a, b in alias.items() if a != b}
+    rename, meant = aliases(model), meanings(model)
     equations = [q for q in equations if q.left not in rename]
-    meant = rename | {ex.derivative(b.position): ex.symbol(b.velocity) for b in model.bodies}
     equations = [replace(q, left=q.left.xreplace(meant), right=q.right.xreplace(meant)) for q in equations]
     signals = {section: [s.xreplace(meant) for s in found] for section, found in signals.items()}
 
@@ -192,50 +147,11 @@ def check(model: Model) -> list[Problem]:
         return error.problems
 
 
-# -- mechanics --------------------------------------------------------------------------------------------------------
-
-
-def _sign(ends: tuple[str, str], body: str) -> int:
-    """Direction of a pulling force on a body: down on the first end, up on the second."""
-    return (ends[1] == body) - (ends[0] == body)
-
-
-def _shared_ends(model: Model) -> dict[str, str]:
-    """Element -> the first element between the same ends, whose deflection and rate it shares."""
-    first: dict[tuple[str, str], str] = {}
-    return {e.name: first.setdefault(e.ends, e.name) for e in model.elements}
-
-
-def _kinematics(model: Model) -> tuple[list[_Equation], dict[str, str]]:
-    """Deflection and rate of each element, and the unit of every name of the model."""
-    ends: dict[str, Body | Input] = {b.name: b for b in model.bodies} | {i.name: i for i in model.inputs}
-
-    def motion(end: str) -> tuple[sp.Expr, sp.Expr]:
-        thing = ends.get(end)
-        if isinstance(thing, Body):
-            return ex.symbol(thing.position), ex.symbol(thing.velocity)
-        if end == GROUND or thing is None:
-            return sp.Integer(0), sp.Integer(0)
-        return ex.symbol(end), ex.derivative(end)
-
-    found = []
-    unit_of = {p.name: p.unit for p in model.parameters.values()} | {i.name: i.unit for i in model.inputs}
-    unit_of |= {b.position: "m" for b in model.bodies} | {b.velocity: "m/s" for b in model.bodies}
-    unit_of |= {s.name: s.unit for s in model.extra_states} | {v.name: v.unit for v in model.variables}
-    for e in model.elements:
-        (z_a, v_a), (z_b, v_b) = map(motion, e.ends)
-        between = f"of {e.name}" if e.ends[1] == GROUND else f"between {e.ends[0]} and {e.ends[1]}"
-        found.append(_Equation(("elements", e.name), ex.symbol(f"s_{e.name}"), z_a - z_b, f"deflection {between}"))
-        found.append(_Equation(("elements", e.name), ex.symbol(f"v_{e.name}"), v_a - v_b, f"rate {between}"))
-        unit_of |= {f"s_{e.name}": "m", f"v_{e.name}": "m/s"}
-    return found, unit_of
-
-
 # -- checks -----------------------------------------------------------------------------------------------------------
 
 
 def _check_units(
-    model: Model, equations: list[_Equation], signals: dict[str, list[sp.Expr]], unit_of: dict[str, str]
+    model: Model, equations: list[Relation], signals: dict[str, list[sp.Expr]], unit_of: dict[str, str]
 ) -> Iterable[Problem]:
     per_second = units.dimension("1/s")
 
@@ -305,7 +221,7 @@ def _check_result(causal: Causal) -> None:
 # -- order and solution -----------------------------------------------------------------------------------------------
 
 
-def _solve(equations: list[_Equation], unknowns: list[sp.Symbol]) -> list[Step]:
+def _solve(equations: list[Relation], unknowns: list[sp.Symbol]) -> list[Step]:
     """Block lower triangular form, each block solved for its unknowns."""
     where = {u: i for i, u in enumerate(unknowns)}
     reads = [{where[s] for s in q.residual.free_symbols if s in where} for q in equations]
@@ -361,7 +277,7 @@ def _functions(expr: sp.Expr) -> set[sp.Expr]:
     return set() if expr.is_Symbol or expr.is_Number else {expr}
 
 
-def _match(equations: list[_Equation], unknowns: list[sp.Symbol], reads: list[set[int]]) -> dict[int, int]:
+def _match(equations: list[Relation], unknowns: list[sp.Symbol], reads: list[set[int]]) -> dict[int, int]:
     """One unknown for each equation (augmenting paths, an equation's own left side first)."""
     owner: dict[int, int] = {}
 

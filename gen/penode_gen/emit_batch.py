@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from . import expressions as ex
-from . import sets
+from . import functions, sets
 from .c_text import Printer, fold, real
 from .causalise import Causal, Step
 from .emit_c import _RUNGE_KUTTA, _TEMPLATES, VERSION, _Emitter
@@ -74,7 +74,7 @@ class _LaneEmitter(_Emitter):
             "outputs": self._lines(causal.outputs, "y"), "sensors": self._lines(causal.sensors, "z"),
             "n_x": len(model.states), "n_q": causal.n_mechanical, "n_u": len(model.inputs), "n_drive": len(self.drive),
             "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
-            "curved": self.curved, "cubic": self.cubic,
+            "curved": self.curved, "cubic": self.cubic, "elementary": functions.used(causal),
             "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor,
             "networks": [{"code": c, "value": self._value_lines(c), "slope": self._lane_slope_lines(c)} for c in self.networks],
             "folded": self.folded, "at": self.weights_at, "length": {user: sets.network_length(code.network) for user, code in self.folded},

@@ -13,9 +13,12 @@ from . import layout, promises, selftest, sets, units
 from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
 from .emit_networks import NetworkCode, by_value, hidden16, network_code, network_lines, second_lines, slope_lines
+from .functions import CALLS
 from .jacobian import Derivatives
+from .mechanics import state_unit
 from .model import Model
 from .networks import Dense
+from .placeholder import with_input
 from .write import write_all
 
 VERSION = "0.1.0"
@@ -70,8 +73,7 @@ def generate(model: Model, directory: str | Path, self_test: bool = True) -> lis
 
 class _Emitter:
     def __init__(self, model: Model, causal: Causal | None = None):
-        self.model = model
-        self.causal: Causal = causal or causalise(model)
+        self.model, self.causal = model, causal = with_input(model, causal or causalise(model))
         first = model.sets.get("default")
         straight = [n for n, net in (first.networks if first else {}).items() if net.is_piecewise_linear and model.outside != "fade"]
         self.derivatives = Derivatives(self.causal, frozenset(straight))
@@ -109,13 +111,14 @@ class _Emitter:
         return {
             "model": model, "name": model.name, "prefix": self.prefix, "version": VERSION, "abi": sets.ABI,
             "source": model.path.name, "digest": model.digest[:16], "method_name": _METHOD_NAMES[model.method],
-            "states": [{"name": s, "unit": self._unit(s), "start": literal(x)} for s, x in zip(model.states, model.start)],
+            "states": [{"name": s, "unit": state_unit(model, s), "start": literal(x)} for s, x in zip(model.states, model.start)],
             "n_x": len(model.states), "n_q": causal.n_mechanical, "n_u": len(model.inputs), "n_drive": len(self.drive),
             "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
             "curved": self.curved, "cubic": self.cubic, "kept": self.kept,
             "functions": functions, "constants": self._constants(), "networks": self.networks,
             "network_lines": {c.name: network_lines(model, c) for c in self.networks},
             "second_lines": {c.name: by_value(c, second_lines(model, c)) for c in self.networks if self._needs_second(c, functions)},
+            "elementary": self._mentions(functions, tuple(f"{call}(" for call in CALLS.values())),
             "called": {f"{c.name}{part}" for c in self.networks for part in ("", "_slope", "_or_pieces", "_or_pieces_slope") if self._mentions(functions, (f" {c.name}{part}(", f"){c.name}{part}("))},
             "slope_lines": {c.name: by_value(c, slope_lines(model, c)) for c in self.networks},
             "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),
@@ -141,12 +144,6 @@ class _Emitter:
     def _mentions(functions: dict[str, dict[str, Any] | None], names: tuple[str, ...]) -> bool:
         """Does any function's text call one of `names`?"""
         return any(name in line for f in functions.values() if f for line in f["lines"] for name in names)
-
-    def _unit(self, state: str) -> str:
-        for b in self.model.bodies:
-            if state in (b.position, b.velocity):
-                return "m" if state == b.position else "m/s"
-        return next(units.si(s.unit) for s in self.model.extra_states if s.name == state)
 
     # -- expressions and functions --------------------------------------------------------------------------------
 

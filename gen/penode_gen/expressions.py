@@ -11,6 +11,8 @@ from functools import cache, lru_cache
 
 import sympy as sp
 
+from . import functions
+
 _LARGEST = 3.4e38  # what a float holds, and the least it holds with all its digits
 _LEAST = 1.2e-38
 _LONGEST = 2000  # characters of an expression
@@ -113,7 +115,7 @@ FUNCTIONS = {
     "sign": (1, Sign),
     "min": (2, sp.Min),
     "max": (2, sp.Max),
-}
+} | {name: (1, function) for name, function in functions.FUNCTIONS.items()}
 _RELATIONS = {ast.Lt: sp.StrictLessThan, ast.LtE: sp.LessThan, ast.Gt: sp.StrictGreaterThan, ast.GtE: sp.GreaterThan}
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .elementary import Elementary
 from .sets import dense_rows
 
 Array = NDArray[Any]
@@ -52,11 +53,11 @@ _DOUBLE = {
 }  # fmt: skip
 
 
-class Kernels:
-    """pen_math, pen_net and pen_solve for one real type."""
+class Kernels(Elementary):
+    """pen_math, pen_elementary, pen_net and pen_solve for one real type."""
 
     def __init__(self, real: type):
-        self.real = real
+        super().__init__(real)
         table = _SINGLE if real is np.float32 else _DOUBLE
         self._c: dict[str, Any] = {k: [real(c) for c in v] if isinstance(v, list) else real(v) for k, v in table.items()}
         self._low_bits = table["low_bits"]

@@ -1,10 +1,12 @@
 """
 Named force laws of an element: force F over deflection s = z_a - z_b [m] and rate v = v_a - v_b [m/s], positive force
-pulls the two ends together. An extension found from data is one more element with one of these laws.
+pulls the two ends together. An extension found from data is one more element with one of these laws. Between ends that turn, s is an
+angle [rad], F a torque [N*m], and all units follow.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 
@@ -23,6 +25,19 @@ class Law:
     force: str
     arguments: dict[str, str]
     states: dict[str, LawState] = field(default_factory=dict)
+
+
+_TURNED = {"m": "rad", "N": "N*m", "kg": "kg*m^2"}
+
+
+def for_angles(unit: str) -> str:
+    """A unit of a law in m, N and kg, where it acts between ends that turn: N/m -> N*m/rad, kg -> kg*m^2."""
+
+    def turned(found: re.Match[str]) -> str:
+        new = _TURNED.get(found[1], found[1])
+        return f"({new}){found[2]}" if found[2] and "*" in new else new + found[2]
+
+    return re.sub(r"([A-Za-z]+)((?:\^[-0-9.]+)?)", turned, unit)
 
 
 LAWS: dict[str, Law] = {

@@ -26,7 +26,8 @@ class ModelError(Exception):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known), 0 if none is stated."""
+    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known): 0 if none is stated or it is known
+    exactly, infinite if it is unknown."""
 
     name: str
     value: float
@@ -50,18 +51,34 @@ class Input:
 
 @dataclass(frozen=True)
 class Body:
-    """A mass that moves along one axis; its two states are `position` [m] and `velocity` [m/s]."""
+    """A mass that moves along one axis; its two states are `position` [m] and `velocity` [m/s]. A `rotational` one turns about it: then
+    `mass` names its inertia [kg*m^2], and its states are an angle [rad] and its rate [rad/s]."""
 
     name: str
     mass: str
     position: str
     velocity: str
     start: tuple[float, float] = (0.0, 0.0)
+    rotational: bool = False
+
+    @property
+    def unit(self) -> str:
+        """Of its position."""
+        return "rad" if self.rotational else "m"
+
+
+@dataclass(frozen=True)
+class Point:
+    """A linear combination of positions, inputs and earlier points, with parameters as coefficients; elements may act on it."""
+
+    name: str
+    text: str
+    unit: str = "m"
 
 
 @dataclass(frozen=True)
 class Element:
-    """A force between two ends (bodies, position inputs or ground): deflection s = z_a - z_b, positive force pulls."""
+    """A force between two ends (bodies, points, position inputs or ground): deflection s = z_a - z_b, positive force pulls."""
 
     name: str
     ends: tuple[str, str]
@@ -188,6 +205,7 @@ class Model:
     digest: str
     guard: Guard = Guard()
     set_owner: str = ""  # the model whose sets these are, if it is another
+    points: tuple[Point, ...] = ()
 
     @property
     def owner(self) -> str:

@@ -12,7 +12,7 @@ from .causalise import Causal, causalise
 from .model import Model
 
 _NUMPY = [
-    {"Softplus": lambda x: np.logaddexp(0.0, x), "Sigmoid": lambda x: 1.0 / (1.0 + np.exp(-x)), "Sign": np.sign, "Absolute": np.abs},
+    {"Root": np.sqrt, "Logarithm": np.log, "Softplus": lambda x: np.logaddexp(0.0, x), "Sigmoid": lambda x: 1.0 / (1.0 + np.exp(-x)), "Sign": np.sign, "Absolute": np.abs},
     "numpy",
 ]
 

@@ -90,5 +90,11 @@ def parse(path: Path, called: str = "") -> tuple[dict[str, Any], bytes, Lines]:
 
 
 def merge(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
-    """`own` over `base`, section by section."""
-    return base | {k: base[k] | v if isinstance(v, dict) and isinstance(base.get(k), dict) else v for k, v in own.items()}
+    """`own` over `base`, section by section; of bodies and states key by key, so that a start state can be given alone."""
+    merged = base | {k: base[k] | v if isinstance(v, dict) and isinstance(base.get(k), dict) else v for k, v in own.items()}
+    for section in ("bodies", "states"):
+        both = [t.get(section) for t in (base, own)]
+        if all(isinstance(entries, dict) for entries in both):
+            changed = {k: both[0][k] | v for k, v in both[1].items() if isinstance(v, dict) and isinstance(both[0].get(k), dict)}
+            merged[section] = merged[section] | changed
+    return merged

@@ -33,9 +33,10 @@ MACROS = (  # that each generated model defines, behind its name
 _COMMENT = re.compile(r"(?:(?!\*/|/\*)[^\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\\]){0,200}")
 
 SECTIONS: dict[str, dict[str, type | tuple[type, ...]]] = {
-    "parameters": {"value": (int, float), "unit": str, "tolerance": (int, float), "tunable": bool, "description": str},
+    "parameters": {"value": (int, float), "unit": str, "tolerance": (int, float, str), "exact": bool, "tunable": bool, "description": str},
     "inputs": {"unit": str, "min": (int, float), "max": (int, float), "noise": (int, float), "description": str},
-    "bodies": {"mass": str, "position": str, "velocity": str, "start_position": str, "start_velocity": str},
+    "bodies": {"mass": str, "inertia": str, "position": str, "velocity": str, "start_position": str, "start_velocity": str},
+    "actuators": {"input": str, "law": str, "gain": str, "time": str, "start": str, "description": str},
     "states": {"unit": str, "start": (int, float), "description": str},
     "variables": {"unit": str},
     "networks": {"inputs": list, "output": str, "description": str} | promises.KEYS,
@@ -45,13 +46,21 @@ SECTIONS: dict[str, dict[str, type | tuple[type, ...]]] = {
 REQUIRED = {
     "parameters": ("value", "unit"),
     "inputs": ("unit",),
-    "bodies": ("mass", "position", "velocity"),
+    "bodies": (),
+    "actuators": ("input", "law"),
     "states": ("unit",),
     "variables": ("unit",),
     "networks": ("inputs", "output"),
     "outputs": ("value", "unit"),
     "sensors": ("value", "unit"),
 }
+
+
+def _base(tables: dict[str, Any]) -> str:
+    """What a file says that it extends; empty if nothing."""
+    head = tables.get("model")
+    found = head.get("extends") if isinstance(head, dict) else None
+    return found if isinstance(found, str) else ""
 
 
 class Tables:
@@ -64,18 +73,20 @@ class Tables:
         self.digest = hashlib.sha256(raw)
         self.places = [(path, lines)]
         self.set_owner = ""  # the model that this one shares its sets with
-        head = self.data.get("model")
-        if isinstance(head, dict) and isinstance(head.get("extends"), str):
-            base = path.parent / head["extends"]
-            place = f"{path}:{lines.of(('model', 'extends'))}: model.extends"
-            tables, raw, lines = parse(base, place)
-            if isinstance(tables.get("model"), dict) and "extends" in tables["model"]:
-                raise m.ModelError([one_line(f"{place}: {base} itself extends a file; extend that one")])
-            if not {"parameters", "networks", "sets"} & set(self.data) and isinstance(tables.get("model"), dict):
-                self.set_owner = str(tables["model"].get("name", ""))
-            self.data = merge(tables, self.data)
+        own, shares = self.data, True
+        while base := _base(own):
+            before = self.places[-1][0]
+            place = f"{before}:{lines.of(('model', 'extends'))}: model.extends"
+            if len(self.places) > 2:
+                raise m.ModelError([one_line(f"{place}: this would be the third file that extends another; extend {base} by at most two in a row")])
+            base_path = before.parent / base
+            shares = shares and not {"parameters", "networks", "sets"} & set(own)
+            own, raw, lines = parse(base_path, place)
+            if shares and isinstance(own.get("model"), dict):
+                self.set_owner = str(own["model"].get("name", self.set_owner))
+            self.data = merge(own, self.data)
             self.digest.update(raw)
-            self.places.append((base, lines))
+            self.places.append((base_path, lines))
 
     def place(self, where: tuple[str, ...]) -> tuple[Path, Lines]:
         """The file that says something about this key."""
@@ -195,4 +206,6 @@ def _type_name(kind: Any) -> str:
     names = {str: "a text", bool: "true or false", list: "a list", dict: "a table", int: "a whole number"}
     if kind in ((int, float), (bool, str)):
         return "a number" if kind == (int, float) else "true, false or a text"
+    if kind == (int, float, str):
+        return "a number or \"unknown\""
     return names.get(kind, "a text or a table")

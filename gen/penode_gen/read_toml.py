@@ -16,7 +16,8 @@ from . import promises
 from .causalise import check
 from .fold import room
 from .laws import LAWS
-from .read_networks import ROOM, UNKNOWN, NetworkTables
+from .read_ends import EndTables
+from .read_networks import ROOM, UNKNOWN
 from .read_places import one_line, show
 from .read_tables import C_PATTERN, MACROS, NAME, SECTIONS, same
 
@@ -39,21 +40,22 @@ class _All(frozenset):
         return True
 
 
-class _Reader(NetworkTables):
+class _Reader(EndTables):
     """Reads the whole model."""
 
     def __init__(self, path: Path):
         super().__init__(path)
-        self.made: dict[str, tuple[str, ...]] = {}  # parameters made from quantities, and where
+        self.made, self.kinds = {}, {}
 
     def read(self) -> m.Model:
         if not self.data:
             raise m.ModelError([one_line(f"{self.path}:1: says nothing; write a model with [model], [inputs] and [outputs]")])
         if not self.path.name.isprintable():
             self.problem((), "the file has a name that cannot stand in a comment", "rename it")
+        known = [*SECTIONS, "model", "points", "elements", "equations", "sets"]
         for key in self.data:
-            if key not in (*SECTIONS, "model", "elements", "equations", "sets"):
-                near = difflib.get_close_matches(key, [*SECTIONS, "model", "elements", "equations", "sets"], 1)
+            if key not in known:
+                near = difflib.get_close_matches(key, known, 1)
                 self.problem((key,), "unknown section", f"did you mean [{near[0]}]?" if near else "remove it")
         head, sample_time = self.head()
         name = head.get("name", "model")
@@ -61,22 +63,23 @@ class _Reader(NetworkTables):
         inputs = tuple(self.inputs())
         bodies = tuple(self.bodies(parameters))
         networks = dict(self.networks())
-        elements = tuple(self.elements(parameters, inputs, bodies, networks))
-        states = (*self.states(), *_law_states(elements))
+        gains, lags, lagging = self.actuators(inputs, parameters)
+        points = (*gains, *self.points(bodies, inputs, lags, gains, parameters))
+        elements = tuple(self.elements(parameters, inputs, networks))
+        states = (*self.states(), *lags, *self.law_states(elements))
         variables = tuple(self.variables())
-        equations = tuple(self.equations())
+        equations = (*self.equations(), *lagging)
         outputs = tuple(self.signals("outputs"))
         sensors = tuple(self.signals("sensors"))
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
         self.folds(head, sets)
         promises.check(networks, sets, head["outside"], self.problem)
-        self.unique(parameters, inputs, bodies, elements, states, variables, networks)
+        self.unique(parameters, inputs, bodies, points, elements, states, variables, networks)
         moving = {*(s.name for s in states), *(b.position for b in bodies), *(b.velocity for b in bodies)}
         self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs))
         self.macros(parameters, networks, name)
-        for section, entries in (("inputs", inputs), ("outputs", outputs)):
-            if not entries and not self.data.get(section):
-                self.problem((section,), f"the model has no {section}", f"add [{section}]: the C needs at least one")
+        if not outputs and not self.data.get("outputs"):
+            self.problem(("outputs",), "the model has no outputs", "add [outputs]: the C needs at least one")
         if self.problems:
             self.expressions(elements, equations, (*outputs, *sensors), networks, len(outputs))
             raise m.ModelError(self.problems)
@@ -85,7 +88,7 @@ class _Reader(NetworkTables):
             substeps=head["substeps"], interpolation=head["input"], outside=head["outside"], fade_width=float(head["fade_width"]),
             pieces=room(head["pieces"]), more_pieces=head["more_pieces"], parameters=parameters, inputs=inputs, bodies=bodies, elements=elements, extra_states=states, variables=variables,
             equations=equations, networks=networks, outputs=outputs, sensors=sensors, sets=sets, path=self.path,
-            digest=self.digest.hexdigest(), guard=m.Guard(head["out_of_range"], head["on_damage"], head["trial"]), set_owner=self.set_owner,
+            digest=self.digest.hexdigest(), guard=m.Guard(head["out_of_range"], head["on_damage"], head["trial"]), set_owner=self.set_owner, points=points,
         )  # fmt: skip
 
     def head(self) -> tuple[dict[str, Any], float]:
@@ -121,11 +124,25 @@ class _Reader(NetworkTables):
         for name, entry in self.section("parameters").items():
             where = ("parameters", name)
             value = self.number((*where, "value"), entry["value"], self.unit(where, entry.get("unit"))) if "value" in entry else math.nan
-            tolerance = self.number((*where, "tolerance"), entry.get("tolerance", 0.0))
-            if tolerance < 0.0 or tolerance >= 1.0:
-                self.problem(where, f"tolerance {tolerance} is not a share", "give 0 to 1, such as 0.05 for 5 %")
+            tolerance = self.tolerance(where, entry)
             tunable = entry.get("tunable", "tunable" in self.stated("parameters", name))  # of a wrong type: meant to be
             found[name] = m.Parameter(name, value, entry.get("unit", UNKNOWN), tolerance, tunable, entry.get("description", ""))
+        return found
+
+    def tolerance(self, where: tuple[str, ...], entry: dict[str, Any]) -> float:
+        """How well a parameter is known: a share of it, infinite if it is unknown."""
+        given = entry.get("tolerance", 0.0)
+        if given == "unknown":
+            found = math.inf
+        elif isinstance(given, str):
+            self.problem((*where, "tolerance"), f"{show(given)} is no tolerance", 'give a share, such as 0.05 for 5 %, or "unknown"')
+            return 0.0
+        else:
+            found = self.number((*where, "tolerance"), given)
+        if found < 0.0:
+            self.problem((*where, "tolerance"), f"tolerance {found:g} is below zero", 'give a share, such as 0.05 for 5 %, or "unknown"')
+        if entry.get("exact") and found != 0.0:
+            self.problem(where, f"is exact and has a tolerance of {show(given)}", "remove one of them")
         return found
 
     def inputs(self) -> Iterable[m.Input]:
@@ -144,21 +161,6 @@ class _Reader(NetworkTables):
             self.problem((*where, "noise"), f"{entry['noise']} is below zero", "give a standard deviation")
         return noise
 
-    def bodies(self, parameters: dict[str, m.Parameter]) -> Iterable[m.Body]:
-        for name, entry in self.section("bodies").items():
-            where = ("bodies", name)
-            mass = self.argument(where, "mass", entry["mass"], "kg", f"m_{name}", parameters) if "mass" in entry else ""
-            if mass in parameters and parameters[mass].value <= 0.0:
-                self.problem(where, f"mass '{entry['mass']}' is not above zero", "give a positive mass; write a massless point as plain equations")
-            for key in ("position", "velocity"):
-                if key in entry:
-                    self.name((*where, key), entry[key])
-            start = tuple(
-                self.quantity((*where, key), entry[key], unit) if key in entry else 0.0
-                for key, unit in (("start_position", "m"), ("start_velocity", "m/s"))
-            )
-            yield m.Body(name, mass, entry.get("position", ""), entry.get("velocity", ""), start)
-
     def states(self) -> Iterable[m.State]:
         for name, entry in self.section("states").items():
             scale = self.unit(("states", name), entry.get("unit"))
@@ -170,28 +172,9 @@ class _Reader(NetworkTables):
             self.unit(("variables", name), entry.get("unit"))
             yield m.Variable(name, entry.get("unit", UNKNOWN))
 
-    def argument(self, where: tuple[str, ...], key: str, text: str, unit: str, new: str, parameters: dict[str, m.Parameter]) -> str:
-        """Name of the parameter that `text` names, or of a new one made from a quantity such as '35 N'."""
-        where = (*where, key)
-        if NAME.fullmatch(text):
-            if text not in parameters:
-                near = difflib.get_close_matches(text, parameters, 1)
-                self.problem(where, f"'{text}' is no parameter", f"did you mean '{near[0]}'?" if near else f"add it to [parameters] or write a quantity in {unit}")
-            elif not same(parameters[text].unit, unit):
-                self.problem(where, f"'{text}' is in {parameters[text].unit}, needed is {unit}", "use a parameter of that unit")
-            return text
-        value = self.quantity(where, text, unit)
-        if new in parameters:
-            self.problem(where, f"this quantity would become the parameter '{new}', which there is already", f"name that one, or rename it")
-        else:
-            parameters[new] = m.Parameter(new, value, unit, description=f"{key} of {where[1]}")
-            self.made[new] = where
-        return new
-
     def elements(
-        self, parameters: dict[str, m.Parameter], inputs: tuple[m.Input, ...], bodies: tuple[m.Body, ...], networks: dict[str, m.NetworkPort]
+        self, parameters: dict[str, m.Parameter], inputs: tuple[m.Input, ...], networks: dict[str, m.NetworkPort]
     ) -> Iterable[m.Element]:
-        ends_known = [b.name for b in bodies] + [i.name for i in inputs] + [m.GROUND]
         for name, entry in self.entries("elements").items():
             where = ("elements", name)
             self.label(where, name)
@@ -213,60 +196,13 @@ class _Reader(NetworkTables):
                 known = f"did you mean '{near[0]}'?" if near else f"known are network, expression, {', '.join(LAWS)}"
                 self.problem((*where, "law"), f"law '{law}' is unknown", known)
                 continue
-            ends = self.ends((*where, "between"), entry["between"], ends_known, inputs) if "between" in entry else (m.GROUND, m.GROUND)
+            ends = self.ends((*where, "between"), entry["between"], inputs) if "between" in entry else (m.GROUND, m.GROUND)
             if law == "network":
                 yield self.network_element(name, ends, entry, networks)
             elif law == "expression":
                 yield m.Element(name, ends, law, expression=entry.get("force", "0"))
             else:
-                arguments = {
-                    key: self.argument(where, key, entry[key], unit, f"{name}_{key}", parameters)
-                    for key, unit in LAWS[law].arguments.items()
-                    if key in entry
-                }
-                yield m.Element(name, ends, law, arguments)
-
-    def ends(self, where: tuple[str, ...], ends: list[Any], known: list[str], inputs: tuple[m.Input, ...]) -> tuple[str, str]:
-        """The two ends of an element."""
-        if len(ends) != 2 or not all(isinstance(e, str) for e in ends) or ends[0] == ends[1]:
-            self.problem(where, f"{show(ends)} does not name two different ends", 'write between = ["body", "wheel"]')
-            return m.GROUND, m.GROUND
-        for end in ends:
-            if end not in known:
-                near = difflib.get_close_matches(end, known, 1)
-                self.problem(where, f"end {show(end)} is no body, input or ground", f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}")
-        for i in inputs:
-            if i.name in ends and not same(i.unit, "m"):
-                self.problem(where, f"input '{i.name}' is in {i.unit}, an end needs a position", "use an input in m")
-        return ends[0], ends[1]
-
-    def network_element(self, name: str, ends: tuple[str, str], entry: dict[str, Any], networks: dict[str, m.NetworkPort]) -> m.Element:
-        where = ("elements", name)
-        network = entry.get("network", "")
-        if network not in networks:
-            if "network" in entry:
-                near = difflib.get_close_matches(network, networks, 1)
-                self.problem((*where, "network"), f"network {show(network)} is not declared", f"did you mean '{near[0]}'?" if near else "add it to [networks]")
-            return m.Element(name, ends, "network")
-        port = networks[network]
-        kinds = {"deflection": "m", "rate": "m/s"}
-        takes = () if network in self.unsure else port.input_units
-        inputs = entry.get("inputs")
-        if inputs is None:  # the units say which is meant
-            inputs = [next((k for k, u in kinds.items() if same(u, unit)), "") for unit in takes]
-            for unit in (unit for unit, kind in zip(takes, inputs) if not kind):
-                self.problem(where, f"network '{network}' takes {unit}, an element has a deflection in m and a rate in m/s", "mend the unit in [networks]")
-        else:
-            for kind, unit in zip(inputs, takes):
-                if kind not in list(kinds):
-                    self.problem((*where, "inputs"), f"{show(kind)} is neither deflection nor rate", 'write inputs = ["deflection"]')
-                elif not same(kinds[kind], unit):
-                    self.problem((*where, "inputs"), f"the network takes {unit}, but {kind} is in {kinds[kind]}", "mend the unit in [networks]")
-            if takes and len(inputs) != len(takes):
-                self.problem((*where, "inputs"), f"{len(inputs)} inputs for a network of {len(takes)}", "give one for each")
-        if not same(port.output_unit, "N"):
-            self.problem(where, f"network '{network}' gives {port.output_unit}, an element needs a force", "declare its output in N")
-        return m.Element(name, ends, "network", network=network, network_inputs=tuple(inputs))
+                yield self.law_element(where, ends, law, entry, parameters)
 
     def equations(self) -> Iterable[m.Equation]:
         for name, text in self.entries("equations").items():
@@ -285,13 +221,15 @@ class _Reader(NetworkTables):
                 self.problem((section, name, "trial_bound"), f"{bound} is not a bound", "give how far outputs with a new set may be from those with the running one, above 0")
             yield m.Signal(name, entry.get("value", ""), entry.get("unit", UNKNOWN), noise, entry.get("description", ""), bound)
 
-    def unique(self, parameters, inputs, bodies, elements, states, variables, networks) -> None:
+    def unique(self, parameters, inputs, bodies, points, elements, states, variables, networks) -> None:
         """No name may mean two things."""
         named = [("parameter", n, self.made.get(n, ("parameters", n))) for n in parameters]
         named += [("input", i.name, ("inputs", i.name)) for i in inputs]
         for key in ("position", "velocity"):
             named += [(key, getattr(b, key), ("bodies", b.name, key)) for b in bodies]
-        of_laws = {s.name: ("elements", e.name) for e in elements for s in _law_states([e])}
+        actuators = self.entries("actuators")
+        named += [("point", p.name, ("actuators" if p.name in actuators else "points", p.name)) for p in points]
+        of_laws = {s.name: ("elements", e.name) for e in elements for s in self.law_states([e])} | {n: ("actuators", n) for n in actuators}
         named += [("state", s.name, of_laws.get(s.name, ("states", s.name))) for s in states] + [("variable", v.name, ("variables", v.name)) for v in variables]
         named += [("network", n, ("networks", n)) for n in networks]
         for e in elements:
@@ -302,9 +240,10 @@ class _Reader(NetworkTables):
             if seen.get(name):
                 self.problem(where, f"'{name}' is taken by the {seen[name]} of that name", "rename one")
             seen.setdefault(name, kind)
-        for i in inputs:
-            if i.name in {b.name for b in bodies}:
-                self.problem(("inputs", i.name), f"'{i.name}' is taken by the body of that name", "rename one: an element could mean either")
+        ends = [("inputs", i.name) for i in inputs] + [("points", p.name) for p in points] + [("actuators", n) for n in actuators]
+        for section, name in dict.fromkeys(ends):
+            if name in {b.name for b in bodies}:
+                self.problem((section, name), f"'{name}' is taken by the body of that name", "rename one: an element could mean either")
 
     def shown(self, signals: tuple[m.Signal, ...], inputs: set[str], states: set[str], n_outputs: int) -> None:
         """In tables of results, a name stands for one quantity; that of a state also for what measures it, however well."""
@@ -337,13 +276,6 @@ class _Reader(NetworkTables):
                     where = self.made.get(n, ("parameters" if n in parameters else "networks", n))
                     self.problem(where, f"its C constant {model.upper()}_{name.upper()} is already taken", "rename it")
                     break
-
-
-def _law_states(elements: Iterable[m.Element]) -> Iterable[m.State]:
-    """The states that the laws of elements bring along."""
-    for e in elements:
-        for name, state in LAWS[e.law].states.items() if e.law in LAWS else ():
-            yield m.State(e.state(name), state.unit, description=f"{name} of {e.name}")
 
 
 def load(path: str | Path) -> m.Model:

@@ -12,7 +12,7 @@ import pint
 import sympy as sp
 
 from . import expressions as ex
-
+from . import functions
 
 
 def _known() -> pint.UnitRegistry:
@@ -74,6 +74,11 @@ def same_dimension(a: str, b: str) -> bool:
     return dimension(a) == dimension(b)
 
 
+def is_angle(text: str) -> bool:
+    """Is it a radian, a degree, a turn or a multiple of these?"""
+    return dict(_registry.Quantity(1.0, _unit(text)).to_base_units().unit_items()) == {"radian": 1}
+
+
 def quantity(text: str) -> tuple[float, str]:
     """'10 kN/m' -> (10000.0, 'kN/m'): the value in SI and the unit as written."""
     match = _QUANTITY.match(text)
@@ -124,6 +129,8 @@ def dimension_of(expr: sp.Expr, of: Callable[[sp.Basic], Dimension]) -> Dimensio
         return (parts[0] or NONE) ** float(exponent)
     if isinstance(expr, ex.Absolute):
         return parts[0]
+    if isinstance(expr, functions.Root):
+        return (parts[0] or NONE) ** 0.5
     if isinstance(expr, ex.Sign):
         return NONE
     for part in parts:  # exp, tanh, ...

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 import penode_gen
 from penode_gen.causalise import Causal
 from penode_gen.emit_batch import BatchCode, render_batch
+from penode_gen.placeholder import columns
 
 from .errors import UserError
 from .output import whole
@@ -105,6 +106,7 @@ class Batch:
         start = np.asarray(model.start if x0 is None else x0, dtype=dtype)
         u = np.ascontiguousarray(u, dtype=dtype)
         runs = self._runs(u, start, given, values, default.size)
+        u = np.ascontiguousarray(columns(model, u), dtype=dtype)
         vectors = -(-runs // self.lanes)
         padded, n = vectors * self.lanes, u.shape[-2]
 
@@ -228,7 +230,8 @@ def _build(model: penode_gen.Model, code: BatchCode, dtype: type, per_run: bool,
         *(["-DWEIGHTS_PER_RUN"] if per_run else []),
         *(f"-I{ROOT}/{folder}" for folder in ("sil/firmware", "src", "inc", "port/gnu")),
     ]
-    parts = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes.h"), ("src", "pen_math.c"))
+    functions = (("src", f"pen_{name}.c") for name in ("math", "trig", "atan", "log", "root"))
+    parts = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes*.h"), *functions)
     folding = []
     if "LANES_PIECES" in code.text:
         own = [ROOT / "src" / name for name in ("pen_fold.c", "pen_net.c")]

@@ -15,10 +15,8 @@ import click
 import penode_gen
 
 from . import look
+from .console import FILE, Several
 from .reading import named
-from .several import Several
-
-FILE = click.Path(path_type=Path)
 
 
 @click.command(cls=Several)

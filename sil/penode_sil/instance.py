@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from penode_gen.placeholder import columns
+
 from .status import BIT, FLAGS
 
 
@@ -67,16 +69,19 @@ class Instance:
     def _vector(self, values: Any) -> NDArray[Any]:
         return np.ascontiguousarray(values, dtype=self.dtype)
 
+    def _input(self, u: Any) -> NDArray[Any]:
+        return self._vector(columns(self.sil.model, u))
+
     def step(self, u: Any) -> tuple[NDArray[Any], NDArray[Any], int]:
         """One step with u [n_u]: state, outputs (those before if it holds) and status."""
-        status = self.sil.function("step")(self._self, self._pointer(self._vector(u)), self._pointer(self._y))
+        status = self.sil.function("step")(self._self, self._pointer(self._input(u)), self._pointer(self._y))
         return self.get_state(), self._y.copy(), status
 
     def step_jacobian(self, u: Any, entries: int) -> tuple[NDArray[Any], NDArray[Any], int]:
         """One step and its derivatives: outputs, the `entries` reals of the jacobian struct, status."""
         jacobian = np.zeros(entries, dtype=self.dtype)
         status = self.sil.function("step_jacobian")(
-            self._self, self._pointer(self._vector(u)), self._pointer(self._y), self._pointer(jacobian)
+            self._self, self._pointer(self._input(u)), self._pointer(self._y), self._pointer(jacobian)
         )
         return self._y.copy(), jacobian, status
 
@@ -104,11 +109,11 @@ class Instance:
         """The input of the last sample."""
         u = np.zeros(self.sil.n_u, dtype=self.dtype)
         self.sil.function("get_input")(self._self, self._pointer(u))
-        return u
+        return u[: len(self.sil.model.inputs)]
 
     def set_input(self, u: Any) -> int:
         """The input that the next step starts from."""
-        return self.sil.function("set_input")(self._self, self._pointer(self._vector(u)))
+        return self.sil.function("set_input")(self._self, self._pointer(self._input(u)))
 
     def verify(self, n: int) -> int:
         """Look at up to n values of the running set for damage."""

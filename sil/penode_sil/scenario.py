@@ -316,7 +316,7 @@ def _instance(
 
 def state_units(model: Any) -> dict[str, str]:
     """Name and SI unit of each state, in order."""
-    units = {body.position: "m" for body in model.bodies} | {body.velocity: "m/s" for body in model.bodies}
+    units = {body.position: body.unit for body in model.bodies} | {body.velocity: f"{body.unit}/s" for body in model.bodies}
     return units | {state.name: state.unit for state in model.extra_states}
 
 
@@ -366,4 +366,4 @@ def sample_times(scenario: Scenario, sample_time: float) -> NDArray[np.float64]:
 
 def sampled(scenario: Scenario, model: Any, times: NDArray[np.float64]) -> NDArray[np.float64]:
     """All inputs at the given times, [n, n_u]."""
-    return np.column_stack([scenario.inputs[signal.name].value(times) for signal in model.inputs])
+    return np.column_stack([np.zeros((len(times), 0)), *(scenario.inputs[signal.name].value(times) for signal in model.inputs)])

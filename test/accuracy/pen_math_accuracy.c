@@ -2,9 +2,10 @@
  * Copyright (c) 2026 the penode authors */
 
 /*
- * Error and monotonicity of pen_exp, pen_tanh, pen_sigmoid and pen_softplus, over all floats or over every n-th one.
+ * Error and monotonicity of pen_exp, pen_tanh, pen_sigmoid and pen_softplus, over all floats or over every n-th one; with
+ * -DPEN_ELEMENTARY of the functions of pen_elementary.h.
  *
- *     pen_math_accuracy STRIDE [THREADS]     STRIDE 1: all 2^32 floats; exit code 1 if pen_math.h promises more
+ *     pen_math_accuracy STRIDE [THREADS]     STRIDE 1: all 2^32 floats; exit code 1 beyond BOUND
  *
  * Inputs are taken in ascending order from -Inf to +Inf (-0 and +0 are two inputs); each result is compared with the
  * one before it, and the NaNs are checked apart. The error is |result - exact| divided by the distance of neighbouring
@@ -24,10 +25,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "penode/pen_math.h"
+#include "penode/pen_real.h"
 
-#define BOUND 2.0 /* what pen_math.h promises, in ulp */
-#define FUNCTIONS 4
 #define MAX_THREADS 64U
 
 #ifdef PEN_REAL_DOUBLE
@@ -57,6 +56,12 @@ typedef double wide_t;
 #define INFINITE UINT32_C(0x7f800000)
 #endif
 
+#ifdef PEN_ELEMENTARY
+#include "elementary_subjects.h"
+#else
+#include "math_subjects.h"
+#endif
+
 typedef struct {
     double     error; /* largest, ulp */
     pen_real_t where;
@@ -73,8 +78,6 @@ typedef struct {
     finding_t finding[FUNCTIONS];
 } job_t;
 
-static const char *const NAME[FUNCTIONS] = {"pen_exp", "pen_tanh", "pen_sigmoid", "pen_softplus"};
-
 static pen_real_t from_bits(bits_t bits)
 {
     pen_real_t x;
@@ -89,25 +92,6 @@ static pen_real_t in_order(bits_t order)
 {
     const bits_t bits = (order > INFINITE) ? (order - INFINITE - 1) : (SIGN | (INFINITE - order));
     return from_bits(bits);
-}
-
-static void evaluate(pen_real_t x, pen_real_t y[FUNCTIONS])
-{
-    y[0] = pen_exp(x);
-    y[1] = pen_tanh(x);
-    y[2] = pen_sigmoid(x);
-    y[3] = pen_softplus(x);
-}
-
-/* Written for speed: each of the shortcuts loses 2 ulp of the wide type at most. */
-static void reference(wide_t x, wide_t y[FUNCTIONS])
-{
-    const wide_t e = WIDE(exp)(x);
-    const wide_t inverse = 1 / e;
-    y[0] = e;
-    y[1] = (WIDE(fabs)(x) < 1) ? WIDE(tanh)(x) : (1 - (2 / (1 + (e * e))));
-    y[2] = 1 / (1 + inverse);
-    y[3] = (x > 0) ? (x + WIDE(log1p)(inverse)) : WIDE(log1p)(e);
 }
 
 /* 1 / distance of the numbers of the type in the binade of x. A power of two, so multiplying by it is exact. */
@@ -147,7 +131,7 @@ static double ulps(pen_real_t result, wide_t exact)
 static void compare(finding_t *finding, pen_real_t x, pen_real_t result, wide_t exact)
 {
     const double error = ulps(result, exact);
-    if (isnan(result)) {
+    if (isnan(result) != isnan(exact)) {
         finding->nan++;
     }
     if (error > finding->error) {
@@ -156,10 +140,19 @@ static void compare(finding_t *finding, pen_real_t x, pen_real_t result, wide_t 
     }
 }
 
+/* Is a result below the one before it, where it must not be? A NaN that must be there is below nothing. */
+static int falls(int f, pen_real_t before, pen_real_t y)
+{
+    return MONOTONE[f] && (y < before);
+}
+
 static void *run(void *argument)
 {
     job_t *const job = argument;
-    pen_real_t before[FUNCTIONS] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY};
+    pen_real_t before[FUNCTIONS];
+    for (int f = 0; f < FUNCTIONS; f++) {
+        before[f] = -INFINITY;
+    }
     for (bits_t order = job->first;;) {
         const pen_real_t x = in_order(order);
         pen_real_t y[FUNCTIONS];
@@ -170,7 +163,7 @@ static void *run(void *argument)
         for (int f = 0; f < FUNCTIONS; f++) {
             finding_t *const finding = &job->finding[f];
             compare(finding, x, y[f], exact[f]);
-            if (!(y[f] >= before[f]) && (finding->falls++ == 0)) {
+            if (falls(f, before[f], y[f]) && (finding->falls++ == 0)) {
                 finding->fall = x;
             }
             before[f] = y[f];
@@ -179,7 +172,7 @@ static void *run(void *argument)
         if (order < LAST) {
             evaluate(in_order(order + 1), before);
             for (int f = 0; f < FUNCTIONS; f++) {
-                if (!(before[f] >= y[f]) && (job->finding[f].falls++ == 0)) {
+                if (falls(f, y[f], before[f]) && (job->finding[f].falls++ == 0)) {
                     job->finding[f].fall = in_order(order + 1);
                 }
             }

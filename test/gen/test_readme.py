@@ -30,5 +30,4 @@ def test_every_section(section):
 
 
 def test_every_function():
-    assert " ".join(sorted(expressions.FUNCTIONS)) == " ".join(sorted("exp tanh sigmoid softplus abs sign min max".split()))
-    assert "`+ - * / ^`, `der(x)`, `where(a < b, x, y)`, `exp tanh sigmoid softplus abs sign min max`" in TEXT
+    assert f"`+ - * / ^`, `der(x)`, `where(a < b, x, y)`, `{' '.join(expressions.FUNCTIONS)}`" in TEXT

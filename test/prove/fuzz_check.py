@@ -42,7 +42,7 @@ FAULTS = {
     "bytes at another place": ("pen_set.c", ("pen_serial_get_bytes(bank, offset, n, byte);", 0, "pen_serial_get_bytes(bank, offset & ~3U, n, byte);")),
     "damaged bytes are restored": ("pen_saved.c", ("status = PEN_SET_CHECKSUM;", 0, "status = PEN_OK;")),
     "banks are not compared": ("pen_saved.c", ("(pen_serial_get(&byte[12]) != banks) ||", 0, "")),
-    "the set given to init is not compared": ("pen_saved.c", ("(pen_serial_get(&byte[INITIAL_AT]) != *initial) ||", 0, "")),
+    "the set given to init is not compared": ("pen_saved.c", ("(pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||\n               (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) ||", 0, "")),
     "inputs are not restored": ("pen_saved.c", ("        get_values(inputs, u, byte, &at);", 0, "        at += (size_t)inputs * sizeof(pen_real_t);")),
     "fill is not restored": ("pen_saved.c", ("tuning->fill = get(byte, at);", 0, "(void)get(byte, at);")),
     "what a withdrawal brings back is not restored": ("pen_saved.c", ("    get_set(model, tuning, &tuning->replaced, byte, at);", 0, "    *at += 20U;")),

@@ -4,7 +4,7 @@
 # The gates of `make prove`, each also a target of its own; README.md beside this file says what each shows.
 
 PROVE_STATIC  := prove-rules prove-eva prove-coverage
-PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-readers prove-flip prove-longrun prove-stack prove-bits \
+PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-xcp-fuzz prove-readers prove-flip prove-longrun prove-stack prove-bits \
                  prove-accuracy prove-cost prove-kernels prove-promise prove-promises
 
 .PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC)
@@ -30,6 +30,8 @@ prove-status: | $(READY) ## NaN and Inf anywhere: always reported, the last good
 	@$(PYTHON) test/prove/status_check.py
 prove-fuzz: | $(READY) ## libFuzzer: any calls of the interface, against an oracle
 	@$(PYTHON) test/prove/fuzz_check.py
+prove-xcp-fuzz: | $(READY) ## libFuzzer: any packets to the XCP slave, against an oracle
+	@$(PYTHON) test/prove/xcp_fuzz_check.py --keep
 prove-readers: | $(READY) ## Damaged files: every reader takes them or says what is wrong
 	@$(PYTHON) test/prove/readers_check.py
 prove-flip: | $(READY) ## One flipped bit anywhere in an instance or its banks: no write beside them, no hang
@@ -54,7 +56,7 @@ prove-promises: | $(READY) ## PROMISES.md: each promise, the test that shows it,
 
 # -- the same in full -------------------------------------------------------------------------------------------------
 
-CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-readers campaign-recordings campaign-flip campaign-longrun campaign-accuracy
+CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-xcp-fuzz campaign-readers campaign-recordings campaign-flip campaign-longrun campaign-accuracy
 .PHONY: campaign-proofs $(CAMPAIGN)
 
 campaign-proofs: setup build/setup/proof ## The long proofs: all floats, 10^7 sequences of calls, every bit, a whole day
@@ -65,6 +67,8 @@ campaign-status: | $(READY)
 	@$(PYTHON) test/prove/status_check.py --runs 10000000 --as "status campaign"
 campaign-fuzz: | $(READY)
 	@$(PYTHON) test/prove/fuzz_check.py --runs 5000000 --as "fuzz campaign"
+campaign-xcp-fuzz: | $(READY)
+	@$(PYTHON) test/prove/xcp_fuzz_check.py --runs 10000000 --as "xcp fuzz campaign" --keep
 campaign-readers: | $(READY)
 	@$(PYTHON) test/prove/readers_check.py --files 20000 --seed 2 --as "readers campaign"
 campaign-recordings: | $(READY)

@@ -246,7 +246,7 @@ inline pen_tuning_write() /* one value, the right one or a wrong one; bytes are 
         }
         TOGETHER {
         if
-        :: offset > fill                          // status = check_chunk(tuning, SIZE * length, SIZE * offset, SIZE * n);
+        :: offset > fill                          // } else if ((offset > length) || (n > (length - offset)) || ((SIZE * offset) > tuning->fill)) {
         :: else ->
             store(WORD(staging, offset), content); // bank[offset + i] = value[i];
             note_fill()                           // note_fill(tuning, SIZE * (offset + n));

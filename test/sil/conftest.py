@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import penode_gen
+from penode_sil.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
@@ -63,3 +64,21 @@ def oscillator() -> object:
 def nqvm() -> object:
     """The project's own model."""
     return penode_gen.load(ROOT / "gen" / "nqvm" / "nqvm.toml")
+
+
+@pytest.fixture
+def penode(monkeypatch, capsys):
+    """penode(*words, code=0) runs the command here; gives its stdout, or the lines of its stderr if it is to fail."""
+
+    def run(*words, code=0):
+        monkeypatch.setattr(sys, "argv", ["penode", *map(str, words)])
+        try:
+            main()
+            ended = 0
+        except SystemExit as exc:
+            ended = exc.code or 0
+        out, run.notes = capsys.readouterr()
+        assert ended == code, out + run.notes
+        return out if code == 0 else run.notes.splitlines()
+
+    return run

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from conftest import HERE, ROOT
 
-from penode_sil.cli import main
 
 MODEL = HERE / "models" / "oscillator.toml"
 NQVM = ROOT / "gen" / "nqvm" / "nqvm.toml"
@@ -30,24 +29,6 @@ name = "plain"
 name = "changed"
 exchange = [{ time = "0.3 s", set = "stiff" }]
 """
-
-
-@pytest.fixture
-def penode(monkeypatch, capsys):
-    """penode(*words, code=0) runs the command here; gives its stdout, or the lines of its stderr if it is to fail."""
-
-    def run(*words, code=0):
-        monkeypatch.setattr(sys, "argv", ["penode", *map(str, words)])
-        try:
-            main()
-            ended = 0
-        except SystemExit as exc:
-            ended = exc.code or 0
-        out, run.notes = capsys.readouterr()
-        assert ended == code, out + run.notes
-        return out if code == 0 else run.notes.splitlines()
-
-    return run
 
 
 @pytest.fixture
@@ -133,7 +114,8 @@ WRONG = [
     (["simulate", MODEL, "--scenario", "s.toml"], "Missing option '-o'"),
     (["simulate", MODEL, "--scenario", "s.toml", "-o", "o.csv", "--on", "hil"], '--on: "hil" is not known; use mil'),
     (["simulate", MODEL, "--scenario", "s.toml", "-o", "o.csv", "--on", "pil:m4"], 'no machine "m4"; did you mean "m4f"?'),
-    (["simulate", MODEL, "--scenario", "s.toml", "-o", "no/o.csv"], "there is no directory no; create it"),
+    (["simulate", MODEL, "--scenario", "s.toml", "-o", "s.toml/o.csv"], "s.toml is a file and no directory"),
+    (["simulate", MODEL, "--scenario", "s.toml", "-o", "no/o.txt"], 'cannot be written as ".txt"; end its name in .csv or .mf4'),
     (["simulate", MODEL, "--scenario", "s.toml", "-o", "."], "this is a directory; name a file in it"),
     (["simulate", MODEL, "--scenario", "s.toml", "-o", "o.csv", "--plot", "p.xyz"], "end its name in .png"),
     (["simulate", MODEL, "--scenario", "s.toml", "-o", "o.csv", "--signal", "q"], 'no signal "q"; use one of: z, a, v'),

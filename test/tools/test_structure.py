@@ -29,6 +29,7 @@ def tree(tmp_path: Path) -> Path:
     for name, text in {
         "src/a.c": "int f(void)\n{\n    return 0;\n}\n",
         "src/long.c": "\n" * 401,
+        "src/pen_xcp_a.c": "\n" * 5,
         "inc/penode/a.h": '#include "penode/b.h"\nextern "C" {\nint f(void);\n}\n',
         "inc/penode/b.h": "int g(void);\n",
         "gen/model/c/generated.c": "\n" * 500,
@@ -45,7 +46,7 @@ def tree(tmp_path: Path) -> Path:
 
 
 def test_counts_of_a_small_tree(tree: Path) -> None:
-    counts = {"long files": 1, "long functions": 0, "circular imports": 0, "named thresholds": 1, "runtime lines": 410}
+    counts = {"long files": 1, "long functions": 0, "circular imports": 0, "named thresholds": 1, "runtime lines": 410, "elementary lines": 0, "wire protocol lines": 5}
     assert structure.look(tree)[0] == counts
     assert structure.main(["--root", str(tree)]) == 0
 
@@ -65,6 +66,8 @@ def test_counts_of_a_small_tree(tree: Path) -> None:
         ("inc/penode/b.h", '#include "penode/a.h"\n', "circular imports"),
         ("sil/penode_sil/one.py", "MORE: float = -2 / 3\n", "named thresholds"),
         ("src/a.c", "\n", "runtime lines"),
+        ("src/pen_log.c", "\n", "elementary lines"),
+        ("src/pen_xcp_a.c", "\n", "wire protocol lines"),
     ],
 )
 def test_one_more_is_refused(tree: Path, name: str, text: str, kind: str, capsys: pytest.CaptureFixture[str]) -> None:

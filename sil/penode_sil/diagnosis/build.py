@@ -20,7 +20,7 @@ from .plant import Place, extend, nominal
 from .score import Candidate
 
 Array = NDArray[np.float64]
-SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3, "s": 1e-3}  # of start states of laws
+SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3, "s": 1e-3, "rad": 0.01, "rad/s": 0.05, "N*m": 1e-3}  # of start states of laws
 HEAVIEST = 0.5  # of its body: a hidden mass beyond that is another vehicle
 BENT = 0.01  # [m] deflection of a hidden mass's spring where its bend would show
 SLOWEST = 5.0  # [s] relaxation: what takes longer is a load

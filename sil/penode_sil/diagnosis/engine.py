@@ -20,7 +20,7 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
-from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plausible, residual, search, steady
+from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady
 from .driven import experiment, settled
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
@@ -65,7 +65,7 @@ def diagnose(
     tell(0.0, "fitting the model as it is")
     both = told_of_rails([*train, *holdout])
     train, holdout = both[: len(train)], both[len(train) :]
-    experiments, unused, inputs = settled(model, train, holdout, set_name)
+    experiments, unused, remarks = settled(model, train, holdout, set_name)
     if problems := plausible.misfits(model, [*experiments, *unused], set_name):
         raise UserError(*problems)
     study, other = begin(model, experiments, set_name)
@@ -114,7 +114,7 @@ def diagnose(
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
-    notes = [*inputs]
+    notes = [*remarks, *filter(None, [plant.placeless(study.places)])]
     if behind:
         notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
     if changed and verdict == "unexplained":
@@ -182,7 +182,7 @@ def diagnose(
         notes += more
     tell(0.9, "showing what is wrong")
     whole = named is not None and (named is unnamed or best is not None and bool(causes))
-    shown = residual.show(study, named.fit if whole else None, extended if whole else None, held)
+    shown = residual.show(study, named.fit if whole else None, extended if whole else None, held, verdict == "unexplained")
     data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(

@@ -98,7 +98,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         if known is None:
             parameters.append(f"{named(p.name)} = {_table({'value': value, 'unit': p.unit})}")
         elif p.name in values and value != known.value:
-            more = {"tolerance": known.tolerance} if known.tolerance else {}
+            more = {"tolerance": known.tolerance if np.isfinite(known.tolerance) else "unknown"} if known.tolerance else {}
             more |= {"tunable": True} if known.tunable else {}
             more |= {"description": known.description} if known.description else {}
             parameters.append(f"{p.name} = {_table({'value': value / units.factor(p.unit), 'unit': p.unit, **more})}")

@@ -135,7 +135,7 @@ class Problem:
         way = ("cubic" if self.moving else "parabola") if close else "linear"
         exact = replace(_folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
         self.batch = _compiled(anonymous(exact), _ordered(model)[0])
-        self.inputs = [e.drive if close else _drive(e, self.fine) for e in experiments]
+        self.inputs = [e.drive if close else _drive(e, self.fine) if model.inputs else np.zeros((self.fine * (len(e.time) - 1) + 1, 0)) for e in experiments]
 
     @cached_property
     def halved(self) -> Problem | None:

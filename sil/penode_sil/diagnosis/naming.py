@@ -20,7 +20,7 @@ from penode_gen.model import Model
 
 from .build import Term
 from .hypotheses import HALVES, STRIBECK, Basis, Fault, lag, size, warm
-from .plant import Place, nominal
+from .plant import Place, in_place, nominal
 from .fit import Fit
 from .result import Value
 from .score import where
@@ -461,7 +461,7 @@ def values(study: Study, e: Explanation, group: Group) -> dict[str, Value]:
     covariance = e.fit.covariance() * max(1.0, e.fit.chi2 / len(e.fit.residual))
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     result = {}
-    for name, (unit, function) in found.items():
+    for name, (unit, function) in in_place(found, what, study.places).items():
         middle = float(function(centre))
         slope = np.zeros(len(free))
         for i, f in enumerate(free):

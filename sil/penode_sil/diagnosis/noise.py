@@ -134,7 +134,7 @@ def prepare(
             share = share + further
             unsure[:, k] = sigma * np.sqrt(share)[: 2 * len(unsure) : 2][: len(unsure)]
     whole = fft.irfft(spectra, 2 * n, axis=0)[:n] + trend
-    rate = CubicSpline(time, whole)(time, 1)
+    rate = CubicSpline(time, whole)(time, 1) if u.shape[1] else whole
     f = fft.rfftfreq(n, step)
     quiet = np.full((len(f), len(laws)), np.nan)
     for j, law in enumerate(laws):

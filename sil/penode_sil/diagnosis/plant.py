@@ -13,12 +13,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
-from penode_gen import fold, laws
+from penode_gen import fold, laws, mechanics
 from penode_gen.model import GROUND, Element, Input, Model, Parameter, Signal, State
 
 Array = NDArray[np.float64]
@@ -34,11 +35,16 @@ class Place:
     elements: tuple[tuple[str, int], ...]
     role: str
     trained: tuple[tuple[str, str, float, float, bool], ...] = ()  # element, "s" or "v", range of its network, if it is stated
+    turns: bool = False
 
     @property
     def name(self) -> str:
         """What a report calls it: its first element, or the body."""
         return self.elements[0][0] if self.elements else self.ends[0]
+
+    def unit(self, of_length: str) -> str:
+        """A unit of what acts there: `of_length` as it is, or what stands for it where the ends turn."""
+        return laws.for_angles(of_length) if self.turns else of_length
 
 
 def nominal(model: Model, place: Place, law: str, argument: str, values: Mapping[object, float]) -> float:
@@ -59,17 +65,34 @@ def places(model: Model, set_name: str = "default") -> tuple[Place, ...]:
             back = e.ends[::-1]
             key, sense = (back, -1) if back in found else (e.ends, 1)
             found.setdefault(key, []).append((e.name, sense))
-    bodies, inputs = {b.name for b in model.bodies}, {i.name for i in model.inputs}
-    carried = {end for ends in found if set(ends) <= bodies for end in ends}
+    inputs, moved = {i.name for i in model.inputs}, moving_ends(model)
+    carried = {end for ends in found if set(ends) <= moved for end in ends}
     result = []
     for ends, elements in found.items():
-        tyre = bool(set(ends) & inputs) and bool(set(ends) & carried)
+        turns = mechanics.rotational(model, ends)
+        tyre = bool(set(ends) & inputs) and bool(set(ends) & carried) and not turns
         own = [e for e in model.elements if e.network and any(e.name == name for name, _ in elements)]
         trained = tuple(entry for e in own for entry in _trained(model, e, set_name))
-        result.append(Place(ends, tuple(elements), "tyre" if tyre else "force", trained))
+        result.append(Place(ends, tuple(elements), "tyre" if tyre else "force", trained, turns))
     known = {frozenset(p.ends) for p in result}
-    result += [Place((b.name, GROUND), (), "body") for b in model.bodies if frozenset((b.name, GROUND)) not in known]
+    result += [Place((b.name, GROUND), (), "body", (), b.rotational) for b in model.bodies if frozenset((b.name, GROUND)) not in known]
     return tuple(result)
+
+
+def placeless(found: Sequence[Place]) -> str:
+    """A note on a model in which no force can be missing; empty for others."""
+    return "" if found else "the model has no elements and no bodies: causes are looked for in its parameters and sensors"
+
+
+def in_place(found: dict[str, tuple[str, Any]], what: Any, at: Sequence[Place]) -> dict[str, tuple[str, Any]]:
+    """Parameters of a cause with the units of where it acts: a Basis at its place, or an absorber."""
+    place = getattr(what, "place", what[1] if isinstance(what, tuple) else None)
+    return found if place is None else {name: (at[place].unit(unit), value) for name, (unit, value) in found.items()}
+
+
+def moving_ends(model: Model) -> set[str]:
+    """Bodies, and the points that move with any."""
+    return {b.name for b in model.bodies} | {p.name for p in model.points if mechanics.place_of(p, model)}
 
 
 def _trained(model: Model, e: Element, set_name: str) -> list[tuple[str, str, float, float, bool]]:
@@ -93,17 +116,22 @@ def _external(model: Model, e: Element) -> bool:
 def extend(
     model: Model, elements: Sequence[Element], parameters: Mapping[str, tuple[float, str]], where: Sequence[Place] = ()
 ) -> Model:
-    """The model with more elements. What measures the force at a place then measures theirs as well."""
+    """The model with more elements; units of `parameters` are those of elements that move along a line. What measures the force at
+    a place then measures theirs as well."""
     elements = [_told_apart(model, e) for e in elements]
     sensors, outputs = model.sensors, model.outputs
     for e, place in zip(elements, where):
         sensors, outputs = (tuple(_share(s, e.name, place) for s in signals) for signals in (sensors, outputs))
     states = tuple(
-        State(e.state(name), state.unit)
+        State(e.state(name), mechanics.unit(model, e.ends, state.unit))
         for e in elements
         for name, state in (laws.LAWS[e.law].states.items() if e.law in laws.LAWS else ())
     )
-    values = {name: Parameter(name, value, unit) for name, (value, unit) in parameters.items()}
+    turning = tuple(f"{e.name}_" for e in elements if mechanics.rotational(model, e.ends))
+    values = {
+        name: Parameter(name, value, laws.for_angles(unit) if name.startswith(turning) else unit)
+        for name, (value, unit) in parameters.items()
+    }
     return replace(
         model, elements=(*model.elements, *elements), parameters={**model.parameters, **values}, sensors=sensors,
         outputs=outputs, extra_states=(*model.extra_states, *states),
@@ -188,9 +216,9 @@ def linearise(model: Model, found: Sequence[Place], x: Array, u: Array) -> Linea
     """Mean slopes of the model along states x [n, n_x] and inputs u [n, n_u]."""
     forces = [Element(f"probe{k}", p.ends, "expression", expression=f"at{k}") for k, p in enumerate(found)]
     probed = extend(model, forces, {}, found)
-    seen = [Signal(f"{q}_probe{k}", f"{q}_probe{k}", unit) for k in range(len(found)) for q, unit in (("s", "m"), ("v", "m/s"))]
+    seen = [Signal(f"{q}_probe{k}", f"{q}_probe{k}", p.unit(unit)) for k, p in enumerate(found) for q, unit in (("s", "m"), ("v", "m/s"))]
     probed = replace(
-        probed, interpolation="linear", inputs=(*model.inputs, *(Input(f"at{k}", "N") for k in range(len(found)))),
+        probed, interpolation="linear", inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(found))),
         sensors=(*probed.sensors, *seen),
     )  # fmt: skip
     system = penode_gen.numeric(probed)

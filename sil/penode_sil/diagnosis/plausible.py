@@ -15,7 +15,7 @@ from penode_gen.model import Model
 from .fit import Free, Problem
 from .noise import Experiment
 from .search import COST, NEW, Explanation, cost
-from .study import Study
+from .study import VAGUE, Study
 
 Array = NDArray[np.float64]
 MIXED = (  # factor that a wrong unit makes, what is mixed up, units of signals that it happens to
@@ -26,7 +26,6 @@ MIXED = (  # factor that a wrong unit makes, what is mixed up, units of signals 
 )
 NEAR = 0.14  # of a factor, in its logarithm: what else is wrong with a model changes the ratio by less
 ALIKE = 0.9  # correlation of measured and simulated signals that differ by a factor only
-VAGUE = 0.5  # a parameter known no better may itself make such a factor
 POOR = 0.1  # share of a signal's power that the model must miss before another plant is thought of
 FAR = 0.1  # a parameter that is so much off, and 3 tolerances, is another one
 MANY = 3  # so many other parameters are another plant

@@ -335,11 +335,11 @@ def surface(s: Surface) -> Forces:
     """Everything about a place with elements."""
     missing, left = s.measured - s.nominal, None if s.extended is None else s.measured - s.extended
     share = rms(missing) / max(rms(s.nominal - np.mean(s.nominal)), 1e-300)
-    text = f"missing {value(rms(missing), 'N')} RMS, {percent(share)} of the force"
+    text = f"missing {value(rms(missing), s.unit('N'))} RMS, {percent(share)} of the force"
     figures = [draw(s, which) for draw in (whole_force, missing_force) for which in (0, 1)]
     figures.append(heat(s, missing, "nominal"))
     if left is not None:
-        text += f"; {value(rms(left), 'N')} with the extension"
+        text += f"; {value(rms(left), s.unit('N'))} with the extension"
         figures.append(heat(s, left, "extended"))
     return Forces(s, text, tuple(figures))
 
@@ -347,7 +347,7 @@ def surface(s: Surface) -> Forces:
 def _along(s: Surface, which: int) -> tuple[Array, Array, Axis]:
     """Deflections (0) or rates (1) in the unit of their axis, and SAMPLES of those inside of it, by number."""
     values, ends = (s.s, s.v)[which], s.edges[which]
-    factor, unit = readable(float(ends[-1]), ("m", "m/s")[which])
+    factor, unit = readable(float(ends[-1]), s.unit(("m", "m/s")[which]))
     inside = np.flatnonzero(np.abs(values) <= ends[-1])
     pick = inside[np.linspace(0, len(inside) - 1, min(SAMPLES, len(inside))).astype(int)]
     return factor * values, pick, Axis(("deflection", "rate")[which], pretty(unit), factor * ends[0], factor * ends[-1])
@@ -357,7 +357,7 @@ def whole_force(s: Surface, which: int) -> Figure:
     """The force itself over deflection (0) or rate (1), samples as measured and as the models have it."""
     values, pick, x = _along(s, which)
     forces = {"measured": s.measured, "nominal": s.nominal} | ({} if s.extended is None else {"extended": s.extended})
-    factor, unit = readable(max(float(np.max(np.abs(f[pick]))) for f in forces.values()), "N")
+    factor, unit = readable(max(float(np.max(np.abs(f[pick]))) for f in forces.values()), s.unit("N"))
     y = Axis("force", unit, *fig.around([factor * f[pick] for f in forces.values()]))
     marks = [fig.dots(f"fine {name}", values[pick], factor * f[pick], x, y, name) for name, f in forces.items()]
     return Figure(f"Force over {x.name}", x, y, tuple(marks), "A sample each; positive pulls the ends together.")
@@ -372,7 +372,7 @@ def missing_force(s: Surface, which: int) -> Figure:
     means = {name: averages(f, rows, np.zeros_like(rows), (FINE, 1))[:, 0] for name, f in forces.items()}
     low, high = np.quantile(forces["measured"][pick], (0.005, 0.995))
     pick = pick[(forces["measured"][pick] >= low) & (forces["measured"][pick] <= high)]
-    factor, unit = readable(max(-low, high), "N")
+    factor, unit = readable(max(-low, high), s.unit("N"))
     y = Axis("missing force", unit, *fig.around([factor * v for v in (np.array([low, high]), *means.values())]))
     marks = [fig.dots("cloud", values[pick], factor * forces["measured"][pick], x, y, "samples")]
     marks.append(fig.line("nominal", np.array([x.low, x.high]), np.zeros(2), x, y, "nominal"))
@@ -384,17 +384,17 @@ def missing_force(s: Surface, which: int) -> Figure:
 
 def heat(s: Surface, values: Array, model: str) -> Figure:
     """Force that a model lacks over deflection and rate; colours mean the same force for both models."""
-    (fx, ux), (fy, uy) = readable(float(s.edges[0][-1]), "m"), readable(float(s.edges[1][-1]), "m/s")
+    (fx, ux), (fy, uy) = readable(float(s.edges[0][-1]), s.unit("m")), readable(float(s.edges[1][-1]), s.unit("m/s"))
     before = s.grid(s.measured - s.nominal)
     full = float(np.nanmax(np.abs(before))) if np.isfinite(before).any() else 0.0
-    factor, unit = readable(full, "N")
+    factor, unit = readable(full, s.unit("N"))
     x = Axis("deflection", pretty(ux), fx * s.edges[0][0], fx * s.edges[0][-1])
     y = Axis("rate", pretty(uy), fy * s.edges[1][0], fy * s.edges[1][-1])
     says = f"{{x}} {x.unit}, {{y}} {y.unit}: {{v}} {unit}"
     marks = fig.tiles(factor * s.grid(values), fx * s.edges[0], fy * s.edges[1], x, y, factor * full, says)
     marks.append(fig.Mark("key", "plus", "", "the elements give too little force"))
     marks.append(fig.Mark("key", "minus", "", "too much"))
-    says = f"Full colour: {value(full, 'N')}. No tile: fewer than {LEAST} samples."
+    says = f"Full colour: {value(full, s.unit('N'))}. No tile: fewer than {LEAST} samples."
     return Figure(f"Measured − {model} force", x, y, tuple(marks), says)
 
 

@@ -9,28 +9,25 @@ All is SI. `before` is the model as its file says, parameters within their toler
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
-from scipy.fft import irfft, rfft, rfftfreq
+from scipy.fft import rfft, rfftfreq
 
 from penode_gen import units
-from penode_gen.model import GROUND, Input, Model, ModelError, Signal
+from penode_gen.model import Model
 
-from ..errors import UserError
-from .fit import Fit, Problem
+from .fit import Fit
+from .missing import Missing, missing_forces
 from .noise import Experiment
-from .plant import Place
-from .score import likely
-from .study import Study, watch
+from .restoring import LEAST, Surface, averages, cells, rms, short, surface_numbers, surfaces
+from .study import Study
 
 Array = NDArray[np.float64]
 STRETCHES = 40  # of time, at most
-BINS = 15  # of deflection and of rate
-LEAST = 5  # samples of a bin that counts
 OVERLAP = 1.0 + 2.0 / 36.0  # variance of a mean over Hann segments that overlap by half, over that of separate ones
 CHANCE = 0.05  # of what a limit calls significant
 
@@ -96,31 +93,6 @@ class Channel:
         return self.level(self.before) / self.strength if self.strength > 0.0 else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """Restoring force of a place along the smoothed motion: s, v, and forces [n] as measured and as the elements give
-    them there; means on a grid of BINS deflections by BINS rates (NaN where fewer than LEAST samples are)."""
-
-    place: str
-    elements: tuple[str, ...]
-    s: Array
-    v: Array
-    measured: Array
-    nominal: Array
-    extended: Array | None
-    edges: tuple[Array, Array]
-
-    def grid(self, values: Array) -> Array:
-        """Mean of values [n] on the grid [deflections, rates]."""
-        return averages(values, *self._cells(), (BINS, BINS))
-
-    def count(self) -> NDArray[np.int64]:
-        return np.bincount(np.ravel_multi_index(self._cells(), (BINS, BINS)), minlength=BINS * BINS).reshape(BINS, BINS)
-
-    def _cells(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        return cells(self.s, self.edges[0]), cells(self.v, self.edges[1])
-
-
 def segment(n: int, step: float, few: int) -> int:
     """Samples of the segments of a spectrum: for a resolution of 0.5 Hz if that leaves `few` of them, at least; at most
     1/16 of the recording if that is longer."""
@@ -144,6 +116,8 @@ def coherence(r: Array, u: Array, step: float, length: int) -> tuple[Array, floa
     signals, what it exceeds with CHANCE, and its mean."""
     window = np.hanning(length + 1)[:length, None]
     starts = range(0, len(r) - length + 1, max(length // 2, 1))
+    if not u.shape[1]:
+        return np.zeros(length // 2 + 1), 0.0, 0.0
     r, u = r - np.mean(r), u - np.mean(u, axis=0)
     x = np.stack([rfft(window * u[k : k + length], axis=0) for k in starts])
     y = np.stack([rfft(window[:, 0] * r[k : k + length]) for k in starts])
@@ -170,11 +144,6 @@ def whiteness(ratio: Array) -> tuple[Whiteness, Array]:
     ), running
 
 
-def rms(values: Array) -> float:
-    """Root mean square; 0 of nothing."""
-    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
-
-
 def stretches(time: Array, good: NDArray[np.bool_], *signals: Array) -> list[tuple[float, float, list[float]]]:
     """From, to [s] and the RMS of each signal in equal stretches of time; those without a good sample are left out."""
     edges = np.linspace(0, len(time), min(STRETCHES, max(len(time) // 20, 1)) + 1).astype(int)
@@ -198,19 +167,6 @@ def band_rms(f: Array, power: Array, edges: Array) -> Array:
     at = np.clip(np.searchsorted(f, edges, "right") - 1, 0, len(f) - 1)
     whole = total[at] + 0.5 * (power[at] + inner) * (np.clip(edges, f[0], f[-1]) - f[at])
     return np.sqrt(np.maximum(np.diff(whole), 0.0))
-
-
-def cells(x: Array, edges: Array) -> NDArray[np.int64]:
-    """Number of the bin of each value; those outside count to the last one."""
-    return np.clip(np.searchsorted(edges, x, "right") - 1, 0, len(edges) - 2)
-
-
-def averages(values: Array, rows: NDArray[np.int64], columns: NDArray[np.int64], shape: tuple[int, int]) -> Array:
-    """Means of values [n] by row and column; NaN where fewer than LEAST are."""
-    flat, n = np.ravel_multi_index((rows, columns), shape), shape[0] * shape[1]
-    count = np.bincount(flat, minlength=n)
-    total = np.bincount(flat, values, minlength=n)
-    return np.where(count >= LEAST, total / np.maximum(count, 1), np.nan).reshape(shape)
 
 
 def channels(
@@ -268,86 +224,7 @@ def noise_rms(study: Study) -> Array:
     return np.sqrt(np.mean(np.concatenate([level, beyond]), axis=0) + np.mean(driven, axis=0))
 
 
-def rig(model: Model, places: Sequence[Place]) -> Model:
-    """The elements of places alone, each place under prescribed deflection `s_place0`...; sensors are their forces
-    [N]."""
-    elements, signals = [], []
-    for k, place in enumerate(places):
-        names = []
-        for x in model.elements:
-            if x.ends in (place.ends, place.ends[::-1]):
-                ahead = x.ends == place.ends
-                elements.append(replace(x, ends=(f"s_place{k}", GROUND) if ahead else (GROUND, f"s_place{k}")))
-                names.append(f"{'+' if ahead else '-'} F_{x.name}")
-        signals.append(Signal(f"force_place{k}", " ".join(names).removeprefix("+ "), "N"))
-    memory = tuple(s for s in model.extra_states if any(s.name.startswith(f"{x.name}_") for x in elements))
-    inputs = (*(Input(f"s_place{k}", "m") for k in range(len(places))), *model.inputs)
-    return replace(
-        model, bodies=(), inputs=inputs, elements=tuple(elements), extra_states=memory, variables=(), equations=(),
-        outputs=(signals[0],), sensors=tuple(signals),
-    )  # fmt: skip
-
-
-def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surface]:
-    """Restoring forces of all places with elements, over all recordings; none if their laws need more than motion.
-
-    The motion and the measured force are those of the best model there is (`fit`, or the null fit), and what the
-    smoother makes of its residual; its gain is that for the residual of the null fit.
-    """
-    acting = [p for p, place in enumerate(study.places) if place.elements]
-    places = [study.places[p] for p in acting]
-    n_z, n_u = len(study.model.sensors), len(study.model.inputs)
-    motions, beside, rigs = [], [], []
-    for k, (e, simulated) in enumerate(zip(study.experiments, watch(study, fit or study.null))):
-        nominal, rest = (
-            rfft(np.where(e.good, e.y - z[:, :n_z], 0.0), axis=0)[: e.band] for z in (study.null.simulated[k], simulated)
-        )
-        h = study.linear.transfer(e.frequencies[: e.band])[:, :, [n_u + p for p in acting] + list(range(n_u))]
-        gain = likely(e, study.levels[k], h[:, :n_z], len(acting), nominal / np.sqrt(len(e.time)))
-        w = np.einsum("fqz,fz->fq", gain, rest)
-        h = h[:, n_z:]
-        whole = np.zeros((len(e.frequencies), h.shape[1] + len(acting)), dtype=complex)
-        whole[: e.band] = np.concatenate([np.einsum("fyq,fq->fy", h, w), w[:, : len(acting)]], axis=1)
-        change = irfft(whole, len(e.time), axis=0)
-        paths = simulated[:, n_z:] + change[:, : h.shape[1]]
-        s, v = (paths[:, [2 * p + q for p in acting]] for q in (0, 1))
-        motions.append((s, v))
-        beside.append(change[:, h.shape[1] :])
-        none = np.zeros((len(s), len(acting)))
-        rigs.append(replace(e.driven_at(s, v), y=none, good=none > 0.0))
-    known = tuple(f for f in study.null.free if isinstance(f.target, str))  # nominal is what the tolerance allows
-    try:
-        laws = [
-            (Problem(rig(m, places), rigs, (), study.set_name), free)
-            for m, free in ((study.model, known), (extended, ()))
-            if m
-        ]
-    except (ModelError, UserError):
-        return []
-    both = [
-        [np.array(p.simulate(k, free, np.zeros((1, len(free))))[0][0]) for k in range(len(rigs))] for p, free in laws
-    ]
-    found = []
-    for i, place in enumerate(places):
-        s, v = (np.concatenate([m[q][:, i] for m in motions]) for q in (0, 1))
-        forces = [np.concatenate([z[:, i] for z in each]) for each in both]
-        edges = tuple(
-            np.linspace(-x, x, BINS + 1) for x in (max(float(np.quantile(np.abs(q), 0.999)), 1e-12) for q in (s, v))
-        )
-        measured = forces[-1] + np.concatenate([w[:, i] for w in beside])
-        names = tuple(name for name, _ in place.elements)
-        found.append(Surface(place.name, names, s, v, measured, forces[0], forces[1] if extended else None, edges))
-    return found
-
-
 # -- numbers ----------------------------------------------------------------------------------------------------------
-
-
-def short(value: Any) -> Any:
-    """Numbers of five digits, for a file; None for NaN."""
-    if isinstance(value, np.ndarray):
-        return [short(x) for x in value]
-    return float(f"{value:.5g}") if np.isfinite(value) else None
 
 
 def channel_numbers(c: Channel) -> dict[str, Any]:
@@ -395,28 +272,6 @@ def linear_share(c: Channel, r: Residual) -> float:
     return float(np.sum(corrected * r.density) / max(float(np.sum(r.density)), 1e-300))
 
 
-def surface_numbers(s: Surface) -> dict[str, Any]:
-    """Forces over deflection and rate, where they are most wrong, and by how much."""
-    gap = s.grid(s.measured - s.nominal)
-    found: dict[str, Any] = {
-        "place": s.place,
-        "elements": list(s.elements),
-        "unit": "N",
-        "force_rms": short(rms(s.nominal - np.mean(s.nominal))),
-        "before_rms": short(rms(s.measured - s.nominal)),
-    }
-    if s.extended is not None:
-        found["after_rms"] = short(rms(s.measured - s.extended))
-    if np.isfinite(gap).any():
-        i, j = np.unravel_index(np.nanargmax(s.count() * gap**2), gap.shape)
-        middle = [0.5 * (e[k] + e[k + 1]) for e, k in zip(s.edges, (i, j))]
-        found["worst"] = {"deflection": short(middle[0]), "rate": short(middle[1]), "missing": short(gap[i, j])}
-    forces = {"measured": s.measured, "nominal": s.nominal} | ({} if s.extended is None else {"extended": s.extended})
-    grids = {name: short(s.grid(values)) for name, values in forces.items()}
-    found["grid"] = {"deflection": short(s.edges[0]), "rate": short(s.edges[1]), "samples": s.count().tolist(), **grids}
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class Shown:
     """All that a report draws."""
@@ -424,6 +279,7 @@ class Shown:
     train: tuple[Channel, ...]
     holdout: tuple[Channel, ...]
     surfaces: tuple[Surface, ...]
+    missing: tuple[Missing, ...] = ()
 
     def numbers(self) -> dict[str, Any]:
         """As in diagnosis.json."""
@@ -431,15 +287,16 @@ class Shown:
             "signals": [channel_numbers(c) for c in self.train],
             "holdout": [channel_numbers(c) for c in self.holdout],
             "state_space": [surface_numbers(s) for s in self.surfaces],
+            "places": [m.numbers() for m in self.missing],
         }
 
 
-def show(study: Study, fit: Fit | None, extended: Model | None, holdout: Sequence[Channel]) -> Shown:
+def show(study: Study, fit: Fit | None, extended: Model | None, holdout: Sequence[Channel], nameless: bool = False) -> Shown:
     """What the model gets wrong in training; `fit` and `extended`: the model with the named causes, if there are
-    any."""
+    any; `nameless`: what has no name is shown as the force that is missing at each place."""
     train: list[Channel] = []
     for k, e in enumerate(study.experiments):
         train += channels(
             e, study.model, study.null.simulated[k], fit.simulated[k] if fit else None, noise_floor(study, k)
         )
-    return Shown(tuple(train), tuple(holdout), tuple(surfaces(study, extended, fit)))
+    return Shown(tuple(train), tuple(holdout), tuple(surfaces(study, extended, fit)), missing_forces(study) if nameless else ())

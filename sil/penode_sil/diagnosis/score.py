@@ -25,7 +25,7 @@ from .hypotheses import Basis, Fault, Motion
 from .noise import Experiment, Metric
 from penode_gen.model import GROUND, Model
 
-from .plant import Linear, Place
+from .plant import Linear, Place, moving_ends
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -370,7 +370,7 @@ def collect(
 
     for k, place in enumerate(found):
         motions = [Motion(m.s[::every], m.v[::every], m.t[::every]) for m in (s.motions[k] for s in seen)]
-        laws = list(hy.force_laws(k, place, motions, step, not {b.name for b in model.bodies} & set(place.ends), kinds))
+        laws = list(hy.force_laws(k, place, motions, step, not moving_ends(model) & set(place.ends), kinds))
         body = next((b.name for b in model.bodies if set(place.ends) == {b.name, GROUND}), None)
         for i in range(0, len(laws), TOGETHER):
             own = laws[i : i + TOGETHER]

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from penode_gen.model import Model, Signal
+from penode_gen.model import Model, Parameter, Signal
 
 from . import plant
 from .fit import KEPT, Fit, Free, Problem
@@ -22,6 +22,7 @@ from .score import Regression, Seen, collect, smooth
 Array = NDArray[np.float64]
 SKEW = 0.001  # of a sample: channels are never sampled at quite the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
+VAGUE = 0.5  # a parameter known no better may itself make a plant of another kind
 FEW = 4  # studies with other noise that are kept: the next step of a search may ask for one again
 SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 
@@ -45,16 +46,22 @@ class Study:
     nothing: float = 0.0  # loss of the null fit, see `loss`
 
 
+def uncertain(p: Parameter, guessed: float = 1e3) -> Free:
+    """A parameter within its tolerance. One that may be nothing, or is unknown, keeps its sign and moves by ratios; an unknown one is at
+    most `guessed` times as large or small as the file has it."""
+    size, most = abs(p.value), LIMIT * p.tolerance
+    if most < 1.0:
+        sigma, far = size * p.tolerance * SHARE, size * most
+        return Free(p.name, p.value, sigma, sigma=sigma, origin=p.value, low=p.value - far, high=p.value + far)
+    known = np.isfinite(most)
+    ends = sorted((p.value / (guessed if not known else 1.0 + most), p.value * (guessed if not known else 1.0 + most)))
+    sigma = size * p.tolerance * SHARE if known else np.inf
+    return Free(p.name, p.value, size, log=True, sigma=sigma, origin=p.value, low=ends[0], high=ends[1])
+
+
 def nuisances(model: Model, experiments: Sequence[Experiment]) -> tuple[Free, ...]:
     """Parameters within tolerance and all start states."""
-    free = [
-        Free(
-            p.name, p.value, abs(p.value) * p.tolerance * SHARE, sigma=abs(p.value) * p.tolerance * SHARE, origin=p.value,
-            low=p.value - LIMIT * abs(p.value) * p.tolerance, high=p.value + LIMIT * abs(p.value) * p.tolerance,
-        )  # fmt: skip
-        for p in model.parameters.values()
-        if p.tolerance > 0.0 and p.value != 0.0
-    ]
+    free = [uncertain(p) for p in model.parameters.values() if p.tolerance > 0.0 and p.value != 0.0]
     skew = SKEW * model.sample_time
     free += [Free(("skew", j), 0.0, skew, sigma=skew, low=-3.0 * skew, high=3.0 * skew) for j in range(len(model.sensors))]
     for e, experiment in enumerate(experiments):
@@ -73,7 +80,7 @@ def watched(model: Model, found: Sequence[Place]) -> Model:
             texts = (f"s_{p.elements[0][0]}", f"v_{p.elements[0][0]}")
         else:
             texts = ends[p.ends[0]]
-        signals += [Signal(f"{q}_place{k}", text, unit) for q, text, unit in zip("sv", texts, ("m", "m/s"))]
+        signals += [Signal(f"{q}_place{k}", text, p.unit(unit)) for q, text, unit in zip("sv", texts, ("m", "m/s"))]
     return replace(model, sensors=(*model.sensors, *signals))
 
 
@@ -117,10 +124,19 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
             metrics[e] = metric(experiment, levels[e], h)
         problem = Problem(model, experiments, metrics, set_name)
         free = fit.free
+        if any(p.tolerance > VAGUE for p in model.parameters.values()):  # what the file says is no point to linearise about
+            linear = plant.linearise(fitted(model, fit), found, np.array(x[0][pick]), experiments[0].u[pick])
     fit = problem.solve(free)
     study = Study(model, set_name, experiments, found, linear, tuple(levels), tuple(metrics), fit.free, fit)
     seen = look(study, fit)
     return replace(study, sizes=tuple(size([s.motions[k] for s in seen]) for k in range(len(found))))
+
+
+def fitted(model: Model, fit: Fit) -> Model:
+    """The model with the parameters of a fit."""
+    values = {f.target: f.value for f in fit.free if isinstance(f.target, str)}
+    changed = {name: replace(p, value=values[name]) for name, p in model.parameters.items() if name in values}
+    return replace(model, parameters={**model.parameters, **changed})
 
 
 def heard(study: Study, fit: Fit, coloured: bool = True, robust: bool = True) -> tuple[tuple[Array, ...], tuple[Metric, ...]]:

@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The force that is missing at each place, sample by sample and without a law, and how much of the residual it explains alone.
+
+What a simulation misses moves by the plant linearised about it, driven by an unknown force at one place. Its rate is a
+random walk, of the strength under which the recordings are most likely. A Kalman filter gives the likelihood and
+a smoother the force (Bryson and Frazier 1963), both stationary, mode by mode. The free values of the fit (parameters within
+their tolerance, start states) are estimated beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+from scipy.signal import lfilter
+
+from penode_gen.model import Element, Input, Model
+
+from .fit import Free, Problem
+from .noise import Experiment
+from .plant import Linear, Place, extend, linearise
+from .study import Study
+
+Array = NDArray[np.float64]
+
+@dataclass(frozen=True)
+class Effort:
+    """How a walk is looked for. `strengths`: variance of a force's rate after a second, in squares of `_unit` times `pace` [1/s^2];
+    `finer`: factors around the best. `forgets`: recordings after which a walk has forgotten where it was, for accelerations do not show a
+    constant force. `shift`: units by which free values are moved for derivatives. The `refined` places that explain most are looked at
+    `again`, about the free values found there, so many times each."""
+
+    strengths: tuple[float, ...] = (1.0, 30.0, 1e3, 3e4, 1e6, 3e7)
+    finer: tuple[float, ...] = (0.18, 1.0, 5.6)
+    pace: float = 1e3
+    forgets: float = 10.0
+    shift: float = 0.02
+    refined: int = 2
+    again: int = 3
+
+
+EFFORT = Effort()
+
+
+@dataclass(frozen=True, eq=False)
+class Missing:
+    """Force at a place [N] or [N*m], per recording [n]; `left`: -2 log likelihood with it, up to a constant; `share`: what it explains
+    alone of the power that the fit leaves beyond noise."""
+
+    place: Place
+    forces: tuple[Array, ...]
+    left: float
+    share: float
+
+    def numbers(self) -> dict[str, Any]:
+        """As in diagnosis.json."""
+        size = float(np.sqrt(np.mean(np.concatenate(self.forces) ** 2)))
+        return {
+            "place": self.place.name, "ends": list(self.place.ends), "unit": self.place.unit("N"), "missing_rms": float(f"{size:.5g}"),
+            "share": float(f"{self.share:.5g}"),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A stationary filter and smoother: x' = f x + noise, y = h x + noise of deviation 1."""
+
+    step: Array  # of the prediction from one sample to the next, f (1 - k h)
+    gain: Array  # f k
+    out: Array  # h
+    spread: Array  # covariance of the prediction
+    precision: Array  # of innovations
+    root: Array  # turns innovations white
+    volume: float  # log determinant of their covariance
+
+    @staticmethod
+    def of(f: Array, noise: Array, h: Array) -> Walk | None:
+        """None where there is none: a walk that no sensor sees."""
+        try:
+            p = _riccati(f, noise, h)
+            s = h @ p @ h.T + np.eye(len(h))
+            low = np.linalg.cholesky(s)
+        except (np.linalg.LinAlgError, ValueError):
+            return None
+        root = linalg.solve_triangular(low, np.eye(len(s)), lower=True)
+        precision = root.T @ root
+        gain = f @ p @ h.T @ precision
+        step = f - gain @ h
+        if not np.max(np.abs(np.linalg.eigvals(step))) < 1.0:
+            return None
+        return Walk(step, gain, h, p, precision, root, 2.0 * float(np.sum(np.log(np.diag(low)))))
+
+    def predictions(self, y: Array) -> Array:
+        """States [n, x, any] foretold before each sample of y [n, sensors, any]."""
+        drive = np.einsum("xs,ns...->nx...", self.gain, y[:-1])
+        return recursion(self.step, np.concatenate([np.zeros_like(drive[:1]), drive]))
+
+    def innovations(self, y: Array) -> Array:
+        """White [n, sensors, any] if y is what the walk makes."""
+        return np.einsum("rs,ns...->nr...", self.root, y - np.einsum("sx,nx...->ns...", self.out, self.predictions(y)))
+
+    def smoothed(self, y: Array) -> Array:
+        """States [n, x] as they most likely were, by the innovations still to come: no covariance is inverted."""
+        before = self.predictions(y)
+        pulls = (y - before @ self.out.T) @ self.precision @ self.out
+        return before + recursion(self.step.T, pulls[::-1])[::-1] @ self.spread
+
+
+def _riccati(f: Array, noise: Array, h: Array) -> Array:
+    """Covariance of stationary predictions. States are counted in their deviations, which differ by many powers of ten. Raises LinAlgError."""
+    p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
+    size = np.sqrt(np.maximum(np.diag(p), 1e-300))
+    f, h, noise = f * size / size[:, None], h * size, noise / np.outer(size, size)
+    p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
+    for _ in range(50):  # what rounding has left
+        k = np.linalg.solve(h @ p @ h.T + np.eye(len(h)), h @ p).T
+        rest = np.eye(len(f)) - k @ h
+        p = f @ (rest @ p @ rest.T + k @ k.T) @ f.T + noise
+    return 0.5 * (p + p.T) * np.outer(size, size)
+
+
+def recursion(a: Array, drive: Array) -> Array:
+    """x[k] = a x[k-1] + drive[k] from rest, [n, x, any]: mode by mode."""
+    values, modes = np.linalg.eig(a)
+    if np.linalg.cond(modes) < 1e10:
+        parts = np.tensordot(np.linalg.inv(modes), drive.astype(complex), (1, 1))  # [x, n, any]
+        found = np.stack([lfilter([1.0], [1.0, -value], part, axis=0) for value, part in zip(values, parts)])
+        return np.moveaxis(np.real(np.tensordot(modes, found, 1)), 0, 1)
+    x, found = np.zeros_like(drive[0]), np.empty_like(drive)
+    for k, d in enumerate(drive):
+        x = found[k] = a @ x + d
+    return found
+
+
+def missing_forces(study: Study) -> tuple[Missing, ...]:
+    """For all places, those that explain most first."""
+    parts = [_Recording.of(study, k, study.null.free) for k in range(len(study.experiments))]
+    nothing = sum(float(np.sum(p.residual**2)) for p in parts), sum(p.residual.size for p in parts)
+    known = [(study.linear, study.linear.n_inputs + k) for k in range(len(study.places))]
+    found = [_at(place, *way, study.null.free, parts, EFFORT.strengths) for place, way in zip(study.places, known)]
+    ranked = sorted((f for f in found if f is not None), key=lambda f: f.left)
+    ranked[: EFFORT.refined] = [_again(study, f) for f in ranked[: EFFORT.refined]]
+    return tuple(f.result(nothing) for f in sorted(ranked, key=lambda f: f.left))
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A force at a place under the likeliest walk, and the free values beside it."""
+
+    place: Place
+    left: float
+    strength: float
+    free: tuple[Free, ...]
+    forces: tuple[Array, ...]
+    rest: float
+
+    def result(self, nothing: tuple[float, int]) -> Missing:
+        share = (nothing[0] - self.rest) / max(nothing[0] - nothing[1], 1.0)
+        return Missing(self.place, self.forces, self.left, float(np.clip(share, 0.0, 1.0)))
+
+
+def _again(study: Study, found: _Found) -> _Found:
+    """The same about the free values and along the motion that were found: what a parameter does depends on both."""
+    probe = Element("missing", found.place.ends, "expression", expression="missing_force")
+    acting = extend(study.model, [probe], {}, [found.place])
+    acting = replace(acting, inputs=(*acting.inputs, Input("missing_force", found.place.unit("N"))))
+    for again in range(EFFORT.again):
+        values = {f.target: f.value for f in found.free if isinstance(f.target, str)}
+        known = {n: replace(p, value=values.get(n, p.value)) for n, p in study.model.parameters.items()}
+        if study.model.networks:
+            linear, column = study.linear, study.linear.n_inputs + study.places.index(found.place)
+        else:
+            start = np.array([study.model.start])
+            linear = linearise(replace(study.model, parameters=known), [found.place], start, study.experiments[0].u[:1])
+            column = linear.n_inputs
+        parts = [_Recording.of(study, k, found.free, acting, force) for k, force in enumerate(found.forces)]
+        parts = [replace(p, residual=p.residual + _answer(linear, column, p, force)) for p, force in zip(parts, found.forces)]
+        strengths = EFFORT.strengths if again < EFFORT.again - 1 else tuple(found.strength * x for x in EFFORT.finer)
+        better = _at(found.place, linear, column, found.free, parts, strengths)
+        if better is None:
+            return found
+        found = better
+    return found
+
+
+def _answer(linear: Linear, column: int, p: _Recording, force: Array) -> Array:
+    """What the linear plant makes of a force [n], in deviations of the sensors [n, measured]."""
+    f, h = _discrete(linear, column, p, 1.0)
+    n = len(linear.a)
+    after = np.append(force[1:], force[-1])
+    drive = np.outer(force, f[:n, n] - f[:n, n + 1]) + np.outer(after, f[:n, n + 1])
+    x = recursion(f[:n, :n], np.vstack([np.zeros((1, n)), drive[:-1]]))
+    return x @ h[:, :n].T + np.outer(force, h[:, n])
+
+
+@dataclass(frozen=True, eq=False)
+class _Recording:
+    """What a fit leaves of a recording, in deviations of its sensors' noise [n, measured], and what free values do to that."""
+
+    experiment: Experiment
+    sensors: tuple[int, ...]
+    sigma: Array
+    residual: Array
+    slopes: Array  # [n, measured, free]
+
+    @staticmethod
+    def of(study: Study, k: int, free: Sequence[Free], acting: Model | None = None, force: Array | None = None) -> _Recording:
+        """About free values; `acting`: a model with one more input, `force` [n]."""
+        e = study.experiments[k]
+        own = tuple(j for j in range(e.y.shape[1]) if e.good[:, j].any())
+        declared = np.array([s.noise for s in study.model.sensors])
+        quiet = np.sqrt(np.min(study.levels[k], axis=0))  # a force that is missing is no noise
+        sigma = np.where(declared > 0.0, declared, quiet)[list(own)]
+        driven = e if force is None else replace(
+            e, u=_beside(e.u, force), drive=_beside(e.drive, force), rate=_beside(e.rate, np.gradient(force, e.step)),
+            unsure=_beside(e.unsure, np.zeros(len(e.unsure))),
+        )  # fmt: skip
+        problem = Problem(acting or study.model, [driven], (), study.set_name, study.linear.fastest, study.null.faults)
+        moves = np.vstack([np.zeros(len(free)), EFFORT.shift * np.eye(len(free))])
+        z = problem.simulate(0, [replace(_of(f, k), low=-np.inf, high=np.inf) for f in free], moves)[0][:, :, list(own)] / sigma
+        rest = e.y[:, list(own)] / sigma - z[0]
+        at = np.arange(len(rest))
+        for c, j in enumerate(own):
+            rest[:, c] = np.interp(at, at[e.good[:, j]], rest[e.good[:, j], c])
+        return _Recording(e, own, sigma, rest, np.moveaxis((z[1:] - z[0]) / EFFORT.shift, 0, -1))
+
+
+def _beside(columns: Array, more: Array) -> Array:
+    return np.hstack([columns, more[:, None]])
+
+
+def _of(f: Free, k: int) -> Free:
+    """A free value as the only recording of a problem has it: start states of recording k are those of 0, those of others are nobody's."""
+    if isinstance(f.target, str) or f.target[0] != "start":
+        return f
+    return replace(f, target=("start", 0 if f.target[1] == k else -1, f.target[2]))
+
+
+def _at(
+    place: Place, linear: Linear, column: int, free: tuple[Free, ...], parts: Sequence[_Recording], strengths: Sequence[float]
+) -> _Found | None:
+    """The force of one place, column of the inputs of a plant, under the likeliest walk; None where no sensor sees it."""
+    units = [_unit(linear, column, p) for p in parts]
+    best: tuple[float, float, Array, list[Walk]] | None = None
+    for strength in strengths:
+        walks = [_walk(linear, column, p, unit, strength) for p, unit in zip(parts, units)]
+        if any(w is None for w in walks):
+            continue
+        left, shift = _regressed(free, parts, walks)
+        if np.isfinite(left) and (best is None or left < best[0]):
+            best = left, float(strength), shift, walks
+    if best is None:
+        return None
+    left, strength, shift, walks = best
+    forces, rest = [], 0.0
+    for p, walk, unit in zip(parts, walks, units):
+        y = p.residual - p.slopes @ shift
+        x = walk.smoothed(y)
+        forces.append(x[:, len(linear.a)] * unit)
+        rest += float(np.sum((y - x @ walk.out.T) ** 2))
+    moved = tuple(replace(f, value=float(f.at(s))) for f, s in zip(free, shift))
+    return _Found(place, left, strength, moved, tuple(forces), rest)
+
+
+def _unit(linear: Linear, column: int, p: _Recording) -> float:
+    """The force that would make so much of a residual where sensors see it best: walks are counted in it."""
+    f = p.experiment.frequencies[1 : p.experiment.band]
+    seen = linear.transfer(p.experiment.frequencies)[1 : p.experiment.band, list(p.sensors), column]
+    most = float(np.max(np.abs(seen) / p.sigma)) if len(f) else 0.0
+    return max(float(np.sqrt(np.mean(p.residual**2))), 1.0) / most if most > 0.0 else 1.0
+
+
+def _discrete(linear: Linear, column: int, p: _Recording, unit: float) -> tuple[Array, Array]:
+    """The plant from sample to sample under a force that goes straight between them: states, the force and its change in a sample; and
+    what the sensors see of these, in their deviations."""
+    step, n = p.experiment.step, len(linear.a)
+    block = np.zeros((n + 2, n + 2))
+    block[:n, :n], block[:n, n], block[n, n + 1] = linear.a * step, linear.b[:, column] * unit * step, 1.0
+    whole = linalg.expm(block)
+    f = np.zeros((n + 2, n + 2))
+    f[:n, :n], f[:n, n], f[:n, n + 1] = whole[:n, :n], whole[:n, n], whole[:n, n + 1]
+    f[n, n] = f[n, n + 1] = f[n + 1, n + 1] = 1.0
+    h = np.zeros((len(p.sensors), n + 2))
+    h[:, :n], h[:, n] = linear.c[list(p.sensors)], linear.d[list(p.sensors), column] * unit
+    return f, h / p.sigma[:, None]
+
+
+def _walk(linear: Linear, column: int, p: _Recording, unit: float, strength: float) -> Walk | None:
+    """The plant under a wandering force, which forgets in the end."""
+    f, h = _discrete(linear, column, p, unit)
+    n, step = len(linear.a), p.experiment.step
+    into = np.concatenate([f[:n, n + 1], [1.0, 1.0]])
+    forgetting = f * np.exp(-1.0 / (EFFORT.forgets * len(p.residual)))
+    return Walk.of(forgetting, strength * EFFORT.pace * step**3 * np.outer(into, into), h)
+
+
+def _regressed(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[Walk]) -> tuple[float, Array]:
+    """-2 log likelihood, and the shifts of the free values under which it is least, within their priors."""
+    r = np.concatenate([w.innovations(p.residual).ravel() for p, w in zip(parts, walks)])
+    volume = sum(len(p.residual) * w.volume for p, w in zip(parts, walks))
+    if not free:
+        return float(r @ r) + volume, np.zeros(0)
+    rows = [w.innovations(p.slopes).reshape(-1, len(free)) for p, w in zip(parts, walks)]
+    whole = np.vstack([*rows, np.diag([f.unit / f.sigma for f in free])])
+    r = np.concatenate([r, [-f.offset for f in free]])
+    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    shift = np.linalg.solve((whole / size).T @ (whole / size) + 1e-12 * np.eye(len(free)), (whole / size).T @ r) / size
+    left = r - whole @ shift
+    return float(left @ left) + volume, shift

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Recordings that drive a model: inputs on the model's raster, and what the sensors measured meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import recording, scenario as scenarios
+from .errors import UserError
+from .signals import Samples
+
+Array = NDArray[np.float64]
+HOW = ("linear", "held", "bandlimited")
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What a recording holds of one sensor or output: its own sound rows, in SI."""
+
+    unit: str  # of the model file
+    time: Array  # [rows] s, as in the file
+    values: Array  # [rows]
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """One recording on the model's raster of n samples, SI."""
+
+    plan: scenarios.Scenario
+    times: Array  # [n] s, from 0
+    offset: float  # s, time of the first sample in the file
+    u: Array  # [n, inputs]
+    sensed: dict[str, Sensed]
+
+
+def load(path: Path, model: Any, set_name: str | None, channels: Iterable[str], how: str, note: Callable[[str], None]) -> Replay:
+    """Read a recording for a model; `how` says what an input does between two rows of the file. Raises UserError."""
+    wanted = {signal.name: signal.unit for signal in model.inputs}
+    signals = {s.name: s.unit for s in (*model.sensors, *model.outputs) if s.name not in wanted}
+    pairs = recording.aliases(channels, [*wanted, *signals])
+    tables = recording.read(path, [*wanted, *signals, "time"], pairs)
+    sensed = _sensed(tables, signals, path, note)
+    if wanted:
+        raster, u, remarks = recording.on_raster(tables, wanted, model.sample_time)
+        if how != "linear":
+            u, remarks = _between(tables, wanted, raster, model.sample_time, how)
+    else:
+        raster, remarks = _clock(path, sensed, model.sample_time), []
+        u = np.zeros((raster.size, 0))
+    for remark in remarks:
+        note(f"{path}: {remark}")
+    times = np.arange(raster.size) * model.sample_time
+    inputs = {s.name: Samples(times, column) for s, column in zip(model.inputs, u.T)}
+    instance = scenarios.Instance(model.name, set_name or next(iter(model.sets)))
+    plan = scenarios.Scenario(path.stem, float(times[-1]), inputs, {}, (instance,), path)
+    return Replay(plan, times, float(raster[0]), u, sensed)
+
+
+def _sensed(tables: Sequence[Any], signals: dict[str, str], path: Path, note: Callable[[str], None]) -> dict[str, Sensed]:
+    """The sensors that the file holds; one that cannot be read is left out, which is noted: nothing depends on it."""
+    found = {}
+    for name, unit in signals.items():
+        try:
+            if not any(table.find(name, unit) for table in tables):
+                continue
+            table = recording.pick(tables, name, unit)
+            time = table.channel("time", "s", finite=False)
+            values = table.channel(name, unit, finite=False)
+        except UserError as exc:
+            note(f"{exc.problems[0]}; {name} is not compared")
+            continue
+        sound = np.isfinite(time) & np.isfinite(values)
+        order = np.argsort(time[sound], kind="stable")
+        if order.size:
+            found[name] = Sensed(unit, time[sound][order], values[sound][order])
+    return found
+
+
+def _clock(path: Path, sensed: dict[str, Sensed], step: float) -> Array:
+    """The raster of a model without inputs: as long as all its sensors were measured."""
+    if not sensed:
+        raise UserError(f"{path}: it holds neither inputs nor sensors of the model; name them with --channel NAME=COLUMN")
+    first, last = max(s.time[0] for s in sensed.values()), min(s.time[-1] for s in sensed.values())
+    count = int((last - first) / step + 1e-3) + 1
+    if last <= first or count < 2:
+        raise UserError(f"{path}: its sensors share less than two samples of {step * 1e3:g} ms; record them together")
+    if count > 1000 * max(s.time.size for s in sensed.values()):
+        raise UserError(f"{path}: it has far longer gaps than samples; split the recording there")
+    return first + np.arange(count) * step
+
+
+def _between(
+    tables: Sequence[Any], wanted: dict[str, str], raster: Array, step: float, how: str
+) -> tuple[Array, list[str]]:
+    """Inputs [n, inputs] on a raster, held or band-limited between the rows of the file; notes."""
+    columns, remarks = [], []
+    for name, unit in wanted.items():
+        table = recording.pick(list(tables), name, unit)
+        time, values = table.time(), table.channel(name, unit)
+        usual = float(np.median(np.diff(time)))
+        if how == "held":
+            columns.append(values[np.maximum(np.searchsorted(time, raster + 1e-3 * step, side="right") - 1, 0)])
+            continue
+        grid = time[0] + np.arange(time.size) * (time[-1] - time[0]) / (time.size - 1)
+        worst = float(np.max(np.abs(time - grid))) / usual
+        if worst > 0.01:  # an error of pi * 1 % at half of the highest frequency
+            what = f"rows are off an even clock by {worst:.2g} of their interval"
+            raise UserError(f"{table.path}: channel {name}: its {what}; replay it with --replay linear or held")
+        if np.max(np.abs((raster - time[0]) / usual - np.rint((raster - time[0]) / usual))) < 1e-3 and usual <= 1.001 * step:
+            if usual >= 0.999 * step:
+                columns.append(values[np.rint((raster - time[0]) / usual).astype(int)])
+                continue
+        kernel = recording.Kernel(raster, float(time[0]), float(grid[1] - grid[0]), time.size, step)
+        columns.append(kernel.apply(values[:, None])[:, 0])
+        remarks.append(f"{name} is replayed band-limited from rows {usual * 1e3:.6g} ms apart")
+    return np.column_stack(columns), list(dict.fromkeys(remarks))

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""`penode simulate`: a model on a scenario or on recordings, exact, as C on the host, or as C on an emulated core."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+import penode_gen
+
+from . import mil, replay, results, scenario as scenarios, starts, status, units
+from .console import FILE, Several, note, progress
+from .errors import UserError, hint
+from .mdf_write import write_mf4
+from .output import write_csv
+from .results import Result
+from .schedule import instance_calls
+from .targets import MACHINES, Pil, Sil
+
+ENDINGS = (".csv", ".mf4")
+PICTURES = (".png", ".svg", ".pdf")
+
+
+@click.command(cls=Several)
+@click.argument("model", type=FILE)
+@click.option("--scenario", type=FILE, help="Scenario file (TOML) to run.")
+@click.option("--input", "records", type=FILE, multiple=True, help="Recordings (CSV with units, or MDF) that drive the model.")
+@click.option(
+    "--on",
+    "target",
+    default="sil",
+    show_default=True,
+    metavar="mil|sil|pil[:machine]",
+    help=f"Exact reference, C on this machine, or C on an emulated one of {', '.join(MACHINES)}.",
+)
+@click.option("-o", "--output", type=FILE, required=True, help="File to write (.csv, .mf4); for several recordings a folder, or a name with {name}. Folders are made.")
+@click.option("--plot", type=FILE, help="Picture to write as well (.png, .svg, .pdf).")
+@click.option("--signal", help="Signal to plot; the first output if not given.")
+@click.option("--set", "set_name", help="Parameter set for --input.")
+@click.option("--channel", multiple=True, help="What the recording calls a signal: x=pos_mm, or x=Weg [mm].")
+@click.option("--start", multiple=True, help='Start: "state=0.01 m", or measured[:K], fitted to the first K samples of the sensors.')
+@click.option("--replay", "how", type=click.Choice(replay.HOW), default="linear", show_default=True, help="What an input does between rows.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def simulate(model: Path, target: str, as_json: bool, **given: Any) -> None:
+    """Run the model file MODEL on a scenario or on recorded inputs."""
+    asked = _Asked(model, target, **given)
+    place, machine = asked.place()
+    outputs = asked.outputs()
+    loaded = penode_gen.load(model)
+    asked.check(loaded)
+    start = starts.parse(asked.start, loaded)
+    jobs = asked.jobs(loaded, start)
+    for job in jobs:
+        _warn_range(loaded, job.u)
+    compiled = None if place == "mil" else Sil(loaded) if place == "sil" else Pil(loaded, machine)
+    summaries = []
+    for job, output in zip(jobs, outputs):
+        found = _run(loaded, job, place, compiled)
+        _tell_refused(found)
+        columns = results.table(loaded, job.times + job.offset, job.u, found, prefix=len(found) > 1, full=job.replay is None)
+        output.parent.mkdir(parents=True, exist_ok=True)
+        (write_mf4 if output.suffix == ".mf4" else write_csv)(output, columns)
+        if asked.plot is not None:
+            asked.plot.parent.mkdir(parents=True, exist_ok=True)
+            results.plot(loaded, job.plan, job.times, found, asked.signal or _names(loaded)[0], asked.plot, target)
+        summary = results.summary(loaded, job.plan, job.times, found, target, output)
+        if job.replay is not None:
+            summary["start"] = job.start
+            summary["instances"][0]["rmse"] = results.rmse(loaded, job.replay, found[0])
+        summaries.append(summary)
+        if not as_json:
+            click.echo(results.sentences(summary))
+    if as_json:
+        click.echo(json.dumps(summaries[0] if len(summaries) == 1 else {"recordings": summaries}, indent=2))
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """One scenario or recording, ready to run; `start` as a line, empty if it is that of model file and scenario."""
+
+    plan: scenarios.Scenario
+    times: NDArray[np.float64]
+    offset: float
+    u: NDArray[np.float64]
+    replay: replay.Replay | None = None
+    start: str = ""
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """The options, to be checked before anything is read or run. Every method raises UserError."""
+
+    model: Path
+    target: str
+    scenario: Path | None
+    records: tuple[Path, ...]
+    output: Path
+    plot: Path | None
+    signal: str | None
+    set_name: str | None
+    channel: tuple[str, ...]
+    start: tuple[str, ...]
+    how: str
+
+    def place(self) -> tuple[str, str]:
+        """mil, sil or pil, and the machine of pil."""
+        if (self.scenario is None) == (not self.records):
+            raise UserError("simulate needs exactly one of --scenario and --input; name a scenario file or recordings")
+        place, _, machine = self.target.partition(":")
+        if place not in ("mil", "sil", "pil") or (machine and place != "pil"):
+            raise UserError(f'--on: "{self.target}" is not known; use mil, sil, pil or pil:MACHINE')
+        if machine and machine not in MACHINES:
+            raise UserError(f'--on: there is no machine "{machine}"; {hint(machine, MACHINES)}')
+        return place, machine or next(iter(MACHINES))
+
+    def outputs(self) -> list[Path]:
+        """A file for each recording, or one for the scenario; none of them, nor the picture, has a wrong name."""
+        if self.plot is not None:
+            if self.plot.suffix not in PICTURES:
+                raise UserError(f'{self.plot}: a picture cannot be written as "{self.plot.suffix}"; end its name in .png, .svg or .pdf')
+            if len(self.records) > 1:
+                raise UserError("--plot: it draws one recording, and there are several; leave it out or give one --input")
+            check_makeable(self.plot)
+        pattern = str(self.output)
+        if len(self.records) > 1 and "{name}" not in pattern:
+            if self.output.suffix in ENDINGS:
+                raise UserError(f"{self.output}: several recordings need several files; name a folder, or a file with {{name}} in it")
+            pattern = str(self.output / "{name}.csv")
+        outputs = [Path(pattern.replace("{name}", path.stem)) for path in self.records] or [self.output]
+        for path in outputs:
+            check_makeable(path)
+            if path.suffix not in ENDINGS:
+                raise UserError(f'{path}: a table cannot be written as "{path.suffix}"; end its name in .csv or .mf4')
+        twice = sorted({str(p) for p in outputs if outputs.count(p) > 1})
+        if twice:
+            raise UserError(f"{twice[0]}: two recordings would be written to it; rename one of the recordings")
+        for record, path in ((r, p) for r in self.records for p in outputs):
+            if path.exists() and record.exists() and path.samefile(record):
+                raise UserError(f"{path}: this is the recording itself; name another file")
+        return outputs
+
+    def check(self, model: Any) -> None:
+        """What the model must know."""
+        names = _names(model)
+        if self.signal is not None and self.signal not in names:
+            raise UserError(f'--signal: the model has no signal "{self.signal}"; {hint(self.signal, names)}')
+        if self.scenario is not None:
+            for option, given, why in (
+                ("--channel", self.channel, "it names what a recording holds, and a scenario has none"),
+                ("--start", self.start, "a scenario names its start states itself"),
+                ("--replay", self.how != "linear", "it is about the rows of a recording, and a scenario has none"),
+                ("--set", self.set_name, "scenarios name their sets themselves"),
+            ):
+                if given:
+                    raise UserError(f"{option}: {why}; remove it")
+        if self.set_name is not None and self.set_name not in model.sets:
+            raise UserError(f'--set: the model has no set "{self.set_name}"; {hint(self.set_name, model.sets)}')
+
+    def jobs(self, model: Any, start: starts.Start) -> list[_Job]:
+        """All that is to be run, read and checked."""
+        if self.scenario is not None:
+            length = int(np.asarray(penode_gen.set_values(model, next(iter(model.sets)))).size)
+            plan = scenarios.load(self.scenario, model, length)
+            times = scenarios.sample_times(plan, model.sample_time)
+            return [_Job(plan, times, 0.0, scenarios.sampled(plan, model, times))]
+        found, problems = [], []
+        for path in self.records:
+            try:
+                found.append(replay.load(path, model, self.set_name, self.channel, self.how, note))
+            except UserError as exc:
+                problems += exc.problems
+        if problems:
+            raise UserError(*dict.fromkeys(problems))
+        return [self._started(model, start, one) for one in found]
+
+    def _started(self, model: Any, start: starts.Start, one: replay.Replay) -> _Job:
+        initial, text = dict(start.given), ""
+        if start.fitted:
+            initial, text = starts.fit(model, one.plan.instances[0].set, one, start)
+        return _Job(replace(one.plan, initial=initial), one.times, one.offset, one.u, one, text)
+
+
+def check_makeable(path: Path) -> None:
+    """UserError now rather than after long work, if `path` cannot be written, its folders made if need be."""
+    if path.is_dir():
+        raise UserError(f"{path}: this is a directory; name a file in it")
+    folder = path.absolute().parent
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir():
+        raise UserError(f"{path}: {folder} is a file and no directory; name another one")
+    if not os.access(folder, os.W_OK):
+        raise UserError(f"{path}: the directory {folder} is not writable; name another one")
+
+
+def _names(model: Any) -> list[str]:
+    return list(dict.fromkeys([*(s.name for s in (*model.outputs, *model.sensors)), *model.states]))
+
+
+def _tell_refused(found: list[Result]) -> None:
+    for result in found:
+        for call, code in result.run.calls if result.run else ():
+            if code:
+                refused = ", ".join(status.names(code))
+                note(f"{result.instance.name}: {call.kind} before sample {call.sample} was refused: {refused}")
+
+
+def _warn_range(model: Any, u: NDArray[np.float64]) -> None:
+    """Say where an input leaves the range that the model file states."""
+    for signal, column in zip(model.inputs, u.T):
+        scale = units.factor(signal.unit)
+        for bound, worst, outside in ((signal.minimum, column.min(), "below"), (signal.maximum, column.max(), "above")):
+            if bound is not None and (worst < bound if outside == "below" else worst > bound):
+                note(
+                    f"input {signal.name} reaches {worst / scale:.6g} {signal.unit}, "
+                    f"{outside} the model's range that ends at {bound / scale:.6g} {signal.unit}"
+                )
+
+
+def _run(model: Any, job: _Job, place: str, target: Sil | Pil | None) -> list[Result]:
+    """All instances of a scenario, one after the other."""
+    found = []
+    for instance in job.plan.instances:
+        title = f"{job.plan.path.name}: {instance.name}"
+        if target is None:
+            length = int(np.asarray(penode_gen.set_values(model, next(iter(model.sets)))).size)
+            with progress(f"{title} (exact)", job.plan.duration) as tell:
+                exact = mil.run(model, job.plan, instance, job.times, length, tell)
+            found.append(Result(instance, exact.x, exact.y, exact.z, None, exact.adopted))
+        else:
+            calls = instance_calls(model, instance, job.plan.initial, target.dtype)
+            with progress(f"{title} on {place}", job.times.size) as tell:
+                run = target.run(job.u, calls, instance.set, tell)
+            adopted = tuple(np.flatnonzero(run.status & status.BIT["adopted"]).tolist())
+            found.append(Result(instance, run.x, run.y, run.z, run.status, adopted, run))
+    return found
