@@ -65,6 +65,7 @@ def test_counts_of_a_small_tree(tree: Path) -> None:
         ("gen/penode_gen/two.py", "from penode_gen import one\n", "circular imports"),
         ("inc/penode/b.h", '#include "penode/a.h"\n', "circular imports"),
         ("sil/penode_sil/one.py", "MORE: float = -2 / 3\n", "named thresholds"),
+        ("sil/penode_sil/rules.py", "class Rules:\n    more: float = 0.5  # of an interval\n", "named thresholds"),
         ("src/a.c", "\n", "runtime lines"),
         ("src/pen_log.c", "\n", "elementary lines"),
         ("src/pen_xcp_a.c", "\n", "wire protocol lines"),
