@@ -982,7 +982,7 @@ z = { value = "z", unit = "m" }
 z = { value = "z", unit = "m" }
 ''')
     model = penode_gen.load(path)
-    still = SimpleNamespace(u=np.zeros((1000, 1)))
+    still = SimpleNamespace(u=np.zeros((1000, 1)), held=None)
     z = extension.deployed(model, still, np.array([1.0, 0.0]), "default")[:, 0]
     assert np.max(np.abs(z - np.cos(30.0 * 2e-3 * np.arange(1000)))) < 1e-4
 

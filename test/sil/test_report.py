@@ -17,7 +17,7 @@ from test_diagnosis import MODEL, SAMPLES, STEP, drive, record, road
 import penode_gen
 from penode_sil import targets
 from penode_sil.cli import cli
-from penode_sil.diagnosis import files, noise, report, report_figure as fig, residual, result
+from penode_sil.diagnosis import files, noise, report, report_figure as fig, residual, restoring, result
 from penode_sil.diagnosis.report_figure import Axis
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
@@ -67,8 +67,8 @@ def found(model):
     train = residual.channels(e, model, signal, signal + wrong, floor)
     held = residual.channels(e, model, signal, signal + wrong, floor, time > 5.0)
     s, v = 0.02 * rng.standard_normal((2, n))
-    edges = (np.linspace(-0.06, 0.06, residual.BINS + 1),) * 2
-    surface = residual.Surface(
+    edges = (np.linspace(-0.06, 0.06, restoring.BINS + 1),) * 2
+    surface = restoring.Surface(
         "spring",
         ("spring", "damper"),
         s,

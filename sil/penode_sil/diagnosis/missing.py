@@ -125,7 +125,9 @@ def _riccati(f: Array, noise: Array, h: Array) -> Array:
 
 
 def recursion(a: Array, drive: Array) -> Array:
-    """x[k] = a x[k-1] + drive[k] from rest, [n, x, any]: mode by mode."""
+    """x[k] = a x[k-1] + drive[k] from rest, [n, x, any]: mode by mode. Without states, as without motion, nothing."""
+    if not len(a):
+        return drive
     values, modes = np.linalg.eig(a)
     if np.linalg.cond(modes) < 1e10:
         parts = np.tensordot(np.linalg.inv(modes), drive.astype(complex), (1, 1))  # [x, n, any]

@@ -47,10 +47,10 @@ class Study:
 
 
 def uncertain(p: Parameter, guessed: float = 1e3) -> Free:
-    """A parameter within its tolerance. One that may be nothing, or is unknown, keeps its sign and moves by ratios; an unknown one is at
-    most `guessed` times as large or small as the file has it."""
+    """A parameter within its tolerance. One that is only guessed (above 100 %), or unknown, keeps its sign and moves by ratios; an unknown
+    one is at most `guessed` times as large or small as the file has it."""
     size, most = abs(p.value), LIMIT * p.tolerance
-    if most < 1.0:
+    if p.tolerance <= 1.0:
         sigma, far = size * p.tolerance * SHARE, size * most
         return Free(p.name, p.value, sigma, sigma=sigma, origin=p.value, low=p.value - far, high=p.value + far)
     known = np.isfinite(most)
