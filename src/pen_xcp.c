@@ -83,7 +83,7 @@ static void xcp_get_id(pen_xcp_t *xcp, uint32_t type, uint8_t out[])
 }
 
 /* Bytes that a command needs at least, and 16 times those of its answer; 0: no such command. */
-static uint32_t xcp_shape(uint8_t command)
+static uint32_t xcp_shape(uint8_t code)
 {
     static const uint8_t shape[48] = {
         0x00U, 0x00U, 0x00U, 0x16U, 0x15U, 0x14U, 0x11U, 0x74U, 0x00U, 0x81U, 0x81U, 0x00U, 0x81U, 0x12U, 0x24U, 0x84U, /* d0 */
@@ -91,12 +91,12 @@ static uint32_t xcp_shape(uint8_t command)
         0x12U, 0x00U, 0x00U, 0x88U, 0x18U, 0x12U, 0x18U, 0x22U, 0x23U, 0x12U, 0x82U, 0x81U, 0x21U, 0x61U, 0x11U, 0x82U, /* f0 */
     };
 
-    return (command >= XCP_FIRST) ? shape[command - XCP_FIRST] : 0U;
+    return (code >= XCP_FIRST) ? shape[code - XCP_FIRST] : 0U;
 }
 
-static uint32_t xcp_call(pen_xcp_command_t command, pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint8_t out[])
+static uint32_t xcp_call(pen_xcp_command_t answer, pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint8_t out[])
 {
-    return (command != NULL) ? command(xcp, in, n, out) : PEN_XCP_UNKNOWN;
+    return (answer != NULL) ? answer(xcp, in, n, out) : PEN_XCP_UNKNOWN;
 }
 
 static uint32_t xcp_execute(pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint8_t out[])
@@ -141,14 +141,14 @@ static uint32_t xcp_execute(pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint
 }
 
 /* What is wrong with a packet before its command is looked at. */
-static uint32_t xcp_refuse(const pen_xcp_t *xcp, uint8_t command, uint32_t n, uint32_t needs)
+static uint32_t xcp_refuse(const pen_xcp_t *xcp, uint8_t code, uint32_t n, uint32_t needs)
 {
     uint32_t resource = 0U;
     uint32_t error = PEN_XCP_DONE;
 
-    if (command < XCP_CAL_FIRST) {
+    if (code < XCP_CAL_FIRST) {
         resource = PEN_XCP_DAQ;
-    } else if (command <= XCP_CAL_LAST) {
+    } else if (code <= XCP_CAL_LAST) {
         resource = PEN_XCP_CAL;
     } else {
         /* open to all */

@@ -245,12 +245,12 @@ static uint32_t xcp_event_info(pen_xcp_t *xcp, uint32_t event, uint8_t out[])
 }
 
 /* Commands that change lists need them at rest; FREE_DAQ sees to that. */
-static uint32_t xcp_at_rest(pen_xcp_t *xcp, uint8_t command)
+static uint32_t xcp_at_rest(pen_xcp_t *xcp, uint8_t code)
 {
-    const bool changes = (command <= 0xd6U) || (command >= 0xe0U);
+    const bool changes = (code <= 0xd6U) || (code >= 0xe0U);
     uint32_t error = PEN_XCP_DONE;
 
-    if (command == 0xd6U) {
+    if (code == 0xd6U) {
         xcp_stop(xcp, UINT32_MAX);
         pen_port_barrier();
     }

@@ -63,7 +63,7 @@ ALLOWED.mps2-an385 := __aeabi_(f[a-z0-9]*|u?i2f)
 LEVELS := -O2 -Os -O3
 
 # Cores that no port has. Most call memcpy for a copied struct sooner than a Cortex-M; clang needs no more than itself.
-SOFT_FLOAT  := __aeabi_(f[a-z0-9]*|u?i2f|u?i?divmod|u?idiv)|__(add|sub|mul|div|eq|ne|lt|le|gt|ge|unord)sf[23]|__float(un)?sisf|__fix(uns)?sfsi
+SOFT_FLOAT  := __gnu_thumb1_case_(uqi|sqi|uhi|shi|si)|__aeabi_(f[a-z0-9]*|u?i2f|u?i?divmod|u?idiv)|__(add|sub|mul|div|eq|ne|lt|le|gt|ge|unord)sf[23]|__float(un)?sisf|__fix(uns)?sfsi
 CORES       := rv32 rv32-clang rv64 m0 m0plus-clang mips ppc s390x
 CC.rv32     := riscv64-unknown-elf-gcc -march=rv32imac -mabi=ilp32
 CC.rv32-clang   := clang-19 --target=riscv32-none-elf -march=rv32imc -mabi=ilp32
