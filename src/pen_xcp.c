@@ -94,9 +94,9 @@ static uint32_t xcp_shape(uint8_t code)
     return (code >= XCP_FIRST) ? shape[code - XCP_FIRST] : 0U;
 }
 
-static uint32_t xcp_call(pen_xcp_command_t answer, pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint8_t out[])
+static uint32_t xcp_call(pen_xcp_command_t handler, pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint8_t out[])
 {
-    return (answer != NULL) ? answer(xcp, in, n, out) : PEN_XCP_UNKNOWN;
+    return (handler != NULL) ? handler(xcp, in, n, out) : PEN_XCP_UNKNOWN;
 }
 
 static uint32_t xcp_execute(pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint8_t out[])
