@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_gen import expressions
 from penode_gen.model import Parameter
 from penode_sil.diagnosis.engine import experiment
 from penode_sil.diagnosis.plant import placeless
@@ -23,28 +22,20 @@ MEASURED = Path(os.environ.get("PENODE_SHARED", HERE.parents[1].parent / "shared
 FILES = {"pendulum": ("swing_5.csv", "swing_6.csv"), "robot_joint": ("train.csv",)}
 
 
-def rig(name: str, tmp_path: Path) -> penode_gen.Model:
-    """The model of a rig; where the language has no sine yet, a linear one that is right for small angles."""
-    text = (HERE / "models" / f"{name}.toml").read_text()
-    path = tmp_path / f"{name}.toml"
-    path.write_text(text if "sin" in expressions.FUNCTIONS else text.replace("sin(s)", "s"))
-    return penode_gen.load(path)
-
-
+@pytest.mark.skipif(not MEASURED.exists(), reason="the measured data are not beside the checkout")
 @pytest.mark.parametrize("name", FILES)
-def test_rigs(name, tmp_path):
-    """Null fit of the model as it is, start states free. Held-out errors of quick fits by the ones who measured: some 10 mrad (small
-    swings of the pendulum), 33.5 mrad (joint, linear): training is no worse, 15 and 40 mrad are allowed."""
-    folder = MEASURED / name
-    if not folder.is_dir():
-        pytest.skip(f"no {folder}")
-    model = rig(name, tmp_path)
-    recordings = load([folder / f for f in FILES[name]], model)
+def test_rigs(name, show):
+    """Null fit of the model as it is, start states free. Quick fits by the ones who measured, held out: up to 10 mrad (pendulum, small
+    swings; half more is allowed to a model whose parameters were not fitted to this rig), 33.5 mrad (joint, linear)."""
+    model = penode_gen.load(HERE / "models" / f"{name}.toml")
+    recordings = load([MEASURED / name / f for f in FILES[name]], model)
     study = null_study(model, [experiment(m, model) for m in recordings])
     assert {p.name for p in study.places} == {"gravity"}
-    limit = {"pendulum": 0.015, "robot_joint": 0.04}[name]
+    limit = {"pendulum": 0.015, "robot_joint": 0.0335}[name]
     for e, z in zip(study.experiments, study.null.simulated):
-        assert np.sqrt(np.mean((e.y - z)[e.good] ** 2)) < limit
+        left = float(np.sqrt(np.mean((e.y - z)[e.good] ** 2)))
+        show(f"{name}: {left * 1e3:.2f} mrad")
+        assert left < limit
 
 
 def test_unknown_and_guessed_parameters():
@@ -77,8 +68,8 @@ T = {{ value = "T", unit = "K", noise = 0.01 }}
 
 
 def test_states_and_equations_only(tmp_path):
-    """A cooling with tau = 2 s, whose file guesses 20 s: the fit finds it. Deviation of tau: noise/sqrt(sum of squares of dT/dtau) =
-    0.01/sqrt(100*tau/4)/tau*tau^2... = 0.01*2/sqrt(50) s = 3 ms for a start that is known; 30 ms are allowed with a free one."""
+    """A cooling with tau = 2 s, whose file guesses 20 s: the fit finds it. With T = A exp(-t/tau), both free, noise s and n samples a
+    second, its information matrix is n/s^2 (tau/2, 1/4; 1/4, 1/(4 tau)): tau deviates by 4 ms, of which five are allowed."""
     path = tmp_path / "cooling.toml"
     path.write_text(PLAIN.format(tau=20))
     model = penode_gen.load(path)
@@ -87,5 +78,5 @@ def test_states_and_equations_only(tmp_path):
     record = tmp_path / "cooling.csv"
     record.write_text("time [s],T [K]\n" + "".join(f"{a:.3f},{b:.6f}\n" for a, b in zip(t, T)))
     study = null_study(model, [experiment(m, model) for m in load([record], model)])
-    assert study.places == () and abs(study.null.value("tau") - 2.0) < 0.03
+    assert study.places == () and abs(study.null.value("tau") - 2.0) < 0.02
     assert placeless(study.places) == "the model has no elements and no bodies: causes are looked for in its parameters and sensors"
