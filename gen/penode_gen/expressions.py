@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ast
+import operator
 import re
 import unicodedata
 import warnings
 from collections.abc import Collection
+from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import sympy as sp
@@ -116,6 +118,7 @@ FUNCTIONS = {
     "min": (2, sp.Min),
     "max": (2, sp.Max),
 } | {name: (1, function) for name, function in functions.FUNCTIONS.items()}
+_OPERATIONS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 _RELATIONS = {ast.Lt: sp.StrictLessThan, ast.LtE: sp.LessThan, ast.Gt: sp.StrictGreaterThan, ast.GtE: sp.GreaterThan}
 
 
@@ -143,91 +146,110 @@ def parse(text: str, names: Collection[str], networks: dict[str, int], moving: C
     return _parse(text.strip(), known, frozenset(networks.items()), moved)
 
 
-@lru_cache(_KEPT)
-def _parse(text: str, names: frozenset[str], calls: frozenset[tuple[str, int]], moving: frozenset[str]) -> sp.Expr:
-    """The same of those names that the text has."""
-    networks = dict(calls)
-    shown = text if len(text) <= 300 else f"an expression of {len(text)} characters"
+@dataclass(frozen=True)
+class _Reader:
+    """Turns the syntax tree of one text into an expression of the names, networks and moving names that the text has."""
 
-    def refuse(what: str) -> ExpressionError:
-        return ExpressionError(f"'{shown}' {what}")
+    text: str
+    names: frozenset[str]
+    networks: dict[str, int]
+    moving: frozenset[str]
 
-    def walk(node: ast.AST) -> sp.Expr:
-        found = build(node)
+    @property
+    def shown(self) -> str:
+        return self.text if len(self.text) <= 300 else f"an expression of {len(self.text)} characters"
+
+    def refuse(self, what: str) -> ExpressionError:
+        return ExpressionError(f"'{self.shown}' {what}")
+
+    def walk(self, node: ast.AST) -> sp.Expr:
+        found = self.build(node)
         if found.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
-            raise refuse(f"divides by zero in '{ast.unparse(node)}'")
+            raise self.refuse(f"divides by zero in '{ast.unparse(node)}'")
         if found.is_number and not found.is_Rational:  # exp(1), tanh(2)
             found = sp.Float(found.evalf(17), 17)
         for number in found.atoms(sp.Number):
             if not in_range(number):
-                raise refuse("holds a number that a float cannot hold")
+                raise self.refuse("holds a number that a float cannot hold")
         return found
 
-    def build(node: ast.AST) -> sp.Expr:
+    def build(self, node: ast.AST) -> sp.Expr:
         match node:
             case ast.Constant(value=bool()):
                 pass
             case ast.Constant(value=int() | float() as value):
                 if not in_range(value):
-                    raise refuse("holds a number that a float cannot hold")
+                    raise self.refuse("holds a number that a float cannot hold")
                 return sp.Integer(value) if isinstance(value, int) else sp.Float(value, 17)
             case ast.Name(id=name):
-                if name not in names:
-                    raise refuse(f"uses '{name}', which the model does not define")
+                if name not in self.names:
+                    raise self.refuse(f"uses '{name}', which the model does not define")
                 return symbol(name)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return -walk(operand)
+                return -self.walk(operand)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-                return walk(operand)
-            case ast.BinOp(left=left, op=ast.Add(), right=right):
-                return walk(left) + walk(right)
-            case ast.BinOp(left=left, op=ast.Sub(), right=right):
-                return walk(left) - walk(right)
-            case ast.BinOp(left=left, op=ast.Mult(), right=right):
-                return walk(left) * walk(right)
-            case ast.BinOp(left=left, op=ast.Div(), right=right):
-                return walk(left) / walk(right)
+                return self.walk(operand)
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
-                base, exponent = walk(left), walk(right)
-                if not (exponent.is_Integer and abs(exponent) <= _HIGHEST):
-                    raise refuse(f"has the power '{ast.unparse(right)}'; whole powers up to {_HIGHEST} are known, and exp")
-                return base**exponent
+                return self.power(left, right)
+            case ast.BinOp(left=left, op=operation, right=right) if type(operation) in _OPERATIONS:
+                return _OPERATIONS[type(operation)](self.walk(left), self.walk(right))
             case ast.Call(func=ast.Name(id="der"), args=arguments):
-                if len(arguments) != 1 or not isinstance(arguments[0], ast.Name):
-                    raise refuse("has a 'der' that is not der(name)")
-                name = arguments[0].id
-                if name not in names:
-                    raise refuse(f"uses der({name}), but the model does not define '{name}'")
-                if name not in moving:
-                    raise refuse(f"uses der({name}), but '{name}' is no state or input")
-                return derivative(name)
+                return self.rate(arguments)
             case ast.Call(func=ast.Name(id="where"), args=arguments, keywords=keywords):
-                match arguments:
-                    case [ast.Compare(left, [relation], [right]), yes, no] if type(relation) in _RELATIONS and not keywords:
-                        a, b = walk(left), walk(right)
-                        if a.has(sp.Piecewise) or b.has(sp.Piecewise):
-                            raise refuse("compares the result of a 'where'; give that a variable of its own")
-                        return sp.Piecewise((walk(yes), _RELATIONS[type(relation)](a, b)), (walk(no), True))
-                raise refuse("has a 'where' that is not where(a < b, x, y)")
+                return self.choice(arguments, bool(keywords))
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-                count, function = FUNCTIONS.get(name, (None, None))
-                if name in networks:
-                    count, function = networks[name], network(name)
-                if function is None:
-                    known = ", ".join(sorted([*FUNCTIONS, *networks, "der", "where"]))
-                    raise UnknownFunction(f"'{shown}' calls '{name}'; known are {known}")
-                if len(arguments) != count:
-                    raise refuse(f"has {name} with {len(arguments)} argument(s); it takes {count}")
-                return function(*map(walk, arguments))
-        raise refuse(f"contains '{ast.unparse(node)}', which is no part of an expression")
+                return self.call(name, arguments)
+        raise self.refuse(f"contains '{ast.unparse(node)}', which is no part of an expression")
 
+    def power(self, left: ast.AST, right: ast.AST) -> sp.Expr:
+        base, exponent = self.walk(left), self.walk(right)
+        if not (exponent.is_Integer and abs(exponent) <= _HIGHEST):
+            raise self.refuse(f"has the power '{ast.unparse(right)}'; whole powers up to {_HIGHEST} are known, and exp")
+        return base**exponent
+
+    def rate(self, arguments: list[ast.expr]) -> sp.Expr:
+        if len(arguments) != 1 or not isinstance(arguments[0], ast.Name):
+            raise self.refuse("has a 'der' that is not der(name)")
+        name = arguments[0].id
+        if name not in self.names:
+            raise self.refuse(f"uses der({name}), but the model does not define '{name}'")
+        if name not in self.moving:
+            raise self.refuse(f"uses der({name}), but '{name}' is no state or input")
+        return derivative(name)
+
+    def choice(self, arguments: list[ast.expr], named: bool) -> sp.Expr:
+        match arguments:
+            case [ast.Compare(left, [relation], [right]), yes, no] if type(relation) in _RELATIONS and not named:
+                a, b = self.walk(left), self.walk(right)
+                if a.has(sp.Piecewise) or b.has(sp.Piecewise):
+                    raise self.refuse("compares the result of a 'where'; give that a variable of its own")
+                return sp.Piecewise((self.walk(yes), _RELATIONS[type(relation)](a, b)), (self.walk(no), True))
+        raise self.refuse("has a 'where' that is not where(a < b, x, y)")
+
+    def call(self, name: str, arguments: list[ast.expr]) -> sp.Expr:
+        count, function = FUNCTIONS.get(name, (None, None))
+        if name in self.networks:
+            count, function = self.networks[name], network(name)
+        if function is None:
+            known = ", ".join(sorted([*FUNCTIONS, *self.networks, "der", "where"]))
+            raise UnknownFunction(f"'{self.shown}' calls '{name}'; known are {known}")
+        if len(arguments) != count:
+            raise self.refuse(f"has {name} with {len(arguments)} argument(s); it takes {count}")
+        return function(*map(self.walk, arguments))
+
+
+@lru_cache(_KEPT)
+def _parse(text: str, names: frozenset[str], calls: frozenset[tuple[str, int]], moving: frozenset[str]) -> sp.Expr:
+    """The same of those names that the text has."""
+    reader = _Reader(text, names, dict(calls), moving)
+    refuse = reader.refuse
     if len(text) > _LONGEST:
         raise refuse(f"has {len(text)} characters, which is more than {_LONGEST}; split it with variables")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Python's remarks on its own syntax
             tree = ast.parse(text.replace("^", "**"), mode="eval")
-        return walk(tree.body)
+        return reader.walk(tree.body)
     except SyntaxError as error:
         raise refuse(f"cannot be read as an expression ({error.msg})") from error
     except (RecursionError, MemoryError) as error:

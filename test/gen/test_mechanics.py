@@ -155,6 +155,15 @@ def test_every_law_in_both_kinds(load, law):
     assert np.array_equal(*found)
 
 
+def expect_refused(path: Path, text: str, what: str) -> None:
+    """A line for each problem, with place and remedy; one says `what`."""
+    path.write_text(text)
+    with pytest.raises(penode_gen.ModelError) as caught:
+        penode_gen.load(path)
+    assert any(what in p for p in caught.value.problems), caught.value.problems
+    assert all(re.match(rf"{re.escape(str(path))}:\d+: .+; .+", p) for p in caught.value.problems)
+
+
 @pytest.mark.parametrize(
     "old, new, what",
     [
@@ -172,12 +181,7 @@ def test_every_law_in_both_kinds(load, law):
     ],
 )
 def test_what_is_refused_and_how_to_mend_it(tmp_path, old, new, what):
-    path = tmp_path / "bad.toml"
-    path.write_text(CAR.replace(old, new))
-    with pytest.raises(penode_gen.ModelError) as caught:
-        penode_gen.load(path)
-    assert any(what in p for p in caught.value.problems), caught.value.problems
-    assert all(re.match(rf"{re.escape(str(path))}:\d+: .+; .+", p) for p in caught.value.problems)
+    expect_refused(tmp_path / "bad.toml", CAR.replace(old, new), what)
 
 
 ACTUATED = """
@@ -232,11 +236,7 @@ def test_actuators(load):
     ],
 )
 def test_actuators_refused(tmp_path, old, new, what):
-    path = tmp_path / "bad.toml"
-    path.write_text(ACTUATED.replace(old, new))
-    with pytest.raises(penode_gen.ModelError) as caught:
-        penode_gen.load(path)
-    assert any(what in p for p in caught.value.problems), caught.value.problems
+    expect_refused(tmp_path / "bad.toml", ACTUATED.replace(old, new), what)
 
 
 @pytest.mark.parametrize("method", ["rk4", "ros2", "ros1", "euler"])
