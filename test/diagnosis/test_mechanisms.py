@@ -7,15 +7,24 @@ import pytest
 
 from mechanisms import generator
 from mechanisms_campaign import LIMIT, model_of, score
+from penode_sil.diagnosis import missing
 
 
-@pytest.mark.parametrize("plant, kind, seed", [("halfcar", "friction", 901), ("drive", "backlash", 902), ("drive", "nothing", 903)])
+@pytest.mark.parametrize("plant, kind, seed", [("halfcar", "friction", 901), ("drive", "backlash", 902), ("drive", "friction", 3), ("drive", "nothing", 903)])
 def test_places_and_missing_force(plant, kind, seed):
     case = {"halfcar": generator.halfcar, "drive": generator.drive}[plant]([kind], [seed], 3.0)[0]
     found = score(model_of(plant), case)
     assert not found.unseen
     assert found.error < LIMIT
     assert found.verdict in ("", "no_discrepancy")
+
+
+def test_a_free_angle_of_many_deviations_is_no_force(monkeypatch):
+    """The shaft turns by a million deviations of its sensor, and no spring holds it. A filter that forgets the angle, as it did before,
+    makes a force of that and misses the true one: so does this one without the weights of its samples."""
+    case = generator.drive(["friction"], [3], 3.0)[0]
+    monkeypatch.setattr(missing, "_fade", lambda n: np.ones((n, 1)))
+    assert score(model_of("drive"), case).error > 2 * LIMIT
 
 
 def test_generator_keeps_the_balance_of_power():
