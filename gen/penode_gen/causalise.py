@@ -99,7 +99,7 @@ def causalise(model: Model) -> Causal:
     ports = {name: len(port.input_units) for name, port in model.networks.items()}
     kinematic, unit_of = kinematics(model)
     names = set(unit_of)
-    moving = {*model.states, *(i.name for i in model.inputs), *(p.name for p in model.points)}
+    moving = {*model.states, *(i.name for i in (*model.inputs, *model.sampled)), *(p.name for p in model.points)}
 
     def parse(where: tuple[str, ...], text: str, extra: set[str] = frozenset()) -> sp.Expr:
         try:
@@ -131,7 +131,7 @@ def causalise(model: Model) -> Causal:
     states = tuple(ex.symbol(n) for n in model.states)
     velocities = {b.position: ex.symbol(b.velocity) for b in model.bodies}
     causal = Causal(
-        model, states, tuple(ex.symbol(i.name) for i in model.inputs), tuple(_hoist(steps, names)),
+        model, states, tuple(ex.symbol(i.name) for i in (*model.inputs, *model.sampled)), tuple(_hoist(steps, names)),
         tuple(velocities.get(n, ex.derivative(n)) for n in model.states), tuple(signals["outputs"]), tuple(signals["sensors"]),
     )  # fmt: skip
     _check_result(causal)
@@ -192,6 +192,9 @@ def _check_result(causal: Causal) -> None:
     everything = [*causal.rates, *causal.outputs, *causal.sensors]
     if model.interpolation == "held" and causal.uses(everything, causal.input_rates):
         problems.append((("model", "input"), "the model uses the rate of an input, which is not defined for a held input", 'write input = "linear"'))
+    steps = [s.name for s in model.sampled if s.law == "held"]
+    for name in (n for n in steps if model.interpolation != "held" and causal.uses(everything, [ex.derivative(n)])):
+        problems.append((("actuators", name), f"the model uses the rate of '{name}', which moves in steps", "put a lag behind it, and use that"))
     constants = {ex.symbol(p.name): sp.Float(p.value, 17) for p in model.parameters.values() if not p.tunable}
     parts = [(step.where, part) for step in causal.steps for part in (step.arguments if step.network else (step.value,))]
     for section, found in (("outputs", causal.outputs), ("sensors", causal.sensors)):
@@ -203,7 +206,7 @@ def _check_result(causal: Causal) -> None:
         if part.has(sp.zoo, sp.nan) or not all(ex.in_range(n) for n in part.atoms(sp.Number)):
             problems.append((where, "its solution holds a number that a float cannot hold", "scale the equation"))
     locals_ = {f"{s.target.name}{end}" for s in causal.steps if s.network for end in ("_in", "_slope", "_bend")}
-    for name in sorted(locals_ & {*model.states, *model.parameters, *(i.name for i in model.inputs), *(v.name for v in model.variables)}):
+    for name in sorted(locals_ & {*model.states, *model.parameters, *(i.name for i in (*model.inputs, *model.sampled)), *(v.name for v in model.variables)}):
         problems.append((("model",), f"the code needs the name '{name}' for a network call", f"rename '{name}'"))
     known = {*causal.states, *causal.inputs, *causal.input_rates, *(s.target for s in causal.steps)}
     known |= {ex.symbol(p) for p in model.parameters}

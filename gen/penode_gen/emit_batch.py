@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from . import expressions as ex
-from . import functions, sets
+from . import functions, sampled, sets
 from .c_text import Printer, fold, real
 from .causalise import Causal, Step
 from .emit_c import _RUNGE_KUTTA, _TEMPLATES, VERSION, _Emitter
@@ -68,7 +68,7 @@ class _LaneEmitter(_Emitter):
         rosenbrock = model.method.startswith("ros")
         nodes, weights, divisor = _RUNGE_KUTTA.get(model.method, ((), (), 1.0))
         return {
-            "model": model, "version": VERSION, "source": model.path.name, "digest": model.digest[:16], "real": real,
+            **sampled.context(self.given), "model": model, "version": VERSION, "source": model.path.name, "digest": model.digest[:16], "real": real,
             "rates": self._lines(causal.rates, "dx") if model.method != "ros1" else None,
             "rates_jacobian": self._lines(causal.rates, "dx", ("fx", "fu")) if rosenbrock else None,
             "outputs": self._lines(causal.outputs, "y"), "sensors": self._lines(causal.sensors, "z"),

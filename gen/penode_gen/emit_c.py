@@ -9,7 +9,7 @@ import jinja2
 import sympy as sp
 
 from . import expressions as ex
-from . import layout, promises, selftest, sets, units
+from . import layout, promises, sampled, selftest, sets, units
 from .c_text import Printer, fold, literal, real
 from .causalise import Causal, Step, causalise
 from .emit_networks import NetworkCode, by_value, hidden16, network_code, network_lines, second_lines, slope_lines
@@ -73,6 +73,7 @@ def generate(model: Model, directory: str | Path, self_test: bool = True) -> lis
 
 class _Emitter:
     def __init__(self, model: Model, causal: Causal | None = None):
+        self.given = model
         self.model, self.causal = model, causal = with_input(model, causal or causalise(model))
         first = model.sets.get("default")
         straight = [n for n, net in (first.networks if first else {}).items() if net.is_piecewise_linear and model.outside != "fade"]
@@ -109,6 +110,7 @@ class _Emitter:
         uses_p, uses_f = (any(f[uses] for f in functions.values() if f) for uses in ("uses_p", "uses_f"))
         reads_set = uses_p or not uses_f  # else its pieces are all that it has
         return {
+            **sampled.context(self.given), "given": self.given.inputs or model.inputs,
             "model": model, "name": model.name, "prefix": self.prefix, "version": VERSION, "abi": sets.ABI,
             "source": model.path.name, "digest": model.digest[:16], "method_name": _METHOD_NAMES[model.method],
             "states": [{"name": s, "unit": state_unit(model, s), "start": literal(x)} for s, x in zip(model.states, model.start)],

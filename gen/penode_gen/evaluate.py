@@ -16,6 +16,7 @@ import numpy as np
 from . import sets
 from .fold_walk import Walk, find, value
 from .kernels import Array, Kernels
+from .sampled import Past
 from .translate import expression, function
 
 _RESULTS = {"rates": ["dx"], "rates_jacobian": ["dx", "fx", "fu"], "outputs": ["y"]}
@@ -54,6 +55,8 @@ class Evaluator:
         self.y = np.zeros(self.n_y, real)
         self.running = 0
         self.before: dict[str, Array] = {}
+        self.past = Past(context["sampled"])
+        self.steps = [s["at"] for s in context["sampled"] if s["law"] == "held"]
 
     # -- what the lines call and name -----------------------------------------------------------------------------
 
@@ -152,6 +155,7 @@ class Evaluator:
                 second = second + (((share + r(1)) / r(3)) * now["third"])
             inner = change + ((r(0.5) * (share - r(1))) * second)
         at = now["from"] + (share * inner)
+        at[self.steps] = now["from"][self.steps]
         return np.concatenate([at, self._slope(share, now) / self.sample_time]) if c["uses_input_rate"] else at
 
     def _slope(self, share: Any, now: dict[str, Array]) -> Array:
@@ -166,6 +170,7 @@ class Evaluator:
     def _drive_rate(self, share: Any, now: dict[str, Array]) -> Array:
         c = self.context
         rate = self._slope(share, now) / self.sample_time
+        rate[self.steps] = 0
         if not c["uses_input_rate"]:
             return rate
         turn = np.zeros_like(rate)
@@ -241,7 +246,7 @@ class Evaluator:
         """One sample with a finite input. False if state and outputs stay as they were."""
         method = {"euler": self._euler, "ros1": self._ros1, "ros2": self._ros2}.get(self.model.method, self._runge_kutta)
         with np.errstate(all="ignore"):
-            now = self._receive(np.asarray(u, self.real))
+            now = self._receive(self.past.beside(np.asarray(u, self.real)))
             x, good, advance = self.x, True, self.real(self.running & 1)
             for i in range(self.model.substeps if self.n_x else 0):
                 x, solved = method(x, self.real(i), now, advance)

@@ -39,7 +39,7 @@ class Relation:
 
 def turns(model: Model, end: str) -> bool:
     """Is an end measured as an angle?"""
-    for thing in (*model.bodies, *model.points, *model.inputs, *model.extra_states):
+    for thing in (*model.bodies, *model.points, *model.inputs, *model.sampled, *model.extra_states):
         if thing.name == end:
             return thing.rotational if isinstance(thing, Body) else not units.same_dimension(thing.unit, "m")
     return False
@@ -76,7 +76,7 @@ def combination(text: str, moving: dict[str, Motion], parameters: set[str]) -> M
 
 def motions(model: Model) -> dict[str, Motion]:
     """Position and rate of every end of a checked model."""
-    named: dict[str, Motion] = {i.name: (ex.symbol(i.name), ex.derivative(i.name)) for i in (*model.inputs, *model.extra_states)}
+    named: dict[str, Motion] = {i.name: (ex.symbol(i.name), ex.derivative(i.name)) for i in (*model.inputs, *model.sampled, *model.extra_states)}
     named |= {b.position: (ex.symbol(b.position), ex.symbol(b.velocity)) for b in model.bodies}
     for p in model.points:
         named[p.name] = combination(p.text, named, set(model.parameters))
@@ -88,7 +88,7 @@ def kinematics(model: Model) -> tuple[list[Relation], dict[str, str]]:
     """Deflection and rate of each element, and the unit of every name of the model."""
     ends = motions(model)
     found = []
-    unit_of = {p.name: p.unit for p in model.parameters.values()} | {i.name: i.unit for i in model.inputs}
+    unit_of = {p.name: p.unit for p in model.parameters.values()} | {i.name: i.unit for i in (*model.inputs, *model.sampled)}
     unit_of |= {b.position: b.unit for b in model.bodies} | {b.velocity: f"{b.unit}/s" for b in model.bodies}
     unit_of |= {s.name: s.unit for s in model.extra_states} | {v.name: v.unit for v in model.variables}
     unit_of |= {p.name: p.unit for p in model.points}

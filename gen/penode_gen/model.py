@@ -77,6 +77,18 @@ class Point:
 
 
 @dataclass(frozen=True)
+class Sampled:
+    """What an actuator makes of the samples of an input, or of an earlier one of its kind: a `delay` by, or a value `held` for `time`
+    [s], a whole number of samples."""
+
+    name: str
+    source: str
+    law: str
+    time: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Element:
     """A force between two ends (bodies, points, position inputs or ground): deflection s = z_a - z_b, positive force pulls."""
 
@@ -206,11 +218,16 @@ class Model:
     guard: Guard = Guard()
     set_owner: str = ""  # the model whose sets these are, if it is another
     points: tuple[Point, ...] = ()
+    sampled: tuple[Sampled, ...] = ()
 
     @property
     def owner(self) -> str:
         """The model that the sets are named after: several methods of one model share them."""
         return self.set_owner or self.name
+
+    def fits(self, step: float) -> bool:
+        """Are its delays and holds whole numbers of steps [s]?"""
+        return all(abs(s.time / step - round(s.time / step)) < 1e-6 for s in self.sampled)
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Callable
+from typing import Callable, Sequence
 
 import numpy as np
 import sympy as sp
@@ -18,7 +18,8 @@ _NUMPY = [
 
 
 class Numeric:
-    """Right-hand side, outputs and sensors of a model with one parameter set; x [n_x], u [n_u], udot = du/dt [n_u]."""
+    """Right-hand side, outputs and sensors of a model with one parameter set; x [n_x], u [n_u], udot = du/dt [n_u]. Behind the inputs u may
+    have the signals of actuators that delay or hold samples; without them, these are what they are of inputs that move slowly."""
 
     def __init__(self, model: Model, set_name: str = "default"):
         self.model = model
@@ -62,15 +63,26 @@ class Numeric:
             known.append(step.target)
         last = self._lambdify(known, results)
         networks = {n: net.evaluate for n, net in self._networks.items()}
+        whole = self._whole
 
         def function(x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
-            values = [*x, *u, *udot]
+            values = [*x, *whole(u), *whole(udot)]
             for expression, network in plan:
                 found = expression(*values)
                 values.append(float(networks[network](np.array(found, dtype=float))[0]) if network else found[0])
             return np.array(last(*values), dtype=float)
 
         return function
+
+    def _whole(self, u: np.ndarray) -> Sequence[float] | np.ndarray:
+        """Inputs or their rates, and what actuators make of them."""
+        names = [i.name for i in self.model.inputs]
+        if len(u) > len(names) or not self.model.sampled:
+            return u
+        of = dict(zip(names, u))
+        for s in self.model.sampled:
+            of[s.name] = of[s.source]
+        return list(of.values())
 
     def _lambdify(self, known: list[sp.Symbol], parts: list[sp.Expr] | tuple[sp.Expr, ...]) -> Callable[..., list[float]]:
         names = [sp.Symbol(f"a{i}", real=True) for i in range(len(known))]

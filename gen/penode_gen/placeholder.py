@@ -12,14 +12,15 @@ import numpy as np
 from . import expressions as ex
 from .causalise import Causal
 from .model import Input, Model
+from .sampled import as_inputs
 
 UNUSED = Input("unused_", "1", description="the model has no input: not read")  # a name that no model file can have
 
 
 def with_input(model: Model, causal: Causal) -> tuple[Model, Causal]:
-    """Both as they are, or with an unused input if they have none."""
+    """Both with what the C takes for inputs: signals of actuators that work on samples, and an unused input where there is none."""
     if model.inputs:
-        return model, causal
+        return as_inputs(model, causal)
     padded = replace(model, inputs=(UNUSED,), interpolation="held")
     return padded, replace(causal, model=padded, inputs=(ex.symbol(UNUSED.name),))
 

@@ -9,7 +9,7 @@ from typing import Any, Iterable
 
 from . import expressions as ex
 from . import model as m
-from . import units
+from . import sampled, units
 from .laws import LAWS, for_angles
 from .mechanics import combination
 from .read_networks import UNKNOWN, NetworkTables
@@ -69,10 +69,13 @@ class EndTables(NetworkTables):
             self.kinds[name] = length
             yield m.Body(name, mass, entry.get("position", f"{z}_{name}"), entry.get("velocity", f"{v}_{name}"), start, key == "inertia")
 
-    def actuators(self, inputs: tuple[m.Input, ...], parameters: dict[str, m.Parameter]) -> tuple[list[m.Point], list[m.State], list[m.Equation]]:
-        """Actuated signals: a gain is a combination of its input, a lag is a state with an equation."""
+    def actuators(
+        self, inputs: tuple[m.Input, ...], parameters: dict[str, m.Parameter], sample_time: float
+    ) -> tuple[list[m.Point], list[m.State], list[m.Equation], list[m.Sampled]]:
+        """Actuated signals: a gain is a combination of its input, a lag is a state with an equation, others work on samples."""
         of: dict[str, str] = {i.name: i.unit for i in inputs}
-        points, states, equations = [], [], []
+        made_by: dict[str, str] = {}
+        points, states, equations, late = [], [], [], []
         for name, entry in self.section("actuators").items():
             where = ("actuators", name)
             law, source = entry.get("law", ""), entry.get("input", "")
@@ -80,9 +83,14 @@ class EndTables(NetworkTables):
                 if source:
                     self.problem((*where, "input"), f"'{source}' is no input or earlier actuator", f"known are {', '.join(of) or 'none'}")
                 continue
+            if law in sampled.LAWS:
+                found = sampled.read(where, entry, of[source], made_by.get(source, ""), sample_time, self.problem)
+                late += [found] if found else []
+                of[name], made_by[name] = of[source], law
+                continue
             if law not in ACTUATORS:
                 if law:
-                    self.problem((*where, "law"), f"law '{law}' is unknown", f"known are {', '.join(ACTUATORS)}")
+                    self.problem((*where, "law"), f"law '{law}' is unknown", f"known are {', '.join((*ACTUATORS, *sampled.LAWS))}")
                 continue
             arguments = {}
             for key, unit in ACTUATORS[law].items():
@@ -90,11 +98,11 @@ class EndTables(NetworkTables):
                     arguments[key] = self.argument(where, key, entry[key], unit, f"{name}_{key}", parameters)
                 else:
                     self.problem(where, f"'{key}' is missing", f"add {key} = ...")
-            for key in {k for keys in ACTUATORS.values() for k in keys} & set(entry) - set(arguments):
+            for key in sorted({"samples", "gain", "time", *(("start",) if law == "gain" else ())} & set(entry) - set(arguments)):
                 self.problem((*where, key), f"the law '{law}' has no {key}", "remove it")
             if len(arguments) < len(ACTUATORS[law]):
                 continue
-            of[name] = of[source]
+            of[name], made_by[name] = of[source], law
             if law == "gain":
                 points.append(m.Point(name, f"{arguments['gain']}*{source}", of[source]))
             else:
@@ -107,7 +115,7 @@ class EndTables(NetworkTables):
         for name in of:
             if same(of[name], "m") and of[name] != UNKNOWN or _angle(of[name]):
                 self.kinds[name] = "rad" if _angle(of[name]) else "m"
-        return points, states, equations
+        return points, states, equations, late
 
     def points(
         self, bodies: tuple[m.Body, ...], inputs: tuple[m.Input, ...], states: Iterable[m.State], earlier: list[m.Point],

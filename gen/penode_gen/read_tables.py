@@ -27,8 +27,8 @@ C_PATTERN = re.compile(r"u?int\w*_t|U?INT\w*_(MAX|MIN|C)|(SIZE|PTRDIFF|WCHAR|SIG
 RESERVED = {*ex.FUNCTIONS, "der", "where", m.GROUND}
 PREFIXES = ("pen_", "PEN_", "slope_", "second_", "inputs_of_", "slopes_of_", "seconds_of_", "piece_of_", "der_", "network_")  # of names that the generated code makes
 MACROS = (  # that each generated model defines, behind its name
-    "N_X N_U N_Y N_SENSORS N_LAST N_DRIVE N_COLUMNS N_KEPT N_Q N_W SAMPLE_TIME SUBSTEPS STEP IMPLICIT_STEP AT_FIRST AT_SECOND AT_THIRD "
-    "LAYOUT SET_LENGTH SCRUB VERIFY SAVED PIECES TRIAL TRIAL_ROOM H SETS_H".split()
+    "N_X N_U N_IN N_Y N_SENSORS N_LAST N_DRIVE N_COLUMNS N_KEPT N_Q N_W SAMPLE_TIME SUBSTEPS STEP IMPLICIT_STEP AT_FIRST AT_SECOND AT_THIRD "
+    "LAYOUT SET_LENGTH SCRUB VERIFY SAVED SAVED_MAIN PIECES TRIAL TRIAL_ROOM H SETS_H".split()
 )
 _COMMENT = re.compile(r"(?:(?!\*/|/\*)[^\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\\]){0,200}")
 
@@ -36,7 +36,7 @@ SECTIONS: dict[str, dict[str, type | tuple[type, ...]]] = {
     "parameters": {"value": (int, float), "unit": str, "tolerance": (int, float, str), "exact": bool, "tunable": bool, "description": str},
     "inputs": {"unit": str, "min": (int, float), "max": (int, float), "noise": (int, float), "description": str},
     "bodies": {"mass": str, "inertia": str, "position": str, "velocity": str, "start_position": str, "start_velocity": str},
-    "actuators": {"input": str, "law": str, "gain": str, "time": str, "start": str, "description": str},
+    "actuators": {"input": str, "law": str, "gain": str, "time": str, "start": str, "samples": int, "description": str},
     "states": {"unit": str, "start": (int, float), "description": str},
     "variables": {"unit": str},
     "networks": {"inputs": list, "output": str, "description": str} | promises.KEYS,

@@ -63,8 +63,8 @@ class _Reader(EndTables):
         inputs = tuple(self.inputs())
         bodies = tuple(self.bodies(parameters))
         networks = dict(self.networks())
-        gains, lags, lagging = self.actuators(inputs, parameters)
-        points = (*gains, *self.points(bodies, inputs, lags, gains, parameters))
+        gains, lags, lagging, sampled = self.actuators(inputs, parameters, sample_time)
+        points = (*gains, *self.points(bodies, inputs, (*lags, *sampled), gains, parameters))
         elements = tuple(self.elements(parameters, inputs, networks))
         states = (*self.states(), *lags, *self.law_states(elements))
         variables = tuple(self.variables())
@@ -74,8 +74,8 @@ class _Reader(EndTables):
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
         self.folds(head, sets)
         promises.check(networks, sets, head["outside"], self.problem)
-        self.unique(parameters, inputs, bodies, points, elements, states, variables, networks)
-        moving = {*(s.name for s in states), *(b.position for b in bodies), *(b.velocity for b in bodies)}
+        self.unique(parameters, inputs, bodies, points, elements, (*states, *sampled), variables, networks)
+        moving = {*(s.name for s in (*states, *sampled)), *(b.position for b in bodies), *(b.velocity for b in bodies)}
         self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs))
         self.macros(parameters, networks, name)
         if not outputs and not self.data.get("outputs"):
@@ -88,7 +88,7 @@ class _Reader(EndTables):
             substeps=head["substeps"], interpolation=head["input"], outside=head["outside"], fade_width=float(head["fade_width"]),
             pieces=room(head["pieces"]), more_pieces=head["more_pieces"], parameters=parameters, inputs=inputs, bodies=bodies, elements=elements, extra_states=states, variables=variables,
             equations=equations, networks=networks, outputs=outputs, sensors=sensors, sets=sets, path=self.path,
-            digest=self.digest.hexdigest(), guard=m.Guard(head["out_of_range"], head["on_damage"], head["trial"]), set_owner=self.set_owner, points=points,
+            digest=self.digest.hexdigest(), guard=m.Guard(head["out_of_range"], head["on_damage"], head["trial"]), set_owner=self.set_owner, points=points, sampled=tuple(sampled),
         )  # fmt: skip
 
     def head(self) -> tuple[dict[str, Any], float]:

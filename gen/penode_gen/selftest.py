@@ -69,7 +69,7 @@ def model_context(context: dict[str, Any]) -> dict[str, Any]:
         else (i.minimum, i.minimum + 2.0 * _UNBOUNDED) if i.minimum is not None
         else (i.maximum - 2.0 * _UNBOUNDED, i.maximum) if i.maximum is not None
         else (-_UNBOUNDED, _UNBOUNDED)
-        for i in context["model"].inputs
+        for i in context["given"]
     ]  # fmt: skip
     double, levels = None, []
     for quarterings in range(_QUARTERINGS):
@@ -78,7 +78,7 @@ def model_context(context: dict[str, Any]) -> dict[str, Any]:
         if double is not None:
             break
     return {
-        "levels": [{"name": i.name, "low": literal(v.low), "step": literal(v.step)} for i, v in zip(context["model"].inputs, levels)],
+        "levels": [{"name": i.name, "low": literal(v.low), "step": literal(v.step)} for i, v in zip(context["given"], levels)],
         "n_levels": LEVELS, "hold": HOLD, "level_shift": 32 - _LEVEL_BITS,
         "answer_float": _run(context, levels, np.float32, strict=False), "answer_double": double,
     }  # fmt: skip

@@ -24,6 +24,7 @@ import penode_gen
 from penode_gen.causalise import Causal
 from penode_gen.emit_batch import BatchCode, render_batch
 from penode_gen.placeholder import columns
+from penode_gen.sampled import beside
 
 from .errors import UserError
 from .output import whole
@@ -106,7 +107,7 @@ class Batch:
         start = np.asarray(model.start if x0 is None else x0, dtype=dtype)
         u = np.ascontiguousarray(u, dtype=dtype)
         runs = self._runs(u, start, given, values, default.size)
-        u = np.ascontiguousarray(columns(model, u), dtype=dtype)
+        u = np.ascontiguousarray(beside(model, columns(model, u)), dtype=dtype)
         vectors = -(-runs // self.lanes)
         padded, n = vectors * self.lanes, u.shape[-2]
 

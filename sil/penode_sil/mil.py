@@ -21,6 +21,7 @@ import penode_gen
 
 from .errors import UserError
 from .scenario import Instance, Scenario, staging_samples
+from .late import Held, driving
 from .signals import Signal
 
 Array = NDArray[np.float64]
@@ -78,11 +79,19 @@ class _Inputs:
 
     def __init__(self, signals: tuple[Signal, ...], begin: float, end: float):
         self.signals, self.begin, self.last = signals, begin, float(np.nextafter(end, begin))
+        self.steps = {i: float(signal.value(0.5 * (begin + end))) for i, signal in enumerate(signals) if isinstance(signal, Held)}
 
     def __call__(self, t: float) -> tuple[Array, Array]:
         u = np.array([float(signal.value(t)) for signal in self.signals])
         inside = min(max(t, self.begin), self.last)
         return u, np.array([float(signal.slope(inside)) for signal in self.signals])
+
+    def before(self, t: float) -> tuple[Array, Array]:
+        """The same for the equations: at the end of the piece, what moves in steps has not moved yet."""
+        u, udot = self(t)
+        for i, level in self.steps.items():
+            u[i] = level
+        return u, udot
 
 
 def solve(
@@ -98,7 +107,7 @@ def solve(
     """Exact states, outputs and sensors of one instance at `times` [s] (increasing, within 0..duration)."""
     from scipy.integrate import DOP853, LSODA  # here, for other commands need not wait for it
 
-    signals = tuple(inputs[signal.name] for signal in model.inputs)
+    signals = driving(model, inputs, duration)
     knots = {knot for signal in signals for knot in signal.knots()}
     equations = {name: penode_gen.numeric(model, name) for name in model.sets}
     x = np.array(equations[instance.set].initial_state(), dtype=float)
@@ -128,7 +137,7 @@ def solve(
             continue
         method = DOP853 if piece.end - piece.begin < SHORT else LSODA
         solver = method(
-            lambda t, state: system.rates(state, *source(t)), piece.begin, x, piece.end, rtol=RTOL, atol=ATOL
+            lambda t, state: system.rates(state, *source.before(t)), piece.begin, x, piece.end, rtol=RTOL, atol=ATOL
         )
         while done < last and times[done] <= piece.begin:
             keep(done, x)

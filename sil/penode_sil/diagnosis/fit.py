@@ -157,7 +157,7 @@ class Problem:
 
     def _half(self, rough: bool = False) -> Problem | None:
         twice = 2.0 * self.model.sample_time
-        even = all(e.good.all() and len(e.time) % 2 == 0 and e.held is None for e in self.experiments)
+        even = self.model.fits(twice) and all(e.good.all() and len(e.time) % 2 == 0 and e.held is None for e in self.experiments)
         if not even or twice > CLOSE * (1.0 + 1e-9):
             return None
         faults = [replace(f, series=tuple(x[::2] for x in f.series)) for f in self.faults]
