@@ -10,13 +10,14 @@ their tolerance, start states) are estimated beside it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
+from scipy.optimize import lsq_linear
 from scipy.signal import lfilter
 
 from penode_gen.model import Element, Input, Model
@@ -248,17 +249,16 @@ def _at(
 ) -> _Found | None:
     """The force of one place, column of the inputs of a plant, under the likeliest walk; None where no sensor sees it."""
     units = [_unit(linear, column, p) for p in parts]
-    best: tuple[float, float, Array, list[Walk]] | None = None
-    for strength in strengths:
+
+    def walking(strength: float) -> list[Walk] | None:
         walks = [_walk(linear, column, p, unit, strength) for p, unit in zip(parts, units)]
-        if any(w is None for w in walks):
-            continue
-        left, shift = _regressed(free, parts, walks)
-        if np.isfinite(left) and (best is None or left < best[0]):
-            best = left, float(strength), shift, walks
-    if best is None:
+        return None if any(w is None for w in walks) else walks
+
+    shift = next((_shifts(free, parts, walks) for s in reversed(EFFORT.strengths) if (walks := walking(s))), None)
+    found = [(_left(free, parts, walks, shift), float(s), walks) for s in strengths if shift is not None and (walks := walking(s))]
+    if not (found := [f for f in found if np.isfinite(f[0])]):
         return None
-    left, strength, shift, walks = best
+    left, strength, walks = min(found, key=lambda f: f[0])
     forces, rest = [], 0.0
     for p, walk, unit in zip(parts, walks, units):
         y = p.residual - p.slopes @ shift
@@ -301,6 +301,72 @@ def _walk(linear: Linear, column: int, p: _Recording, unit: float, strength: flo
     return Walk.of(f * np.exp(-1.0 / (EFFORT.forgets * len(p.residual))), strength * EFFORT.pace * step**3 * np.outer(into, into), h)
 
 
+def _limits(free: Sequence[Free]) -> tuple[Array, Array]:
+    """How far free values may be shifted down and up."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.array([[np.log(end / f.value) if f.log else (end - f.value) / f.unit for end in (f.low, f.high)] for f in free])
+    down, up = np.where(np.isnan(ends), np.inf, ends).T
+    return np.where(np.isposinf(down), -np.inf, np.minimum(down, 0.0)), np.maximum(up, 0.0)
+
+
+def _least(whole: Array, r: Array, down: Array, up: Array) -> Array:
+    """Shifts within limits that leave least of r [rows] after whole [rows, free] (Stark and Parker 1995)."""
+    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    scaled = whole / size
+    root = np.linalg.cholesky(scaled.T @ scaled + 1e-12 * np.eye(len(size))).T
+    reach = 1e-12  # limits must differ
+    found = lsq_linear(root, linalg.solve_triangular(root.T, scaled.T @ r, lower=True), (down * size - reach, up * size + reach), method="bvls")
+    return np.clip(found.x / size, down, up)
+
+
+def _fade(n: int) -> Array:
+    """Weights [n, 1] of samples by which a stationary filter forgets and the plant stays what it is: the states of x' = f x, so weighted,
+    are those of x' = c f x with c < 1, and noise is weighted by some percent. With c f and samples as they are, an angle of 10^6
+    deviations of its sensor, held by no spring, would be off by 17 of them in each sample, and a force and damping found in it."""
+    return np.exp(-(np.arange(n)[:, None] - 0.5 * (n - 1)) / (EFFORT.forgets * n))
+
+
+def _innovations(parts: Sequence[_Recording], walks: Sequence[Walk], of: Callable[[_Recording], Array]) -> list[Array]:
+    """White if `of` a recording is what the walk makes."""
+    return [w.innovations(x * _fade(len(x)).reshape(-1, *[1] * (x.ndim - 1))) for p, w in zip(parts, walks) for x in (of(p),)]
+
+
+def _shifts(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[Walk]) -> Array:
+    """The likeliest shifts of the free values, within their priors and limits, beside a walk of the greatest strength: what a force at this
+    place does as well, as a torque does for an inertia, says nothing about them. A walk that is smoother than the force would rather
+    have a part of it in a parameter (Rice 1986, Speckman 1988)."""
+    if not free:
+        return np.zeros(0)
+    r = np.concatenate([x.ravel() for x in _innovations(parts, walks, lambda p: p.residual)] + [[-f.offset for f in free]])
+    rows = [x.reshape(-1, len(free)) for x in _innovations(parts, walks, lambda p: p.slopes)]
+    return _least(np.vstack([*rows, np.diag([f.unit / f.sigma for f in free])]), r, *_limits(free))
+
+
+def _left(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[Walk], shift: Array) -> float:
+    """-2 log likelihood."""
+    r = [x.ravel() for x in _innovations(parts, walks, lambda p: p.residual - p.slopes @ shift)]
+    volume = sum(len(p.residual) * w.volume for p, w in zip(parts, walks))
+    return float(sum(x @ x for x in r) + sum((f.offset + f.unit * x / f.sigma) ** 2 for f, x in zip(free, shift)) + volume)
+
+
+def _limits(free: Sequence[Free]) -> tuple[Array, Array]:
+    """How far free values may be shifted down and up."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.array([[np.log(end / f.value) if f.log else (end - f.value) / f.unit for end in (f.low, f.high)] for f in free])
+    down, up = np.where(np.isnan(ends), np.inf, ends).T
+    return np.where(np.isposinf(down), -np.inf, np.minimum(down, 0.0)), np.maximum(up, 0.0)
+
+
+def _least(whole: Array, r: Array, down: Array, up: Array) -> Array:
+    """Shifts within limits that leave least of r [rows] after whole [rows, free] (Stark and Parker 1995)."""
+    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    scaled = whole / size
+    root = np.linalg.cholesky(scaled.T @ scaled + 1e-12 * np.eye(len(size))).T
+    reach = 1e-12  # limits must differ
+    found = lsq_linear(root, linalg.solve_triangular(root.T, scaled.T @ r, lower=True), (down * size - reach, up * size + reach), method="bvls")
+    return np.clip(found.x / size, down, up)
+
+
 def _fade(n: int) -> Array:
     """Weights [n, 1] of samples by which a stationary filter forgets and the plant stays what it is: the states of x' = f x, so weighted,
     are those of x' = c f x with c < 1, and noise is weighted by some percent. With c f and samples as they are, an angle of 10^6
@@ -309,7 +375,8 @@ def _fade(n: int) -> Array:
 
 
 def _regressed(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[Walk]) -> tuple[float, Array]:
-    """-2 log likelihood, and the shifts of the free values under which it is least, within their priors."""
+    """-2 log likelihood, and the shifts of the free values under which it is least, within their priors and limits: a parameter that left
+    its limits would take the force with it wherever both do the same, as an inertia and a torque on it do."""
     fades = [_fade(len(p.residual)) for p in parts]
     r = np.concatenate([w.innovations(p.residual * fade).ravel() for p, w, fade in zip(parts, walks, fades)])
     volume = sum(len(p.residual) * w.volume for p, w in zip(parts, walks))
@@ -318,7 +385,6 @@ def _regressed(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequenc
     rows = [w.innovations(p.slopes * fade[..., None]).reshape(-1, len(free)) for p, w, fade in zip(parts, walks, fades)]
     whole = np.vstack([*rows, np.diag([f.unit / f.sigma for f in free])])
     r = np.concatenate([r, [-f.offset for f in free]])
-    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
-    shift = np.linalg.solve((whole / size).T @ (whole / size) + 1e-12 * np.eye(len(free)), (whole / size).T @ r) / size
+    shift = _least(whole, r, *_limits(free))
     left = r - whole @ shift
     return float(left @ left) + volume, shift
