@@ -72,7 +72,7 @@ campaign-xcp-fuzz: | $(READY)
 campaign-readers: | $(READY)
 	@$(PYTHON) test/prove/readers_check.py --files 20000 --seed 2 --as "readers campaign"
 campaign-recordings: | $(READY)
-	@$(PYTHON) test/prove/readers_check.py --files 50000 --seed 3 --only recording forms --as "recordings campaign"
+	@$(PYTHON) test/prove/readers_check.py --files 50000 --seed 3 --only recording forms mdf --as "recordings campaign"
 campaign-flip: | $(READY)
 	@$(PYTHON) test/prove/flip_check.py --every 1 --as "flip campaign"
 campaign-longrun: | $(READY)

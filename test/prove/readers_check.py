@@ -9,6 +9,7 @@ so the search goes on from what leads somewhere. The random numbers are seeded, 
 from __future__ import annotations
 
 import argparse
+import math
 import random
 import re
 import shutil
@@ -23,6 +24,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "sil"))
 import gate
+import mdf_files
 import numpy as np
 import onnx
 import penode_gen
@@ -52,6 +54,7 @@ class Reader:
     read: Callable[[Path], object]
     files: list[bytes]
     limit: int = LIMIT
+    share: float = 1.0  # of the files that are asked for
     tried: int = 0
     taken: int = 0
     messages: set[str] = field(default_factory=set)
@@ -127,6 +130,9 @@ def regraft(data: bytes, pick: random.Random) -> bytes:
     return model.SerializeToString()
 
 
+DEEPER = {".onnx": regraft, ".mf4": mdf_files.overwritten}  # changes beyond which a reader of that kind of file still looks
+
+
 def failure(reader: Reader, path: Path) -> str | None:
     """Read a file; None if it was taken or refused in words, else what happened."""
     try:
@@ -150,10 +156,11 @@ def failure(reader: Reader, path: Path) -> str | None:
 def search(reader: Reader, tries: int, folder: Path, seed: int = 1) -> list[str]:
     """Change files of a reader; the failures, with the file kept beside the build."""
     pick, known, found = random.Random(f"{reader.name} {seed}"), list(reader.files), []
-    for _ in range(tries):
+    for _ in range(math.ceil(tries * reader.share)):
         data = pick.choice(reader.files) if pick.random() < 0.3 else pick.choice(known)
         for _ in range(pick.choice((1, 1, 2, 4))):
-            data = regraft(data, pick) if reader.suffix == ".onnx" and pick.random() < 0.7 else changed(data, pick, reader.suffix == ".onnx")
+            inside = DEEPER.get(reader.suffix) if pick.random() < 0.7 else None
+            data = inside(data, pick) if inside else changed(data, pick, reader.suffix in DEEPER)
         path = folder / f"file{reader.suffix}"
         path.write_bytes(data)
         before = len(reader.messages)
@@ -189,6 +196,7 @@ def readers(folder: Path) -> list[Reader]:
                [path.read_bytes() for path in sorted((gate.ROOT / "sil" / "scenarios").glob("*.toml"))]),
         Reader("recording", ".csv", lambda path: measured.load([path], nqvm), [csv, german]),
         Reader("forms", ".csv", lambda path: (look.look(path, nqvm), _channels(path)), small_forms()),
+        *([Reader("mdf", ".mf4", lambda path: measured.load([path], nqvm), mdf_files.good(), share=0.05)] if mdf_files.asammdf else []),
     ]  # fmt: skip
 
 
@@ -211,7 +219,7 @@ def check(tries: int, seed: int = 1, only: Collection[str] = ()) -> tuple[list[s
     """So many files for each reader (or those of these names): failures, and per reader how many files were tried and taken, and
     messages seen."""
     signal.signal(signal.SIGPROF, _too_long)
-    with tempfile.TemporaryDirectory() as place:
+    with tempfile.TemporaryDirectory() as place, mdf_files.quick():
         every = [reader for reader in readers(Path(place)) if not only or reader.name in only]
         good = [f"{reader.name}: a good file is refused" for reader in every if failure(reader, _put(reader, Path(place))) or not reader.taken]
         found = good + [problem for reader in every for problem in search(reader, tries, Path(place), seed)]
