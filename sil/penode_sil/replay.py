@@ -46,13 +46,17 @@ def load(path: Path, model: Any, set_name: str | None, channels: Iterable[str], 
     signals = {s.name: s.unit for s in (*model.sensors, *model.outputs) if s.name not in wanted}
     pairs = recording.aliases(channels, [*wanted, *signals])
     tables = recording.read(path, [*wanted, *signals, "time"], pairs)
-    sensed = _sensed(tables, signals, path, note)
+    sensed, broken = _sensed(tables, signals, path)
+    if broken and not wanted and not sensed:
+        raise UserError(next(iter(broken.values())))
+    for name, problem in broken.items():
+        note(f"{problem}; {name} is not compared")
     if wanted:
         raster, u, remarks = recording.on_raster(tables, wanted, model.sample_time)
         if how != "linear":
             u, remarks = _between(tables, wanted, raster, model.sample_time, how)
     else:
-        raster, remarks = _clock(path, sensed, model.sample_time), []
+        raster, remarks = _clock(path, sensed, model), []
         u = np.zeros((raster.size, 0))
     for remark in remarks:
         note(f"{path}: {remark}")
@@ -63,9 +67,9 @@ def load(path: Path, model: Any, set_name: str | None, channels: Iterable[str], 
     return Replay(plan, times, float(raster[0]), u, sensed)
 
 
-def _sensed(tables: Sequence[Any], signals: dict[str, str], path: Path, note: Callable[[str], None]) -> dict[str, Sensed]:
-    """The sensors that the file holds; one that cannot be read is left out, which is noted: nothing depends on it."""
-    found = {}
+def _sensed(tables: Sequence[Any], signals: dict[str, str], path: Path) -> tuple[dict[str, Sensed], dict[str, str]]:
+    """The sensors that the file holds, and why those that cannot be read are left out."""
+    found, broken = {}, {}
     for name, unit in signals.items():
         try:
             if not any(table.find(name, unit) for table in tables):
@@ -74,19 +78,22 @@ def _sensed(tables: Sequence[Any], signals: dict[str, str], path: Path, note: Ca
             time = table.channel("time", "s", finite=False)
             values = table.channel(name, unit, finite=False)
         except UserError as exc:
-            note(f"{exc.problems[0]}; {name} is not compared")
+            broken[name] = exc.problems[0]
             continue
         sound = np.isfinite(time) & np.isfinite(values)
         order = np.argsort(time[sound], kind="stable")
         if order.size:
             found[name] = Sensed(unit, time[sound][order], values[sound][order])
-    return found
+    return found, broken
 
 
-def _clock(path: Path, sensed: dict[str, Sensed], step: float) -> Array:
+def _clock(path: Path, sensed: dict[str, Sensed], model: Any) -> Array:
     """The raster of a model without inputs: as long as all its sensors were measured."""
+    step = model.sample_time
     if not sensed:
-        raise UserError(f"{path}: it holds neither inputs nor sensors of the model; name them with --channel NAME=COLUMN")
+        first = next(s.name for s in (*model.sensors, *model.outputs))
+        look = f'"penode inspect {path.name} {model.path.name}" lists its columns'
+        raise UserError(f"{path}: it holds no sensor of the model; {look}, then name them, such as --channel {first}=COLUMN")
     first, last = max(s.time[0] for s in sensed.values()), min(s.time[-1] for s in sensed.values())
     count = int((last - first) / step + 1e-3) + 1
     if last <= first or count < 2:

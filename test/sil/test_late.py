@@ -102,3 +102,21 @@ def test_signals():
     assert late.value(np.array([0.0, 0.1, 0.25, 0.9])) == pytest.approx([0.0, 0.0, 0.005, 0.49])
     assert late.slope(np.array([0.1, 0.25])) == pytest.approx([0.0, 0.1])
     assert late.knots()[:3] == pytest.approx([0.2, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(
+    "header, channel, what",
+    [
+        ("time [s];Winkel (deg)", [], '"penode inspect a.csv swing.toml" lists its columns, then name them, such as --channel angle=COLUMN'),
+        ("t;Winkel (deg)", ["--channel", "angle=Winkel"], 'channel time has no unit; write "t [s]" in the header, or say --channel "time=t [s]"\n'),
+    ],
+)
+def test_a_model_without_inputs_says_what_its_recording_lacks(tmp_path, header, channel, what):
+    """The first problem of the only sensor, not that there is none."""
+    swing = ROTOR.replace('tau = { unit = "N*m" }', "").replace("[inputs]", "").split("[actuators]")[0]
+    swing += '[bodies]\nrotor = { inertia = "J", position = "phi", velocity = "omega" }\n[outputs]\nphi = { value = "phi", unit = "rad" }\n'
+    (tmp_path / "swing.toml").write_text(swing.replace("d = {", "# ") + '[sensors]\nangle = { value = "phi", unit = "rad" }\n')
+    (tmp_path / "a.csv").write_text("\n".join([header, *(f"{0.001 * k:.3f};{k}" for k in range(50))]))
+    found = CliRunner().invoke(cli, ["simulate", str(tmp_path / "swing.toml"), "--input", str(tmp_path / "a.csv"), *channel, "-o", str(tmp_path / "o.csv")])
+    said = "".join(getattr(found.exception, "problems", [str(found.exception)])) + "\n"
+    assert found.exit_code != 0 and what in said and not (tmp_path / "o.csv").exists()
