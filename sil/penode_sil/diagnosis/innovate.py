@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The search for what is missing: propose by a score test, fit to innovations, compare on held-out blocks, stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import catalogue
+from .catalogue.form import Form
+from .evidence.bench import Bench
+from .evidence.blocks import Blocks
+from .evidence.fit import Fit
+from .propose import Term, Trial, adopt, propose
+
+Array = NDArray[np.float64]
+KEPT = 4  # of which so many have to predict blocks
+NATS = 10.0  # log density by which a cause predicts left-out blocks better, at least
+SHARE = 0.1  # and of what the first cause gains
+AGREE = 3  # of the blocks in which it does
+CAUSES = 4  # at most
+INTERVAL = 1.96  # standard deviations that hold 95 %
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search ends with: the bench with all accepted terms in it, and of every round the trials compared, the best first."""
+
+    bench: Bench
+    terms: tuple[Term, ...]
+    rounds: tuple[tuple[Trial, ...], ...]
+    null: Fit
+
+
+def search(bench: Bench, log: Callable[[str], None]) -> Found:
+    """Causes one by one, each the one that predicts best, until none predicts enough better."""
+    terms: list[Term] = []
+    rounds: list[tuple[Trial, ...]] = []
+    null, first, floor = bench.fit, 0.0, None
+    lengths = [len(r) // bench.update for r in bench.records]
+    blocks = Blocks.of(lengths)
+    base = blocks.scores(bench.problem(), bench.fit)
+    while len(terms) < CAUSES:
+        trials, wide = propose(bench, terms, log)
+        trials = [replace(t, blocks=blocks.scores(bench.problem(wide), t.fit)) for t in trials[:KEPT]]
+        for t in trials:
+            log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, blocks {np.round(t.blocks - base, 1)}")
+        good = [t for t in trials if _accepted(t, base, first)]
+        rounds.append(tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks)))))
+        if not good:
+            break
+        best = _simplest(rounds[-1])
+        first = first or float(np.sum(best.blocks - base))
+        bench, term = adopt(bench, best)
+        terms.append(term)
+        base = blocks.scores(bench.problem(), bench.fit)
+    return Found(bench, tuple(terms), tuple(rounds), null)
+
+
+def _simplest(trials: Sequence[Trial]) -> Trial:
+    """The likeliest by the criterion among the forms of the curve that predicts best: blocks decide what, all data which form of it."""
+    first = trials[0].form
+    same = [t for t in trials if t.form.where == first.where and _curve(t.form) is _curve(first)]
+    return max(same, key=lambda t: t.gain)
+
+
+def _curve(form: Form) -> object:
+    """The file of the catalogue that a form is of, where only one of it is at a place; else its kind."""
+    file = catalogue.OF.get(form.kind)
+    return file if getattr(file, "ONE", False) else form.kind
+
+
+def _accepted(t: Trial, base: Array, first: float) -> bool:
+    """Does a form predict left-out blocks enough better, with a size that is not zero?"""
+    better = t.blocks - base
+    if not (np.sum(better > 0.0) >= AGREE and np.sum(better) > max(NATS, SHARE * first)):
+        return False
+    return all(abs(t.fit.value(f.target) - f.origin) > INTERVAL * t.fit.deviation(f.target) for f in t.term.free if not f.log)
+
+
