@@ -14,14 +14,17 @@ from . import catalogue
 from .catalogue.form import Form
 from .evidence.bench import Bench
 from .evidence.blocks import Blocks
-from .evidence.fit import Fit
+from .evidence.fit import Fit, Problem
 from .propose import Term, Trial, adopt, propose
 
 Array = NDArray[np.float64]
-KEPT = 4  # of which so many have to predict blocks
+KEPT = 3  # of which so many have to predict blocks
 NATS = 10.0  # log density by which a cause predicts left-out blocks better, at least
 SHARE = 0.1  # and of what the first cause gains
 AGREE = 3  # of the blocks in which it does
+HOPE = 0.5  # of that, which a criterion has to promise before blocks are asked
+WIDER = (3.0, 10.0, 30.0)  # times a level: those that are tried
+LEAST = 1e-4  # level that is as good as none
 CAUSES = 4  # at most
 INTERVAL = 1.96  # standard deviations that hold 95 %
 
@@ -40,13 +43,13 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Causes one by one, each the one that predicts best, until none predicts enough better."""
     terms: list[Term] = []
     rounds: list[tuple[Trial, ...]] = []
-    null, first, floor = bench.fit, 0.0, None
+    null, first = bench.fit, 0.0
     lengths = [len(r) // bench.update for r in bench.records]
     blocks = Blocks.of(lengths)
-    base = blocks.scores(bench.problem(), bench.fit)
+    bench, base = _based(bench, blocks)
     while len(terms) < CAUSES:
         trials, wide = propose(bench, terms, log)
-        trials = [replace(t, blocks=blocks.scores(bench.problem(wide), t.fit)) for t in trials[:KEPT]]
+        trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:KEPT] if t.gain > HOPE * NATS]
         for t in trials:
             log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, blocks {np.round(t.blocks - base, 1)}")
         good = [t for t in trials if _accepted(t, base, first)]
@@ -57,8 +60,21 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         first = first or float(np.sum(best.blocks - base))
         bench, term = adopt(bench, best)
         terms.append(term)
-        base = blocks.scores(bench.problem(), bench.fit)
+        bench, base = _based(bench, blocks)
     return Found(bench, tuple(terms), tuple(rounds), null)
+
+
+def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
+    """The bench with the level that predicts best, and its scores [blocks]."""
+    sizes = [max(bench.level.size, LEAST) * factor for factor in WIDER]
+    level, fit, scores = blocks.leveled(bench, bench.problem(), bench.fit, bench.level, sizes)
+    return replace(bench, level=level, fit=fit), scores
+
+
+def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
+    own = [] if t.level == bench.level else [bench.level.size]
+    level, fit, scores = blocks.leveled(replace(bench, model=problem.follower.model), problem, t.fit, t.level, own)
+    return replace(t, level=level, fit=fit, blocks=scores)
 
 
 def _simplest(trials: Sequence[Trial]) -> Trial:

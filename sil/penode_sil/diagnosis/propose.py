@@ -19,13 +19,13 @@ from .catalogue.form import Form, Motion, Moved, Part
 from .evidence.bench import Bench, leveled
 from .evidence.fit import Fit
 from .evidence.gain import Level
-from .evidence.observer import scale
+from .evidence.observer import Filter, scale
 from .evidence.screening import Probe, Score, scores
 from .fit import Free
 from .plant import extend
 
 Array = NDArray[np.float64]
-TRIED = 8  # forms that are fitted in a round, the best of each name and place first
+TRIED = 6  # forms that are fitted in a round, the best of each name and place first
 PROMISE = 3.0  # log likelihood that a form has to promise for it
 SMALL = 0.02  # of the force at a place: a force that is put on to see what it does, and a law's start
 LITTLE = 0.4  # of a unit, which is 0.05 of the force at the place
@@ -55,20 +55,19 @@ class Trial:
 
 
 def motions(probe: Probe) -> list[Motion]:
-    """Of every place."""
-    found = []
-    for k in range(len(probe.bench.places)):
-        parts = [Moved(m[:, 2 * k], m[:, 2 * k + 1], np.arange(len(m)) * probe.bench.step) for m in probe.motions]
-        found.append(Motion.of(parts))
+    """Of every place. What acts on a body where nothing of the model does is what moves it."""
+    found, bench = [], probe.bench
+    for k, place in enumerate(bench.places):
+        parts = [Moved(m[:, 3 * k], m[:, 3 * k + 1], np.arange(len(m)) * bench.step) for m in probe.motions]
+        acts = float(np.std(np.concatenate([m[:, 3 * k + 2] for m in probe.motions])))
+        found.append(Motion.of(parts, acts if place.elements else _inertia(bench, place.ends[0])))
     return found
 
 
-def force_at(bench: Bench, place: int) -> float:
-    """Rms of what acts at a place, about [N]."""
-    ends = bench.places[place].ends
-    masses = {b.name: bench.fit.values.get(b.mass, bench.model.parameters[b.mass].value) for b in bench.model.bodies}
-    own = [masses[b.name] * a for b, a in zip(bench.model.bodies, bench.forces) if b.name in ends]
-    return float(max(own, default=np.max(bench.forces)))
+def _inertia(bench: Bench, body: str) -> float:
+    """Rms of mass times acceleration of a body."""
+    k, b = next((k, b) for k, b in enumerate(bench.model.bodies) if b.name == body)
+    return bench.fit.values.get(b.mass, bench.model.parameters[b.mass].value) * float(bench.forces[k])
 
 
 def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> tuple[list[Trial], Model]:
@@ -78,7 +77,7 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     n_u = bench.records[0].u.shape[1]
     forms: list[Form] = []
     for k, (place, motion) in enumerate(zip(bench.places, moved)):
-        if motion.s_rms > 0.0 and motion.v_rms > 0.0:
+        if motion.s_rms > 0.0 and motion.v_rms > 0.0 and motion.force > 0.0:
             for file in catalogue.FILES:
                 forms += file.forms(bench.model, k, place, motion)
     forms += drives.inputs(bench.model, n_u)
@@ -106,7 +105,7 @@ def _taken(form: Form, terms: Sequence[Term]) -> bool:
 
 def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence[Motion]) -> list[tuple[Score, Form]]:
     forces = [(f.index, [p.along(m) for m in moved[f.index].parts]) for f in forms if f.how == "force" for p in f.parts]
-    size = SMALL * min(force_at(bench, k) for k in range(len(bench.places)))
+    size = SMALL * min(m.force for m in moved if m.force > 0.0)
     columns = iter(probe.columns(forces, size))
     hypotheses = []
     for f in forms:
@@ -124,7 +123,7 @@ def _slope(bench: Bench, form: Form) -> Array:
     free = (*bench.fit.free, f)
     shifts = np.zeros((2, len(free)))
     shifts[1, -1] = 0.1
-    nu = problem.nu(free, shifts, bench.fit.gain)
+    nu = problem.nu(free, shifts, bench.fit.by)
     return (nu[1] - nu[0]) / 0.1
 
 
@@ -161,7 +160,7 @@ def grown(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], first: i
             elements.append(_element(name, place.ends, part))
             where.append(place)
             names.append(name)
-            size = force_at(bench, form.index) / max(_rms([part.along(m) for m in moved[form.index].parts]), 1e-300)
+            size = moved[form.index].force / max(_rms([part.along(m) for m in moved[form.index].parts]), 1e-300)
             low, high = (0.0 if part.sign > 0 else -np.inf), (0.0 if part.sign < 0 else np.inf)
             free.append(Free(f"{name}_{part.gain[0]}", 0.0, 0.05 * size, sigma=size, low=low, high=high))
             for key, (value, _) in part.shapes.items():
@@ -189,14 +188,14 @@ def _fitted(bench: Bench, wide: Model, term: Term, sizes: Array) -> Trial:
     also from the nominal ones, and from its own free run, for the motion of a wrong plant promises little."""
     problem = bench.problem(wide)
     n_x = len(wide.states)
-    gain, still = _padded(bench.fit.gain, n_x), np.zeros((n_x, len(bench.noise)))
+    by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
     starts = [(*bench.fit.free, *_sized(term, sizes))]
     if any(f.log and f.sigma > VAGUE for f in bench.nominal):
         little = np.clip(sizes, *np.outer((-1.0, 1.0), [LITTLE * f.unit for f in term.free if not f.log]))
         starts += [(*bench.nominal, *_sized(term, little)), (*bench.fit.free, *_sized(term, little))]
         runs = [problem.solve(f, still, FREE_RUN) for f in starts[1:]]
         starts.append(max(runs, key=lambda f: f.cost).free)
-    best = max((problem.solve(f, gain, FOLLOWED) for f in starts), key=lambda f: f.cost)
+    best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
     level, best = leveled(replace(bench, model=wide), problem, best, bench.level)
     return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level)
 
@@ -207,13 +206,6 @@ def _sized(term: Term, sizes: Array) -> list[Free]:
     return [f if f.log else replace(f, value=float(np.clip(f.value + 0.5 * next(at), f.low, f.high))) for f in term.free]
 
 
-def _padded(gain: Array, n_x: int) -> Array:
-    """An observer's gain with states more that are not corrected."""
-    wide = np.zeros((n_x, gain.shape[1]))
-    wide[: len(gain)] = gain
-    return wide
-
-
 def adopt(bench: Bench, t: Trial) -> tuple[Bench, Term]:
     """The bench with a trial's form in its model, and the term that it has become."""
     moved = motions(Probe.of(bench))
@@ -222,5 +214,4 @@ def adopt(bench: Bench, t: Trial) -> tuple[Bench, Term]:
     free = tuple(replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free)
     fresh = replace(bench, model=wide, free=free, level=t.level)
     problem = fresh.problem()
-    gain = fresh.gains(None).at(t.level) if not len(t.fit.gain) else _padded(t.fit.gain[: len(bench.model.states)], len(wide.states))
-    return replace(fresh, fit=problem.solve(free, gain, FOLLOWED)), term
+    return replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(wide.states)), FOLLOWED)), term

@@ -18,17 +18,17 @@ from .catalogue.form import Form, Sizes
 from .evidence.bench import Bench, build
 from .evidence.blocks import posterior
 from .evidence.fit import Fit
-from .evidence.observer import Record, bias, shown
+from .evidence.observer import Filter, Record, bias, shown
 from .evidence.screening import Probe
 from .fit import Free
 from .innovate import INTERVAL, Found
 from .noise import Experiment
-from .propose import Term, Trial, force_at, motions
+from .propose import Term, Trial, motions
 from .plant import Place
 from .result import Cause, Named, Value
 
 Array = NDArray[np.float64]
-WORTH = 0.1  # of the force at its place, of an input or of a signal: less is a small deviation
+WORTH = 0.06  # of the force at its place, of an input or of a signal: less is a small deviation, as any model has, of 2 to 5 %
 UNSTATED = 0.05  # of a parameter without a tolerance
 RIVAL = 0.1  # posterior from which on an explanation is listed
 
@@ -60,15 +60,23 @@ def answer(
     probabilities = [_weighed(r) for r in found.rounds]
     for k, term in enumerate(found.terms):
         cause, size = _cause(model, after, term, _rivals(probabilities[k], term), _sure(probabilities[k], term))
-        if size >= WORTH:
-            causes.append(cause)
+        if size >= WORTH or any((c.kind, c.where) == (cause.kind, cause.where) for c in causes):
+            causes = _merged(causes, cause)
         else:
             notes.append(f"{cause.kind} at {cause.where} is real but small: {size:.1%} of what acts there; not named, but in model_extended.toml")
     wrong, more = _parameters(model, after)
     notes += more + _offsets(model, after)
-    still = np.zeros_like(after.fit.gain)
+    still = Filter.none(*after.fit.by.gain.shape)
     run = after.problem().solve(after.fit.free, still, 20)
     return Answer((*wrong, *causes), tuple(notes), _explanations(found, probabilities), found, run, after.model)
+
+
+def _merged(causes: list[Cause], new: Cause) -> list[Cause]:
+    """Causes with another one; a second form of one that is there gives it more parameters."""
+    same = [c for c in causes if (c.kind, c.where) == (new.kind, new.where)]
+    if not same:
+        return [*causes, new]
+    return [replace(c, parameters={**new.parameters, **c.parameters}) if c is same[0] else c for c in causes]
 
 
 def _weighed(trials: Sequence[Trial]) -> list[tuple[Form, float]]:
@@ -96,14 +104,15 @@ def _sure(names: Sequence[tuple[Form, float]], term: Term) -> float:
 
 def _explanations(found: Found, names: Sequence[Sequence[tuple[Form, float]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
     """Sets of causes with their posterior: the one found, and it with one cause exchanged for a rival."""
-    own = tuple(Named(t.form.kind, t.form.where) for t in found.terms)
+    own = tuple(dict.fromkeys(Named(t.form.kind, t.form.where) for t in found.terms))
     if not own:
         return ()
     sets = [(own, float(np.prod([_sure(n, t) for n, t in zip(names, found.terms)])))]
     for k, (options, term) in enumerate(zip(names, found.terms)):
         for r in _rivals(options, term):
             p = next(p for f, p in options if (f.kind, f.where) == (r.kind, r.where))
-            sets.append(((*own[:k], r, *own[k + 1 :]), p))
+            here = Named(term.form.kind, term.form.where)
+            sets.append((tuple(r if n == here else n for n in own), p))
     return tuple(sets)
 
 
@@ -163,7 +172,7 @@ def _share(bench: Bench, term: Term) -> float:
         shapes = {k: (fit.values.get(f"{name}_{k}", v), u) for k, (v, u) in part.shapes.items()}
         now = replace(part, shapes=shapes)
         total = [x + fit.value(f"{name}_{part.gain[0]}") * now.along(m) for x, m in zip(total, moved.parts)]
-    return float(np.sqrt(np.mean(np.concatenate(total) ** 2))) / force_at(bench, form.index)
+    return float(np.sqrt(np.mean(np.concatenate(total) ** 2))) / moved.force
 
 
 def _parameters(model: Model, bench: Bench) -> tuple[list[Cause], list[str]]:

@@ -38,21 +38,22 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A place along all recordings."""
+    """A place along all recordings; `force`: rms of what acts there already, about its mean."""
 
     parts: tuple[Moved, ...]
     s_rms: float
     v_rms: float
     s_reach: float
     v_reach: float
+    force: float = 0.0
 
     @staticmethod
-    def of(parts: Iterable[Moved]) -> Motion:
+    def of(parts: Iterable[Moved], force: float = 0.0) -> Motion:
         parts = tuple(parts)
         s, v = (np.concatenate([getattr(p, k) for p in parts]) for k in "sv")
         rms = [float(np.sqrt(np.mean(x**2))) for x in (s, v)]
         reach = [float(np.quantile(np.abs(x), 0.999)) for x in (s, v)]
-        return Motion(parts, *rms, *reach)
+        return Motion(parts, *rms, *reach, force)
 
     @property
     def longest(self) -> float:

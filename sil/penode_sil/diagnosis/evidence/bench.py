@@ -13,9 +13,9 @@ from penode_gen.model import Model, Parameter
 
 from ..fit import Free
 from ..plant import Place
-from .fit import Fit, Problem
+from .fit import Fit, Problem, likelihood
 from .gain import Gains, Level, linear
-from .observer import WANDER, Follower, Record, bias, dressed
+from .observer import WANDER, Filter, Follower, Record, bias, dressed
 
 Array = NDArray[np.float64]
 UPDATES = 16  # a period of the motion
@@ -23,7 +23,8 @@ GUESSED = 0.3  # standard deviation of the logarithm of a parameter for which th
 SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 FAR = 1e3  # a parameter is at most so many times as large or small as the file has it
 SIZES = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3)  # of what wanders, relative to what moves: levels that are tried
-STAYS = (0.5, 6.0)  # updates for which it stays: about white, and about a third of a period
+STAYS = 0.5  # updates for which it stays: about white. One that stays longer winds up against a friction that sticks
+AGAIN = 6  # iterations with another level
 TURNS = 3  # how often levels and values are fitted in turn
 
 
@@ -84,7 +85,7 @@ def build(model: Model, places: Sequence[Place], records: Sequence[Record], nois
     means = np.array([max(abs(np.nanmean(r.y[:, j])) for r in records) if any(np.isfinite(r.y[:, j]).any() for r in records) else 0.0 for j in range(len(noise))])
     for s, span, mean in zip(model.sensors, spans, means):
         free.append(Free(bias(s.name), 0.0, span, sigma=span + mean))
-    plain = Fit((), np.zeros((0, 0)), *(np.zeros(0),) * 2, np.zeros(0, bool), np.zeros(0), 0.0, 0.0)
+    plain = Fit((), Filter.none(0, 0), *(np.zeros(0),) * 2, np.zeros(0, bool), np.zeros(0), 0.0, 0.0)
     longest = sum(map(len, records)) * records[0].step
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
     wanders = [n for n in wide.states if n.startswith(WANDER)]
@@ -106,8 +107,8 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
     for again in range(3):
         follower = bench.problem().follower
         scale = bench.forces if again else _guess(bench, model, spans)
-        gain = replace(bench.gains(), forces=scale).at(Level(1.0, 2.0 * bench.update * bench.step))
-        moved = follower.follow((), np.zeros((1, 0)), gain, states=names)[2]
+        by = replace(bench.gains(), forces=scale).at(Level(1.0, 2.0 * bench.update * bench.step))
+        moved = follower.follow((), np.zeros((1, 0)), by, states=names)[2]
         x = [np.array(m[0]) for m in moved]
         if not n_q:
             rms = np.array([np.sqrt(np.nanmean(np.concatenate([r.y[:, j] for r in bench.records]) ** 2)) for j in range(len(spans))])
@@ -145,7 +146,7 @@ def settle(bench: Bench, start: Sequence[Free] | None = None) -> Bench:
     problem = bench.problem()
     free = tuple(start or bench.free)
     n_x = len(bench.model.states)
-    fit = problem.solve(free, np.zeros((n_x, len(bench.noise))), 12)
+    fit = problem.solve(free, Filter.none(n_x, len(bench.noise)), 12)
     level = Level(0.0, 1.0)
     for _ in range(TURNS):
         level, fit = leveled(bench, problem, fit, level)
@@ -156,12 +157,10 @@ def leveled(bench: Bench, problem: Problem, fit: Fit, level: Level) -> tuple[Lev
     """The likeliest level, and the values fitted with it, from those of a fit."""
     gains = bench.gains(fit, problem.follower.model)
     period = gains.period
-    tried = [level] + [Level(size, stays * period) for size in SIZES for stays in STAYS if size or stays == STAYS[0]]
-    gain = np.array([gains.at(l) for l in tried])
-    nu = problem.nu(fit.free, np.zeros((len(tried), len(fit.free))), gain)
-    from .fit import likelihood
-
+    tried = [level] + [Level(size, STAYS * period) for size in SIZES]
+    filters = [gains.at(l) for l in tried]
+    nu = problem.nu(fit.free, np.zeros((len(tried), len(fit.free))), Filter.many(filters))
     worth = [likelihood(n, problem.used(n), problem.floor)[1] for n in nu]
-    order = np.argsort(worth)[::-1][:2]
-    found = [(tried[k], problem.solve(fit.free, gain[k], 8)) for k in dict.fromkeys([*order.tolist(), 0])]
-    return max([(level, fit), *found], key=lambda f: f[1].cost)
+    best = int(np.argmax(worth))
+    again = tried[best], problem.solve(fit.free, filters[best], AGAIN)
+    return max((level, fit), again, key=lambda f: f[1].cost)

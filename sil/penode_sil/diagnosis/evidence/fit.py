@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fit import Free
-from .observer import Follower
+from .observer import Filter, Follower
 
 Array = NDArray[np.float64]
 DAMPING = np.array([0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
@@ -24,7 +24,7 @@ class Fit:
     of the free values, `used` [updates, n_z] what was fitted, `variance` [n_z] of the innovations, `likelihood` with these."""
 
     free: tuple[Free, ...]
-    gain: Array
+    by: Filter
     nu: Array
     slopes: Array
     used: NDArray[np.bool_]
@@ -90,9 +90,9 @@ class Problem:
     fixed: Mapping[str, float]
     left: NDArray[np.bool_] | None = None
 
-    def nu(self, free: Sequence[Free], shifts: Array, gain: Array) -> Array:
+    def nu(self, free: Sequence[Free], shifts: Array, by: Filter) -> Array:
         """[runs, updates, n_z], of all recordings in turn."""
-        lanes = self.follower.follow(free, shifts, gain, self.fixed)[0]
+        lanes = self.follower.follow(free, shifts, by, self.fixed)[0]
         nu = np.concatenate(lanes.nu, axis=1)
         nu[~lanes.sane] = np.where(np.isfinite(nu[~lanes.sane]), 1e12, np.nan)
         return nu
@@ -101,27 +101,27 @@ class Problem:
         good = np.isfinite(nu)
         return good if self.left is None else good & ~self.left[:, None]
 
-    def at(self, free: Sequence[Free], gain: Array) -> Fit:
+    def at(self, free: Sequence[Free], by: Filter) -> Fit:
         """The fit that ends at these free values."""
         shifts = np.vstack([np.zeros(len(free)), MOVE * np.eye(len(free))])
         for i, f in enumerate(free):
             if f.at(MOVE) == f.value:
                 shifts[i + 1, i] = -MOVE
-        nu = self.nu(free, shifts, gain)
+        nu = self.nu(free, shifts, by)
         used = self.used(nu[0])
         moves = np.array([shifts[i + 1, i] for i in range(len(free))])
         slopes = np.moveaxis((nu[1:] - nu[0]) / moves[:, None, None], 0, -1)
         slopes[~np.isfinite(slopes)] = 0.0
         variance, value = likelihood(nu[0], used, self.floor)
         cost = value - 0.5 * sum(away(f) ** 2 for f in free)
-        return Fit(tuple(free), gain, nu[0], slopes, used, variance, value, cost)
+        return Fit(tuple(free), by, nu[0], slopes, used, variance, value, cost)
 
-    def solve(self, free: Sequence[Free], gain: Array, iterations: int = 10, close: float = 0.05) -> Fit:
+    def solve(self, free: Sequence[Free], by: Filter, iterations: int = 10, close: float = 0.05) -> Fit:
         """The likeliest free values from those given on; ends where a step gains less than `close` in the log posterior."""
-        fit = self.at(free, gain)
+        fit = self.at(free, by)
         for _ in range(iterations):
             steps = self._steps(fit)
-            nu = self.nu(fit.free, steps, gain)
+            nu = self.nu(fit.free, steps, by)
             costs = []
             for k, step in enumerate(steps):
                 there = put(fit.free, step)
@@ -130,7 +130,7 @@ class Problem:
             if not costs[best] > fit.cost + 1e-9:
                 break
             gained = costs[best] - fit.cost
-            fit = self.at(put(fit.free, steps[best]), gain)
+            fit = self.at(put(fit.free, steps[best]), by)
             if gained < close:
                 break
         return fit

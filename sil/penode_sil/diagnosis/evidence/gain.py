@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from penode_gen.model import Model
 from scipy import linalg
 
-from .observer import WANDER
+from .observer import WANDER, Filter
 
 Array = NDArray[np.float64]
-FORGETS = 1e-4  # share of what it knows that a filter forgets at an update: a state that no sensor shows then has a bounded variance
+FORGETS = 1e-6  # by which states decay at an update: one that no sensor shows then has a bounded variance
 DOUBLINGS = 30  # of the time for which the filter has run: 1e9 updates
 
 
@@ -46,48 +46,49 @@ class Gains:
     def _wanders(self) -> list[int]:
         return [i for i, n in enumerate(self.names) if n.startswith(WANDER)]
 
-    def at(self, level: Level) -> Array:
-        """Gain [n_x, n_z] of an update with the mean innovation since the one before."""
+    def at(self, level: Level) -> Filter:
+        """The steady filter: what an update does with the mean innovation since the one before."""
         n_x, n_z = len(self.a), len(self.noise)
         if level.size == 0.0 or not n_x:
-            return np.zeros((n_x, n_z))
+            return Filter.none(n_x, n_z)
         a = self.a.copy()
         for i in self._wanders:
             a[i, i] = -1.0 / level.tau
-        drive = np.zeros((n_x, n_x))
+        n = n_x + n_z  # the states, and the means of the sensors since the last update
+        wide, drive = np.zeros((n, n)), np.zeros((n, n))
+        wide[:n_x, :n_x], wide[n_x:, :n_x] = a, self.c / self.period
         for i, force in zip(self._wanders, self.forces):
             drive[i, i] = 2.0 * (level.size * force) ** 2 / level.tau
-        # Van Loan 1978: the covariance of what comes in between two updates
-        block = linalg.expm(np.block([[-a, drive], [np.zeros_like(a), a.T]]) * self.period)
-        f = block[n_x:, n_x:].T
-        q = f @ block[:n_x, n_x:]
-        # a mean over the samples of the interval sees the state at its end as it was, on average, over the interval
-        back = linalg.expm(-a * self.period / self.samples)
-        mean, power = np.zeros_like(a), np.eye(n_x)
-        for _ in range(self.samples):
-            mean, power = mean + power / self.samples, power @ back
-        h = self.c @ mean
-        return riccati(f * (1.0 + FORGETS), 0.5 * (q + q.T), h, np.diag(self.noise**2 / self.samples))
+        # Van Loan, IEEE Trans. Autom. Control 23, 1978: the covariance of what comes in between two updates
+        block = linalg.expm(np.block([[-wide, drive], [np.zeros_like(wide), wide.T]]) * self.period)
+        f = block[n:, n:].T
+        q = f @ block[:n, n:]
+        q = 0.5 * (q + q.T)
+        noise = q[n_x:, n_x:] + np.diag(self.noise**2 / self.samples)
+        gain = riccati(f[:n_x, :n_x], f[n_x:, :n_x], q[:n_x, :n_x], q[:n_x, n_x:], noise)
+        return Filter(gain, np.array([level.tau]))
 
 
-def riccati(f: Array, q: Array, h: Array, r: Array) -> Array:
-    """Gain of the steady filter of x+ = f x + w, y = h x + v, by doubling (Anderson and Moore, Optimal Filtering, 1979, section 6.7)."""
-    scale = np.sqrt(np.maximum(np.diag(q), 1e-12 * np.max(np.diag(q)) + 1e-300))
-    f, q, h = f * scale / scale[:, None], q / np.outer(scale, scale), h * scale
-    noise = np.sqrt(np.diag(r))
-    h = h / noise[:, None]
-    alpha, beta, gamma = f.T.copy(), h.T @ h, q.copy()
+def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
+    """Steady gain k of x+ = f x + w, y = h x + v with covariances q of w, r of v and s of both: x+ = f x + k (y - h x). By doubling
+    (Anderson and Moore, Optimal Filtering, 1979, sections 5.5 and 6.7)."""
+    f = f * (1.0 - FORGETS)
+    size = np.sqrt(np.maximum(np.diag(q), 1e-12 * np.max(np.diag(q)) + 1e-300))
+    deviation = np.sqrt(np.diag(r))
+    f, h, q = f * size / size[:, None], h * size / deviation[:, None], q / np.outer(size, size)
+    s, r = s / np.outer(size, deviation), r / np.outer(deviation, deviation)
+    free = f - s @ np.linalg.solve(r, h)
+    alpha, beta, gamma = free.T.copy(), h.T @ np.linalg.solve(r, h), q - s @ np.linalg.solve(r, s.T)
     for _ in range(DOUBLINGS):
-        inner = np.linalg.solve(np.eye(len(f)) + beta @ gamma, np.eye(len(f)))
+        inner = np.linalg.inv(np.eye(len(f)) + beta @ gamma)
         after = alpha @ inner @ alpha
         beta, change = beta + alpha @ inner @ beta @ alpha.T, alpha.T @ gamma @ inner @ alpha
         alpha, gamma = after, gamma + change
         gamma = 0.5 * (gamma + gamma.T)
         if not np.isfinite(gamma).all() or np.max(np.abs(change)) < 1e-12 * np.max(np.abs(gamma)):
             break
-    innovation = h @ gamma @ h.T + np.eye(len(h))
-    gain = np.linalg.solve(innovation, h @ gamma).T
-    return scale[:, None] * gain / noise
+    gain = np.linalg.solve(h @ gamma @ h.T + r, (f @ gamma @ h.T + s).T).T
+    return np.where(np.isfinite(gain), size[:, None] * gain / deviation, 0.0)
 
 
 def linear(model: Model, n_z: int, values: dict[str, float], set_name: str, own: Sequence[str]) -> tuple[tuple[str, ...], Array, Array]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from penode_gen.model import GROUND, Element, Equation, Model, Parameter, Signal, State
+from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter, Signal, State
 
 from ...batch import Observer
 from ..fit import Free, compiled, ordered
@@ -87,15 +87,46 @@ def dressed(model: Model, places: Sequence[Place]) -> Model:
 
 
 def probed(model: Model, places: Sequence[Place]) -> Model:
-    """A dressed model with a force at_k as a further input at each place, and its deflection and rate s_probe_k, v_probe_k as further
-    sensors."""
-    from penode_gen.model import Input
-
+    """A dressed model with a force at_k as a further input at each place, and its deflection, its rate and what acts there already as
+    further sensors."""
     forces = [Element(f"probe{k}", p.ends, "expression", expression=f"at{k}") for k, p in enumerate(places)]
     wide = replace(model, inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(places))))
     wide = extend(wide, forces, {}, places)
-    seen = [Signal(f"{q}_of_probe{k}", f"{q}_probe{k}", p.unit(u)) for k, p in enumerate(places) for q, u in (("s", "m"), ("v", "m/s"))]
+    seen = []
+    for k, p in enumerate(places):
+        force = " ".join(f"{'+' if sense > 0 else '-'} F_{name}" for name, sense in p.elements) or "0"
+        signals = (("s", f"s_probe{k}", "m"), ("v", f"v_probe{k}", "m/s"), ("F", force, "N"))
+        seen += [Signal(f"{q}_of_probe{k}", text, p.unit(unit)) for q, text, unit in signals]
     return replace(wide, sensors=(*wide.sensors, *seen))
+
+
+@dataclass(frozen=True, eq=False)
+class Filter:
+    """How an observer corrects its states: gain [n_x, n_z] or [runs, n_x, n_z], and the time tau [s], one or [runs], for which what
+    wanders stays."""
+
+    gain: Array
+    tau: Array
+
+    @staticmethod
+    def none(n_x: int, n_z: int) -> Filter:
+        """A free run."""
+        return Filter(np.zeros((n_x, n_z)), np.ones(1))
+
+    @staticmethod
+    def many(filters: Sequence[Filter]) -> Filter:
+        """One run by each."""
+        return Filter(np.array([f.gain for f in filters]), np.concatenate([f.tau for f in filters]))
+
+    def cut(self, n_x: int) -> Filter:
+        """Of the first states alone."""
+        return Filter(self.gain[:n_x], self.tau)
+
+    def padded(self, n_x: int) -> Filter:
+        """With more states, which are not corrected."""
+        wide = np.zeros((n_x, self.gain.shape[1]))
+        wide[: len(self.gain)] = self.gain
+        return Filter(wide, self.tau)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,16 +151,17 @@ class Follower:
         self.n_z = len(records[0].y[0])  # sensors that were measured; the model may have more
 
     def follow(
-        self, free: Sequence[Free], shifts: Array, gain: Array, fixed: Mapping[str, float] = {}, extra: Mapping[int, Array] = {},
+        self, free: Sequence[Free], shifts: Array, by: Filter, fixed: Mapping[str, float] = {}, extra: Mapping[int, Array] = {},
         watched: int = 0, states: Sequence[str] = (), parts: Sequence[tuple[int, int]] | None = None,
     ) -> tuple[Lanes, list[Array], list[Array]]:  # fmt: skip
-        """Runs with free values after shifts [runs, free], observer gain [n_x, n_z] or [runs, n_x, n_z]. `extra`: further inputs of a
+        """Runs with free values after shifts [runs, free], corrected `by` a filter. `extra`: further inputs of a
         probed model per recording, [n, .] or [runs, n, .]; `watched`: how many sensors more to give, per recording [runs, n, watched].
         `parts`: samples of each recording, from and to, that are followed. Returns innovations, watched sensors, states."""
         nus, seen, moved, sane = [], [], [], np.ones(len(shifts), bool)
         for e, record in enumerate(self.records):
             first, last = (0, len(record)) if parts is None else parts[e]
             start, parameters, u, y = self._given(e, free, shifts, fixed)
+            parameters[f"{WANDER}_tau"] = by.tau
             u, y = u[..., first:last, :], y[..., first:last, :]
             if e in extra:
                 more = extra[e][..., first:last, :]
@@ -139,8 +171,8 @@ class Follower:
                     more = np.broadcast_to(more, (len(u), *more.shape))
                 u = np.concatenate([u, more], axis=-1)
             blank = np.full((*y.shape[:-1], len(self.model.sensors) - self.n_z), np.nan)
-            wide = np.zeros((*gain.shape[:-1], len(self.model.sensors)))
-            wide[..., : self.n_z] = gain
+            wide = np.zeros((*by.gain.shape[:-1], len(self.model.sensors)))
+            wide[..., : self.n_z] = by.gain
             run = self.batch.run(
                 u, x0=start, parameters=parameters, set_name=self.set_name, states=states,
                 observer=Observer(self.update, np.concatenate([y, blank], axis=-1), wide),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .bench import Bench
 from .fit import Fit
-from .observer import Follower, probed
+from .observer import Filter, Follower, probed
 
 Array = NDArray[np.float64]
 AT_ONCE = 32  # runs that are simulated together
@@ -25,18 +25,18 @@ class Probe:
 
     bench: Bench
     follower: Follower
-    gain: Array
-    motions: list[Array]  # deflection and rate of every place per recording [n, 2 places]
+    by: Filter
+    motions: list[Array]  # deflection, rate and force of every place per recording [n, 3 places]
 
     @staticmethod
     def of(bench: Bench) -> Probe:
         wide = probed(bench.model, bench.places)
         follower = Follower(wide, bench.records, bench.update, bench.set_name, bench.fastest)
-        gain = bench.fit.gain
+        by = bench.fit.by
         none = {e: np.zeros((len(r), len(bench.places))) for e, r in enumerate(bench.records)}
-        watched = 2 * len(bench.places)
-        seen = follower.follow(bench.fit.free, np.zeros((1, len(bench.fit.free))), gain, {}, none, watched)[1]
-        return Probe(bench, follower, gain, [s[0] for s in seen])
+        watched = 3 * len(bench.places)
+        seen = follower.follow(bench.fit.free, np.zeros((1, len(bench.fit.free))), by, {}, none, watched)[1]
+        return Probe(bench, follower, by, [s[0] for s in seen])
 
     def columns(self, forces: Sequence[tuple[int, Sequence[Array]]], size: float) -> Array:
         """Changes [forces, updates, n_z] of the innovations for a force of 1; each is a place and its series [n] per recording; `size` is
@@ -51,7 +51,7 @@ class Probe:
                 for k, (place, series) in enumerate(some):
                     u[k + 1, :, place] = sizes[k] * series[e]
                 extra[e] = u
-            lanes = self.follower.follow(free, np.zeros((len(some) + 1, len(free))), self.gain, {}, extra)[0]
+            lanes = self.follower.follow(free, np.zeros((len(some) + 1, len(free))), self.by, {}, extra)[0]
             nu = np.concatenate(lanes.nu, axis=1)
             found.append((nu[1:] - nu[0]) / np.array(sizes)[:, None, None])
         return np.concatenate(found) if found else np.zeros((0, *bench.fit.nu.shape))
