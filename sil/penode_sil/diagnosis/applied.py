@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from penode_gen import units
@@ -18,8 +18,6 @@ from .evidence.observer import bias, scale
 from .extension import extends, table, toml, unlike
 from .propose import Term
 
-FEW = 2.0  # standard deviations from which on an offset of a sensor is written down
-
 
 @dataclass(frozen=True, eq=False)
 class Applied:
@@ -29,8 +27,9 @@ class Applied:
     left: tuple[str, ...]
 
 
-def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], shown: dict[str, float]) -> Applied:
-    """The nominal model with the values of a fit and the terms of it; `shown` [sensor] are offsets of sensors, SI."""
+def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: Collection[str]) -> Applied:
+    """The nominal model with the values of a fit and the terms of it; `offsets`: sensors whose
+    offset goes into it."""
     forces = [t for t in terms if t.form.how == "force"]
     taken = {*model.parameters, *model.states, *(x.name for x in model.elements), *(s.name for s in model.sensors)}
     rename: dict[str, str] = {}
@@ -53,7 +52,9 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], shown: di
             ]  # fmt: skip
             elements.append(f"{named(name)} = {table(_element(own, named))}")
     driven, left = _driven(model, fit, terms)
-    sensors = [_sensor(model, j, bench, values, shown, parameters, named) for j in range(len(model.sensors))]
+    sensors = [_sensor(model, j, bench, values, offsets, parameters, named) for j in range(len(model.sensors))]
+    units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
+    outputs = [f"{s.name} = {table({**x, 'unit': units_of[s.name]})}" for s, x in zip(model.sensors, sensors) if x and s.name in units_of]
     learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
     lines = [
         f"# What the recordings taught about {model.path.name}: {learnt or 'nothing but values'}.",
@@ -62,7 +63,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], shown: di
     ]  # fmt: skip
     for title, entries in (
         ("parameters", [*parameters, *driven["parameters"]]), ("actuators", driven["actuators"]), ("elements", [*driven["elements"], *elements]),
-        ("sensors", [s for s in sensors if s]),
+        ("outputs", outputs), ("sensors", [f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}" for s, x in zip(model.sensors, sensors) if x]),
     ):  # fmt: skip
         if entries:
             lines += [f"[{title}]", *entries, ""]
@@ -77,15 +78,15 @@ def _changed(model: Model, name: str, value: float) -> str:
     return f"{name} = {table({'value': value / units.factor(known.unit), 'unit': known.unit, **more})}"
 
 
-def _element(e: Element, named) -> dict[str, object]:
+def _element(e: Element, named: Callable[[str], str]) -> dict[str, object]:
     entry: dict[str, object] = {"between": e.ends, "law": e.law}
     if e.law == "expression":
         return entry | {"force": named(e.expression)}
     return entry | {k: named(e.arguments[k]) for k in LAWS[e.law].arguments}
 
 
-def _sensor(model: Model, j: int, bench: Bench, values: dict[str, float], shown: dict[str, float], parameters: list[str], named) -> str:
-    """The entry of a sensor that measures otherwise; empty for one that does not."""
+def _sensor(model: Model, j: int, bench: Bench, values: dict[str, float], offsets: Collection[str], parameters: list[str], named: Callable[[str], str]) -> dict[str, object]:
+    """What a sensor that measures otherwise has as its value and unit; nothing for one that does not."""
     s, unit = model.sensors[j], units.si(model.sensors[j].unit)
     wide = bench.model.sensors[j].expression
     inner = named(wide[1 : wide.rindex(f")*{scale(s.name)}")])
@@ -94,12 +95,12 @@ def _sensor(model: Model, j: int, bench: Bench, values: dict[str, float], shown:
     if scale(s.name) in values:
         parameters.append(f"gain_{s.name} = {table({'value': values[scale(s.name)], 'unit': '1'})}")
         expression = f"gain_{s.name}*({expression})"
-    if s.name in shown:
+    if s.name in offsets:
         parameters.append(f"bias_{s.name} = {table({'value': values[bias(s.name)], 'unit': unit})}")
         expression = f"{expression} + bias_{s.name}"
     if expression == s.expression:
-        return ""
-    return f"{s.name} = {table({'value': expression, 'unit': s.unit, 'noise': s.noise / units.factor(s.unit)})}"
+        return {}
+    return {"value": expression, "unit": s.unit}
 
 
 def _driven(model: Model, fit: Fit, terms: Sequence[Term]) -> tuple[dict[str, list[str]], list[str]]:

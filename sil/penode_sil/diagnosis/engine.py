@@ -20,13 +20,13 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
-from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady
+from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady, weighed
 from .driven import experiment, settled
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
 from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
 from .search import Explanation
-from .study import MOVING, Study, begin, look
+from .study import MOVING, VAGUE, Study, begin, look, stated
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it
@@ -63,6 +63,7 @@ def diagnose(
     started = time.perf_counter()
     log = advancing(log, tell)
     tell(0.0, "fitting the model as it is")
+    plain, model = model, stated(model)
     both = told_of_rails([*train, *holdout])
     train, holdout = both[: len(train)], both[len(train) :]
     experiments, unused, remarks = settled(model, train, holdout, set_name)
@@ -78,6 +79,9 @@ def diagnose(
         more = dropouts.bursts(study.experiments, study.null.simulated)
         bursts = [b | m for b, m in zip(bursts, more)]
     faults = broken_sensors(model, train, study, study.null.simulated, bursts)
+    if any(p.tolerance > VAGUE for p in model.parameters.values()):
+        answer = by_innovations(replace(study, model=plain), unused, output, remarks, log, tell)
+        return replace(answer, data=used(train, holdout), seconds=time.perf_counter() - started)
     tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
     if study.moving:
@@ -91,6 +95,9 @@ def diagnose(
         if rested(losses, costs, told, len(model.states) * len(experiments), search.numbers(found[0])):
             study, explanations = other, found
     best = explanations[0] if explanations else None
+    if weighed.missed(study, best.fit if best else study.null, log):
+        answer = by_innovations(replace(study, model=plain), unused, output, remarks, log, tell)
+        return replace(answer, data=used(train, holdout), seconds=time.perf_counter() - started)
     if best is not None:  # bursts and spikes that a cause explains were none
         kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
         rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
@@ -171,11 +178,7 @@ def diagnose(
             causes, verdict, explained = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0
             notes.append(f"{', '.join(unseen)}: the hold-out shows what the training does not: train with recordings like it")
     if output is not None:
-        output.mkdir(parents=True, exist_ok=True)
-        nominal = model.path.resolve()
-        beside = Path(os.path.relpath(nominal, output.resolve()))  # so that both can be moved together
-        (output / "model_extended.toml").write_text(text.replace(extension.extends(nominal), extension.extends(beside), 1))
-        extended = penode_gen.load(output / "model_extended.toml")
+        extended = written(text, model, output)
     absorbed: dict[str, object] = {}
     if learnt := absorb.taught(study, named) if named is not None and named.terms else []:
         absorbed, more = absorbing(study, named, learnt, unused, output)
@@ -183,11 +186,59 @@ def diagnose(
     tell(0.9, "showing what is wrong")
     whole = named is not None and (named is unnamed or best is not None and bool(causes))
     shown = residual.show(study, named.fit if whole else None, extended if whole else None, held, verdict == "unexplained")
-    data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(
-        verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), data,
-        shown.numbers(), absorbed, time.perf_counter() - started, shown=shown,
+        verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), used(train, holdout),
+        shown.numbers(), absorbed, alternatives(causes), time.perf_counter() - started, shown=shown,
+    )  # fmt: skip
+
+
+def written(text: str, model: Model, output: Path) -> Model:
+    """Writes model_extended.toml beside the rest, with a path to the nominal one such that both can be moved together; the model of it."""
+    output.mkdir(parents=True, exist_ok=True)
+    nominal = model.path.resolve()
+    beside = Path(os.path.relpath(nominal, output.resolve()))
+    (output / "model_extended.toml").write_text(text.replace(extension.extends(nominal), extension.extends(beside), 1))
+    return penode_gen.load(output / "model_extended.toml")
+
+
+def used(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[Recorded, ...]:
+    """All recordings, each with its role."""
+    return tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
+
+
+def alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
+    """Explanations as sets of causes: the one named, and it with one cause exchanged for an alternative."""
+    own = [{"kind": c.kind, "where": c.where} for c in causes if c.kind != OUTSIDE]
+    if not own:
+        return ()
+    sure = float(np.prod([c.confidence for c in causes]))
+    sets = [{"causes": own, "posterior": sure}]
+    for k, c in enumerate(causes):
+        for a in c.alternatives:
+            other = [*own[:k], {"kind": a.kind, "where": a.where}, *own[k + 1 :]]
+            sets.append({"causes": other, "posterior": (1.0 - c.confidence) / len(c.alternatives)})
+    return tuple(sets)
+
+
+def by_innovations(
+    study: Study, unused: Sequence[Experiment], output: Path | None, remarks: Sequence[str], log: Callable[[str], None],
+    tell: Callable[[float, str], None],
+) -> Diagnosis:  # fmt: skip
+    """The diagnosis of recordings that sensor noise alone cannot judge; without recordings and time, which the caller has."""
+    tell(SEARCH[1], "weighing what is missed everywhere")
+    study = replace(study, seen=look(study, study.null))
+    w = weighed.weigh(study, unused, log)
+    extended = w.model if output is None else written(w.text, study.model, output)
+    tell(0.9, "showing what is wrong")
+    shown = residual.show(study, w.fit, extended, w.held, w.verdict == "unexplained")
+    rows = search.rows(study)
+    evidence = (study.null.cost - rows) / np.sqrt(2.0 * rows)
+    numbers, _ = numerics.numerics(study)
+    causes = w.causes or ((Cause(OUTSIDE, "", {}, 0.5),) if w.verdict == "unexplained" else ())
+    return Diagnosis(
+        w.verdict, tuple(replace(c, separate=separating(c)) for c in causes), w.gain, numbers, w.explained, evidence, 0.0,
+        tuple([*remarks, *w.notes]), residual=shown.numbers(), explanations=w.explanations, shown=shown,
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from penode_gen.model import INTERPOLATIONS, Model, Signal
 
 from ..targets import Sil
 from . import stepped
+from .beginning import begun
 from .build import SPREAD, Term
 from .dropouts import bursts
 from .fit import BLUNT, Free, Problem, moving
@@ -80,7 +81,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         if substeps > model.substeps:
             lines.insert(-1, f"substeps = {substeps}")
     if e is None:
-        return _joined(study, "\n".join(lines))
+        return joined(study, "\n".join(lines))
     values = {f.target: f.value for f in e.fit.free}
     taken = {*model.parameters, *model.states, *(x.name for x in model.elements), *(s.name for s in model.sensors)}
     rename = {}
@@ -166,7 +167,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     ):  # fmt: skip
         if entries:
             lines += [f"[{title}]", *entries, ""]
-    return _joined(study, "\n".join(lines))
+    return joined(study, "\n".join(lines))
 
 
 SHORT = 0.02  # of a sample: a delay that is left out
@@ -174,7 +175,7 @@ ONE_POLE = 0.48  # of a delay squared: beyond that the second pole of a filter i
 ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast
 
 
-def _joined(study: Study, text: str) -> tuple[str, Model]:
+def joined(study: Study, text: str) -> tuple[str, Model]:
     """The model of a text; its inputs follow a curve through more samples if the way between them is too rough for the first recording,
     and the C then meets it better. The more samples, the finer, but the louder the noise of the inputs."""
     model, e = _load(text), study.experiments[0]
@@ -333,7 +334,7 @@ def measure(
     outside, notes = [], []
     for e in holdout:
         both = (study, replace(study, set_name=set_name or study.set_name))
-        starts = [started(m, e, s)[0] for m, s in zip((model, extended), both)]
+        starts = [begun(m, e, study, s.set_name) for m, s in zip((model, extended), both)]
         before, after = (deployed(m, e, x, s.set_name) for m, x, s in zip((model, extended), starts, both))
         dropped = bursts([e], [after])[0] & [s.name in lost for s in model.sensors]
         e = replace(e, good=e.good & ~dropped)

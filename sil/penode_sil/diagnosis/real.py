@@ -26,10 +26,10 @@ from .noise import Experiment
 from .propose import Term, Trial, motions
 from .plant import Place
 from .result import Cause, Named, Value
+from .study import UNSTATED
 
 Array = NDArray[np.float64]
 WORTH = 0.06  # of the force at its place, of an input or of a signal: less is a small deviation, as any model has, of 2 to 5 %
-UNSTATED = 0.05  # of a parameter without a tolerance
 RIVAL = 0.1  # posterior from which on an explanation is listed
 
 

@@ -37,7 +37,7 @@ class Bench:
     set_name: str
     places: tuple[Place, ...]
     records: tuple[Record, ...]
-    own: tuple[str, ...]  # states that are corrected
+    base: Model  # of which the filter is: the nominal one, dressed, without laws that are steep where it stands still
     free: tuple[Free, ...]
     update: int
     forces: Array
@@ -61,8 +61,8 @@ class Bench:
         """The linear plant with the values of a fit."""
         update, model = update or self.update, model or self.model
         values = {} if fit is None else fit.values
-        names, a, c = linear(model, len(self.noise), values, self.set_name, self.own)
-        return Gains(names, a, c, self.forces, self.noise, update * self.step, update)
+        a, c = linear(self.base, len(self.noise), values, self.set_name)
+        return Gains(self.base.states, model.states, a, c, self.forces, self.noise, update * self.step, update)
 
 
 def parameter(p: Parameter) -> Free | None:
@@ -77,8 +77,8 @@ def parameter(p: Parameter) -> Free | None:
     return Free(p.name, p.value, size, log=True, sigma=sigma, origin=p.value, low=ends[0], high=ends[1])
 
 
-def build(model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default") -> Bench:
-    """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]."""
+def build(model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default", base: Model | None = None) -> Bench:  # fmt: skip
+    """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]; `base`: the nominal one, if it is not."""
     wide = dressed(model, places)
     free = [f for f in map(parameter, model.parameters.values()) if f]
     spans = np.array([max(np.nanstd(np.concatenate([r.y[:, j] for r in records])), noise[j]) for j in range(len(noise))])
@@ -89,7 +89,7 @@ def build(model: Model, places: Sequence[Place], records: Sequence[Record], nois
     longest = sum(map(len, records)) * records[0].step
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
     wanders = [n for n in wide.states if n.startswith(WANDER)]
-    bench = Bench(wide, set_name, tuple(places), tuple(records), model.states, (), first, np.ones(len(wanders)), noise, fastest, Level(0.0, 1.0), plain)
+    bench = Bench(wide, set_name, tuple(places), tuple(records), dressed(base or model, places), (), first, np.ones(len(wanders)), noise, fastest, Level(0.0, 1.0), plain)
     bench, x = _moved(bench, model, spans)
     starts = []
     for e, states in enumerate(x):

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -32,9 +31,11 @@ class Level:
 @dataclass(frozen=True, eq=False)
 class Gains:
     """Linear plant of a dressed model, x' = a x, y = c x; `forces` [wandering] are the sizes of force to which levels are relative,
-    `noise` [n_z] the standard deviations of a sample of each sensor, `period` [s] the time between updates, `samples` how many."""
+    `noise` [n_z] the standard deviations of a sample of each sensor, `period` [s] the time between updates, `samples` how many; `names` of its states, `into`: those of the
+    model that follows, of which others are not corrected."""
 
     names: tuple[str, ...]
+    into: tuple[str, ...]
     a: Array
     c: Array
     forces: Array
@@ -50,23 +51,38 @@ class Gains:
         """The steady filter: what an update does with the mean innovation since the one before."""
         n_x, n_z = len(self.a), len(self.noise)
         if level.size == 0.0 or not n_x:
-            return Filter.none(n_x, n_z)
+            return Filter.none(len(self.into), n_z)
         a = self.a.copy()
         for i in self._wanders:
             a[i, i] = -1.0 / level.tau
-        n = n_x + n_z  # the states, and the means of the sensors since the last update
-        wide, drive = np.zeros((n, n)), np.zeros((n, n))
-        wide[:n_x, :n_x], wide[n_x:, :n_x] = a, self.c / self.period
+        drive = np.zeros((n_x, n_x))
         for i, force in zip(self._wanders, self.forces):
             drive[i, i] = 2.0 * (level.size * force) ** 2 / level.tau
-        # Van Loan, IEEE Trans. Autom. Control 23, 1978: the covariance of what comes in between two updates
-        block = linalg.expm(np.block([[-wide, drive], [np.zeros_like(wide), wide.T]]) * self.period)
-        f = block[n:, n:].T
-        q = f @ block[:n, n:]
-        q = 0.5 * (q + q.T)
-        noise = q[n_x:, n_x:] + np.diag(self.noise**2 / self.samples)
-        gain = riccati(f[:n_x, :n_x], f[n_x:, :n_x], q[:n_x, :n_x], q[:n_x, n_x:], noise)
-        return Filter(gain, np.array([level.tau]))
+        step, q = sampled(a, drive, self.period / self.samples)
+        # states, and means of the sensors at the samples since the last update, from one sample to the next
+        n = n_x + n_z
+        seen = self.c / self.samples
+        once = np.block([[step, np.zeros((n_x, n_z))], [seen @ step, np.eye(n_z)]])
+        into = np.vstack([np.eye(n_x), seen])
+        noise = into @ q @ into.T
+        f, total = np.eye(n), np.zeros((n, n))
+        for _ in range(self.samples):
+            f, total = once @ f, once @ total @ once.T + noise
+        measured = total[n_x:, n_x:] + np.diag(self.noise**2 / self.samples)
+        gain = riccati(f[:n_x, :n_x], f[n_x:, :n_x], total[:n_x, :n_x], total[:n_x, n_x:], measured)
+        whole = np.zeros((len(self.into), n_z))
+        whole[[self.into.index(n) for n in self.names]] = gain
+        return Filter(whole, np.array([level.tau]))
+
+
+def sampled(a: Array, drive: Array, step: float) -> tuple[Array, Array]:
+    """Transition of x' = a x + w over a step [s], and the covariance of what w of intensity `drive` adds (Van Loan, IEEE Trans. Autom.
+    Control 23, 1978)."""
+    n = len(a)
+    block = linalg.expm(np.block([[-a, drive], [np.zeros_like(a), a.T]]) * step)
+    f = block[n:, n:].T
+    q = f @ block[:n, n:]
+    return f, 0.5 * (q + q.T)
 
 
 def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
@@ -91,21 +107,15 @@ def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
     return np.where(np.isfinite(gain), size[:, None] * gain / deviation, 0.0)
 
 
-def linear(model: Model, n_z: int, values: dict[str, float], set_name: str, own: Sequence[str]) -> tuple[tuple[str, ...], Array, Array]:
-    """State names, a [n_x, n_x] and c [n_z, n_x] of a dressed model where it stands still. Only states in `own` and those of wandering
-    forces are followed: the others, of laws with memory, run by themselves."""
+def linear(model: Model, n_z: int, values: dict[str, float], set_name: str) -> tuple[Array, Array]:
+    """a [n_x, n_x] and c [n_z, n_x] of a dressed model where it stands still."""
     known = {n: replace(p, value=values.get(n, p.value)) for n, p in model.parameters.items()}
     system = penode_gen.numeric(replace(model, parameters=known, interpolation="linear"), set_name)
     n_x, n_u = len(model.states), len(model.inputs)
     x, u = np.zeros(n_x), np.zeros(n_u)
     a, c = np.zeros((n_x, n_x)), np.zeros((n_z, n_x))
-    for j, name in enumerate(model.states):
+    for j in range(n_x):
         step = 1e-4 * np.eye(n_x)[j]
         a[:, j] = (system.rates(x + step, u, u) - system.rates(x - step, u, u)) / 2e-4
         c[:, j] = (system.sensors(x + step, u, u) - system.sensors(x - step, u, u))[:n_z] / 2e-4
-        if name not in own and not name.startswith(WANDER):
-            c[:, j] = 0.0
-    followed = np.array([n in own or n.startswith(WANDER) for n in model.states])
-    a[~followed] = 0.0
-    a[:, ~followed] = 0.0
-    return model.states, a, c
+    return a, c
