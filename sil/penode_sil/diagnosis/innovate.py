@@ -78,10 +78,16 @@ def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
 
 
 def _simplest(trials: Sequence[Trial]) -> Trial:
-    """The likeliest by the criterion among the forms of the curve that predicts best: blocks decide what, all data which form of it."""
+    """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
+    them by NATS."""
     first = trials[0].form
     same = [t for t in trials if t.form.where == first.where and _curve(t.form) is _curve(first)]
-    return max(same, key=lambda t: t.gain)
+    found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
+    for t in more:
+        better = t.blocks - found.blocks
+        if np.all(better > 0.0) and np.sum(better) > NATS:
+            found = t
+    return found
 
 
 def _curve(form: Form) -> object:

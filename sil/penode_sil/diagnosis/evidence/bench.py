@@ -61,8 +61,9 @@ class Bench:
         """The linear plant with the values of a fit."""
         update, model = update or self.update, model or self.model
         values = {} if fit is None else fit.values
-        a, c = linear(self.base, len(self.noise), values, self.set_name)
-        return Gains(self.base.states, model.states, a, c, self.forces, self.noise, update * self.step, update)
+        plant = linear(self.base, len(self.noise), values, self.set_name)
+        shaken = np.array([i.noise for i in self.base.inputs])
+        return Gains(self.base.states, model.states, *plant, shaken, self.forces, self.noise, update * self.step, update)
 
 
 def parameter(p: Parameter) -> Free | None:
@@ -146,8 +147,8 @@ def settle(bench: Bench, start: Sequence[Free] | None = None) -> Bench:
     problem = bench.problem()
     free = tuple(start or bench.free)
     n_x = len(bench.model.states)
-    fit = problem.solve(free, Filter.none(n_x, len(bench.noise)), 12)
     level = Level(0.0, 1.0)
+    fit = problem.solve(free, Filter.none(n_x, len(bench.noise)), 12)
     for _ in range(TURNS):
         level, fit = leveled(bench, problem, fit, level)
     return replace(bench, free=fit.free, level=level, fit=fit)

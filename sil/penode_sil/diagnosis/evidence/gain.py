@@ -30,14 +30,17 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """Linear plant of a dressed model, x' = a x, y = c x; `forces` [wandering] are the sizes of force to which levels are relative,
+    """Linear plant of a dressed model, x' = a x + b u, y = c x + d u; `shaken` [n_u]: noise of a sample of each input; `forces` [wandering] are the sizes of force to which levels are relative,
     `noise` [n_z] the standard deviations of a sample of each sensor, `period` [s] the time between updates, `samples` how many; `names` of its states, `into`: those of the
     model that follows, of which others are not corrected."""
 
     names: tuple[str, ...]
     into: tuple[str, ...]
     a: Array
+    b: Array
     c: Array
+    d: Array
+    shaken: Array
     forces: Array
     noise: Array
     period: float
@@ -50,7 +53,7 @@ class Gains:
     def at(self, level: Level) -> Filter:
         """The steady filter: what an update does with the mean innovation since the one before."""
         n_x, n_z = len(self.a), len(self.noise)
-        if level.size == 0.0 or not n_x:
+        if not n_x or level.size == 0.0 and not self.shaken.any():
             return Filter.none(len(self.into), n_z)
         a = self.a.copy()
         for i in self._wanders:
@@ -64,7 +67,8 @@ class Gains:
         seen = self.c / self.samples
         once = np.block([[step, np.zeros((n_x, n_z))], [seen @ step, np.eye(n_z)]])
         into = np.vstack([np.eye(n_x), seen])
-        noise = into @ q @ into.T
+        drive_noise = np.vstack([self.b * (self.period / self.samples), self.d / self.samples]) * self.shaken
+        noise = into @ q @ into.T + drive_noise @ drive_noise.T
         f, total = np.eye(n), np.zeros((n, n))
         for _ in range(self.samples):
             f, total = once @ f, once @ total @ once.T + noise
@@ -107,8 +111,8 @@ def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
     return np.where(np.isfinite(gain), size[:, None] * gain / deviation, 0.0)
 
 
-def linear(model: Model, n_z: int, values: dict[str, float], set_name: str) -> tuple[Array, Array]:
-    """a [n_x, n_x] and c [n_z, n_x] of a dressed model where it stands still."""
+def linear(model: Model, n_z: int, values: dict[str, float], set_name: str) -> tuple[Array, Array, Array, Array]:
+    """a [n_x, n_x], b [n_x, n_u], c [n_z, n_x] and d [n_z, n_u] of a dressed model where it stands still."""
     known = {n: replace(p, value=values.get(n, p.value)) for n, p in model.parameters.items()}
     system = penode_gen.numeric(replace(model, parameters=known, interpolation="linear"), set_name)
     n_x, n_u = len(model.states), len(model.inputs)
@@ -118,4 +122,9 @@ def linear(model: Model, n_z: int, values: dict[str, float], set_name: str) -> t
         step = 1e-4 * np.eye(n_x)[j]
         a[:, j] = (system.rates(x + step, u, u) - system.rates(x - step, u, u)) / 2e-4
         c[:, j] = (system.sensors(x + step, u, u) - system.sensors(x - step, u, u))[:n_z] / 2e-4
-    return a, c
+    b, d = np.zeros((n_x, n_u)), np.zeros((n_z, n_u))
+    for j in range(n_u):
+        step = 1e-4 * np.eye(n_u)[j]
+        b[:, j] = (system.rates(x, u + step, u) - system.rates(x, u - step, u)) / 2e-4
+        d[:, j] = (system.sensors(x, u + step, u) - system.sensors(x, u - step, u))[:n_z] / 2e-4
+    return a, b, c, d
