@@ -216,7 +216,8 @@ class World:
             if site.damper:
                 plant.laws.append(Law(name, "rub", [size * (0.3 + 0.7 * z[3]), v], "mis"))
                 if z[0] > 0.5:
-                    plant.laws.append(Law(name, "mount", [p[site.damper], p[site.damper] * 2 * np.pi * (80 + 60 * z[1])], "mis"))
+                    rate = min((500 + 400 * z[1]) / self.scale[name], 5e3)  # 1/s; 1.25 a step, stable up to 2.5
+                    plant.laws.append(Law(name, "mount", [p[site.damper], p[site.damper] * rate], "mis"))
         for i, e in enumerate(self.effects):
             self._add(i, e)
 
