@@ -142,11 +142,10 @@ class Batch:
         job.first_bad, job.first_outside = (a.ctypes.data for a in first)
         job.count = tuple(map(len, wanted))
         job.which, job.kept = (tuple(a.ctypes.data for a in arrays) for arrays in (wanted, kept))
-        observed = self._observed(observer, job, n, padded)  # arrays that the job points to
+        kept.append(self._observed(observer, job, n, padded))  # arrays that the job points to
         if not self._step(self._library(per_run), job, vectors, threads):
             raise UserError(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
-        del observed
-        x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept)
+        x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept[:3])
         return BatchRun(x, y, z, *first[:, :runs].astype(np.int64))
 
     def _observed(self, observer: Observer | None, job: _Job, n: int, padded: int) -> tuple[Array, ...]:

@@ -21,10 +21,11 @@ from penode_gen.model import Model
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
 from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady, weighed
+from .answers import alternatives, by_innovations, used, written
 from .driven import experiment, settled
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
-from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
+from .result import OUTSIDE, Cause, Diagnosis, Gain, Named, Value, separating
 from .search import Explanation
 from .study import MOVING, VAGUE, Study, begin, look, stated
 
@@ -45,7 +46,6 @@ MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks onl
 LATE = 0.008  # of a sample: less delay than that is no fault of a sensor
 UNSEEN = 1.5  # times the noise: a hold-out that is that far off, where training showed nothing, is of another vehicle
 FARTHER = 0.02  # share of samples outside of what was trained, from which a hold-out says little about a name
-OUTSIDE = "outside_taxonomy"
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
 SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "maxwell_bushing": "stiffness", "hidden_resonance": "frequency"}
 SURE = 8.0  # chi2 for each gain, by which several together are sure
@@ -190,55 +190,6 @@ def diagnose(
     return Diagnosis(
         verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), used(train, holdout),
         shown.numbers(), absorbed, alternatives(causes), time.perf_counter() - started, shown=shown,
-    )  # fmt: skip
-
-
-def written(text: str, model: Model, output: Path) -> Model:
-    """Writes model_extended.toml beside the rest, with a path to the nominal one such that both can be moved together; the model of it."""
-    output.mkdir(parents=True, exist_ok=True)
-    nominal = model.path.resolve()
-    beside = Path(os.path.relpath(nominal, output.resolve()))
-    (output / "model_extended.toml").write_text(text.replace(extension.extends(nominal), extension.extends(beside), 1))
-    return penode_gen.load(output / "model_extended.toml")
-
-
-def used(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[Recorded, ...]:
-    """All recordings, each with its role."""
-    return tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
-
-
-def alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
-    """Explanations as sets of causes: the one named, and it with one cause exchanged for an alternative."""
-    own = [{"kind": c.kind, "where": c.where} for c in causes if c.kind != OUTSIDE]
-    if not own:
-        return ()
-    sure = float(np.prod([c.confidence for c in causes]))
-    sets = [{"causes": own, "posterior": sure}]
-    for k, c in enumerate(causes):
-        for a in c.alternatives:
-            other = [*own[:k], {"kind": a.kind, "where": a.where}, *own[k + 1 :]]
-            sets.append({"causes": other, "posterior": (1.0 - c.confidence) / len(c.alternatives)})
-    return tuple(sets)
-
-
-def by_innovations(
-    study: Study, unused: Sequence[Experiment], output: Path | None, remarks: Sequence[str], log: Callable[[str], None],
-    tell: Callable[[float, str], None],
-) -> Diagnosis:  # fmt: skip
-    """The diagnosis of recordings that sensor noise alone cannot judge; without recordings and time, which the caller has."""
-    tell(SEARCH[1], "weighing what is missed everywhere")
-    study = replace(study, seen=look(study, study.null))
-    w = weighed.weigh(study, unused, log)
-    extended = w.model if output is None else written(w.text, study.model, output)
-    tell(0.9, "showing what is wrong")
-    shown = residual.show(study, w.fit, extended, w.held, w.verdict == "unexplained")
-    rows = search.rows(study)
-    evidence = (study.null.cost - rows) / np.sqrt(2.0 * rows)
-    numbers, _ = numerics.numerics(study)
-    causes = w.causes or ((Cause(OUTSIDE, "", {}, 0.5),) if w.verdict == "unexplained" else ())
-    return Diagnosis(
-        w.verdict, tuple(replace(c, separate=separating(c)) for c in causes), w.gain, numbers, w.explained, evidence, 0.0,
-        tuple([*remarks, *w.notes]), residual=shown.numbers(), explanations=w.explanations, shown=shown,
     )  # fmt: skip
 
 

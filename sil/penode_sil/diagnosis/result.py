@@ -12,6 +12,9 @@ from typing import Any
 from ..measured import Measured
 
 
+OUTSIDE = "outside_taxonomy"  # kind of what has no name
+
+
 @dataclass(frozen=True)
 class Value:
     """A parameter in `unit`, with its 95 % interval."""
