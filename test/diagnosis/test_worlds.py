@@ -86,6 +86,10 @@ FRICTION = {"kind": "coulomb_friction", "where": ["mount", "damper"], "parameter
 STIFF = {"kind": "wrong_parameter", "where": [], "parameters": {"k": 9.0}, "ratio": 5.0, "share": 0.2, "equivalents": []}
 
 
+GAIN = {"kind": "input_gain", "where": ["tau"], "parameters": {"gain": 0.8}, "ratio": 5.0, "share": 0.2,
+        "equivalents": [{"kind": "wrong_parameter", "where": [], "parameters": ["J", "k"], "why": "all"}]}  # fmt: skip
+
+
 def truth(*effects):
     return {"seed": 1, "index": 2, "stratum": "main", "group": ("null", "single", "pair")[len(effects)], "plant": "rig", "tolerance": None,
             "mismodelling": 0.03, "effects": list(effects)}  # fmt: skip
@@ -114,6 +118,8 @@ RUB, SCALE, K = cause("coulomb_friction", "damper", force=41.0), cause("sensor_s
         ((FRICTION,), [], "unexplained", "missed"),
         ((STIFF,), [K], "explained", "right"),
         ((STIFF,), [cause("wrong_parameter", d=9.0)], "explained", "wrong name"),
+        ((GAIN,), [K, cause("wrong_parameter", J=2.0)], "explained", "right"),
+        ((GAIN,), [K], "explained", "wrong name"),
         ((FRICTION, STIFF), [K, RUB], "explained", "right"),
         ((FRICTION, STIFF), [RUB], "explained", "part missed"),
     ],

@@ -90,6 +90,9 @@ def equivalents(world: World, i: int) -> list[dict]:
         also("input_delay", [*kind.inputs, "actuator"], "time shift")
     if e.kind == "input_gain" and one:
         also("sensor_scale", one, "linear")
+    if e.kind == "input_gain" and world.tolerance is None:
+        also("wrong_parameter", [], "no parameter is vouched for: a factor of the input is its inverse on all of them")
+        found[-1]["parameters"] = list(kind.values)
     if e.kind in ("input_delay", "input_lag", "input_hold"):
         found += _late(world, e.kind)
     position = next((k for k, (_, _, what, _) in kind.sensors.items() if what == "q"), "")
