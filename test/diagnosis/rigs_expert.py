@@ -53,8 +53,8 @@ def swung(p: Array, starts: Array, t: Array, u: Array, terms: Sequence[str]) -> 
 
 
 def begin(t: Array, y: Array) -> Array:
-    """Angle and rate at the start, a parabola through the first samples."""
-    n = min(FIRST, len(t))
+    """Angle and rate at the start, a parabola through the first ten samples; where a search begins."""
+    n = min(10, len(t))
     c = np.polynomial.polynomial.polyfit(t[:n], y[:n], 2)
     return np.array([c[0], c[1]])
 

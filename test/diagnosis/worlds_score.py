@@ -38,11 +38,23 @@ def named(diagnosis: Mapping) -> list[Mapping]:
     return [c for c in diagnosis.get("causes") or [] if not c.get("small")]
 
 
+def together(causes: Sequence[Mapping], effects: Sequence[Mapping]) -> list[Mapping]:
+    """Causes, where wrong parameters that only all together are an equivalent count as one."""
+    for effect in effects:
+        for other in effect["equivalents"]:
+            whole = other.get("parameters") or []
+            some = [c for c in causes if c.get("kind") == "wrong_parameter" and set(c.get("parameters") or ()) <= set(whole)]
+            if whole and {k for c in some for k in c["parameters"]} == set(whole):
+                return [*(c for c in causes if c not in some), {"kind": "wrong_parameter", "parameters": dict.fromkeys(whole)}]
+    return list(causes)
+
+
 def outcome(truth: Mapping, diagnosis: Mapping | None) -> str:
     """Right, or what is wrong."""
     if diagnosis is None:
         return "no answer"
-    causes, effects = named(diagnosis), truth["effects"]
+    effects = truth["effects"]
+    causes = together(named(diagnosis), effects)
     if not effects:
         return "false alarm" if causes else "right" if diagnosis.get("verdict") in HONEST else "claim without a name"
     if all_by(causes, effects):

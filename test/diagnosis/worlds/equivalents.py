@@ -11,6 +11,7 @@ import numpy as np
 
 from . import effects
 from .effects import Array
+from .signals import RATE, beside, rms
 
 if TYPE_CHECKING:
     from .world import World
@@ -57,7 +58,7 @@ def slip(v: Array, presliding: float, h: float) -> Array:
 
 
 def _near(world: World, i: int) -> list[dict]:
-    from .world import SAMPLE, beside, rms  # noqa: PLC0415
+    from .world import SAMPLE  # noqa: PLC0415
 
     e, r = world.effects[i], world.runs["train_1"]
     f = next(r.force[j] for j, law in enumerate(world.plant.laws) if law.role == f"effect{i}")
@@ -89,6 +90,9 @@ def equivalents(world: World, i: int) -> list[dict]:
         also("input_delay", [*kind.inputs, "actuator"], "time shift")
     if e.kind == "input_gain" and one:
         also("sensor_scale", one, "linear")
+    if e.kind == "input_gain" and world.tolerance is None:
+        also("wrong_parameter", [], "no parameter is vouched for: a factor of the input is its inverse on all of them")
+        found[-1]["parameters"] = list(kind.values)
     if e.kind in ("input_delay", "input_lag", "input_hold"):
         found += _late(world, e.kind)
     position = next((k for k, (_, _, what, _) in kind.sensors.items() if what == "q"), "")
@@ -108,8 +112,6 @@ def equivalents(world: World, i: int) -> list[dict]:
 
 def _late(world: World, true: str) -> list[dict]:
     """Delay, lag and hold in place of each other, where what is left of the force is below the mis-modelling."""
-    from .world import RATE, rms  # noqa: PLC0415
-
     e = next(x for x in world.effects if x.kind == true)
     base = next(k for k, (s, _) in world.kind.sites.items() if s.coordinate == 0)
     u = world.records["train_1"].u[:, 0]
