@@ -18,9 +18,10 @@ from penode_sil.diagnosis import driven, plant, real, weighed
 from penode_sil.diagnosis.catalogue import FILES, drives
 from penode_sil.diagnosis.catalogue.form import Motion, Moved
 from penode_sil.diagnosis.evidence import blocks
+from penode_sil.diagnosis.evidence.bench import stated
 from penode_sil.diagnosis.evidence.gain import Gains, Level, riccati
 from penode_sil.diagnosis.evidence.observer import Record, dressed, shown
-from penode_sil.diagnosis.study import begin, stated
+from penode_sil.diagnosis.study import begin
 from penode_sil.measured import load
 
 SWING = """

@@ -27,7 +27,8 @@ from .hypotheses import CLOCK, Basis
 from .noise import Experiment
 from .result import OUTSIDE, Cause, Diagnosis, Gain, Named, Value, separating
 from .search import Explanation
-from .study import MOVING, VAGUE, Study, begin, look, stated
+from .evidence.bench import stated
+from .study import MOVING, VAGUE, Study, begin, look
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it

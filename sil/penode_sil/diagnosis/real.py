@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from penode_gen.model import Model
 from . import catalogue, innovate
 from .catalogue import drives
 from .catalogue.form import Form, Sizes
-from .evidence.bench import Bench, build
+from .evidence.bench import UNSTATED, Bench, build
 from .evidence.blocks import posterior
 from .evidence.fit import Fit
 from .evidence.observer import Filter, Record, bias, shown
@@ -26,7 +26,6 @@ from .noise import Experiment
 from .propose import Term, Trial, motions
 from .plant import Place
 from .result import Cause, Named, Value
-from .study import UNSTATED
 
 Array = NDArray[np.float64]
 WORTH = 0.06  # of the force at its place, of an input or of a signal: less is a small deviation, as any model has, of 2 to 5 %
@@ -64,7 +63,7 @@ def answer(
             causes = _merged(causes, cause)
         else:
             notes.append(f"{cause.kind} at {cause.where} is real but small: {size:.1%} of what acts there; not named, but in model_extended.toml")
-    wrong, more = _parameters(model, after)
+    wrong, more = _parameters(model, after, _shared(model, after, found.terms))
     notes += more + _offsets(model, after)
     still = Filter.none(*after.fit.by.gain.shape)
     run = after.problem().solve(after.fit.free, still, 20)
@@ -175,8 +174,16 @@ def _share(bench: Bench, term: Term) -> float:
     return float(np.sqrt(np.mean(np.concatenate(total) ** 2))) / moved.force
 
 
-def _parameters(model: Model, bench: Bench) -> tuple[list[Cause], list[str]]:
-    """Parameters that are not what the file says, beyond what it vouches for, and a note on others that moved."""
+def _shared(model: Model, bench: Bench, terms: Sequence[Term]) -> set[str]:
+    """Parameters of straight lines at places where a law of the catalogue has a straight part of its own: how much of the line is whose
+    is a matter of writing it down."""
+    places = {t.form.index for t in terms if t.form.how == "force" and t.form.kind in getattr(catalogue.OF[t.form.kind], "STRAIGHT", ())}
+    names = {name for k in places for name, _ in bench.places[k].elements}
+    return {p for e in model.elements if e.name in names for p in e.arguments.values()}
+
+
+def _parameters(model: Model, bench: Bench, shared: Collection[str]) -> tuple[list[Cause], list[str]]:
+    """Parameters that are not what the file says, beyond what it vouches for, and a note on those that are shared with a law."""
     fit, causes, notes = bench.fit, [], []
     for name, p in model.parameters.items():
         f = next((f for f in fit.free if f.target == name), None)
@@ -187,6 +194,9 @@ def _parameters(model: Model, bench: Bench) -> tuple[list[Cause], list[str]]:
         off = abs(f.value / p.value - 1.0)
         low, high = f.value - INTERVAL * sd, f.value + INTERVAL * sd
         if off > limit and not low <= p.value * (1.0 + limit * np.sign(f.value / p.value - 1.0)) <= high and not low <= p.value <= high:
+            if name in shared:
+                notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)} beside what was found at its place, which shares its straight part")
+                continue
             sure = 0.99 if p.tolerance else 0.95
             causes.append(Cause("wrong_parameter", name, {name: Value(f.value, units.si(p.unit), (low, high))}, sure))
     return causes, notes

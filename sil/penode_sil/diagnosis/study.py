@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 SKEW = 0.001  # of a sample: channels are never sampled at quite the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
 VAGUE = 0.5  # a parameter known no better may itself make a plant of another kind
-UNSTATED = 0.05  # tolerance of a parameter for which the file has none: one that is farther off is worth a name
 FEW = 4  # studies with other noise that are kept: the next step of a search may ask for one again
 SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 
@@ -58,12 +57,6 @@ def uncertain(p: Parameter, guessed: float = 1e3) -> Free:
     ends = sorted((p.value / (guessed if not known else 1.0 + most), p.value * (guessed if not known else 1.0 + most)))
     sigma = size * p.tolerance * SHARE if known else np.inf
     return Free(p.name, p.value, size, log=True, sigma=sigma, origin=p.value, low=ends[0], high=ends[1])
-
-
-def stated(model: Model) -> Model:
-    """The model with a tolerance of each parameter: where its file states none and does not call it exact, UNSTATED."""
-    known = {n: p if p.exact or p.tolerance or not p.value else replace(p, tolerance=UNSTATED) for n, p in model.parameters.items()}
-    return replace(model, parameters=known)
 
 
 def nuisances(model: Model, experiments: Sequence[Experiment]) -> tuple[Free, ...]:

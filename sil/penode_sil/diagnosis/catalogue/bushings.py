@@ -12,6 +12,7 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("maxwell_bushing",)
+STRAIGHT = KINDS
 TIMES = (0.15, 0.6, 2.5)  # of s_rms/v_rms, which is the time of a radian
 
 

@@ -12,6 +12,7 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("asymmetric_damper", "degressive_damper", "quadratic_damper", "damper_fading")
+STRAIGHT = ("asymmetric_damper", "degressive_damper")
 KNEES = (0.3, 1.0)  # of the rms rate
 
 

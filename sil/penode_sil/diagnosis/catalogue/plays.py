@@ -12,6 +12,7 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("backlash",)
+STRAIGHT = KINDS
 GAPS = (0.05, 0.2, 0.6)  # of the rms deflection
 
 

@@ -10,6 +10,7 @@ from ..plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("cubic_spring", "asymmetric_spring", "bump_stop")
+STRAIGHT = ("asymmetric_spring",)
 GAPS = (0.5, 0.75)  # of what the deflection reaches
 
 

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 UPDATES = 16  # a period of the motion
 GUESSED = 0.3  # standard deviation of the logarithm of a parameter for which the file states no tolerance
 SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
+UNSTATED = 0.05  # tolerance of a parameter for which the file has none: one that is farther off is worth a name
 FAR = 1e3  # a parameter is at most so many times as large or small as the file has it
 SIZES = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3)  # of what wanders, relative to what moves: levels that are tried
 STAYS = 0.5  # updates for which it stays: about white. One that stays longer winds up against a friction that sticks
@@ -76,6 +77,12 @@ def parameter(p: Parameter) -> Free | None:
     sigma = GUESSED if p.tolerance == 0.0 else np.log1p(p.tolerance) * SHARE  # infinite for one that is unknown
     ends = sorted((p.value / FAR, p.value * FAR))
     return Free(p.name, p.value, size, log=True, sigma=sigma, origin=p.value, low=ends[0], high=ends[1])
+
+
+def stated(model: Model) -> Model:
+    """The model with a tolerance of each parameter: where its file states none and does not call it exact, UNSTATED."""
+    known = {n: p if p.exact or p.tolerance or not p.value else replace(p, tolerance=UNSTATED) for n, p in model.parameters.items()}
+    return replace(model, parameters=known)
 
 
 def build(model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default", base: Model | None = None) -> Bench:  # fmt: skip
