@@ -10,6 +10,8 @@ PYTHON    := build/venv/bin/python
 PENODE    := build/venv/bin/penode
 EXPERIMENT := gen/nqvm/nqvm.toml --scenario sil/scenarios/recalibration.toml
 RECORDED  := sil/recordings/friction
+RIGS_DIR  ?= ../shared/measured
+WORLDS    := 300
 CASES     := 192 # eight rounds of the 24 cases of a draw
 # and of each kind seven in a common form and four in a foreign one, so that one wrong answer is not below 85 or 70 %
 LEAST     := single_common=161 single_foreign=88 pair=48 triple=16 null=100 null_hard=100 outside=60
@@ -54,6 +56,14 @@ campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings
 hidden-mechanisms: setup ## Half-cars with pitch and two-mass drives with something hidden: places, missing forces, nulls; 20 cases of each, minutes
 	$(Q)$(PYTHON) test/diagnosis/mechanisms_campaign.py --cases 20
 
+campaign-worlds: setup ## Wrong worlds: plants that are a few per cent wrong everywhere; is the effect named, and nothing else? Half-cars, drives, no tolerances too
+	$(Q)$(PYTHON) test/diagnosis/worlds_campaign.py --cases $(WORLDS) --jobs $$(nproc) --out build/worlds/main
+	$(Q)$(PYTHON) test/diagnosis/worlds_campaign.py --stratum halfcar --stratum drive --cases 20 --jobs $$(nproc) --out build/worlds/mechanisms
+	$(Q)$(PYTHON) test/diagnosis/worlds_campaign.py --stratum main --stratum halfcar --stratum drive --cases 20 --no-tolerance --jobs $$(nproc) --out build/worlds/bare
+
+rigs: setup ## Real rigs in RIGS_DIR: names, hold-out before and after, what a plain expert fit reaches, time; build/rigs/RIGS.md
+	$(Q)$(PYTHON) test/diagnosis/rigs_table.py --rigs $(RIGS_DIR) --command $(PENODE) --page build/rigs/RIGS.md
+
 dist: ## Packages for firmware, into build/dist: CMake, pkg-config, PlatformIO, Zephyr, CMSIS-Pack, one .c and one .h; no Python
 	$(Q)port/packages/dist.sh build/dist
 
@@ -63,7 +73,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test prove figures bench campaign campaign-diagnosis hidden-mechanisms dist structure clean
+.PHONY: help setup run test prove figures bench campaign campaign-diagnosis campaign-worlds rigs hidden-mechanisms dist structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

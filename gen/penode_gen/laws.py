@@ -121,4 +121,10 @@ LAWS: dict[str, Law] = {
             "rate": LawState("m/s", "(stiffness*(s - position) + cubic*(s - position)^3 + damping*(v - rate))/mass"),
         },
     ),
+    # the same by its frequency and damping ratio: no mass is none
+    "tuned_mass": Law(
+        "mass*(omega^2*(s - position) + 2*loss*omega*(v - rate))",
+        {"mass": "kg", "omega": "1/s", "loss": "1"},
+        {"position": LawState("m", "rate"), "rate": LawState("m/s", "omega^2*(s - position) + 2*loss*omega*(v - rate)")},
+    ),
 }

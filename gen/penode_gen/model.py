@@ -26,8 +26,8 @@ class ModelError(Exception):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known): 0 if none is stated or it is known
-    exactly, infinite if it is unknown."""
+    """A physical constant. `value` is in SI; `tolerance` is relative (how well it is known): 0 if none is stated or it is `exact`,
+    infinite if it is unknown."""
 
     name: str
     value: float
@@ -35,6 +35,7 @@ class Parameter:
     tolerance: float = 0.0
     tunable: bool = False
     description: str = ""
+    exact: bool = False  # the file vouches for it
 
 
 @dataclass(frozen=True)

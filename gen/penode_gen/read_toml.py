@@ -126,7 +126,7 @@ class _Reader(EndTables):
             value = self.number((*where, "value"), entry["value"], self.unit(where, entry.get("unit"))) if "value" in entry else math.nan
             tolerance = self.tolerance(where, entry)
             tunable = entry.get("tunable", "tunable" in self.stated("parameters", name))  # of a wrong type: meant to be
-            found[name] = m.Parameter(name, value, entry.get("unit", UNKNOWN), tolerance, tunable, entry.get("description", ""))
+            found[name] = m.Parameter(name, value, entry.get("unit", UNKNOWN), tolerance, tunable, entry.get("description", ""), entry.get("exact") is True)
         return found
 
     def tolerance(self, where: tuple[str, ...], entry: dict[str, Any]) -> float:

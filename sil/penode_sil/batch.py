@@ -40,6 +40,17 @@ QUICK = ("-ffp-contract=fast", "-fno-trapping-math", "-fno-signed-zeros", "-fass
 
 
 @dataclass(frozen=True, eq=False)
+class Observer:
+    """A run that follows a measurement: after every `update` samples its states move by gain [n_x, n_z] or [runs, n_x, n_z] times the
+    mean of measured [n, n_z] or [runs, n, n_z] less simulated since the update before. NaN: nothing was measured. What is kept of a
+    sample is as it was before its update."""
+
+    update: int
+    measured: Array
+    gain: Array
+
+
+@dataclass(frozen=True, eq=False)
 class BatchRun:
     """What all runs did: states x, outputs y, sensors z [runs, n, .], those asked for in the order asked for.
 
@@ -60,7 +71,8 @@ class _Job(ctypes.Structure):
 
     _fields_ = [(name, ctypes.c_size_t) for name in ("samples", "every", "runs", "input_runs")]
     _fields_ += [(name, ctypes.c_void_p) for name in ("u", "p", "w")]
-    _fields_ += [("set_length", ctypes.c_size_t), ("start", ctypes.c_void_p), ("count", ctypes.c_size_t * 3)]
+    _fields_ += [("set_length", ctypes.c_size_t), ("start", ctypes.c_void_p), ("update", ctypes.c_size_t), ("measured_runs", ctypes.c_size_t)]
+    _fields_ += [("measured", ctypes.c_void_p), ("gain", ctypes.c_void_p), ("count", ctypes.c_size_t * 3)]
     _fields_ += [("which", ctypes.c_void_p * 3), ("kept", ctypes.c_void_p * 3)]
     _fields_ += [(name, ctypes.c_void_p) for name in ("first_bad", "first_outside")]
 
@@ -89,6 +101,7 @@ class Batch:
         states: Sequence[str] = (),
         every: int = 1,
         threads: int = 1,
+        observer: Observer | None = None,
     ) -> BatchRun:
         """Step through the inputs from x0 (sample 0), all quantities in SI.
 
@@ -130,10 +143,27 @@ class Batch:
         job.first_bad, job.first_outside = (a.ctypes.data for a in first)
         job.count = tuple(map(len, wanted))
         job.which, job.kept = (tuple(a.ctypes.data for a in arrays) for arrays in (wanted, kept))
+        kept.append(self._observed(observer, job, n, padded))  # arrays that the job points to
         if not self._step(self._library(per_run), job, vectors, threads):
             raise UserError(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
-        x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept)
+        x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept[:3])
         return BatchRun(x, y, z, *first[:, :runs].astype(np.int64))
+
+    def _observed(self, observer: Observer | None, job: _Job, n: int, padded: int) -> tuple[Array, ...]:
+        """Sets the observer of a job. Raises ValueError for shapes."""
+        if observer is None or not self.model.states or not self.model.sensors:
+            return ()
+        n_x, n_z = len(self.model.states), len(self.model.sensors)
+        measured, gain = (np.asarray(a, dtype=self.dtype) for a in (observer.measured, observer.gain))
+        if measured.shape[-2:] != (n, n_z) or gain.shape[-2:] != (n_x, n_z):
+            raise ValueError(f"measured {measured.shape} must be [n, n_z] = [{n}, {n_z}], gain {gain.shape} [n_x, n_z] = [{n_x}, {n_z}]")
+        if measured.ndim == 3:
+            measured = self._spread(np.moveaxis(measured, 0, -1), padded)
+        gain = self._spread(np.moveaxis(gain, 0, -1) if gain.ndim == 3 else gain[:, :, None], padded)
+        measured = np.ascontiguousarray(measured)
+        job.update, job.measured_runs = observer.update, padded if measured.ndim == 3 else 1
+        job.measured, job.gain = measured.ctypes.data, gain.ctypes.data
+        return measured, gain
 
     def _runs(self, u: Array, start: Array, given: Mapping[str, Array], values: Array, length: int) -> int:
         """How many runs the arguments describe. Raises for what does not fit."""

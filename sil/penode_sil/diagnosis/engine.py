@@ -20,13 +20,15 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
-from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady
+from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady, weighed
+from .answers import alternatives, by_innovations, used, written
 from .driven import experiment, settled
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
-from .result import Cause, Diagnosis, Gain, Named, Recorded, Value, separating
+from .result import OUTSIDE, Cause, Diagnosis, Gain, Named, Value, separating
 from .search import Explanation
-from .study import MOVING, Study, begin, look
+from .evidence.bench import stated
+from .study import MOVING, VAGUE, Study, begin, look
 
 Array = NDArray[np.float64]
 FEW = 5  # bad samples of a sensor that make a fault of it
@@ -45,7 +47,6 @@ MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks onl
 LATE = 0.008  # of a sample: less delay than that is no fault of a sensor
 UNSEEN = 1.5  # times the noise: a hold-out that is that far off, where training showed nothing, is of another vehicle
 FARTHER = 0.02  # share of samples outside of what was trained, from which a hold-out says little about a name
-OUTSIDE = "outside_taxonomy"
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
 SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "maxwell_bushing": "stiffness", "hidden_resonance": "frequency"}
 SURE = 8.0  # chi2 for each gain, by which several together are sure
@@ -63,6 +64,7 @@ def diagnose(
     started = time.perf_counter()
     log = advancing(log, tell)
     tell(0.0, "fitting the model as it is")
+    plain, model = model, stated(model)
     both = told_of_rails([*train, *holdout])
     train, holdout = both[: len(train)], both[len(train) :]
     experiments, unused, remarks = settled(model, train, holdout, set_name)
@@ -78,6 +80,9 @@ def diagnose(
         more = dropouts.bursts(study.experiments, study.null.simulated)
         bursts = [b | m for b, m in zip(bursts, more)]
     faults = broken_sensors(model, train, study, study.null.simulated, bursts)
+    if any(p.tolerance > VAGUE for p in model.parameters.values()):
+        answer = by_innovations(replace(study, model=plain), unused, output, remarks, log, tell)
+        return replace(answer, data=used(train, holdout), seconds=time.perf_counter() - started)
     tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
     if study.moving:
@@ -91,6 +96,9 @@ def diagnose(
         if rested(losses, costs, told, len(model.states) * len(experiments), search.numbers(found[0])):
             study, explanations = other, found
     best = explanations[0] if explanations else None
+    if weighed.missed(study, best.fit if best else study.null, log):
+        answer = by_innovations(replace(study, model=plain), unused, output, remarks, log, tell)
+        return replace(answer, data=used(train, holdout), seconds=time.perf_counter() - started)
     if best is not None:  # bursts and spikes that a cause explains were none
         kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
         rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
@@ -171,11 +179,7 @@ def diagnose(
             causes, verdict, explained = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0
             notes.append(f"{', '.join(unseen)}: the hold-out shows what the training does not: train with recordings like it")
     if output is not None:
-        output.mkdir(parents=True, exist_ok=True)
-        nominal = model.path.resolve()
-        beside = Path(os.path.relpath(nominal, output.resolve()))  # so that both can be moved together
-        (output / "model_extended.toml").write_text(text.replace(extension.extends(nominal), extension.extends(beside), 1))
-        extended = penode_gen.load(output / "model_extended.toml")
+        extended = written(text, model, output)
     absorbed: dict[str, object] = {}
     if learnt := absorb.taught(study, named) if named is not None and named.terms else []:
         absorbed, more = absorbing(study, named, learnt, unused, output)
@@ -183,11 +187,10 @@ def diagnose(
     tell(0.9, "showing what is wrong")
     whole = named is not None and (named is unnamed or best is not None and bool(causes))
     shown = residual.show(study, named.fit if whole else None, extended if whole else None, held, verdict == "unexplained")
-    data = tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(
-        verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), data,
-        shown.numbers(), absorbed, time.perf_counter() - started, shown=shown,
+        verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), used(train, holdout),
+        shown.numbers(), absorbed, alternatives(causes), time.perf_counter() - started, shown=shown,
     )  # fmt: skip
 
 

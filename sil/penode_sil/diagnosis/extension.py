@@ -22,6 +22,7 @@ from penode_gen.model import INTERPOLATIONS, Model, Signal
 
 from ..targets import Sil
 from . import stepped
+from .beginning import begun
 from .build import SPREAD, Term
 from .dropouts import bursts
 from .fit import BLUNT, Free, Problem, moving
@@ -35,28 +36,28 @@ from .study import Study, watched, widened
 Array = NDArray[np.float64]
 
 
-def _table(values: dict[str, object]) -> str:
-    return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in values.items()) + " }"
+def table(values: dict[str, object]) -> str:
+    return "{ " + ", ".join(f"{k} = {toml(v)}" for k, v in values.items()) + " }"
 
 
-def _toml(value: object) -> str:
+def toml(value: object) -> str:
     if isinstance(value, str):
         return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(_toml, value)) + "]"
+        return "[" + ", ".join(map(toml, value)) + "]"
     return repr(float(f"{value:.7g}"))
 
 
-def _unlike(stem: str, taken: Collection[str]) -> str:
+def unlike(stem: str, taken: Collection[str]) -> str:
     """A name that is not taken: the stem, or the stem with a number."""
     return next(name for name in chain([stem], (f"{stem}_{n}" for n in count(2))) if name not in taken)
 
 
 def extends(path: Path) -> str:
     """The line that names the nominal model file."""
-    return f"extends = {_toml(path.as_posix())}"
+    return f"extends = {toml(path.as_posix())}"
 
 
 def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> tuple[str, Model]:
@@ -67,8 +68,8 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         learnt = "something that is on no list; the element nameless takes what it can of it"
     lines = [
         f"# What the recordings taught about {model.path.name}: {learnt or 'nothing'}.",
-        "", "[model]", extends(model.path.resolve()), f"name = {_toml(model.name + '_extended')}",
-        f"sample_time = {_toml(f'{model.sample_time:.12g} s')}", "",
+        "", "[model]", extends(model.path.resolve()), f"name = {toml(model.name + '_extended')}",
+        f"sample_time = {toml(f'{model.sample_time:.12g} s')}", "",
     ]  # fmt: skip
     if any(c.kind == "integration_error" for c in causes):
         lines[-1:] = ['method = "rk4"', 'input = "linear"', ""]
@@ -80,13 +81,13 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         if substeps > model.substeps:
             lines.insert(-1, f"substeps = {substeps}")
     if e is None:
-        return _joined(study, "\n".join(lines))
+        return joined(study, "\n".join(lines))
     values = {f.target: f.value for f in e.fit.free}
     taken = {*model.parameters, *model.states, *(x.name for x in model.elements), *(s.name for s in model.sensors)}
     rename = {}
     for term, name in zip(e.terms, e.built.names):
         stem = term.candidate.kind.replace("network_extrapolation", "beyond_range")  # network_ is the generator's own
-        rename[name] = _unlike(stem, {*taken, *rename.values()})
+        rename[name] = unlike(stem, {*taken, *rename.values()})
 
     def named(text: str) -> str:
         return re.sub(r"\b((?:[Fsv]_)?)(x\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
@@ -96,12 +97,12 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         known = model.parameters.get(p.name)
         value = values.get(p.name, p.value)
         if known is None:
-            parameters.append(f"{named(p.name)} = {_table({'value': value, 'unit': p.unit})}")
+            parameters.append(f"{named(p.name)} = {table({'value': value, 'unit': p.unit})}")
         elif p.name in values and value != known.value:
             more = {"tolerance": known.tolerance if np.isfinite(known.tolerance) else "unknown"} if known.tolerance else {}
             more |= {"tunable": True} if known.tunable else {}
             more |= {"description": known.description} if known.description else {}
-            parameters.append(f"{p.name} = {_table({'value': value / units.factor(p.unit), 'unit': p.unit, **more})}")
+            parameters.append(f"{p.name} = {table({'value': value / units.factor(p.unit), 'unit': p.unit, **more})}")
     elements = []
     for x in e.built.model.elements[len(model.elements) :]:
         entry: dict[str, object] = {"between": x.ends, "law": x.law}
@@ -109,9 +110,9 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
             entry["force"] = named(x.expression)
         else:
             entry |= {k: named(x.arguments[k]) for k in LAWS[x.law].arguments}
-        elements.append(f"{named(x.name)} = {_table(entry)}")
+        elements.append(f"{named(x.name)} = {table(entry)}")
     sensors, states, equations = [], [], []
-    age, recorded = _unlike("age", taken), _unlike("recorded", taken)
+    age, recorded = unlike("age", taken), unlike("recorded", taken)
     changed: dict[Signal, str] = {}
     for j, (s, old) in enumerate(zip(e.built.model.sensors, model.sensors)):
         expression = named(s.expression)
@@ -121,22 +122,22 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
             expression = f"{expression} + {bent}"
         if values.get(("delay", j), 0.0) > SHORT * model.sample_time:
             delay, late, rate = (f"{what}_{s.name}" for what in ("delay", "late", "late_rate"))
-            parameters.append(f"{delay} = {_table({'value': max(values[('delay', j)], 1e-9), 'unit': 's'})}")
+            parameters.append(f"{delay} = {table({'value': max(values[('delay', j)], 1e-9), 'unit': 's'})}")
             stiff, drag, direct, own = _late(_rolled(values, j))
             slope = rate if stiff else f"{expression} - {late}"
-            equations.append(f"{late} = {_toml(f'der({late})*{delay} = {slope}')}")
+            equations.append(f"{late} = {toml(f'der({late})*{delay} = {slope}')}")
             if stiff:
-                equations.append(f"{rate} = {_toml(f'der({rate})*{delay} = {stiff:.7g}*({expression} - {late}) - {drag:.7g}*{rate}')}")
-            states += [f"{name} = {_table({'unit': unit})}" for name in ((late, rate) if stiff else (late,))]
+                equations.append(f"{rate} = {toml(f'der({rate})*{delay} = {stiff:.7g}*({expression} - {late}) - {drag:.7g}*{rate}')}")
+            states += [f"{name} = {table({'unit': unit})}" for name in ((late, rate) if stiff else (late,))]
             if direct == 1.0:
                 expression = f"{expression} - {rate}"
             else:
                 expression = f"{late} + {direct:.7g}*({expression} - {late}) - {own:.7g}*{rate}" if direct else late
         if ("scale", j) in values:
-            parameters.append(f"gain_{s.name} = {_table({'value': 1.0 + values[('scale', j)], 'unit': '1'})}")
+            parameters.append(f"gain_{s.name} = {table({'value': 1.0 + values[('scale', j)], 'unit': '1'})}")
             expression = f"gain_{s.name}*({expression})"
         if ("bias", j) in values:
-            parameters.append(f"bias_{s.name} = {_table({'value': values[('bias', j)], 'unit': unit})}")
+            parameters.append(f"bias_{s.name} = {table({'value': values[('bias', j)], 'unit': unit})}")
             expression = f"{expression} + bias_{s.name}"
         if drift := _drift(e, values, j, s.name, unit, f"min({age}/{recorded}, 1)", parameters):
             expression = f"{expression} + {drift}"
@@ -145,19 +146,19 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         rails = next((c.parameters for c in causes if (c.kind, c.where) == ("sensor_clipping", s.name)), {})
         for side, cut in (("high", "min"), ("low", "max")):
             if side in rails:
-                parameters.append(f"{side}_{s.name} = {_table({'value': rails[side].value, 'unit': unit})}")
+                parameters.append(f"{side}_{s.name} = {table({'value': rails[side].value, 'unit': unit})}")
                 expression = f"{cut}({expression}, {side}_{s.name})"
         if expression != old.expression:
             changed[s] = expression
-            sensors.append(f"{s.name} = {_table({'value': expression, 'unit': s.unit, 'noise': s.noise / units.factor(s.unit)})}")
+            sensors.append(f"{s.name} = {table({'value': expression, 'unit': s.unit, 'noise': s.noise / units.factor(s.unit)})}")
     if any(re.search(rf"\b{age}\b", expression) for expression in changed.values()):
         last = max(float(x.time[-1] - x.time[0]) for x in study.experiments)
-        parameters.append(f"{recorded} = {_table({'value': last, 'unit': 's', 'description': 'the longest recording of the training'})}")
-        states.append(f"{age} = {_table({'unit': 's', 'description': 'since the start'})}")
-        equations.append(f"{age} = {_toml(f'der({age}) = 1')}")
+        parameters.append(f"{recorded} = {table({'value': last, 'unit': 's', 'description': 'the longest recording of the training'})}")
+        states.append(f"{age} = {table({'unit': 's', 'description': 'since the start'})}")
+        equations.append(f"{age} = {toml(f'der({age}) = 1')}")
     measured = {s.name: entry for s, entry in changed.items()}  # one name means one quantity
     outputs = [
-        f"{s.name} = {_table({'value': measured.get(s.name, named(s.expression)), 'unit': s.unit})}"
+        f"{s.name} = {table({'value': measured.get(s.name, named(s.expression)), 'unit': s.unit})}"
         for s, old in zip(e.built.model.outputs, model.outputs) if s.expression != old.expression or s.name in measured
     ]  # fmt: skip
     for title, entries in (
@@ -166,7 +167,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     ):  # fmt: skip
         if entries:
             lines += [f"[{title}]", *entries, ""]
-    return _joined(study, "\n".join(lines))
+    return joined(study, "\n".join(lines))
 
 
 SHORT = 0.02  # of a sample: a delay that is left out
@@ -174,7 +175,7 @@ ONE_POLE = 0.48  # of a delay squared: beyond that the second pole of a filter i
 ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast
 
 
-def _joined(study: Study, text: str) -> tuple[str, Model]:
+def joined(study: Study, text: str) -> tuple[str, Model]:
     """The model of a text; its inputs follow a curve through more samples if the way between them is too rough for the first recording,
     and the C then meets it better. The more samples, the finer, but the louder the noise of the inputs."""
     model, e = _load(text), study.experiments[0]
@@ -255,7 +256,7 @@ def _bent(
     if bends:  # one cube, however many causes share it
         curve = bends[0][0]
         parts.append(f"{sum(k * (curve / shape) ** 2 for shape, k in bends):.7g}*{signal}^3/curve_{name}^2")
-        parameters.append(f"curve_{name} = {_table({'value': curve, 'unit': unit})}")
+        parameters.append(f"curve_{name} = {table({'value': curve, 'unit': unit})}")
     for f, k in _series(e, values, sensor):
         if f.what == "scale_side":
             parts.append(f"{k:.7g}*abs{signal}")
@@ -264,7 +265,7 @@ def _bent(
         if f.what == "clip":
             side, edge = np.sign(f.shape), f"edge_{name}_{len(parts)}"
             parts.append(f"{-side * k:.7g}*max({side:.0f}*{signal} - {edge}, 0)")
-            parameters.append(f"{edge} = {_table({'value': abs(f.shape), 'unit': unit})}")
+            parameters.append(f"{edge} = {table({'value': abs(f.shape), 'unit': unit})}")
     return " + ".join(parts)
 
 
@@ -273,7 +274,7 @@ def _railed(signal: str, rail: float, sharpness: float, name: str, unit: str, pa
     sharpness = max(sharpness, BLUNT)
     slope = np.tanh(0.5 * sharpness)
     knee, width = f"knee_{name}", f"width_{name}"
-    parameters += [f"{key} = {_table({'value': x * slope / rail, 'unit': unit})}" for key, x in ((knee, 1.0), (width, 1.0 / sharpness))]
+    parameters += [f"{key} = {table({'value': x * slope / rail, 'unit': unit})}" for key, x in ((knee, 1.0), (width, 1.0 / sharpness))]
     ends = f"softplus(({signal} - {knee})/{width}) - softplus((-({signal}) - {knee})/{width})"
     return f"({signal} - {width}*({ends}))/{slope:.7g}"
 
@@ -285,7 +286,7 @@ def _drift(e: Explanation, values: dict[object, float], sensor: int, name: str, 
     parts = [(c, f"*{share}{f'^{power}' if power > 1 else ''}" if power else "") for power, c in enumerate(slow.convert(kind=Polynomial).coef) if c]
     parts += [(k, f"*(1 - exp(-{f.shape:.7g}*{share}))") for f, k in own if f.what == "warming"]
     named = [f"drift_{name}_{n}" for n in range(1, len(parts) + 1)]
-    parameters += [f"{own} = {_table({'value': size, 'unit': unit})}" for own, (size, _) in zip(named, parts)]
+    parameters += [f"{own} = {table({'value': size, 'unit': unit})}" for own, (size, _) in zip(named, parts)]
     return " + ".join(own + shape for own, (_, shape) in zip(named, parts))
 
 
@@ -333,7 +334,7 @@ def measure(
     outside, notes = [], []
     for e in holdout:
         both = (study, replace(study, set_name=set_name or study.set_name))
-        starts = [started(m, e, s)[0] for m, s in zip((model, extended), both)]
+        starts = [begun(m, e, study, s.set_name) for m, s in zip((model, extended), both)]
         before, after = (deployed(m, e, x, s.set_name) for m, x, s in zip((model, extended), starts, both))
         dropped = bursts([e], [after])[0] & [s.name in lost for s in model.sensors]
         e = replace(e, good=e.good & ~dropped)

@@ -134,7 +134,7 @@ class Problem:
         substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / least - 1e-6)), -(-model.substeps // self.fine))
         way = ("cubic" if self.moving else "parabola") if close else "linear"
         exact = replace(_folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
-        self.batch = _compiled(anonymous(exact), _ordered(model)[0])
+        self.batch = compiled(anonymous(exact), ordered(model)[0])
         self.inputs = [e.drive if close else _drive(e, self.fine) if model.inputs else np.zeros((self.fine * (len(e.time) - 1) + 1, 0)) for e in experiments]
 
     @cached_property
@@ -388,10 +388,10 @@ def _structure(model: Model) -> tuple[object, ...]:
 
 def moving(model: Model) -> bool:
     """Does anything in it depend on the rate of an input?"""
-    return _ordered(model)[1]
+    return ordered(model)[1]
 
 
-def _ordered(model: Model) -> tuple[Causal, bool]:
+def ordered(model: Model) -> tuple[Causal, bool]:
     """The equations of a model in order, which no method of integration changes, and whether anything depends on the rate of an input."""
     key = _structure(model)
     if key not in _ORDERED:
@@ -400,7 +400,7 @@ def _ordered(model: Model) -> tuple[Causal, bool]:
     return _ORDERED[key]
 
 
-def _compiled(model: Model, causal: Causal) -> Batch:
+def compiled(model: Model, causal: Causal) -> Batch:
     """The batch library of a model with the equations `causal`."""
     key = _structure(model)
     if key not in _BATCHES:

@@ -154,6 +154,11 @@ def _share(signal: Signal, new: str, place: Place) -> Signal:
     return signal
 
 
+def rotational_unit(model: Model, ends: tuple[str, str], of_length: str) -> str:
+    """A unit of what acts between two ends: `of_length`, or what stands for it where they turn."""
+    return mechanics.unit(model, ends, of_length)
+
+
 def anonymous(model: Model) -> Model:
     """The same equations under a common name: models of one structure then share one compiled library."""
     return replace(model, name="plant", description="", path=Path("plant.toml"), digest="0" * 16)

@@ -12,6 +12,9 @@ from typing import Any
 from ..measured import Measured
 
 
+OUTSIDE = "outside_taxonomy"  # kind of what has no name
+
+
 @dataclass(frozen=True)
 class Value:
     """A parameter in `unit`, with its 95 % interval."""
@@ -87,6 +90,7 @@ class Diagnosis:
     data: tuple[Recorded, ...] = ()
     residual: dict[str, Any] = field(default_factory=dict)
     absorbed: dict[str, Any] = field(default_factory=dict)  # the same effect as a set of the running code, see absorb.py
+    explanations: tuple[dict[str, Any], ...] = ()  # sets of causes that the recordings cannot tell apart, each with its posterior
     seconds: float = field(default=0.0, compare=False)
     compile_seconds: float = field(default=0.0, compare=False)  # processor time of compilers, which the next call of its like needs not
     shown: Any = field(default=None, compare=False, repr=False)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A model file with what a search by innovations found in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+from penode_gen import units
+from penode_gen.laws import LAWS
+from penode_gen.model import Element, Model
+
+from .evidence.bench import Bench
+from .evidence.fit import Fit
+from .evidence.observer import bias, scale
+from .extension import extends, table, toml, unlike
+from .propose import Term
+
+
+@dataclass(frozen=True, eq=False)
+class Applied:
+    """Text of a model file that extends the nominal one; `left` says what it cannot have."""
+
+    text: str
+    left: tuple[str, ...]
+
+
+def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: Collection[str]) -> Applied:
+    """The nominal model with the values of a fit and the terms of it; `offsets`: sensors whose
+    offset goes into it."""
+    forces = [t for t in terms if t.form.how == "force"]
+    taken = {*model.parameters, *model.states, *(x.name for x in model.elements), *(s.name for s in model.sensors)}
+    rename: dict[str, str] = {}
+    for t in forces:
+        for name in t.elements:
+            rename[name] = unlike(t.form.kind, {*taken, *rename.values()})
+
+    def named(text: str) -> str:
+        return re.sub(r"\b((?:[Fsv]_)?)(x\d+_\d+_\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
+
+    values = fit.values
+    parameters = [_changed(model, name, values[name]) for name in model.parameters if name in values and values[name] != model.parameters[name].value]
+    elements = []
+    for t in forces:
+        for name in t.elements:
+            own = next(e for e in bench.model.elements if e.name == name)
+            parameters += [
+                f"{named(p.name)} = {table({'value': values.get(p.name, p.value), 'unit': p.unit})}"
+                for p in bench.model.parameters.values() if p.name.startswith(f"{name}_")
+            ]  # fmt: skip
+            elements.append(f"{named(name)} = {table(_element(own, named))}")
+    driven, left = _driven(model, fit, terms)
+    sensors = [_sensor(model, j, bench, values, offsets, parameters, named) for j in range(len(model.sensors))]
+    units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
+    outputs = [f"{s.name} = {table({**x, 'unit': units_of[s.name]})}" for s, x in zip(model.sensors, sensors) if x and s.name in units_of]
+    learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
+    lines = [
+        f"# What the recordings taught about {model.path.name}: {learnt or 'nothing but values'}.",
+        "", "[model]", extends(model.path.resolve()), f"name = {toml(model.name + '_extended')}",
+        f"sample_time = {toml(f'{model.sample_time:.12g} s')}", "",
+    ]  # fmt: skip
+    for title, entries in (
+        ("parameters", [*parameters, *driven["parameters"]]), ("actuators", driven["actuators"]), ("elements", [*driven["elements"], *elements]),
+        ("outputs", outputs), ("sensors", [f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}" for s, x in zip(model.sensors, sensors) if x]),
+    ):  # fmt: skip
+        if entries:
+            lines += [f"[{title}]", *entries, ""]
+    return Applied("\n".join(lines), tuple(left))
+
+
+def _changed(model: Model, name: str, value: float) -> str:
+    known = model.parameters[name]
+    more: dict[str, object] = {"tolerance": known.tolerance if known.tolerance < float("inf") else "unknown"} if known.tolerance else {}
+    more |= {"tunable": True} if known.tunable else {}
+    more |= {"description": known.description} if known.description else {}
+    return f"{name} = {table({'value': value / units.factor(known.unit), 'unit': known.unit, **more})}"
+
+
+def _element(e: Element, named: Callable[[str], str]) -> dict[str, object]:
+    entry: dict[str, object] = {"between": e.ends, "law": e.law}
+    if e.law == "expression":
+        return entry | {"force": named(e.expression)}
+    return entry | {k: named(e.arguments[k]) for k in LAWS[e.law].arguments}
+
+
+def _sensor(model: Model, j: int, bench: Bench, values: dict[str, float], offsets: Collection[str], parameters: list[str], named: Callable[[str], str]) -> dict[str, object]:
+    """What a sensor that measures otherwise has as its value and unit; nothing for one that does not."""
+    s, unit = model.sensors[j], units.si(model.sensors[j].unit)
+    wide = bench.model.sensors[j].expression
+    inner = named(wide[1 : wide.rindex(f")*{scale(s.name)}")])
+    inner = re.sub(r"\(F_(\w+) [-+] F_wander\d+\)", r"F_\1", inner)
+    expression = inner
+    if scale(s.name) in values:
+        parameters.append(f"gain_{s.name} = {table({'value': values[scale(s.name)], 'unit': '1'})}")
+        expression = f"gain_{s.name}*({expression})"
+    if s.name in offsets:
+        parameters.append(f"bias_{s.name} = {table({'value': values[bias(s.name)], 'unit': unit})}")
+        expression = f"{expression} + bias_{s.name}"
+    if expression == s.expression:
+        return {}
+    return {"value": expression, "unit": s.unit}
+
+
+def _driven(model: Model, fit: Fit, terms: Sequence[Term]) -> tuple[dict[str, list[str]], list[str]]:
+    """What terms of inputs add to a model file, and what they cannot."""
+    found: dict[str, list[str]] = {"parameters": [], "actuators": [], "elements": []}
+    left = []
+    for t in (t for t in terms if t.form.how.startswith("input_")):
+        name, value = t.form.where, fit.value(t.free[0].target)
+        if t.form.how in ("input_offset", "input_delay"):
+            left.append(f"{t.form.how} of {name}: a recording has to be corrected, the model file has no law for it")
+            continue
+        acts = f"{name}_acts"
+        law = {"law": "gain", "gain": f"{name}_gain"} if t.form.how == "input_gain" else {"law": "lag", "time": f"{name}_lag"}
+        size = {"value": 1.0 + value, "unit": "1"} if t.form.how == "input_gain" else {"value": value, "unit": "s"}
+        found["parameters"].append(f"{list(law.values())[1]} = {table(size)}")
+        found["actuators"].append(f"{acts} = {table({'input': name, **law})}")
+        for e in model.elements:
+            ends = tuple(acts if x == name else x for x in e.ends)
+            text = re.sub(rf"\b{name}\b", acts, e.expression)
+            if ends != e.ends or text != e.expression:
+                entry = _element(Element(e.name, ends, e.law, e.arguments, e.network, e.network_inputs, text), lambda x: x)
+                found["elements"].append(f"{e.name} = {table(entry)}")
+    return found, left

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Dampers that are no straight lines: other to one side, bent, weaker with time."""
+
+from collections.abc import Iterable
+from functools import partial
+
+import numpy as np
+from penode_gen.model import GROUND, Model
+
+from ..plant import Place
+from .form import Form, Motion, Moved, Part, Sizes
+
+KINDS = ("asymmetric_damper", "degressive_damper", "quadratic_damper", "damper_fading")
+STRAIGHT = ("asymmetric_damper", "degressive_damper")
+KNEES = (0.3, 1.0)  # of the rms rate
+
+
+def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
+    """See Kind."""
+    if place.role == "body" and GROUND in place.ends:
+        yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, 1),))
+        return
+    if place.role != "force":
+        return
+    yield Form(KINDS[0], place.name, "force", index, (Part("rebound_damper", ("damping", "N*s/m")),))
+    for share in KNEES:
+        bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1)
+        yield Form(KINDS[1], place.name, "force", index, (bent,))
+    yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2")),))
+    time = 0.5 * motion.longest
+    faded = Part("fading_damper", ("damping", "N*s/m"), {"time": (time, "s")}, -1, (), partial(_faded, time=time))
+    yield Form(KINDS[3], place.name, "force", index, (faded,))
+
+
+def _faded(m: Moved, time: float):
+    return m.v * (1.0 - np.exp(-m.t / time))
+
+
+def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
+    """See Kind."""
+    own = v.nominal("linear_damper", "damping")
+    match form.kind:
+        case "asymmetric_damper":
+            return {"rebound": ("N*s/m", own + v(0, "damping")), "compression": ("N*s/m", own)}
+        case "degressive_damper":
+            slopes = {"low_rate_damping": ("N*s/m", own), "high_rate_damping": ("N*s/m", own - v(0, "damping"))}
+            return {"knee": ("m/s", v(0, "knee")), **slopes}
+        case "quadratic_damper":
+            return {"coefficient": ("N*s^2/m^2", v(0, "coefficient"))}
+    return {"loss": ("1", -v(0, "damping") * (1.0 - np.exp(-v.longest / v(0, "time"))) / own if own else 1.0)}

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Inputs that are not what drove the plant, and sensors that do not show what it does."""
+
+from collections.abc import Iterable
+
+from penode_gen.model import Model
+
+from .form import Form, Sizes
+
+KINDS = ("input_gain", "input_offset", "input_delay", "input_lag", "sensor_scale", "sensor_delay")
+
+
+def inputs(model: Model, count: int) -> Iterable[Form]:
+    """Forms of the first `count` inputs."""
+    for j, i in enumerate(model.inputs[:count]):
+        for kind in KINDS[:4]:
+            yield Form(kind, i.name, kind, j)
+
+
+def sensors(model: Model, count: int) -> Iterable[Form]:
+    """Forms of the first `count` sensors: what physics cannot do in any place."""
+    for j, s in enumerate(model.sensors[:count]):
+        yield Form("sensor_scale", s.name, "scale", j)
+        yield Form("sensor_delay", s.name, "late", j)
+
+
+def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:
+    """What a report gives of a form; `unit` of its input."""
+    match form.how:
+        case "input_gain":
+            return {"gain": ("1", 1.0 + v.alone)}
+        case "input_offset":
+            return {"offset": (unit, v.alone)}
+        case "scale":
+            return {"scale": ("1", v.alone)}
+    return {"lag" if form.how == "input_lag" else "delay": ("s", v.alone)}

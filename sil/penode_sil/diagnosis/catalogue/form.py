@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What a kind of cause is made of: forms, each a sum of laws at one place, an input or a sensor that is not what it seems."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from penode_gen import laws
+from penode_gen.model import Model
+
+from ..plant import Place
+
+Array = NDArray[np.float64]
+NAMES = {
+    "abs": np.abs, "max": np.maximum, "min": np.minimum, "tanh": np.tanh, "exp": np.exp, "sqrt": np.sqrt,
+    "softplus": lambda x: np.logaddexp(0.0, x),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Deflection s, rate v [n] of a place along one recording, at times t [s] from 0 on; rms of both over all recordings, and what they
+    reach but for a thousandth of the time."""
+
+    s: Array
+    v: Array
+    t: Array
+
+    @property
+    def step(self) -> float:
+        return float(self.t[1] - self.t[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A place along all recordings; `force`: rms of what acts there already, about its mean."""
+
+    parts: tuple[Moved, ...]
+    s_rms: float
+    v_rms: float
+    s_reach: float
+    v_reach: float
+    force: float = 0.0
+
+    @staticmethod
+    def of(parts: Iterable[Moved], force: float = 0.0) -> Motion:
+        parts = tuple(parts)
+        s, v = (np.concatenate([getattr(p, k) for p in parts]) for k in "sv")
+        rms = [float(np.sqrt(np.mean(x**2))) for x in (s, v)]
+        reach = [float(np.quantile(np.abs(x), 0.999)) for x in (s, v)]
+        return Motion(parts, *rms, *reach, force)
+
+    @property
+    def longest(self) -> float:
+        """Of the recordings [s]."""
+        return float(max(p.t[-1] for p in self.parts))
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies
+    it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values.
+    `force` gives its force [n] for gain 1 along a motion, where the expression alone does not."""
+
+    law: str
+    gain: tuple[str, str]
+    shapes: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    sign: int = 0
+    fixed: tuple[str, ...] = ()
+    force: Callable[[Moved], Array] | None = None
+
+    def along(self, m: Moved) -> Array:
+        """Force [n] for gain 1."""
+        if self.force is not None:
+            return self.force(m)
+        text = laws.LAWS[self.law].force if self.law in laws.LAWS else self.law
+        values = {self.gain[0]: 1.0, **{k: v for k, (v, _) in self.shapes.items()}, "s": m.s, "v": m.v}
+        return np.broadcast_to(eval(text.replace("^", "**"), {"__builtins__": {}}, {**NAMES, **values}), m.s.shape)  # noqa: S307
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """A form of a kind at a place of the model (its index), an input or a sensor (its index): `how` is "force", or what is wrong with the
+    input ("input_gain", ...) or sensor ("scale", "late"). Of one family, forms stand for the same name."""
+
+    kind: str
+    where: str
+    how: str
+    index: int
+    parts: tuple[Part, ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """What a fit found of a form: v(part, argument); v.nominal(law, argument) is the sum of what the place has of a linear law already;
+    `longest` recording [s]; `moving`: the model has bodies; `alone`: the value of a form of an input or a sensor."""
+
+    values: Mapping[tuple[int, str], float]
+    own: Mapping[str, float]
+    longest: float
+    moving: bool
+    alone: float = 0.0
+
+    def __call__(self, part: int, argument: str) -> float:
+        return self.values[part, argument]
+
+    def nominal(self, law: str, argument: str) -> float:
+        return self.own.get(f"{law}.{argument}", 0.0)
+
+
+class Kind(Protocol):
+    """A file of the catalogue, for kinds of one curve. `forms` that may be at a place, given the motion of it; `sizes`: what a report gives
+    of a form, name to unit and value (SI); `ONE`: only one of them is at a place, another one is but a form of it; `STRAIGHT`:
+    kinds with a straight part, which a place shares with its linear elements."""
+
+    KINDS: tuple[str, ...]
+
+    @staticmethod
+    def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]: ...
+
+    @staticmethod
+    def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]: ...

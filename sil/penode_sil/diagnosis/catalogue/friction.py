@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Dry friction: of Coulomb, with a constant force beside it or a peak at low rates, and with memory of the way."""
+
+from collections.abc import Iterable
+from functools import partial
+
+from penode_gen.model import GROUND, Model
+
+from ..hypotheses import slips
+from ..plant import Place
+from .form import Form, Motion, Moved, Part, Sizes
+
+KINDS = ("coulomb_friction", "stribeck_friction", "bouc_wen")
+ONE = True  # friction at a place is one curve, with a peak or with memory
+EDGE = 0.02  # of the rms rate: transition of a friction; smooth enough for Gauss-Newton, steep enough for any motion
+PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway
+WAYS = (0.06, 0.25, 0.8)  # of the rms deflection: how far a hysteresis is bent before it slides
+
+
+def coulomb(motion: Motion) -> Part:
+    return Part("coulomb_friction", ("force", "N"), {"transition": (EDGE * motion.v_rms, "m/s")}, 1, ("transition",))
+
+
+def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
+    """See Kind."""
+    if place.role == "tyre":
+        return
+    yield Form(KINDS[0], place.name, "force", index, (coulomb(motion),))
+    if place.role == "body" or GROUND in place.ends:
+        yield Form(KINDS[0], place.name, "force", index, (coulomb(motion), Part("constant_force", ("force", "N"))), "with a constant")
+    if place.role == "body":
+        return
+    for share in PEAKS:
+        peak = Part("2.3316439815971242*rise*exp(-(v/width)^2)*v/width", ("rise", "N"), {"width": (share * motion.v_rms, "m/s")}, 1)
+        yield Form(KINDS[1], place.name, "force", index, (coulomb(motion), peak))
+    for share in WAYS:
+        way = share * motion.s_rms
+        yield Form(KINDS[2], place.name, "force", index, (Part("bouc_wen", ("force", "N"), {"presliding": (way, "m")}, 1, (), partial(_slip, way=way)),))
+
+
+def _slip(m: Moved, way: float):
+    return slips(m.s, [way])[0]
+
+
+def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
+    """See Kind."""
+    if form.kind == KINDS[1]:
+        return {"breakaway": ("N", v(0, "force") + v(1, "rise")), "coulomb": ("N", v(0, "force")), "stribeck_rate": ("m/s", v(1, "width"))}
+    if form.kind == KINDS[2]:
+        return {"force": ("N", v(0, "force")), "yield_deflection": ("m", v(0, "presliding"))}
+    return {"force": ("N", v(0, "force"))}

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A constant force on a body."""
+
+from collections.abc import Iterable
+
+from penode_gen.model import GROUND, Model
+
+from ..plant import Place
+from .form import Form, Motion, Part, Sizes
+
+KINDS = ("constant_force",)
+
+
+def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
+    """See Kind."""
+    if place.role == "body" or GROUND in place.ends:
+        yield Form(KINDS[0], place.name, "force", index, (Part("constant_force", ("force", "N")),))
+
+
+def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
+    """See Kind. What pulls a body to ground is a force downwards; under prescribed motion, what a force adds."""
+    return {"force": ("N", -v(0, "force") if v.moving else v(0, "force"))}

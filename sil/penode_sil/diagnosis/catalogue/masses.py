@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A mass that hangs on a body by rubber and is not in the model."""
+
+from collections.abc import Iterable
+from functools import partial
+
+import numpy as np
+from penode_gen.model import GROUND, Model
+from scipy import signal
+
+from ..plant import Place
+from .form import Form, Motion, Moved, Part, Sizes
+
+KINDS = ("hidden_resonance",)
+RATIOS = (0.6, 1.2, 2.5, 5.0)  # of v_rms/s_rms, to which its frequency is tried
+LOSS = 0.1  # damping ratio at first
+
+
+def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
+    """See Kind."""
+    if place.role != "body" and not (GROUND in place.ends and any(b.name in place.ends for b in model.bodies)):
+        return
+    for ratio in RATIOS:
+        omega = ratio * motion.v_rms / motion.s_rms
+        part = Part("tuned_mass", ("mass", "kg"), {"omega": (omega, "1/s"), "loss": (LOSS, "1")}, 1, (), partial(_hung, omega=omega))
+        yield Form(KINDS[0], place.name, "force", index, (part,))
+
+
+def _hung(m: Moved, omega: float):
+    """Force for a mass of 1: omega^2 (s - p) + 2 loss omega (v - p'), p'' = that."""
+    b, a, _ = signal.cont2discrete(([2 * LOSS * omega, omega**2], [1.0, 2 * LOSS * omega, omega**2]), m.step, "bilinear")
+    own = signal.lfilter(np.squeeze(b), a, m.s)
+    return omega**2 * (m.s - own) + 2.0 * LOSS * omega * (m.v - np.gradient(own, m.step))
+
+
+def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
+    """See Kind."""
+    return {"mass": ("kg", v(0, "mass")), "frequency": ("Hz", v(0, "omega") / (2.0 * np.pi)), "damping_ratio": ("1", v(0, "loss"))}

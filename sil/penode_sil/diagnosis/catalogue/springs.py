@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Springs that are no straight lines: bent, other to one side, with stops."""
+
+from collections.abc import Iterable
+
+from penode_gen.model import Model
+
+from ..plant import Place
+from .form import Form, Motion, Part, Sizes
+
+KINDS = ("cubic_spring", "asymmetric_spring", "bump_stop")
+STRAIGHT = ("asymmetric_spring",)
+GAPS = (0.5, 0.75)  # of what the deflection reaches
+
+
+def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
+    """See Kind."""
+    if place.role != "force":
+        return
+    yield Form(KINDS[0], place.name, "force", index, (Part("cubic_spring", ("cubic", "N/m^3")),))
+    yield Form(KINDS[0], place.name, "force", index, (Part("bend*s*abs(s)", ("bend", "N/m^2")),), "odd square")
+    yield Form(KINDS[1], place.name, "force", index, (Part("asymmetric_spring", ("stiffness", "N/m")),))
+    for share in GAPS:
+        gap = {"gap": (share * motion.s_reach, "m")}
+        yield Form(KINDS[2], place.name, "force", index, (Part("stiffness*(max(s - gap, 0) + min(s + gap, 0))", ("stiffness", "N/m"), gap, 1),))
+        yield Form(KINDS[2], place.name, "force", index, (Part("bump_stop", ("stiffness", "N/m"), gap, 1),), "one side")
+        yield Form(KINDS[2], place.name, "force", index, (Part("rebound_stop", ("stiffness", "N/m"), gap, 1),), "the other side")
+
+
+def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
+    """See Kind."""
+    if form.kind == KINDS[0]:
+        return {"bend": ("N/m^2", v(0, "bend"))} if form.note else {"cubic": ("N/m^3", v(0, "cubic"))}
+    if form.kind == KINDS[1]:
+        return {"difference": ("N/m", -v(0, "stiffness"))}
+    return {"gap": ("m", v(0, "gap")), "stiffness": ("N/m", v(0, "stiffness"))}

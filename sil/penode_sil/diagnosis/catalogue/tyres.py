@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A tyre that damps, that leaves the road, that is no straight line."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from penode_gen.model import Model
+
+from ..plant import Place
+from .form import Form, Motion, Part, Sizes
+
+KINDS = ("tyre_damping", "tyre_liftoff", "tyre_nonlinear")
+SHARES = (0.3, 0.6)  # of the greatest stretch: where a tyre leaves the road
+
+
+def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
+    """See Kind."""
+    if place.role != "tyre":
+        return
+    yield Form(KINDS[0], place.name, "force", index, (Part("linear_damper", ("damping", "N*s/m"), {}, 1),))
+    top = max(float(np.quantile(p.s, 0.9995)) for p in motion.parts)
+    for share in SHARES if top > 0.0 else ():
+        yield Form(KINDS[1], place.name, "force", index, (Part("liftoff", ("stiffness", "N/m"), {"static": (share * top, "m")}, 1),))
+    yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_spring", ("quadratic", "N/m^2")),))
+
+
+def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
+    """See Kind."""
+    if form.kind == KINDS[1]:
+        return {"preload": ("N", v(0, "stiffness") * v(0, "static"))}
+    return {"damping": ("N*s/m", v(0, "damping"))} if form.kind == KINDS[0] else {"quadratic": ("N/m^2", v(0, "quadratic"))}

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Held-out blocks of the training: what a fit of the others predicts of each, and how sure that makes of a hypothesis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bench import STAYS, Bench
+from .fit import Fit, Problem
+from .gain import Level
+
+Array = NDArray[np.float64]
+BLOCKS = 4
+BURN_IN = 0.15  # of the first block of a recording, that stay in training: they carry its start
+REFIT = 3  # iterations from the fit of all blocks
+FREEDOM = 4.0  # degrees of freedom of what one update is off
+ROUNDS = 20  # of the iteration for its width
+DRAWS = 4000  # of the Bayesian bootstrap
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Which block each update belongs to, -1 for those of a burn-in."""
+
+    number: NDArray[np.int64]
+
+    @staticmethod
+    def of(lengths: Sequence[int]) -> Blocks:
+        """Of recordings with so many updates: as many blocks of each as there are, where one is short, a block is a whole recording."""
+        total = sum(lengths)
+        number = np.minimum((np.arange(total) * BLOCKS) // max(total, 1), BLOCKS - 1)
+        begin = 0
+        for n in lengths:
+            stay = max(1, int(BURN_IN * min(n, total / BLOCKS)))
+            number[begin : begin + stay] = -1
+            begin += n
+        return Blocks(number)
+
+    def scores(self, problem: Problem, fit: Fit) -> Array:
+        """Log predictive density [blocks] of each block by the fit of the others."""
+        found = []
+        for b in range(BLOCKS):
+            left = self.number == b
+            part = Problem(problem.follower, problem.floor, problem.fixed, left).solve(fit.free, fit.by, REFIT)
+            found.append(predictive(part, left, problem.floor))
+        return np.array(found)
+
+    def leveled(self, bench: Bench, problem: Problem, fit: Fit, level: Level, sizes: Sequence[float]) -> tuple[Level, Fit, Array]:
+        """The level with which left-out blocks are predicted best, that of a fit or one of other `sizes`, the fit with it, and its scores. The
+        likeliest level in training is too small where few updates meet many free values: they then follow what should wander."""
+        best = level, fit, self.scores(problem, fit)
+        gains = bench.gains(fit, problem.follower.model)
+        for size in sizes:
+            more = Level(size, STAYS * gains.period)
+            wider = problem.solve(fit.free, gains.at(more), REFIT)
+            scores = self.scores(problem, wider)
+            if np.sum(scores) > np.sum(best[2]):
+                best = more, wider, scores
+        return best
+
+
+def predictive(part: Fit, left: NDArray[np.bool_], floor: Array) -> float:
+    """Log density of the innovations left out under Student's t with FREEDOM degrees, whose width is that of the innovations fitted:
+    a moment at which a friction sticks, or does not, is one moment and no block."""
+    total = 0.0
+    for j in range(part.nu.shape[1]):
+        good = np.isfinite(part.nu[:, j])
+        ours, theirs = part.nu[good & part.used[:, j], j], part.nu[good & left, j]
+        if len(ours) and len(theirs):
+            width = spread(ours, floor[j])
+            total -= float(np.sum(0.5 * (FREEDOM + 1.0) * np.log1p(theirs**2 / (FREEDOM * width)))) + 0.5 * len(theirs) * float(np.log(width))
+    return total
+
+
+def spread(x: Array, floor: float) -> float:
+    """Square of the width of a Student's t with FREEDOM degrees that fits x best (Lange, Little and Taylor, JASA 84, 1989), at least floor."""
+    width = max(float(np.mean(x**2)), floor)
+    for _ in range(ROUNDS):
+        weight = (FREEDOM + 1.0) / (FREEDOM + x**2 / width)
+        width = max(float(np.mean(weight * x**2)), floor)
+    return width
+
+
+def posterior(scores: Sequence[Array], seed: int = 1) -> Array:
+    """Probability [hypotheses] of each to predict best: block scores [blocks] weighted by Dirichlet draws (Rubin 1981)."""
+    table = np.array(scores)
+    draws = np.random.default_rng(seed).dirichlet(np.ones(table.shape[1]), DRAWS) * table.shape[1]
+    best = np.argmax(draws @ table.T, axis=1)
+    return np.bincount(best, minlength=len(table)) / DRAWS

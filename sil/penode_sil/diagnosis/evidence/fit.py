@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Fits of free values to innovations by damped Gauss-Newton, and their Laplace approximation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fit import Free
+from .observer import Filter, Follower
+
+Array = NDArray[np.float64]
+DAMPING = np.array([0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
+MOVE = 1e-3  # of a unit: finite differences
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Where a fit ended. Innovations `nu` [updates, n_z] of all recordings in turn, `slopes` [updates, n_z, free] of them along the units
+    of the free values, `used` [updates, n_z] what was fitted, `variance` [n_z] of the innovations, `likelihood` with these."""
+
+    free: tuple[Free, ...]
+    by: Filter
+    nu: Array
+    slopes: Array
+    used: NDArray[np.bool_]
+    variance: Array
+    likelihood: float
+    cost: float
+
+    def value(self, target: object) -> float:
+        return next(f.value for f in self.free if f.target == target)
+
+    @property
+    def values(self) -> dict[str, float]:
+        return {f.target: f.value for f in self.free if isinstance(f.target, str)}
+
+    def curvature(self) -> Array:
+        """Of the negative log posterior, in units of the free values."""
+        rows = (self.slopes / np.sqrt(self.variance)[None, :, None])[self.used]
+        return rows.T @ rows + np.diag([(f.unit / f.sigma) ** 2 if not f.log else (1.0 / f.sigma) ** 2 for f in self.free])
+
+    def covariance(self) -> Array:
+        """Of the free values, in their units (log: relative)."""
+        c = self.curvature()
+        size = 1.0 / np.sqrt(np.maximum(np.diag(c), 1e-300))
+        return np.linalg.pinv(c * np.outer(size, size), rcond=1e-12, hermitian=True) * np.outer(size, size)
+
+    def deviation(self, target: object) -> float:
+        """Standard deviation of a value, in its own unit."""
+        i = [f.target for f in self.free].index(target)
+        f = self.free[i]
+        return float(np.sqrt(self.covariance()[i, i])) * (abs(f.value) if f.log else f.unit)
+
+    def criterion(self) -> float:
+        """Log marginal likelihood by Laplace (Kass and Raftery 1995, eq. 6), but for constants that all fits of the same data share:
+        likelihood, priors, and the width of the posterior against theirs."""
+        prior = np.array([(f.unit / f.sigma) if not f.log else 1.0 / f.sigma for f in self.free])
+        own = prior > 0.0  # what has no prior is free in all fits
+        sign, volume = np.linalg.slogdet(self.curvature())
+        return self.likelihood - 0.5 * sum(away(f) ** 2 for f in self.free) + float(np.sum(np.log(prior[own]))) - 0.5 * volume
+
+
+def away(f: Free) -> float:
+    """How far a value is from its prior, in deviations of that."""
+    if np.isinf(f.sigma):
+        return 0.0
+    return float(np.log(f.value / f.origin) / f.sigma) if f.log else f.offset
+
+
+def likelihood(nu: Array, used: NDArray[np.bool_], floor: Array) -> tuple[Array, float]:
+    """Variance [n_z] of innovations, at least floor, and the log likelihood with it."""
+    count = np.maximum(np.sum(used, axis=0), 1)
+    squares = np.sum(np.where(used, nu, 0.0) ** 2, axis=0)
+    variance = np.maximum(squares / count, floor)
+    return variance, float(-0.5 * np.sum(np.sum(used, axis=0) * np.log(variance) + squares / variance))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Fits of a follower's innovations; `floor` [n_z]: variance that sensor noise alone leaves; `fixed` values of parameters; `left`
+    [updates]: those that are not fitted."""
+
+    follower: Follower
+    floor: Array
+    fixed: Mapping[str, float]
+    left: NDArray[np.bool_] | None = None
+
+    def nu(self, free: Sequence[Free], shifts: Array, by: Filter) -> Array:
+        """[runs, updates, n_z], of all recordings in turn."""
+        lanes = self.follower.follow(free, shifts, by, self.fixed)[0]
+        nu = np.concatenate(lanes.nu, axis=1)
+        nu[~lanes.sane] = np.where(np.isfinite(nu[~lanes.sane]), 1e12, np.nan)
+        return nu
+
+    def used(self, nu: Array) -> NDArray[np.bool_]:
+        good = np.isfinite(nu)
+        return good if self.left is None else good & ~self.left[:, None]
+
+    def at(self, free: Sequence[Free], by: Filter) -> Fit:
+        """The fit that ends at these free values."""
+        shifts = np.vstack([np.zeros(len(free)), MOVE * np.eye(len(free))])
+        for i, f in enumerate(free):
+            if f.at(MOVE) == f.value:
+                shifts[i + 1, i] = -MOVE
+        nu = self.nu(free, shifts, by)
+        used = self.used(nu[0])
+        moves = np.array([shifts[i + 1, i] for i in range(len(free))])
+        slopes = np.moveaxis((nu[1:] - nu[0]) / moves[:, None, None], 0, -1)
+        slopes[~np.isfinite(slopes)] = 0.0
+        variance, value = likelihood(nu[0], used, self.floor)
+        cost = value - 0.5 * sum(away(f) ** 2 for f in free)
+        return Fit(tuple(free), by, nu[0], slopes, used, variance, value, cost)
+
+    def solve(self, free: Sequence[Free], by: Filter, iterations: int = 10, close: float = 0.05) -> Fit:
+        """The likeliest free values from those given on; ends where a step gains less than `close` in the log posterior."""
+        fit = self.at(free, by)
+        for _ in range(iterations):
+            steps = self._steps(fit)
+            nu = self.nu(fit.free, steps, by)
+            costs = []
+            for k, step in enumerate(steps):
+                there = put(fit.free, step)
+                costs.append(likelihood(nu[k], self.used(nu[k]), self.floor)[1] - 0.5 * sum(away(f) ** 2 for f in there))
+            best = int(np.nanargmax(costs))
+            if not costs[best] > fit.cost + 1e-9:
+                break
+            gained = costs[best] - fit.cost
+            fit = self.at(put(fit.free, steps[best]), by)
+            if gained < close:
+                break
+        return fit
+
+    def _steps(self, fit: Fit) -> Array:
+        rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
+        rest = (fit.nu / np.sqrt(fit.variance))[fit.used]
+        weight = np.array([(f.unit / f.sigma) if not f.log else 1.0 / f.sigma for f in fit.free])
+        curvature = rows.T @ rows + np.diag(weight**2)
+        slope = -rows.T @ rest - weight * np.array([away(f) for f in fit.free])
+        stuck = [f.value <= f.low and s <= 0.0 or f.value >= f.high and s >= 0.0 for f, s in zip(fit.free, slope)]
+        slope[stuck] = 0.0
+        curvature[stuck], curvature[:, stuck] = 0.0, 0.0
+        size = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
+        normed = curvature / np.outer(size, size)
+        found = np.array([np.linalg.solve(normed + (1e-10 + d) * np.eye(len(size)), slope / size) / size for d in DAMPING])
+        return np.where([f.log for f in fit.free], np.clip(found, -1.0, 1.0), found)
+
+
+def put(free: Sequence[Free], shift: Array) -> tuple[Free, ...]:
+    return tuple(replace(f, value=float(f.at(s))) for f, s in zip(free, shift))

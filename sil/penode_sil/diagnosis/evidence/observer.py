@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A model as its own observer: recordings, the model in the form in which it follows them, and its innovations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter, Signal, State
+
+from ...batch import Observer
+from ..fit import Free, compiled, ordered
+from ..noise import Experiment
+from ..plant import Place, anonymous, extend, rotational_unit
+
+Array = NDArray[np.float64]
+WANDER = "wander"  # stem of the forces that wander, and of their states
+TURN = 0.15  # of a period of the fastest mode, in one step of the integration: Runge-Kutta of order 4 then errs by 1e-4 of it a step
+CROSSED = 5  # steps between updates: the edge of a friction, 0.02 of the rms rate wide, then damps less than Runge-Kutta bears
+LOST = 1e15  # innovation of a run that left all bounds
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A recording: inputs u [n, n_u], sensors y [n, n_z] (NaN: nothing measured), `step` [s] apart; the noise of each sensor that the
+    model file states [n_z] (0: none). `held`: inputs that move in steps."""
+
+    name: str
+    step: float
+    u: Array
+    y: Array
+    held: bool = False
+
+    @staticmethod
+    def of(e: Experiment) -> Record:
+        held = e.held is not None and bool(e.held.all())
+        return Record(e.name, e.step, e.drive if e.held is None else e.u, np.where(e.good, e.y, np.nan), held)
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+
+def shown(records: Sequence[Record], stated: Array) -> Array:
+    """Noise [n_z] of a sample: what the model file states (0: nothing), but not more than neighbouring samples show, whose second
+    differences have six times its variance where the motion is smooth."""
+    own = []
+    for j, most in enumerate(stated):
+        bends = np.concatenate([np.diff(r.y[:, j], 2) for r in records])
+        bends = bends[np.isfinite(bends)]
+        seen = float(np.sqrt(np.mean(bends**2) / 6.0)) if bends.size else 0.0
+        own.append(max(min(seen, most) if most > 0.0 else seen, 1e-12))
+    return np.array(own)
+
+
+def bias(sensor: str) -> str:
+    return f"{sensor}_bias"
+
+
+def scale(sensor: str) -> str:
+    return f"{sensor}_scale"
+
+
+def dressed(model: Model, places: Sequence[Place]) -> Model:
+    """The model with a bias and a scale of each sensor as parameters, and with an acceleration that wanders, w' = -w/tau, of each body;
+    without bodies, with a force at each place. The parameter wander_tau is tau [s]. An acceleration, so that the observer stays the
+    same where masses and forces are scaled together, which no sensor of motion shows."""
+    free = {bias(s.name): Parameter(bias(s.name), 0.0, s.unit) for s in model.sensors}
+    free |= {scale(s.name): Parameter(scale(s.name), 1.0, "1") for s in model.sensors}
+    free[f"{WANDER}_tau"] = Parameter(f"{WANDER}_tau", 1.0, "s")
+    ends = [(b.name, GROUND) for b in model.bodies] or [p.ends for p in places]
+    where = [] if model.bodies else list(places)
+    units = [rotational_unit(model, e, "m/s^2" if model.bodies else "N") for e in ends]
+    names = [f"{WANDER}{k}" for k in range(len(ends))]
+    masses = [f"{b.mass}*" for b in model.bodies] or [""] * len(ends)
+    forces = [Element(name, e, "expression", expression=f"{mass}{name}_f") for name, e, mass in zip(names, ends, masses)]
+    states = [State(f"{name}_f", u) for name, u in zip(names, units)]
+    laws = [Equation(name, f"der({name}_f)*{WANDER}_tau = -{name}_f") for name in names]
+    wide = replace(
+        model, parameters={**model.parameters, **free}, extra_states=(*model.extra_states, *states), equations=(*model.equations, *laws),
+    )  # fmt: skip
+    wide = extend(wide, forces, {}, where)
+    sensors = tuple(replace(s, expression=f"({s.expression})*{scale(s.name)} + {bias(s.name)}") for s in wide.sensors)
+    return replace(wide, sensors=sensors)
+
+
+def probed(model: Model, places: Sequence[Place]) -> Model:
+    """A dressed model with a force at_k as a further input at each place, and its deflection, its rate and what acts there already as
+    further sensors."""
+    forces = [Element(f"probe{k}", p.ends, "expression", expression=f"at{k}") for k, p in enumerate(places)]
+    wide = replace(model, inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(places))))
+    wide = extend(wide, forces, {}, places)
+    seen = []
+    for k, p in enumerate(places):
+        force = " ".join(f"{'+' if sense > 0 else '-'} F_{name}" for name, sense in p.elements) or "0"
+        signals = (("s", f"s_probe{k}", "m"), ("v", f"v_probe{k}", "m/s"), ("F", force, "N"))
+        seen += [Signal(f"{q}_of_probe{k}", text, p.unit(unit)) for q, text, unit in signals]
+    return replace(wide, sensors=(*wide.sensors, *seen))
+
+
+@dataclass(frozen=True, eq=False)
+class Filter:
+    """How an observer corrects its states: gain [n_x, n_z] or [runs, n_x, n_z], and the time tau [s], one or [runs], for which what
+    wanders stays."""
+
+    gain: Array
+    tau: Array
+
+    @staticmethod
+    def none(n_x: int, n_z: int) -> Filter:
+        """A free run."""
+        return Filter(np.zeros((n_x, n_z)), np.ones(1))
+
+    @staticmethod
+    def many(filters: Sequence[Filter]) -> Filter:
+        """One run by each."""
+        return Filter(np.array([f.gain for f in filters]), np.concatenate([f.tau for f in filters]))
+
+    def cut(self, n_x: int) -> Filter:
+        """Of the first states alone."""
+        return Filter(self.gain[:n_x], self.tau)
+
+    def padded(self, n_x: int) -> Filter:
+        """With more states, which are not corrected."""
+        wide = np.zeros((n_x, self.gain.shape[1]))
+        wide[: len(self.gain)] = self.gain
+        return Filter(wide, self.tau)
+
+
+@dataclass(frozen=True, eq=False)
+class Lanes:
+    """Innovations of some runs, per recording [runs, updates, sensors], NaN where nothing was measured; and whether a run stayed within
+    bounds [runs]."""
+
+    nu: list[Array]
+    sane: NDArray[np.bool_]
+
+
+class Follower:
+    """A dressed model that follows recordings, corrected every `update` samples."""
+
+    def __init__(self, model: Model, records: Sequence[Record], update: int, set_name: str = "default", fastest: float = 0.0):
+        self.model, self.records, self.update, self.set_name = model, tuple(records), update, set_name
+        causal, moves = ordered(model)
+        step = model.sample_time
+        substeps = max(1, int(np.ceil(step * fastest / TURN)), -(-CROSSED // update), model.substeps)
+        way = "cubic" if moves else "held" if any(r.held for r in records) else "linear"
+        self.batch = compiled(anonymous(replace(model, method="rk4", interpolation=way, substeps=substeps)), causal)
+        self.n_z = len(records[0].y[0])  # sensors that were measured; the model may have more
+
+    def follow(
+        self, free: Sequence[Free], shifts: Array, by: Filter, fixed: Mapping[str, float] = {}, extra: Mapping[int, Array] = {},
+        watched: int = 0, states: Sequence[str] = (), parts: Sequence[tuple[int, int]] | None = None,
+    ) -> tuple[Lanes, list[Array], list[Array]]:  # fmt: skip
+        """Runs with free values after shifts [runs, free], corrected `by` a filter. `extra`: further inputs of a
+        probed model per recording, [n, .] or [runs, n, .]; `watched`: how many sensors more to give, per recording [runs, n, watched].
+        `parts`: samples of each recording, from and to, that are followed. Returns innovations, watched sensors, states."""
+        nus, seen, moved, sane = [], [], [], np.ones(len(shifts), bool)
+        for e, record in enumerate(self.records):
+            first, last = (0, len(record)) if parts is None else parts[e]
+            start, parameters, u, y = self._given(e, free, shifts, fixed)
+            parameters[f"{WANDER}_tau"] = by.tau
+            u, y = u[..., first:last, :], y[..., first:last, :]
+            if e in extra:
+                more = extra[e][..., first:last, :]
+                if more.ndim == 3 and u.ndim == 2:
+                    u = np.broadcast_to(u, (len(more), *u.shape))
+                if u.ndim == 3 and more.ndim == 2:
+                    more = np.broadcast_to(more, (len(u), *more.shape))
+                u = np.concatenate([u, more], axis=-1)
+            blank = np.full((*y.shape[:-1], len(self.model.sensors) - self.n_z), np.nan)
+            wide = np.zeros((*by.gain.shape[:-1], len(self.model.sensors)))
+            wide[..., : self.n_z] = by.gain
+            run = self.batch.run(
+                u, x0=start, parameters=parameters, set_name=self.set_name, states=states,
+                observer=Observer(self.update, np.concatenate([y, blank], axis=-1), wide),
+            )  # fmt: skip
+            z = run.z
+            sane &= (run.first_bad < 0) & np.isfinite(z).all(axis=(1, 2))
+            nus.append(self._means(y - np.where(np.abs(z[:, :, : self.n_z]) < LOST, z[:, :, : self.n_z], LOST)))
+            seen.append(z[:, :, self.n_z : self.n_z + watched])
+            moved.append(run.x)
+        return Lanes(nus, sane), seen, moved
+
+    def _means(self, beyond: Array) -> Array:
+        """Means [runs, updates, n_z] of what was measured beyond the prediction."""
+        runs, n, n_z = beyond.shape
+        whole = beyond[:, : n // self.update * self.update].reshape(runs, -1, self.update, n_z)
+        there = np.isfinite(whole)
+        count = np.sum(there, axis=2)
+        total = np.sum(np.where(there, whole, 0.0), axis=2)
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    def _given(self, e: int, free: Sequence[Free], shifts: Array, fixed: Mapping[str, float]) -> tuple[Array, dict[str, Array], Array, Array]:
+        record, runs = self.records[e], len(shifts)
+        start = np.tile(np.array(self.model.start, dtype=float), (runs, 1))
+        parameters: dict[str, Array] = {name: np.array([value]) for name, value in fixed.items()}
+        u, y = record.u, record.y
+        for f, shift in zip(free, shifts.T):
+            values = f.at(shift)
+            if isinstance(f.target, str):
+                parameters[f.target] = values
+            elif f.target[0] == "start":
+                if f.target[1] == e:
+                    start[:, f.target[2]] = values
+            elif f.target[0] == "late":
+                y = np.array(np.broadcast_to(y, (runs, *y.shape[-2:])))
+                y[:, :, f.target[1]] = earlier(record.y[:, f.target[1]], values / record.step)
+            else:
+                u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
+                u[:, :, f.target[1]] = driven(f.target[0], u[:, :, f.target[1]], values, record.step)
+        return start, parameters, u, y
+
+
+def earlier(y: Array, samples: Array) -> Array:
+    """A signal [n] as it was so many samples [runs] before it was seen: [runs, n]; what was not seen is NaN."""
+    at = np.arange(len(y)) + samples[:, None]
+    low = np.clip(np.floor(at).astype(int), 0, len(y) - 1)
+    part = at - low
+    found = y[low] * (1.0 - part) + y[np.minimum(low + 1, len(y) - 1)] * np.where(part > 0.0, part, 0.0)
+    return np.where((at >= 0) & (at <= len(y) - 1), found, np.nan)
+
+
+def driven(how: str, u: Array, values: Array, step: float) -> Array:
+    """An input [runs, n] with a gain of 1 + values [runs], an offset, a delay or a lag [s]."""
+    match how:
+        case "input_gain":
+            return u * (1.0 + values[:, None])
+        case "input_offset":
+            return u + values[:, None]
+        case "input_delay":
+            at = np.arange(u.shape[1]) - values[:, None] / step
+            low = np.clip(np.floor(at).astype(int), 0, u.shape[1] - 1)
+            part = np.clip(at - low, 0.0, 1.0)
+            after = np.minimum(low + 1, u.shape[1] - 1)
+            return np.take_along_axis(u, low, 1) * (1.0 - part) + np.take_along_axis(u, after, 1) * part
+        case "input_lag":
+            keep = np.exp(-step / np.maximum(values, 1e-3 * step))
+            out = np.empty_like(u)
+            out[:, 0] = u[:, 0]
+            for k in range(1, u.shape[1]):
+                out[:, k] = keep * out[:, k - 1] + (1.0 - keep) * u[:, k]
+            return out
+    raise ValueError(how)

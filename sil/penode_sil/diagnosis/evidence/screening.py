@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A score test of many hypotheses at once: what each would change in the innovations, along the motion as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bench import Bench
+from .fit import Fit
+from .observer import Filter, Follower, probed
+
+Array = NDArray[np.float64]
+AT_ONCE = 32  # runs that are simulated together
+NEARLY = 1e-6  # of the square of a column: what is left of it beside what is free anyway is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """A bench with a force to be put on each place."""
+
+    bench: Bench
+    follower: Follower
+    by: Filter
+    motions: list[Array]  # deflection, rate and force of every place per recording [n, 3 places]
+
+    @staticmethod
+    def of(bench: Bench) -> Probe:
+        wide = probed(bench.model, bench.places)
+        follower = Follower(wide, bench.records, bench.update, bench.set_name, bench.fastest)
+        by = bench.fit.by
+        none = {e: np.zeros((len(r), len(bench.places))) for e, r in enumerate(bench.records)}
+        watched = 3 * len(bench.places)
+        seen = follower.follow(bench.fit.free, np.zeros((1, len(bench.fit.free))), by, {}, none, watched)[1]
+        return Probe(bench, follower, by, [s[0] for s in seen])
+
+    def columns(self, forces: Sequence[tuple[int, Sequence[Array]]], size: float) -> Array:
+        """Changes [forces, updates, n_z] of the innovations for a force of 1; each is a place and its series [n] per recording; `size` is
+        a small force."""
+        bench, free = self.bench, self.bench.fit.free
+        found = []
+        for first in range(0, len(forces), AT_ONCE):
+            some = forces[first : first + AT_ONCE]
+            extra, sizes = {}, [size / max(float(np.sqrt(np.mean(np.concatenate(list(f)) ** 2))), 1e-300) for _, f in some]
+            for e, record in enumerate(bench.records):
+                u = np.zeros((len(some) + 1, len(record), len(bench.places)))
+                for k, (place, series) in enumerate(some):
+                    u[k + 1, :, place] = sizes[k] * series[e]
+                extra[e] = u
+            lanes = self.follower.follow(free, np.zeros((len(some) + 1, len(free))), self.by, {}, extra)[0]
+            nu = np.concatenate(lanes.nu, axis=1)
+            found.append((nu[1:] - nu[0]) / np.array(sizes)[:, None, None])
+        return np.concatenate(found) if found else np.zeros((0, *bench.fit.nu.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """What hypotheses promise: log likelihood that each gains and the sizes it takes, beside all that is free anyway."""
+
+    gain: float
+    sizes: Array
+
+
+def scores(fit: Fit, hypotheses: Sequence[Array]) -> list[Score]:
+    """Scores of hypotheses [updates, n_z, sizes] each, linearised about a fit (Rao 1948), with the level of the innovations profiled out."""
+    white = 1.0 / np.sqrt(fit.variance)
+    used = fit.used
+    weights = np.array([(f.unit / f.sigma) if not f.log else 1.0 / f.sigma for f in fit.free])
+    own = np.vstack([(fit.slopes * white[None, :, None])[used], np.diag(weights)])
+    rest = np.concatenate([(fit.nu * white)[used], np.zeros(len(weights))])
+    size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
+    q = np.linalg.qr(own / size)[0] if own.shape[1] else np.zeros((len(own), 0))
+    rest = rest - q @ (q.T @ rest)
+    total = float(rest @ rest)
+    found = []
+    for h in hypotheses:
+        columns = np.vstack([(h * white[None, :, None])[used], np.zeros((len(weights), h.shape[2]))])
+        columns[~np.isfinite(columns)] = 0.0
+        before = np.sum(columns**2, axis=0)
+        columns = columns - q @ (q.T @ columns)
+        if np.any(np.sum(columns**2, axis=0) < NEARLY * before) or not before.all():
+            found.append(Score(0.0, np.zeros(h.shape[2])))
+            continue
+        theta = np.linalg.lstsq(columns, -rest, rcond=1e-9)[0]
+        left = float(np.sum((rest + columns @ theta) ** 2))
+        found.append(Score(0.5 * int(np.sum(used)) * float(np.log(total / max(left, 1e-300))), theta))
+    return found

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A diagnosis of recordings in which more is wrong than sensor noise can tell: by innovations, see `evidence`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from penode_gen.model import Model
+
+from . import applied, extension, real
+from .evidence.bench import Bench, build
+from .evidence.gain import Level
+from .evidence.observer import Record, bias, shown
+from .fit import Fit, Problem
+from .noise import Experiment
+from .residual import Channel, rms
+from .result import Cause, Gain
+from .study import Study
+
+Array = NDArray[np.float64]
+SURE = 2.0  # standard deviations of an offset that goes into the extended model
+MISSED = 20.0  # log likelihood that a wandering force gains beside the best explanation by sensor noise alone
+WANDERS = 0.005  # and its least size: coloured noise of sensors, and a curve that stands for another one, make about that much
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """What a diagnosis needs of it: causes, verdict, notes, explanations, text and model of the extended file, gain, hold-out, and the
+    training as the extended model has it."""
+
+    causes: tuple[Cause, ...]
+    verdict: str
+    notes: tuple[str, ...]
+    explanations: tuple[dict[str, object], ...]
+    text: str
+    model: Model
+    gain: dict[str, Gain]
+    held: list[Channel]
+    fit: Fit
+    explained: float  # share of the power that the nominal model leaves in training
+
+
+def missed(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> bool:
+    """Does more act than an explanation has, beyond the noise of sensors? Then innovations have to decide."""
+    values = {f.target: f.value for f in fit.free if isinstance(f.target, str)}
+    known = {n: replace(p, value=values.get(n, p.value), exact=True) for n, p in fit.model.parameters.items()}
+    model = replace(fit.model, parameters=known)
+    plain = [f for f in fit.free if isinstance(f.target, str) or f.target[0] == "start"]
+    problem = Problem(fit.model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
+    records = []
+    for e, x in enumerate(study.experiments):  # what faults of sensors explain is taken out of the recordings
+        alone = np.array(problem.simulate(e, plain, np.zeros((1, len(plain))))[0][0])
+        records.append(replace(Record.of(x), y=np.where(x.good, x.y - fit.simulated[e] + alone, np.nan)))
+    noise = shown(records, np.array([s.noise for s in model.sensors]))
+    bench = build(model, study.places, records, noise, study.linear.fastest, study.set_name, study.model)
+    still = bench.problem().solve(bench.fit.free, bench.gains(bench.fit).at(Level(0.0, 1.0)), 12)
+    gained = bench.fit.likelihood - still.likelihood
+    log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats")
+    return gained > MISSED and bench.level.size > WANDERS
+
+
+def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]) -> Weighed:
+    """Causes by innovations, the model with them, and what it gains."""
+    model = study.model
+    found = real.answer(model, study.places, study.experiments, study.linear.fastest, study.set_name, log)
+    bench = found.found.bench
+    offsets = {s.name for s in model.sensors if abs(bench.fit.value(bias(s.name))) > SURE * bench.fit.deviation(bias(s.name))}
+    made = applied.apply(model, bench, found.run, found.found.terms, offsets)
+    text, extended = extension.joined(study, made.text)
+    gain, more, held = extension.measure(study, extended, unused) if unused else ({}, [], [])
+    scale = np.array([s.noise or 1.0 for s in model.sensors])
+    after = tuple(extension.started(extended, e, study)[1] for e in study.experiments)
+    fit = replace(study.null, simulated=after)
+    left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, study.null.simulated))
+    powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
+    causes, notes = _plausible(model, found.causes)
+    verdict = "unexplained" if found.causes and not causes else "explained" if causes else "no_discrepancy" if left < real.WORTH else "unexplained"
+    explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
+    notes = (*notes, *found.notes, *made.left, *more)
+    return Weighed(causes, verdict, notes, explanations, text, extended, gain, held, fit, max(1.0 - powers[1] / powers[0], 0.0))
+
+
+def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:
+    """Causes, none where several parameters have left tolerances that the file states: that is another plant, and what else was found is
+    of that; and a note on it."""
+    off = [c.where for c in causes if c.kind == "wrong_parameter" and 0.0 < model.parameters[c.where].tolerance <= 1.0]
+    if len(off) < 2:
+        return causes, []
+    return (), [f"{', '.join(off)} would all have to be outside of their tolerances: another plant, or dynamics that the model does not have"]

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Evidence by innovations: the filter, the observer in the batch, held-out blocks, and whole searches on rigs whose data come from an
+integrator of this file."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy import linalg, stats
+
+import penode_gen
+from penode_sil.batch import Batch, Observer
+from penode_sil.diagnosis import driven, plant, real, weighed
+from penode_sil.diagnosis.catalogue import FILES, drives
+from penode_sil.diagnosis.catalogue.form import Motion, Moved
+from penode_sil.diagnosis.evidence import blocks
+from penode_sil.diagnosis.evidence.bench import stated
+from penode_sil.diagnosis.evidence.gain import Gains, Level, riccati
+from penode_sil.diagnosis.evidence.observer import Record, dressed, shown
+from penode_sil.diagnosis.study import begin
+from penode_sil.measured import load
+
+SWING = """
+[model]
+name = "swing"
+sample_time = "4 ms"
+[parameters]
+J = {{ value = 0.01, unit = "kg*m^2", exact = true }}
+k = {{ value = {k}, unit = "N*m/rad"{tolerance} }}
+d = {{ value = 0.004, unit = "N*m*s/rad"{tolerance} }}
+[inputs]
+tau = {{ unit = "N*m" }}
+[bodies]
+arm = {{ inertia = "J", position = "phi", velocity = "omega" }}
+[elements]
+spring = {{ between = ["arm", "ground"], law = "linear_spring", stiffness = "k" }}
+bearing = {{ between = ["arm", "ground"], law = "linear_damper", damping = "d" }}
+motor = {{ between = ["arm", "ground"], law = "expression", force = "-tau" }}
+[outputs]
+phi = {{ value = "phi", unit = "rad" }}
+[sensors]
+phi = {{ value = "phi", unit = "rad", noise = 1e-4 }}
+"""
+
+
+def swing(folder, torque, seed=1, k=0.64, tolerance=", tolerance = 0.05", seconds=24.0):
+    """A model file and a recording of a driven arm with J = 0.01, k = 0.64, d = 0.004 on which torque(phi, omega) acts as well."""
+    h, n = 0.004, int(seconds / 0.004)
+    rng = np.random.default_rng(seed)
+    drive = np.cumsum(rng.standard_normal(n // 25 + 2))
+    drive = np.interp(np.arange(n + 1) / 25.0, np.arange(len(drive)), drive - np.linspace(0.0, drive[-1], len(drive)))
+    drive *= 0.25 / np.std(drive)
+    x, seen = np.zeros(2), []
+    fine = 4
+    for i in range(n):
+        seen.append(x[0])
+        for j in range(fine):
+            def rate(y, share):
+                tau = drive[i] + (drive[i + 1] - drive[i]) * (j + share) / fine
+                return np.array([y[1], (tau - 0.64 * y[0] - 0.004 * y[1] - torque(y[0], y[1])) / 0.01])
+
+            s = h / fine
+            a = rate(x, 0.0)
+            b = rate(x + 0.5 * s * a, 0.5)
+            c = rate(x + 0.5 * s * b, 0.5)
+            x = x + s / 6.0 * (a + 2.0 * b + 2.0 * c + rate(x + s * c, 1.0))
+    rows = np.column_stack([np.arange(n) * h, drive[:n], np.array(seen) + 1e-4 * rng.standard_normal(n)])
+    (folder / "model.toml").write_text(SWING.format(k=k, tolerance=tolerance))
+    np.savetxt(folder / "train_1.csv", rows, delimiter=",", header="time [s],tau [N*m],phi [rad]", comments="", fmt="%.9g")
+    model = penode_gen.load(folder / "model.toml")
+    return model, [driven.experiment(m, model) for m in load([folder / "train_1.csv"], model)]
+
+
+def answered(model, experiments):
+    places = plant.places(model)
+    fastest = plant.linearise(model, places, np.array([model.start]), experiments[0].u[:1]).fastest
+    return real.answer(model, places, experiments, fastest, "default", lambda text: None)
+
+
+def test_steady_gain_is_that_of_the_recursion():
+    """The gain by doubling against 4000 steps of the covariance recursion, where its slowest mode, 0.98 a step, has died out to 1e-35.
+    Both add up in double; their condition, 1e4 here, leaves 1e-11."""
+    rng = np.random.default_rng(3)
+    f = rng.standard_normal((4, 4))
+    f *= 0.98 / np.max(np.abs(np.linalg.eigvals(f)))
+    h = rng.standard_normal((2, 4))
+    root = rng.standard_normal((6, 6))
+    joint = root @ root.T
+    q, s, r = joint[:4, :4], joint[:4, 4:], joint[4:, 4:]
+    k = riccati(f, h, q, s, r)
+    p = q.copy()
+    for _ in range(4000):
+        v = h @ p @ h.T + r
+        gain = (f @ p @ h.T + s) @ np.linalg.inv(v)
+        p = f @ p @ f.T - gain @ v @ gain.T + q
+    forgetting = 2e-6 * 50.0  # FORGETS moves f by 1e-6, and a mode of 0.98 adds that up 50 times
+    assert np.max(np.abs(k - gain)) < (1e-9 + forgetting) * np.max(np.abs(gain))
+    assert np.max(np.abs(np.linalg.eigvals(f - k @ h))) < 1.0
+
+
+def test_filter_predicts_a_mean_over_samples():
+    """One state that stays (a = 0) under a wandering rate, seen by means over 8 samples: the closed loop, run sample by sample in
+    Python, is stable, and its innovations are white: their correlation from one to the next is within 4/sqrt(n) of zero."""
+    dt, samples, tau = 0.01, 8, 0.02
+    a, c = np.array([[0.0, 1.0], [0.0, -1.0 / tau]]), np.array([[1.0, 0.0]])
+    gains = Gains(("x", "wander0_f"), ("x", "wander0_f"), a, np.zeros((2, 0)), c, np.zeros((1, 0)), np.zeros(0), np.array([1.0]), np.array([0.01]), samples * dt, samples)
+    k = gains.at(Level(0.5, tau)).gain
+    step = linalg.expm(a * dt)
+    keep = math.exp(-dt / tau)
+    rng = np.random.default_rng(5)
+    truth, follows, nus = np.zeros(2), np.zeros(2), []
+    for _ in range(4000):
+        beyond = 0.0
+        for _ in range(samples):
+            # the exact sampled process: the force is held by its own step, the state integrates it
+            noise = np.linalg.cholesky(_intensity(tau, dt, 2.0 * 0.25 / tau)) @ rng.standard_normal(2)
+            truth, follows = step @ truth + noise, step @ follows
+            beyond += (truth[0] + 0.01 * rng.standard_normal() - follows[0]) / samples
+        follows = follows + k[:, 0] * beyond
+        nus.append(beyond)
+    nu = np.array(nus[100:])
+    assert keep < 1.0 and np.isfinite(nu).all()
+    assert abs(np.corrcoef(nu[1:], nu[:-1])[0, 1]) < 4.0 / math.sqrt(len(nu))
+
+
+def _intensity(tau, dt, q):
+    """Covariance of [x, w] over a step dt for w' = -w/tau + white noise of intensity q, x' = w, in closed form."""
+    e = math.exp(-dt / tau)
+    ww = q * tau / 2.0 * (1.0 - e * e)
+    xw = q * tau**2 / 2.0 * (1.0 - e) ** 2
+    xx = q * tau**2 * (dt - 2.0 * tau * (1.0 - e) + tau / 2.0 * (1.0 - e * e))
+    return np.array([[xx, xw], [xw, ww]])
+
+
+def test_observer_moves_states_by_the_mean_innovation(tmp_path):
+    """The batch with an observer against the same in Python, sample by sample, with the batch for one sample at a time."""
+    model, (e,) = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
+    batch = Batch(model)
+    gain = np.array([[0.3], [2.0]])
+    y = np.array(e.y)
+    y[5] = np.nan
+    whole = batch.run(e.u, observer=Observer(4, y, gain), states=model.states)
+    x = np.zeros(2)
+    plain = batch.run(e.u[:4], states=model.states)
+    assert np.array_equal(whole.z[0, :4], plain.z[0])
+    nu = np.nanmean(y[:4] - plain.z[0], axis=0)
+    x = plain.x[0, -1] + gain @ nu
+    after = batch.run(e.u[3:8], x0=x, states=model.states)  # its first sample is the start itself
+    assert np.max(np.abs(whole.z[0, 4:8] - after.z[0, 1:])) < 1e-15
+    nu = np.nanmean(y[4:8] - after.z[0, 1:], axis=0)  # one of these was not measured
+    again = batch.run(e.u[7:9], x0=after.x[0, -1] + gain @ nu, states=model.states)
+    assert np.max(np.abs(whole.x[0, 8] - again.x[0, 1])) < 1e-14  # rounding of a mean of four, and of one step
+
+
+def test_width_of_a_students_t():
+    """Of 20 000 draws with 4 degrees of freedom and a width of 2: Fisher's information of log width is n (1/2) 4/7, so that its deviation
+    is 0.013; five of these."""
+    x = 2.0 * stats.t(4).rvs(20000, random_state=7)
+    assert abs(math.log(blocks.spread(x, 0.0) / 4.0)) < 2 * 5 * 0.5 * 0.0265
+
+
+def test_posterior_spreads_where_blocks_disagree():
+    """One that is first in all blocks is sure; two that share them are not."""
+    assert blocks.posterior([np.array([9.0, 9, 9, 9]), np.zeros(4)])[0] == 1.0
+    shared = blocks.posterior([np.array([5.0, 5, 0, 0]), np.array([0.0, 0, 5, 5])])
+    assert 0.4 < shared[0] < 0.6  # by symmetry a half; 4000 draws deviate by 0.008
+
+
+def test_forms_are_linear_in_their_gains(tmp_path):
+    """Every form of every file of the catalogue gives finite forces, that are not all zero, along a motion with stops and reversals."""
+    model, _ = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
+    t = np.arange(4000) * 0.004
+    s = 0.4 * np.sin(3.0 * t) + 0.1 * np.sin(11.0 * t)
+    motion = Motion.of([Moved(s, np.gradient(s, t), t)], 1.0)
+    kinds = set()
+    for role, ends in (("force", ("arm", "ground")), ("body", ("arm", "ground")), ("tyre", ("arm", "z_road"))):
+        place = plant.Place(ends, (("spring", 1),) if role != "body" else (), role)
+        for file in FILES:
+            for form in file.forms(model, 0, place, motion):
+                kinds.add(form.kind)
+                for part in form.parts:
+                    force = part.along(motion.parts[0])
+                    assert force.shape == t.shape and np.isfinite(force).all() and np.any(force != 0.0), form
+    assert kinds == {k for file in FILES for k in file.KINDS}
+    assert {f.kind for f in drives.inputs(model, 1)} | {f.kind for f in drives.sensors(model, 1)} == set(drives.KINDS)
+
+
+def test_nothing_wanders_where_nothing_is_missing(tmp_path):
+    """Made-up data of the model itself: a free run is the likeliest observer, and sensor noise alone may judge."""
+    model, experiments = swing(tmp_path, lambda s, v: 0.0)
+    study, _ = begin(stated(model), experiments)
+    assert not weighed.missed(study, study.null)
+
+
+def test_sensor_noise_does_not_judge_what_is_bent_everywhere(tmp_path):
+    model, experiments = swing(tmp_path, lambda s, v: 0.03 * 0.64 * 0.3 * math.sin(9.0 * s) + 0.0005 * math.sin(40.0 * v))
+    study, _ = begin(stated(model), experiments)
+    assert weighed.missed(study, study.null)
+
+
+BENT = 0.03 * 0.64 * 0.5  # a spring of waves, 3 % of what acts: no law of the catalogue
+
+
+@pytest.mark.parametrize("seed", (1, 2))
+def test_friction_in_a_wrong_world(tmp_path, seed, show):
+    """Coulomb friction of 0.06 N*m beside a spring that is bent in waves: one name, and its size within its interval widened by what the
+    waves may take of it (their rms, 0.007 N*m)."""
+    model, experiments = swing(tmp_path, lambda s, v: 0.06 * math.tanh(v / 0.01) + BENT * math.sin(11.0 * s), seed)
+    found = answered(model, experiments)
+    show([(c.kind, {k: (v.value, v.ci95) for k, v in c.parameters.items()}) for c in found.causes])
+    assert [c.kind for c in found.causes] == ["coulomb_friction"]
+    low, high = found.causes[0].parameters["force"].ci95
+    assert low - 0.007 < 0.06 < high + 0.007
+
+
+def test_small_deviations_have_no_name(tmp_path):
+    model, experiments = swing(tmp_path, lambda s, v: BENT * math.sin(11.0 * s), 3)
+    assert answered(model, experiments).causes == ()
+
+
+def test_parameter_without_a_tolerance(tmp_path, penode):
+    """A stiffness that is 12 % off in a file without tolerances: the parameter is named, and no spring of another form."""
+    swing(tmp_path, lambda s, v: 0.0, 4, k=0.64 / 1.12, tolerance="")
+    penode("diagnose", tmp_path / "model.toml", "--data", tmp_path / "train_1.csv", "-o", tmp_path / "out")
+    causes = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["causes"]
+    assert [(c["kind"], list(c["parameters"])) for c in causes] == [("wrong_parameter", ["k"])]
+    value = causes[0]["parameters"]["k"]
+    assert value["ci95"][0] < 0.64 < value["ci95"][1]
+
+
+def test_noise_of_a_sample_is_what_neighbours_show():
+    """White noise of 0.01 on a slow motion, stated as 0.5: 6000 second differences deviate by 1.3 % of it; five of these."""
+    rng = np.random.default_rng(2)
+    y = np.sin(np.arange(6000) * 1e-3) + 0.01 * rng.standard_normal(6000)
+    assert abs(shown([Record("r", 1e-3, np.zeros((6000, 0)), y[:, None])], np.array([0.5]))[0] / 0.01 - 1.0) < 0.065
+
+
+def test_dressed_model_is_the_model(tmp_path):
+    """With biases of 0, scales of 1 and nothing that wanders, to the bit."""
+    model, (e,) = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
+    assert np.array_equal(Batch(model).run(e.u).z, Batch(dressed(model, plant.places(model))).run(e.u).z)
