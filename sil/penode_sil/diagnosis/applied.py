@@ -16,6 +16,7 @@ from .evidence.bench import Bench
 from .evidence.fit import Fit
 from .evidence.observer import bias, scale
 from .extension import extends, table, toml, unlike
+from .plant import extend
 from .propose import Term
 
 
@@ -52,7 +53,9 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
             ]  # fmt: skip
             elements.append(f"{named(name)} = {table(_element(own, named))}")
     driven, left = _driven(model, fit, terms)
-    sensors = [_sensor(model, j, bench, values, offsets, parameters, named) for j in range(len(model.sensors))]
+    own = [(e, bench.places[t.form.index]) for t in forms for e in bench.model.elements if e.name in t.elements]
+    grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
+    sensors = [_sensor(model, j, named(grown.sensors[j].expression), values, offsets, parameters) for j in range(len(model.sensors))]
     units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
     outputs = [f"{s.name} = {table({**x, 'unit': units_of[s.name]})}" for s, x in zip(model.sensors, sensors) if x and s.name in units_of]
     learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
@@ -85,13 +88,11 @@ def _element(e: Element, named: Callable[[str], str]) -> dict[str, object]:
     return entry | {k: named(e.arguments[k]) for k in LAWS[e.law].arguments}
 
 
-def _sensor(model: Model, j: int, bench: Bench, values: dict[str, float], offsets: Collection[str], parameters: list[str], named: Callable[[str], str]) -> dict[str, object]:
+def _sensor(
+    model: Model, j: int, expression: str, values: dict[str, float], offsets: Collection[str], parameters: list[str]
+) -> dict[str, object]:
     """What a sensor that measures otherwise has as its value and unit; nothing for one that does not."""
     s, unit = model.sensors[j], units.si(model.sensors[j].unit)
-    wide = bench.model.sensors[j].expression
-    inner = named(wide[1 : wide.rindex(f")*{scale(s.name)}")])
-    inner = re.sub(r"\(F_(\w+) [-+] F_wander\d+\)", r"F_\1", inner)
-    expression = inner
     if scale(s.name) in values:
         parameters.append(f"gain_{s.name} = {table({'value': values[scale(s.name)], 'unit': '1'})}")
         expression = f"gain_{s.name}*({expression})"

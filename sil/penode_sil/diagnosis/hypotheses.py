@@ -240,7 +240,7 @@ def _force_laws(
                     lambda s, v, t: side * np.maximum(side * (s if what == "s" else v) - gap, 0.0), fixed=known if stated else {},
                 )  # fmt: skip
                 yield law(
-                    "network_extrapolation", f"k*{over}^2", ("k", f"{unit.replace('/m', '/m^2')}"), {} if stated else known, sign,
+                    "network_extrapolation", f"k*{over}^2", ("k", "N/m^2" if what == "s" else "N*s^2/m^2"), {} if stated else known, sign,
                     lambda s, v, t: np.maximum(side * (s if what == "s" else v) - gap, 0.0) ** 2, fixed=known if stated else {},
                 )  # fmt: skip
     # friction: odd, constant in rate, little or no deflection before it slides

@@ -23,6 +23,7 @@ from .study import Study
 
 Array = NDArray[np.float64]
 SURE = 2.0  # standard deviations of an offset that goes into the extended model
+WHOLE = 0.85  # share of the residual that causes take away where they explain it
 MISSED = 20.0  # log likelihood that a wandering force gains beside the best explanation by sensor noise alone
 WANDERS = 0.005  # and its least size: coloured noise of sensors, and a curve that stands for another one, make about that much
 
@@ -78,10 +79,19 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, study.null.simulated))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
-    verdict = "unexplained" if found.causes and not causes else "explained" if causes else "no_discrepancy" if left < real.WORTH else "unexplained"
+    share = max(1.0 - powers[1] / powers[0], 0.0)
+    verdict = _verdict(found, causes, share, left)
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
-    return Weighed(causes, verdict, notes, explanations, text, extended, gain, held, fit, max(1.0 - powers[1] / powers[0], 0.0))
+    return Weighed(causes, verdict, notes, explanations, text, extended, gain, held, fit, share)
+
+
+def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float) -> str:
+    """From what is named, the share of the residual that it takes in a free run, and the residual of the nominal model as a share of the
+    signal. Small deviations that have been found are what any model has."""
+    if causes:
+        return "explained" if share > WHOLE else "partly_explained"
+    return "no_discrepancy" if not found.causes and left < real.WORTH and found.found.terms else "unexplained"
 
 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:

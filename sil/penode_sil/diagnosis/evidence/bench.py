@@ -124,6 +124,8 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
         rates = np.concatenate([s[:, n_q : 2 * n_q] for s in x])
         slopes = np.concatenate([np.gradient(smooth(s[:, n_q : 2 * n_q], bench.update), bench.step, axis=0) for s in x])
         v, a = (np.sqrt(np.mean(r**2, axis=0)) for r in (rates, slopes))
+        if not (np.isfinite(v).all() and np.isfinite(a).all()):  # it does not follow: what was guessed has to do
+            return replace(bench, forces=scale), [np.where(np.abs(s) < np.inf, s, 0.0) for s in x]
         period = float(np.min(2.0 * np.pi * v / np.maximum(a, 1e-300)))
         update = int(np.clip(round(period / UPDATES / bench.step), 1, max(len(r) for r in bench.records) // 40 or 1))
         bench = replace(bench, forces=np.maximum(a, 1e-12), update=update)

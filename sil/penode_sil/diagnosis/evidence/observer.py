@@ -211,7 +211,7 @@ class Follower:
             else:
                 u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
                 u[:, :, f.target[1]] = driven(f.target[0], u[:, :, f.target[1]], values, record.step)
-        return start, parameters, u, y
+        return np.clip(np.nan_to_num(start), -LOST, LOST), parameters, u, y
 
 
 def earlier(y: Array, samples: Array) -> Array:
