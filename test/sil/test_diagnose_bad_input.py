@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples import sample
 from scipy.signal import StateSpace, lsim
 
-from samples import sample
 from penode_sil.cli import main
 from penode_sil.diagnosis.plausible import mixed, off_by
 

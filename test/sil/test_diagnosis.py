@@ -11,12 +11,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from curves import curve
+from samples import sample
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter, lsim
 
 import penode_gen
-from samples import sample
 from penode_sil import diagnosis
 from penode_sil.diagnosis import build, dropouts, echo, extension, hypotheses, naming, noise, plant, score, search, steady, study
 from penode_sil.diagnosis.build import Term
@@ -65,29 +66,15 @@ def road(seed: int) -> np.ndarray:
     return 0.006 * z / np.std(z) * np.minimum(np.arange(SAMPLES) * STEP, 1.0) ** 2
 
 
-def curve(z: np.ndarray):
-    """The cubic spline through a road, for one time after the other: SciPy's own object takes ten times as long for one."""
-    pieces = CubicSpline(np.arange(SAMPLES) * STEP, z).c.T.tolist()
-
-    def at(time: float) -> float:
-        i = min(max(int(time / STEP), 0), len(pieces) - 1)
-        x, (a, b, c, d) = time - i * STEP, pieces[i]
-        return ((a * x + b) * x + c) * x + d
-
-    return at
-
-
 def drive(z: np.ndarray, force, mass: float = M_B, load: float = 0.0, stiffer: float = 0.0) -> dict[str, np.ndarray]:
     """Sensors without noise of a quarter vehicle with an extra force(s, v) in its suspension and a load on its body, by SciPy. Within
     half a second in the middle its spring gets stiffer, by a share."""
-    t = np.arange(SAMPLES) * STEP
-    height, middle = curve(z), 0.5 * STEP * (SAMPLES - 1)
+    t, height, middle = np.arange(SAMPLES) * STEP, curve(z, STEP), 0.5 * STEP * (SAMPLES - 1)
 
     def rates(time: float, x: np.ndarray) -> list[float]:
         z_b, z_w, v_b, v_w = x.tolist()  # plain numbers: quicker than NumPy's
         s, v = z_b - z_w, v_b - v_w
-        raised = 1.0 + stiffer * min(max((time - middle) / 0.5, 0.0), 1.0)
-        pull = C * raised * s + D * v + force(s, v)
+        pull = C * (1.0 + stiffer * min(max((time - middle) / 0.5, 0.0), 1.0)) * s + D * v + force(s, v)
         return [v_b, v_w, (load - pull) / mass, (pull - C_T * (z_w - height(time))) / M_W]
 
     x = solve_ivp(rates, (0.0, t[-1]), np.zeros(4), method="RK45", rtol=1e-7, atol=1e-10, max_step=STEP, t_eval=t).y
@@ -826,8 +813,7 @@ def test_two_bends_of_a_sensor_are_one_cube_in_the_file(model, sound):
     assert eval(sensor, {"z_b": y, "z_w": 0.0, "curve_deflection": curve}) - y == pytest.approx(want, rel=1e-5)
 
 
-SHARE = np.linspace(0.0, 1.0, SAMPLES)
-LATE = 12e-3  # s
+SHARE, LATE = np.linspace(0.0, 1.0, SAMPLES), 12e-3  # s
 FAULTS = {  # sensor, what it shows, and its kind
     "late": ("a_body", lambda y: CubicSpline(SHARE, y)(np.maximum(SHARE - LATE / (STEP * (SAMPLES - 1)), 0.0)), "sensor_delay"),
     "a little late": ("a_body", lambda y: CubicSpline(SHARE, y)(np.maximum(SHARE - 0.08 * LATE / (STEP * (SAMPLES - 1)), 0.0)), "sensor_delay"),

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples import sample
 
 import penode_gen
-from samples import sample
 
 BENCH = Path(__file__).resolve().parents[1] / "bench"
 sys.path.insert(0, str(BENCH))
