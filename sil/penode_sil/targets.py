@@ -305,24 +305,16 @@ def build_firmware(model: Any, machine: str, source: Path | None = None, optimis
     program, board = ROOT / "sil" / "firmware" / "pil.c", MACHINES[machine]
     port = ROOT / "port" / "host" / "board.c"
     sets = ",".join(f"&{model.name}_set_{name}" for name in model.sets)
-    command = [
-        *(
-            [str(PORT / "cc"), board]
-            if board
-            else ["gcc", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/sil/firmware"]
-        ),
-        *FLAGS,
-        optimise,
-        *model_options(model),
-        f"-DMODEL_SETS={sets}",
-        f"-I{source}",
-        *map(str, [program, *code, *runtime, *([] if board else [port])]),
-    ]
     compiler = "arm-none-eabi-gcc" if board else "gcc"
     if shutil.which(compiler) is None:
         raise UserError(f"{compiler}: this compiler is not installed; install it (make test does)")
-    read = [_version(compiler), program, *code, source / f"{model.name}.h", *runtime, *_included()]
-    return _kept(f"{model.name}-{machine}", ".elf", command, read)
+    own = ["gcc", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/sil/firmware"]
+    options = [*([str(PORT / "cc"), board] if board else own), *FLAGS, optimise]
+    read = [_version(compiler), *runtime, *_included()]
+    same = _kept(f"runtime-{machine}", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], read)  # for every model
+    files = [program, *code, same, *([] if board else [port])]
+    command = [*options, *model_options(model), f"-DMODEL_SETS={sets}", f"-I{source}", *map(str, files)]
+    return _kept(f"{model.name}-{machine}", ".elf", command, [*read, program, *code, source / f"{model.name}.h", same])
 
 
 def build_object(model: Any, machine: str, name: str) -> Path:

@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -36,14 +37,22 @@ COMPILERS = [c for c in ("gcc", "clang-19") if shutil.which(c)]
 METHODS, INPUTS, OUTSIDE, SUBSTEPS = ("euler", "heun", "rk4", "ros1", "ros2"), ("held", "linear"), ("extrapolate", "clamp", "fade"), (1, 3)
 
 
-def complaints(folder: Path, name: str, reals: tuple[list[str], ...] = REALS) -> list[str]:
+TOOLCHAINS = list(itertools.product(COMPILERS, REALS))
+
+
+def complaints(folder: Path, name: str, toolchains: Sequence[tuple[str, list[str]]] = TOOLCHAINS) -> list[str]:
     """What the compilers say about the C of a model."""
     sources = sorted(map(str, folder.glob("*.c")))
     found = []
-    for compiler, real in itertools.product(COMPILERS, reals):
+    for compiler, real in toolchains:
         result = subprocess.run([compiler, *STRICT, *real, f"-I{folder}", *sources], capture_output=True, text=True)
         found += [f"{compiler} {real}: {result.stderr[:2000]}"] if result.returncode or result.stderr else []
     return found
+
+
+def in_turn(k: int) -> list[tuple[str, list[str]]]:
+    """One of the toolchains for model k, the next for the next one; all of them for `make python-long`."""
+    return TOOLCHAINS if "PENODE_LONG" in os.environ else [TOOLCHAINS[k % len(TOOLCHAINS)]]
 
 
 # -- bytes ------------------------------------------------------------------------------------------------------------
@@ -120,7 +129,8 @@ def test_folded_lines_say_the_same(line):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_no_warnings(tmp_path, method):
-    """All policies, inputs and substeps, in float and double, by every compiler that is installed."""
+    """All policies, inputs and substeps. Of one method each takes its turn in float and double, by every compiler that is installed; the
+    next method begins with the next of these."""
     assert COMPILERS
     folders = []
     curved = [("parabola", "clamp", 1), ("parabola", "fade", 3), ("cubic", "clamp", 3)]
@@ -128,8 +138,9 @@ def test_no_warnings(tmp_path, method):
         model = penode_gen.load(models.rich(tmp_path, method, input=input, outside=outside, substeps=substeps))
         folders.append(tmp_path / f"{input}_{outside}_{substeps}")
         penode_gen.generate(model, folders[-1])
+    turn = METHODS.index(method)
     with ThreadPoolExecutor(2) as pool:
-        assert not [c for found in pool.map(lambda f: complaints(f, "rich"), folders) for c in found]
+        assert not [c for found in pool.map(lambda k: complaints(folders[k], "rich", in_turn(turn + k)), range(len(folders))) for c in found]
 
 
 SPARSE = {
@@ -183,7 +194,7 @@ n = "n.json"
         folders.append(tmp_path / f"{name} {input}".replace(" ", "_"))
         penode_gen.generate(penode_gen.load(path), folders[-1])
     with ThreadPoolExecutor(2) as pool:
-        assert not [c for found in pool.map(lambda f: complaints(f, "sparse", REALS[:1]), folders) for c in found]
+        assert not [c for found in pool.map(lambda f: complaints(f, "sparse", [(compiler, []) for compiler in COMPILERS]), folders) for c in found]
 
 
 def test_another_abi_is_refused_at_compile_time(tmp_path, monkeypatch):

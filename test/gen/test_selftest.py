@@ -38,18 +38,26 @@ RICH = [
 ]
 
 
+RUNTIME = [path for path in sorted((ROOT / "src").glob("*.c")) if not path.stem.startswith("pen_xcp")]  # which no self-test calls
+
+
 @cache
-def runtime(*options: str) -> Path:
-    """The runtime's objects as one, made once."""
+def runtime(*options: str, but: str = "") -> Path:
+    """The runtime's objects as one, made once; but for one file."""
     made = Path(tempfile.mkdtemp()) / "runtime.o"
-    subprocess.run(["gcc", *options, "-r", "-nostdlib", "-o", made, *sorted((ROOT / "src").glob("*.c"))], check=True)
+    subprocess.run(["gcc", *options, "-r", "-nostdlib", "-o", made, *(path for path in RUNTIME if path.name != but)], check=True)
     return made
 
 
-def build(folder: Path, *flags: str, model: Path = NQVM, name: str = "nqvm", source: Path = ROOT) -> ctypes.CDLL:
-    """A model's C, its self-test and the runtime as a library; -O0 compiles fastest, and -ffp-contract=off comes first."""
+def build(folder: Path, *flags: str, model: Path = NQVM, name: str = "nqvm", changed: Path | None = None) -> ctypes.CDLL:
+    """A model's C, its self-test and the runtime as a library; -O0 compiles fastest, and -ffp-contract=off comes first. `changed`: a
+    file that takes the place of one of src/, or a folder that takes that of all sources."""
+    source = changed if changed and changed.is_dir() else ROOT
     options = ["-std=c99", "-O0", "-ffp-contract=off", *flags, f"-I{source}/inc", f"-I{ROOT}/port/gnu", "-fPIC"]
-    others = [runtime(*options)] if source == ROOT else sorted((source / "src").glob("*.c"))
+    if source == ROOT:
+        others = [runtime(*options, but=changed.name), changed] if changed else [runtime(*options)]
+    else:
+        others = [source / "src" / path.name for path in RUNTIME]
     files = [model / f"{name}{end}.c" for end in ("", "_params", "_selftest")]
     library = folder / f"{name}{len(list(folder.glob('*.so')))}.so"
     subprocess.run(["gcc", *options, f"-I{model}", "-shared", "-o", library, *files, *others], check=True)
@@ -134,7 +142,7 @@ def test_networks_of_every_shape(tmp_path, short):
 @pytest.mark.parametrize("compiler", ["gcc", "clang-19"])
 def test_committed_models(tmp_path, compiler):
     """At every optimisation, in float and in double."""
-    files = [*sorted((ROOT / "src").glob("*.c")), *sorted(NQVM.glob("*.c"))]
+    files = [*RUNTIME, *sorted(NQVM.glob("*.c"))]
     for level, (real, flags) in zip(("-O1", "-O2", "-O3"), [*REALS.items(), *REALS.items()]):
         options = ["-std=c99", level, *flags, "-ffp-contract=off", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{NQVM}", "-shared", "-fPIC"]
         subprocess.run([compiler, *options, "-o", tmp_path / f"{level}.so", *files], check=True)
@@ -221,7 +229,8 @@ def test_a_changed_build_is_reported(tmp_path, fault):
         other = text[:-2] + str((int(text[-2]) + 5) % 10) + "F"
     assert text in before
     path.write_text(before.replace(text, other, 1))
-    assert found(build(tmp_path, "-O2", model=model, source=source)) == flags
+    changed = {"src": path, "inc": source, "model": None}[path.relative_to(source).parts[0]]
+    assert found(build(tmp_path, "-O2", model=model, changed=changed)) == flags
 
 
 @pytest.mark.parametrize("real", REALS, ids=["float", "double"])
@@ -244,7 +253,7 @@ def test_another_real_type_is_reported(tmp_path, real):
         }
     """)
     options = ["-std=c99", "-ffp-contract=off", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{NQVM}"]
-    files = [*sorted((ROOT / "src").glob("*.c")), *(NQVM / f"nqvm{end}.c" for end in ("", "_params", "_selftest"))]
+    files = [*RUNTIME, *(NQVM / f"nqvm{end}.c" for end in ("", "_params", "_selftest"))]
     subprocess.run(["gcc", *options, *REALS[real], "-c", program, "-o", tmp_path / "caller.o"], check=True)
 
     def said(*library: str | Path) -> str:
@@ -277,7 +286,7 @@ def objects(folder: Path, machine: str, flags: list[str], source: Path = ROOT, m
     """A program that prints the flags of runtime and model, compiled for an emulated core in gcc's own dialect: object by name."""
     folder.mkdir()
     (folder / "main.c").write_text(MAIN)
-    files = [folder / "main.c", *sorted((source / "src").glob("*.c")), *(model / f"nqvm{end}.c" for end in ("", "_params", "_selftest"))]
+    files = [folder / "main.c", *(source / "src" / path.name for path in RUNTIME), *(model / f"nqvm{end}.c" for end in ("", "_params", "_selftest"))]
     command = [ROOT / "port" / "cortex-m" / "cc", MACHINES[machine], "-std=gnu17", "-O2", "-iquote", source / "inc", f"-I{model}", *flags, "-c"]
     subprocess.run([*command, *files], check=True, cwd=folder)
     return {path.stem: folder / f"{path.stem}.o" for path in files}

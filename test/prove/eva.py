@@ -41,6 +41,8 @@ PROMISED = {
 }
 OWNED = ("nqvm_sets.h", "nqvm_params.c")  # the sets of all others
 PARTS = ("all_layers", "elements", "elementary", "networks_of_16", "systems", "folding", "sets", "serial")
+# Parts in a file of their own.
+OF_FILE = {"trial": "promise.c", "promises": "promise.c"}
 
 OPTIONS = [
     *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write,octagon:pen_tuning_write_bytes,octagon:pen_serial_get_bytes,octagon:pen_serial_put_bytes,octagon:pen_fold", "-eva-octagon-through-calls"),
@@ -48,6 +50,8 @@ OPTIONS = [
     *("-warn-special-float", "none"),  # NaN and Inf are values
     *("-warn-unsigned-downcast", "-warn-signed-downcast", "-eva-no-show-progress", "-eva-msg-key=-final-states"),
 ]
+
+LIMIT = 1800  # seconds that an analysis may take
 
 
 @dataclass(frozen=True)
@@ -172,12 +176,14 @@ def analyse(run: Run, place: Path) -> Seen:
         words += [f"'{word}'" for word in told(run.model)]
         files += [place / "src" / f"{run.model}.c", place / "src" / f"{owner(run.model)}_params.c", HARNESS / "model.c"]
     else:
-        files += [HARNESS / "runtime.c"]
+        files += [HARNESS / OF_FILE.get(run.entry, "runtime.c")]
     # The limits of pen_math.c are volatile only to stop compilers; elsewhere a volatile read may give anything.
     split = [f"-cpp-extra-args-per-file={place}/src/pen_math.c:-Dvolatile="]
     last = ["-then", "-metrics", "-metrics-eva-cover"]
     machine = "ppc_32" if run.big_endian else "gcc_x86_32"  # 32 bits, as a Cortex-M
-    done = gate.run(["frama-c", "-machdep", machine, f"-cpp-extra-args={' '.join(words)}", *split, *files, "-main", run.entry, *OPTIONS, *last], limit=1800)
+    # Half an hour of processor time, however busy the machine is.
+    command = ["prlimit", f"--cpu={LIMIT}", "frama-c", "-machdep", machine, f"-cpp-extra-args={' '.join(words)}", *split, *files, "-main", run.entry, *OPTIONS, *last]
+    done = gate.run(command, limit=48 * LIMIT)
     text = done.stdout + done.stderr
     alarms = [f"{run}: {' '.join(m.split())}" for m in re.findall(r"^\[eva:alarm\] (.*\n(?:  .*\n)*)", text, re.M)]
     counted = re.search(r"^  (\d+) alarms? generated", text, re.M)
@@ -231,7 +237,7 @@ def main(only: Sequence[str]) -> int:
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
     models(WORK)
-    runs = [Run(None, part) for part in PARTS] + [Run(None, "networks_of_16", size_build=True), Run(None, "serial", big_endian=True)]
+    runs = [Run(None, part) for part in (*PARTS, *OF_FILE)] + [Run(None, "networks_of_16", size_build=True), Run(None, "serial", big_endian=True)]
     runs += [ORDER, *(Run(model, "corrupted") for model in MODELS)]
     good = True
     place = sources()

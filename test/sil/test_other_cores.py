@@ -33,11 +33,17 @@ def use(core, monkeypatch, folder):
     monkeypatch.setenv("SHIFT", "none")
 
 
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Where programs are built: the runtime of a core once for both models."""
+    return tmp_path_factory.mktemp("cores")
+
+
 @pytest.mark.parametrize("name", ["nqvm", "nqvm_folded"])
 @pytest.mark.parametrize("core", CORES)
-def test_the_steps_of_a_chirp_are_the_same(name, core, monkeypatch, tmp_path, show):
+def test_the_steps_of_a_chirp_are_the_same(name, core, monkeypatch, folder, show):
     """The layered model takes minutes: 1000 steps of it, and 20 000 folded ones on m0; 100 000 of all with PENODE_LONG=1."""
-    use(core, monkeypatch, tmp_path)
+    use(core, monkeypatch, folder)
     folded, every = name == "nqvm_folded", "PENODE_LONG" in os.environ
     steps = 100_000 if every or (folded and core != "m0") else 20_000 if folded else 1000
     nqvm, u = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml"), chirp(steps)
@@ -47,9 +53,9 @@ def test_the_steps_of_a_chirp_are_the_same(name, core, monkeypatch, tmp_path, sh
 
 
 @pytest.mark.parametrize("core", CORES)
-def test_every_call_has_the_same_answer(core, nqvm, monkeypatch, tmp_path):
+def test_every_call_has_the_same_answer(core, nqvm, monkeypatch, folder):
     """Sets that are written, refused, selected, rolled back; in a size build, where compilers like to call memcpy."""
-    use(core, monkeypatch, tmp_path)
+    use(core, monkeypatch, folder)
     u, calls = every_call(nqvm)
     sil, pil = targets.Sil(nqvm).run(u, calls), targets.Pil(nqvm, core, optimise="-Os").run(u, calls)
     assert [status for _, status in sil.calls] == [status for _, status in pil.calls]

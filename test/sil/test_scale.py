@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import ROOT
+from samples import sample
 
 import penode_gen
 from penode_sil.targets import Pil, Sil
@@ -73,17 +74,20 @@ def work(sizes: list[int]) -> tuple[int, int]:
     return sum(m * n for m, n in zip(sizes, sizes[1:])), sum(sizes[1:])
 
 
-def test_the_step_costs_its_multiply_adds_and_nothing_else(tmp_path, show):
+SIZES = [[1, 16, 16, 16, 1], [2, 64, 64, 1], [3, 128, 128, 1], [4, 256, 256, 1], [2, 32, 32, 32, 32, 32, 32, 1], [1, 4, 1], [6, 256, 1], [2, 20, 37, 1]]
+
+
+@pytest.mark.parametrize("sizes", sample(SIZES, [1, 16, 16, 16, 1], [4, 256, 256, 1], [1, 4, 1], [2, 20, 37, 1]), ids=lambda sizes: "-".join(map(str, sizes)))
+def test_the_step_costs_its_multiply_adds_and_nothing_else(tmp_path, sizes, show):
     """A multiply-add is a multiplication and an addition, 2 instructions, and a load: an instruction of its own, or 1/8 of
     one in the port's kernel for layers of 16; with 1/16 to 1/4 of a loop's overhead of about 8. A neuron is stored, loaded
     and rectified once. No layer, however wide, costs more than that."""
-    for sizes in ([1, 16, 16, 16, 1], [2, 64, 64, 1], [3, 128, 128, 1], [4, 256, 256, 1], [2, 32, 32, 32, 32, 32, 32, 1], [1, 4, 1], [6, 256, 1], [2, 20, 37, 1]):
-        model = wide(tmp_path / "-".join(map(str, sizes)), sizes)
-        products, neurons = work(sizes)
-        found = instructions(model)
-        show(f"{'-'.join(map(str, sizes))}: {products} multiply-adds, {found} instructions, {found / products:.2f} each")
-        blocks = sum(-(-n // 16) for n in sizes[1:])
-        assert 2 * products <= found <= 3.5 * products + 25 * neurons + 60 * blocks + 400
+    model = wide(tmp_path, sizes)
+    products, neurons = work(sizes)
+    found = instructions(model)
+    show(f"{'-'.join(map(str, sizes))}: {products} multiply-adds, {found} instructions, {found / products:.2f} each")
+    blocks = sum(-(-n // 16) for n in sizes[1:])
+    assert 2 * products <= found <= 3.5 * products + 25 * neurons + 60 * blocks + 400
 
 
 def test_code_does_not_grow_with_width(tmp_path):

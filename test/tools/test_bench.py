@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples import sample
 
 import penode_gen
 
@@ -112,10 +113,16 @@ def test_plugin_and_timer_count_the_same() -> None:
 CASES = [model("nqvm"), model("nqvm_folded"), *worst_case.everything()]
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-@pytest.mark.parametrize("machine", worst_case.FPU)
-def test_every_step_costs_the_same(machine: str, case: penode_gen.Model, show: Callable[[str], None]) -> None:
+KERNELS = [(machine, case.name) for machine in worst_case.FPU for case in CASES]
+# All models on one core; on each of the others the layered or the folded one, and a model of every law.
+SHORT = [*KERNELS[: len(CASES)], ("m7", "nqvm"), ("m7", "all_laws_rk4_clamp"), ("m33", "nqvm_folded"), ("m33", "all_laws_ros1_clamp"),
+         ("m55", "nqvm"), ("m55", "all_laws_ros1_fade")]  # fmt: skip
+
+
+@pytest.mark.parametrize("machine, name", sample(KERNELS, *SHORT))
+def test_every_step_costs_the_same(machine: str, name: str, show: Callable[[str], None]) -> None:
     """Some hundred hostile steps here, ten thousand in `make figures`. Adoption adds a few stores and barriers."""
+    case = next(case for case in CASES if case.name == name)
     for level in bench.LEVELS:
         found = worst_case.measure(case, machine, 400, (level,))
         count = {kind: calls["instructions"] for kind, calls in found.items() if kind != "commit"}
