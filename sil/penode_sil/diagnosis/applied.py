@@ -53,7 +53,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
             ]  # fmt: skip
             elements.append(f"{named(name)} = {table(_element(own, named))}")
     driven, left = _driven(model, fit, terms)
-    own = [(e, bench.places[t.form.index]) for t in forms for e in bench.model.elements if e.name in t.elements]
+    own = [(e, bench.places[t.form.index]) for t in forces for e in bench.model.elements if e.name in t.elements]
     grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
     sensors = [_sensor(model, j, named(grown.sensors[j].expression), values, offsets, parameters) for j in range(len(model.sensors))]
     units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity

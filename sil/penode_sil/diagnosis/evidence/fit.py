@@ -126,7 +126,8 @@ class Problem:
             for k, step in enumerate(steps):
                 there = put(fit.free, step)
                 costs.append(likelihood(nu[k], self.used(nu[k]), self.floor)[1] - 0.5 * sum(away(f) ** 2 for f in there))
-            best = int(np.nanargmax(costs))
+            costs = [c if np.isfinite(c) else -np.inf for c in costs]
+            best = int(np.argmax(costs))
             if not costs[best] > fit.cost + 1e-9:
                 break
             gained = costs[best] - fit.cost
