@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What a model file promises of a network as linear limits on its curve, kept by the margin that the certificate asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from penode_gen.model import Promises
+
+from .curve import Curve
+from .solve import NONE, Limits
+
+Array = NDArray[np.float64]
+FIRST = 1e-5  # margin that is tried first: of the largest slope or force
+
+
+def bound(promises: Promises, margin: float = FIRST, size: float = 0.0) -> Callable[[Curve], Limits]:
+    """Limits on the free values of a curve. `margin` is relative to its own size, or to `size` [N] where that is more."""
+
+    def limits(curve: Curve) -> Limits:
+        wide = np.diff(curve.knots)
+        slopes = _free(curve, (np.eye(len(curve.knots))[1:] - np.eye(len(curve.knots))[:-1]) / wide[:, None])
+        values = _free(curve, np.eye(len(curve.knots)))
+        force = margin * max(float(np.max(np.abs(curve.values))), size)
+        by = margin * max(float(np.max(np.abs(np.diff(curve.values) / wide))), size / float(np.ptp(curve.knots)))
+        rows: list[Array] = []
+        least: list[Array] = []
+
+        def add(matrix: Array, low: Array | float) -> None:
+            rows.append(matrix)
+            least.append(np.broadcast_to(low, len(matrix)).astype(float))
+
+        if promises.increasing or promises.decreasing:
+            add(slopes if promises.increasing else -slopes, by)
+        if promises.max_slope is not None:
+            add(-slopes, by - promises.max_slope)
+            add(slopes, by - promises.max_slope)
+        if promises.max_force is not None:
+            add(-values, 16.0 * force - promises.max_force)
+            add(values, 16.0 * force - promises.max_force)
+        if promises.dissipative is not None:
+            away = curve.knots != 0.0
+            sign = np.sign(curve.knots[away])
+            gone = np.minimum(16.0 * force, np.abs(curve.knots[away]) * by) if promises.dissipative == 0.0 else 16.0 * force
+            add(sign[:, None] * values[away], gone - promises.dissipative)
+            add(slopes[[0, -1]], by)  # beyond the outermost knots it goes on
+        return Limits(np.vstack(rows), np.concatenate(least)) if rows else NONE
+
+    return limits
+
+
+def _free(curve: Curve, matrix: Array) -> Array:
+    """Columns of the free values."""
+    return np.delete(matrix, curve.zero, axis=1) if curve.zero >= 0 else matrix
+
+
+def flattened(promises: Promises, curve: Curve) -> Curve:
+    """With a largest force promised, a curve that stays flat outside of its knots: they get a neighbour of the same value."""
+    if promises.max_force is None:
+        return curve
+    ends = curve.knots[[0, -1]] * 1.05
+    knots = np.concatenate([ends[:1], curve.knots, ends[1:]])
+    values = np.concatenate([curve.values[:1], curve.values, curve.values[-1:]])
+    return Curve(knots, values, curve.zero + 1 if curve.zero >= 0 else -1)
