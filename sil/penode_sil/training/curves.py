@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from . import data
+from . import data, unknown
 from .curve import Curve, fewer, spaced, three
 from .problem import Point, Problem
 from .solve import NONE, Fit, Limits, solve
@@ -125,8 +125,10 @@ def lines(problem: Problem, shapes: Sequence[Curve], limits: Callable[[Point], L
     point = short.begin(shapes)
     for _ in range(3):  # measured by what lines leave, not by noise: or the priors would count for nothing
         short = renoised(short, point)
-        point = solve(short, point, 5, 20.0, limits, damping=1e-2).point
-    return problem.with_(noise=short.noise), point
+        fit = solve(short, point, 5, 20.0, limits, damping=1e-2)
+        point = fit.point
+    tied = unknown.invisible(short, fit)
+    return problem.with_(noise=short.noise, tied=tied), solve(short.with_(tied=tied), point, 2, 20.0, limits).point
 
 
 def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
@@ -148,7 +150,7 @@ def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callab
 
 def covariance(problem: Problem, fit: Fit) -> Array:
     """Of all unknowns, where a fit ended."""
-    curvature = fit.normal.curvature + problem.prior(fit.point)[0]
+    curvature = fit.normal.curvature + problem.with_(tied=None).prior(fit.point)[0]
     scale = 1.0 / np.sqrt(np.diag(curvature))
     scaled = curvature * np.outer(scale, scale) + 1e-13 * np.eye(len(scale))
     return np.linalg.inv(scaled) * np.outer(scale, scale)

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 HORIZON = 10.0  # [s] of each recording that weights see first
 GOOD = 1.1  # times the noise that a sensor states: a fit that leaves more is tried again from other weights
 TRIES = 3
+CLOSE = 3.0  # gain in chi2 that counts: weights of a network go on gaining little for long
 
 
 def straight(port: Port, inputs: int) -> Shape:
@@ -90,16 +91,16 @@ def _descend(problem: Problem, point: Point, limits: Callable[[Point], Limits], 
     short = problem.with_(records=tuple(r.first(samples) for r in problem.records))
     tell(0.0, "start states")
     point = solve(short.with_(frozen=True), point, 4, 1.0, damping=1e-3).point
-    for k, iterations in enumerate((10, 10, 15)):
+    for k, iterations in enumerate((8, 8, 10)):
         tell(0.1 + 0.15 * k, "weights on the first seconds")
         short = curves.renoised(short, point)
         point = solve(short, point, iterations, 5.0, limits, damping=1e-2).point
     whole = problem.with_(noise=short.noise)
-    for k, iterations in enumerate((6, 12)):
+    for k, iterations in enumerate((4, 8)):
         tell(0.6 + 0.15 * k, "weights on everything")
         whole = curves.renoised(whole, point)
-        fit = solve(whole, point, iterations, 1.0, limits, damping=1e-3)
+        fit = solve(whole, point, iterations, CLOSE, limits, damping=1e-3)
         point = fit.point
     whole = curves.renoised(whole, point)
     tell(0.95, "weights on everything")
-    return whole, solve(whole, point, 6, 1.0, limits, damping=fit.damping)
+    return whole, solve(whole, point, 6, CLOSE, limits, damping=fit.damping)

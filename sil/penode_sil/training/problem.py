@@ -15,6 +15,7 @@ from penode_gen.model import Model
 
 from .curve import Curve
 from .data import Noise, Record
+from .dense import Dense
 from .engine import Engine, Shape
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ LARGE = 30.0  # of the force scale: standard deviation of a value, so that what 
 DECAY = 3.0  # standard deviation of a weight of a network that is not a curve
 WIDE = 300  # columns from which on curvature is taken from every SPARSE-th sample
 SPARSE = 8
+TIED = 1e-4  # standard deviation along directions that no sensor sees, relative
 STARTS = {"m": 0.1, "rad": 0.3, "m/s": 1.0, "rad/s": 3.0}  # standard deviation of start states by unit; others 1 + 10 times their value
 
 
@@ -71,6 +73,7 @@ class Problem:
     scale: Array
     held: frozenset[str] = frozenset()
     frozen: bool = False  # only start states move
+    tied: Array | None = None  # [directions, free]: of the parameters, that no sensor sees; they stay where the model file has them
     model: Model = field(init=False)
 
     def __post_init__(self) -> None:
@@ -78,7 +81,7 @@ class Problem:
 
     def with_(self, **changes: object) -> Problem:
         """The same problem but for some of it."""
-        given = {k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen")}
+        given = {k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied")}
         return Problem(**(given | changes))  # type: ignore[arg-type]
 
     @property
@@ -156,8 +159,8 @@ class Problem:
                     one = one * (weight[rows, j] / self.noise.sigma[j])[:, None]
                     along += white[rows, j] @ one
                     if columns > WIDE:
-                        few = one[::SPARSE].astype(np.float32)
-                        part += (few.T @ few).astype(float) * (len(one) / len(few))
+                        few = one[::SPARSE]
+                        part += few.T @ few * (len(one) / len(few))
                     else:
                         part += one.T @ one
             curvature[np.ix_(own, own)] += part * np.outer(scale, scale)
@@ -176,7 +179,11 @@ class Problem:
         spread = [STARTS[u] for u in units] + [1.0 + 10.0 * abs(s.start) for s in self.model.extra_states]
         deviations += spread * len(self.records)
         origin += list(self.model.start) * len(self.records)
-        blocks = [np.diag(np.array(deviations) ** -2.0)] if deviations else []
+        first = np.diag(np.array(deviations) ** -2.0)
+        if self.tied is not None and len(self.tied):
+            n_f = len(self.engine.free)
+            first[:n_f, :n_f] += self.tied.T @ self.tied * TIED**-2.0
+        blocks = [first]
         for shape, size in zip(point.shapes, self.scale):
             blocks.append(self._of_shape(shape, size))
             origin += [0.0] * len(shape.theta)
@@ -187,13 +194,15 @@ class Problem:
             at += len(block)
         where = np.array(origin)
         if self.frozen:  # shapes stay where they are
-            first = len(deviations)
-            matrix[first:, first:] = np.diag(np.full(n - first, 1e18))
-            where[first:], where[: len(self.engine.free)] = point.vector[first:], point.vector[: len(self.engine.free)]
+            k = len(deviations)
+            matrix[k:, k:] = np.diag(np.full(n - k, 1e18))
+            where[k:], where[: len(self.engine.free)] = point.vector[k:], point.vector[: len(self.engine.free)]
         return matrix, where
 
     def _of_shape(self, shape: Shape, size: float) -> Array:
         """Precision of a shape's numbers."""
+        if isinstance(shape, Dense) and shape.activation == ("identity",):  # lines, in the units of the model
+            return np.diag(np.full(len(shape.theta), 1e-12))
         if not isinstance(shape, Curve):
             return np.diag(np.full(len(shape.theta), DECAY**-2.0))
         rows = shape.bends() / (BENT * size)

@@ -25,8 +25,8 @@ def bound(promises: Promises, margin: float = FIRST, size: float = 0.0) -> Calla
         wide = np.diff(curve.knots)
         slopes = _free(curve, (np.eye(len(curve.knots))[1:] - np.eye(len(curve.knots))[:-1]) / wide[:, None])
         values = _free(curve, np.eye(len(curve.knots)))
-        force = margin * max(float(np.max(np.abs(curve.values))), size)
-        by = margin * max(float(np.max(np.abs(np.diff(curve.values) / wide))), size / float(np.ptp(curve.knots)))
+        force = margin * min(max(float(np.max(np.abs(curve.values))), size), _or_far(promises.max_force))
+        by = margin * min(max(float(np.max(np.abs(np.diff(curve.values) / wide))), size / float(np.ptp(curve.knots))), _or_far(promises.max_slope))
         rows: list[Array] = []
         least: list[Array] = []
 
@@ -53,16 +53,10 @@ def bound(promises: Promises, margin: float = FIRST, size: float = 0.0) -> Calla
     return limits
 
 
+def _or_far(limit: float | None) -> float:
+    return np.inf if limit is None else limit
+
+
 def _free(curve: Curve, matrix: Array) -> Array:
     """Columns of the free values."""
     return np.delete(matrix, curve.zero, axis=1) if curve.zero >= 0 else matrix
-
-
-def flattened(promises: Promises, curve: Curve) -> Curve:
-    """With a largest force promised, a curve that stays flat outside of its knots: they get a neighbour of the same value."""
-    if promises.max_force is None:
-        return curve
-    ends = curve.knots[[0, -1]] * 1.05
-    knots = np.concatenate([ends[:1], curve.knots, ends[1:]])
-    values = np.concatenate([curve.values[:1], curve.values, curve.values[-1:]])
-    return Curve(knots, values, curve.zero + 1 if curve.zero >= 0 else -1)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
 
-from .problem import Normal, Point, Problem
+from .problem import WIDE, Normal, Point, Problem
 
 Array = NDArray[np.float64]
 CLOSE = 1.0  # gain in chi2 below which a step counts as none; twice in a row ends a fit
@@ -67,6 +67,8 @@ def least(curvature: Array, slope: Array, limits: Limits, at: Array) -> Array:
     target[-1] = 1.0
     multipliers, _ = nnls(stacked, target, maxiter=30 * stacked.shape[1])
     left = stacked @ multipliers - target
+    if not left[-1] < -1e-12:
+        raise RuntimeError("no step is within the limits")
     return scale * solve_triangular(root, free - left[:-1] * most / left[-1])
 
 
@@ -88,7 +90,8 @@ def solve(
         diagonal = np.diag(curvature)
         extra = np.maximum(diagonal, FLOOR * float(diagonal.max()))
         best, found, used = cost, None, 0.0
-        for d, share in ((0.0, 1.0), (0.0, 0.5), *((by * damping, 1.0) for by in (0.1, 1.0, 10.0, 1e2, 1e3, 1e5))):
+        full = ((0.0, 1.0), (0.0, 0.5)) if len(slope) <= WIDE else ()
+        for d, share in (*full, *((by * damping, 1.0) for by in (0.1, 1.0, 10.0, 1e2, 1e3, 1e5))):
             try:
                 step = least(curvature + np.diag(d * extra), slope, limits(point), point.vector)
             except (np.linalg.LinAlgError, RuntimeError):

@@ -116,8 +116,8 @@ def ports_of(model: Model, engine: Engine) -> list[Port]:
         elements = [e for e in model.elements if e.network == name]
         zero = port.promises.zero_at_zero or bool(elements and len(elements) == len(seen))
         knots = unfold.capacity(template) if zero else 0
-        if knots and port.promises.max_force is not None:
-            knots -= 2
+        if port.promises.max_force is not None and model.outside != "clamp":
+            raise UserError(f'{model.path}: network {name} promises max_force, which training keeps with outside = "clamp" only; choose that, or promise max_slope')
         if port.promises and not knots:
             raise UserError(f"{model.path}: network {name} makes promises, which hold for a ReLU network of one input with room for kinks; give it layers = [16, 16]")
         found.append(Port(name, tuple(seen), _is_rate(port), zero, max(knots, 0) if knots >= 3 else 0))
@@ -162,12 +162,14 @@ def written(
                 network = dense.network_of(shape, template, low, high)
                 break
             low, high = (np.array([v]) for v in _envelope(float(low[0]), float(high[0]), model.pieces > 0))
-            network = unfold.unfold(promised.flattened(given, shape), template, float(low[0]), float(high[0]))
+            network = unfold.unfold(shape, template, float(low[0]), float(high[0]))
             if not given or not promises.broken(given, network, model.outside == "clamp"):
                 break
             margin = promised.FIRST * TIGHTER ** (n + 1)
             bounds = [promised.bound(model.networks[p.name].promises, margin if p is port else promised.FIRST, 1.0) for p in ports]
             fit = solve(problem, fit.point, 2, 1.0, curves.limits_of(problem, bounds), damping=1e-6)
+        else:
+            raise UserError(f"{model.path}: network {port.name} cannot keep its promises by their margin: {promises.broken(given, network, model.outside == 'clamp')[0]}; relax them")
         found.append(network)
     return found, fit
 

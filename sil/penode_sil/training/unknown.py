@@ -6,17 +6,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .curve import Curve
-from .curves import Port
 from .problem import Problem
 from .solve import Fit
 
+if TYPE_CHECKING:
+    from .curves import Port
+
 Array = NDArray[np.float64]
 INVISIBLE = 0.5  # of its prior deviation: what data leave uncertain by more rests on the model file, not on the recordings
+NOTHING = 1e-2  # of what the model file says of a direction: what data say less of is not seen at all
 PART = 0.25  # of the largest: components of a direction that are named
 SPLIT = 0.01  # of a force's span: a constant that is known no better is reported
 
@@ -39,11 +43,29 @@ def find(problem: Problem, fit: Fit, ports: Sequence[Port], visited: Sequence[Ar
 
 def _parameters(problem: Problem, fit: Fit) -> list[Unknown]:
     """Directions of the parameters along which the data say less than the model file."""
+    names, values, vectors, deviation = _seen(problem, fit)
+    return [
+        _direction(problem, names, vector * deviation / np.sqrt(max(value, 0.0) + 1.0))
+        for value, vector in zip(values, vectors.T) if value < INVISIBLE**-2.0
+    ]  # fmt: skip
+
+
+def invisible(problem: Problem, fit: Fit) -> Array:
+    """Directions [., free] of the parameters, of length 1, along which no sensor changes at all."""
+    names, values, vectors, deviation = _seen(problem, fit)
+    found = np.zeros((int(np.sum(values < NOTHING)), len(problem.engine.free)))
+    for row, vector in zip(found, vectors.T[values < NOTHING]):
+        row[[problem.engine.free.index(n) for n in names]] = vector * deviation / np.linalg.norm(vector * deviation)
+    return found
+
+
+def _seen(problem: Problem, fit: Fit) -> tuple[list[str], Array, Array, Array]:
+    """Names of free parameters; eigenvalues and vectors of what data say of them, over what the model file says; its deviations."""
     names = [n for n in problem.engine.free if n not in problem.held]
     at = np.array([problem.engine.free.index(n) for n in names], dtype=int)
     if not len(at):
-        return []
-    prior, _ = problem.prior(fit.point)
+        return [], np.zeros(0), np.zeros((0, 0)), np.zeros(0)
+    prior, _ = problem.with_(tied=None).prior(fit.point)
     whole = fit.normal.curvature
     rest = np.setdiff1d(np.arange(len(whole)), at)
     inner = whole[np.ix_(rest, rest)] + prior[np.ix_(rest, rest)]
@@ -52,11 +74,7 @@ def _parameters(problem: Problem, fit: Fit) -> list[Unknown]:
     left = whole[np.ix_(at, at)] - across.T @ np.linalg.solve(inner * np.outer(scale, scale) + 1e-13 * np.eye(len(rest)), across)
     deviation = 1.0 / np.sqrt(np.diag(prior)[at])
     values, vectors = np.linalg.eigh((left + left.T) / 2.0 * np.outer(deviation, deviation))
-    found = []
-    for value, vector in zip(values, vectors.T):
-        if value < INVISIBLE**-2.0:
-            found.append(_direction(problem, names, vector * deviation / np.sqrt(max(value, 0.0) + 1.0)))
-    return found
+    return names, values, vectors, deviation
 
 
 def _direction(problem: Problem, names: Sequence[str], by: Array) -> Unknown:

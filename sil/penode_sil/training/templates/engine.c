@@ -96,7 +96,7 @@ static double forward(const net_t *net, const double *x, double *h)
                 sum += w[(o * n_in) + i] * h[i];
             }
             const int a = net->activation[l];
-            y[o] = (a == RELU) ? ((sum > 0.0) ? sum : 0.0) : (a == TANH) ? tanh(sum) : (a == SIGMOID) ? t_sigmoid(sum) : (a == SOFTPLUS) ? t_softplus(sum) : sum;
+            y[o] = (a == RELU) ? ((sum > 0.0) ? sum : 0.0) : (a == TANH) ? (1.0 - (2.0 / (exp(2.0 * sum) + 1.0))) : (a == SIGMOID) ? t_sigmoid(sum) : (a == SOFTPLUS) ? t_softplus(sum) : sum;
         }
         w = &b[n_out];
         h = y;
