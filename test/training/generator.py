@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import subprocess
+import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -112,3 +113,15 @@ def make(truth: Truth, seed: int, noise: float = 1.0, speed: float = 5.0, second
     random = np.random.default_rng([seed, 7])
     a_body, a_wheel = (shown[:, i] + noise * s * random.standard_normal(len(shown)) for i, s in enumerate(SIGMA))
     return Made(np.arange(n - lead) * 1e-3, height[rows], rate[rows], a_body, a_wheel, shown[:, 2], shown[:, 3])
+
+
+def main() -> None:
+    """The recordings of `make train`, into the folder named."""
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, seed in (("train", 1), ("holdout", 101)):
+        print(make(Truth(), seed).write(folder / f"{name}.csv"))
+
+
+if __name__ == "__main__":
+    main()

@@ -27,7 +27,7 @@ from .curves import Port, Tell
 from .dense import Dense
 from .engine import Engine
 from .problem import Problem
-from .result import Force, Trained
+from .result import Error, Force, Trained
 from .solve import Fit, solve
 
 Array = NDArray[np.float64]
@@ -211,10 +211,16 @@ def _judged(
     parameters = {n: (float(values[n]), sigma[n], model.parameters[n].value, model.parameters[n].unit) for n in sigma}
     found = Trained(
         model.name, tuple(forces), parameters, known, tuple(unknown.find(problem, fit, ports, visited)), training, holdout, outside, masked,
-        fit.ended and not loud, tuple(notes), problem.chi2(fit.point) / max(problem.samples, 1), spent, options.seed,
+        (fit.ended or _all_stated(model, training)) and not loud, tuple(notes), problem.chi2(fit.point) / max(problem.samples, 1), spent, options.seed,
         {m.path.name: hashlib.sha256(m.path.read_bytes()).hexdigest() for m in (*train_, *held)} | {model.path.name: model.digest}, _versions(),
     )  # fmt: skip
     return after, found
+
+
+def _all_stated(model: Model, training: Sequence[Error]) -> bool:
+    """Does every sensor that was recorded state its noise? Then a fit that came down to it has arrived, whatever it still gains."""
+    stated = {s.name for s in (*model.sensors, *model.outputs) if s.noise > 0.0}
+    return bool(training) and all(e.signal in stated for e in training)
 
 
 def _versions() -> dict[str, str]:
