@@ -21,8 +21,7 @@ from penode_sil.training.solve import Limits, least
 HERE = Path(__file__).parent
 
 
-@pytest.mark.parametrize("method", ["euler", "heun", "rk4"])
-@pytest.mark.parametrize("activation", ["tanh", "sigmoid", "softplus", "relu"])
+@pytest.mark.parametrize(("method", "activation"), [("euler", "tanh"), ("heun", "sigmoid"), ("rk4", "softplus"), ("rk4", "relu")])
 def test_sensitivities_are_those_of_the_discrete_step(method: str, activation: str) -> None:
     """Against central differences of the simulation: parameters, start states, weights; two networks, substeps, rates of the input."""
     model = replace(penode_gen.load(HERE / "quarter_two.toml"), method=method, substeps=2)
