@@ -5,13 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from . import data, unknown
 from .curve import Curve, fewer, spaced, three
+from .port import Port, inputs_of
 from .problem import Point, Problem
 from .solve import NONE, Fit, Limits, solve
 
@@ -21,23 +20,6 @@ SHORT = 8.0  # [s] of each recording that the straight lines are fitted to
 COARSE = 25  # knots of the first curves
 WIDER = 1.05  # of the visited range, that knots span
 POWERS = {"rate": 2.0, "place": 1.2}  # how dense knots are about 0: friction turns within millimetres a second
-
-
-@dataclass(frozen=True)
-class Port:
-    """A network to be trained: the columns of its inputs among those that the engine sees, whether they are rates, whether it is 0
-    at 0, and how many knots its shape holds (0: it is no curve)."""
-
-    name: str
-    seen: tuple[tuple[int, ...], ...]  # one tuple of columns for each call
-    rate: bool
-    zero: bool
-    knots: int
-
-
-def inputs_of(port: Port, seen: Sequence[Array]) -> Array:
-    """All that went into a network [n, inputs]."""
-    return np.concatenate([s[:, list(columns)] for s in seen for columns in port.seen])
 
 
 def grid(port: Port, low: float, high: float, count: int) -> Array:

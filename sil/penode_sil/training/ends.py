@@ -13,7 +13,8 @@ from penode_gen.networks import Network
 
 from . import curves
 from .curve import Curve, three
-from .curves import Port, Tell
+from .curves import Tell
+from .port import Port, inputs_of
 from .dense import Dense, like
 from .engine import Shape
 from .problem import Point, Problem
@@ -77,7 +78,7 @@ def _begin(problem: Problem, lines: Point, seen: Sequence[Array], ports: Sequenc
     """Random weights in place of the lines."""
     found: list[Shape] = []
     for k, (port, network, line) in enumerate(zip(ports, shapes, lines.shapes)):
-        x = curves.inputs_of(port, seen)
+        x = inputs_of(port, seen)
         if isinstance(line, Curve):
             found.append(curves.curve_on(port, line, seen, min(curves.COARSE, port.knots)))
         else:

@@ -15,7 +15,7 @@ from penode_gen.model import Model
 
 from ..batch import Batch
 from ..measured import Measured
-from .curves import Port, inputs_of
+from .port import Port, inputs_of
 from .data import Noise, Record
 from .problem import Point, Problem
 from .result import Error

@@ -23,7 +23,8 @@ from ..errors import UserError
 from ..measured import Measured
 from . import curves, data, dense, ends, judge, promised, unfold, unknown
 from .curve import Curve
-from .curves import Port, Tell
+from .curves import Tell
+from .port import Port
 from .dense import Dense
 from .engine import Engine
 from .problem import Problem

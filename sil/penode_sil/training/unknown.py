@@ -6,17 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .curve import Curve
+from .port import Port
 from .problem import Problem
 from .solve import Fit
-
-if TYPE_CHECKING:
-    from .curves import Port
 
 Array = NDArray[np.float64]
 INVISIBLE = 0.5  # of its prior deviation: what data leave uncertain by more rests on the model file, not on the recordings
