@@ -53,6 +53,15 @@ class Curve:
         found[np.arange(len(x)), i], found[np.arange(len(x)), i + 1] = 1.0 - t, t
         return np.delete(found, self.zero, axis=1) if self.zero >= 0 else found
 
+    def chord(self, x: Array) -> Array:
+        """How far a smooth curve may be from the straight piece at each x, as a standard deviation: its bend at the piece's ends, spread
+        over the piece, makes width * change of slope / 8 in the middle of it, of which a fit that goes through the middle leaves half."""
+        wide = np.diff(self.knots)
+        change = np.abs(np.diff(np.diff(self.values) / wide))
+        ends = np.concatenate([change[:1], change, change[-1:]]) if len(change) else np.zeros(2)
+        i = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(wide) - 1)
+        return wide[i] * 0.5 * (ends[i] + ends[i + 1]) / 16.0
+
     def on(self, knots: Array) -> Curve:
         """The same curve on other knots, as near as they allow."""
         zero = int(np.flatnonzero(knots == 0.0)[0]) if self.zero >= 0 else -1

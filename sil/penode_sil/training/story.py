@@ -238,7 +238,8 @@ def _force(model: Model, port: Port, shape: Curve | Dense, network: Network, x: 
         slopes = shape.hats(along) if isinstance(shape, Curve) else _slopes(shape, at)
         xs.append(along)
         ys.append(shape(along) if isinstance(shape, Curve) else shape(at))
-        sigmas.append(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, spread, slopes), 0.0)))
+        chord = shape.chord(along) if isinstance(shape, Curve) else 0.0
+        sigmas.append(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, spread, slopes), 0.0) + chord**2))
         count, edge = np.histogram(x[:, k], BINS)
         edges.append(edge)
         counts.append(count.astype(float))
