@@ -17,6 +17,7 @@ from penode_gen.untrained import untrained
 from penode_sil.training import curve, data, dense, drive, promised, story, unfold
 from penode_sil.training.engine import Engine
 from penode_sil.training.solve import Limits, least
+from penode_sil.training.settings import SETTINGS
 
 HERE = Path(__file__).parent
 
@@ -124,8 +125,8 @@ def test_limits_keep_promises_by_exact_arithmetic(given: Promises) -> None:
         values = random.normal(0.0, 300.0, count)
         values[zero] = 0.0
         wild = curve.Curve(knots, values, zero)
-        for n in range(story.TRIES):  # as `written` does
-            limits = promised.bound(given, promised.FIRST * story.TIGHTER**n)(wild)
+        for n in range(SETTINGS.story_tries):  # as `written` does
+            limits = promised.bound(given, SETTINGS.promised_first * SETTINGS.story_tighter**n)(wild)
             step = least(np.eye(wild.columns), np.zeros(wild.columns), limits, wild.theta)
             kept = wild.with_theta(wild.theta + step)
             if not promises.broken(given, unfold.unfold(kept, network, -1.0, 1.0), False):

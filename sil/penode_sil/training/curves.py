@@ -13,12 +13,10 @@ from .curve import Curve, fewer, spaced, three
 from .port import Port, inputs_of
 from .problem import Point, Problem
 from .solve import NONE, Fit, Limits, solve
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
 Tell = Callable[[float, str], None]
-SHORT = 8.0  # [s] of each recording that the straight lines are fitted to
-COARSE = 25  # knots of the first curves
-WIDER = 1.05  # of the visited range, that knots span
 POWERS = {"rate": 2.0, "place": 1.2}  # how dense knots are about 0: friction turns within millimetres a second
 
 
@@ -30,7 +28,7 @@ def grid(port: Port, low: float, high: float, count: int) -> Array:
 def curve_on(port: Port, before: Curve, seen: Sequence[Array], count: int) -> Curve:
     """The curve of before on new knots over the range that is visited now."""
     x = inputs_of(port, seen)[:, 0]
-    low, high = WIDER * min(float(x.min()), 0.0), WIDER * max(float(x.max()), 0.0)
+    low, high = SETTINGS.curves_wider * min(float(x.min()), 0.0), SETTINGS.curves_wider * max(float(x.max()), 0.0)
     reach = max(high, -low, 1e-12)
     return before.on(grid(port, min(low, -1e-3 * reach), max(high, 1e-3 * reach), count))
 
@@ -82,7 +80,7 @@ def train(problem: Problem, ports: Sequence[Port], bounds: Sequence[Callable[[Cu
     limits = limits_of(problem, bounds)
     tell(0.05, "straight lines")
     problem, point = lines(problem, [three(1.0, p.zero) for p in ports], limits)
-    for share, count, iterations in ((0.15, COARSE, 8), (0.35, COARSE, 4)):
+    for share, count, iterations in ((0.15, SETTINGS.curves_coarse, 8), (0.35, SETTINGS.curves_coarse, 4)):
         tell(share, f"curves of {count} knots")
         seen = seen_by(problem, point)
         problem = rescaled(problem, point, seen, ports)
@@ -102,7 +100,7 @@ def train(problem: Problem, ports: Sequence[Port], bounds: Sequence[Callable[[Cu
 
 def lines(problem: Problem, shapes: Sequence[Curve], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
     """Parameters, start states and two slopes of each network from the first seconds: everything later leans on it."""
-    samples = max(int(SHORT / problem.model.sample_time), 100)
+    samples = max(int(SETTINGS.curves_short / problem.model.sample_time), 100)
     short = problem.with_(records=tuple(r.first(samples) for r in problem.records))
     point = short.begin(shapes)
     for _ in range(3):  # measured by what lines leave, not by noise: or the priors would count for nothing

@@ -17,10 +17,9 @@ from penode_gen.model import Model
 from ..errors import UserError
 from ..measured import Measured
 from .drive import Drive, drive
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-ORDERS = 4  # of the colour of noise: it follows from so many samples before, at most
-EXPLAINED = 0.98  # share of the variance that a colour must leave: below it is one
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,17 +102,17 @@ def of_residuals(residuals: Sequence[Array], goods: Sequence[NDArray[np.bool_]],
     """The noise that residuals [n, n_z] of several recordings show; as before for a signal that nobody recorded."""
     sigma, level, colour = before.sigma.copy(), before.level.copy(), list(before.colour)
     for j in range(len(sigma)):
-        lags, count = np.zeros(ORDERS + 1), 0
+        lags, count = np.zeros(SETTINGS.data_orders + 1), 0
         for r, good in zip(residuals, goods):
             x = np.where(good[:, j], r[:, j], 0.0)
-            lags += [float(x[i:] @ x[: len(x) - i]) for i in range(ORDERS + 1)]
+            lags += [float(x[i:] @ x[: len(x) - i]) for i in range(SETTINGS.data_orders + 1)]
             count += int(good[:, j].sum())
         if count < 50 or lags[0] <= 0.0:
             continue
         lags /= count
         level[j] = np.sqrt(lags[0])
-        best = solve_toeplitz(lags[:-1], lags[1:]) if lags[0] > 0.0 else np.zeros(ORDERS)
+        best = solve_toeplitz(lags[:-1], lags[1:]) if lags[0] > 0.0 else np.zeros(SETTINGS.data_orders)
         left = lags[0] - float(best @ lags[1:])
-        some = coloured and 0.0 < left < EXPLAINED * lags[0]
+        some = coloured and 0.0 < left < SETTINGS.data_explained * lags[0]
         colour[j], sigma[j] = (best, np.sqrt(left)) if some else (np.zeros(0), level[j])
     return Noise(sigma, tuple(colour), level)

@@ -19,12 +19,9 @@ from .dense import Dense, like
 from .engine import Shape
 from .problem import Point, Problem
 from .solve import Fit, Limits, solve
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-HORIZON = 10.0  # [s] of each recording that weights see first
-GOOD = 1.1  # times the noise that a sensor states: a fit that leaves more is tried again from other weights
-TRIES = 3
-CLOSE = 3.0  # gain in chi2 that counts: weights of a network go on gaining little for long
 
 
 def straight(port: Port, inputs: int) -> Shape:
@@ -54,16 +51,16 @@ def train(
     seen = curves.seen_by(first, lines)
     first = curves.rescaled(first, lines, seen, ports)
     best: tuple[Problem, Fit] | None = None
-    for k in range(TRIES):
+    for k in range(SETTINGS.ends_tries):
         own = _begin(first, lines, seen, ports, shapes, seed + 1000 * k)
         try:
-            found = _descend(first, own, limits, lambda share, doing, k=k: tell((k + share) / TRIES, f"{doing}, try {k + 1}"))
+            found = _descend(first, own, limits, lambda share, doing, k=k: tell((k + share) / SETTINGS.ends_tries, f"{doing}, try {k + 1}"))
         except FloatingPointError:
             continue
         kept(f"try {k + 1}", found[1].point)
         if best is None or loud(*_of(found)) < loud(*_of(best)):
             best = found
-        if loud(*_of(best)) < GOOD:
+        if loud(*_of(best)) < SETTINGS.ends_good:
             break
     if best is None:
         raise FloatingPointError("the simulation left all bounds from every start")
@@ -80,7 +77,7 @@ def _begin(problem: Problem, lines: Point, seen: Sequence[Array], ports: Sequenc
     for k, (port, network, line) in enumerate(zip(ports, shapes, lines.shapes)):
         x = inputs_of(port, seen)
         if isinstance(line, Curve):
-            found.append(curves.curve_on(port, line, seen, min(curves.COARSE, port.knots)))
+            found.append(curves.curve_on(port, line, seen, min(SETTINGS.curves_coarse, port.knots)))
         else:
             found.append(like(network, 2.0 * np.maximum(np.std(x, axis=0), 1e-12), float(np.max(problem.scale)), port.zero, seed + k))
     return Point(lines.ratios, lines.starts, tuple(found))
@@ -88,7 +85,7 @@ def _begin(problem: Problem, lines: Point, seen: Sequence[Array], ports: Sequenc
 
 def _descend(problem: Problem, point: Point, limits: Callable[[Point], Limits], tell: Tell) -> tuple[Problem, Fit]:
     """Start states alone, weights on the first seconds, then on everything."""
-    samples = max(int(HORIZON / problem.model.sample_time), 100)
+    samples = max(int(SETTINGS.ends_horizon / problem.model.sample_time), 100)
     short = problem.with_(records=tuple(r.first(samples) for r in problem.records))
     tell(0.0, "start states")
     point = solve(short.with_(frozen=True), point, 4, 1.0, damping=1e-3).point
@@ -100,8 +97,8 @@ def _descend(problem: Problem, point: Point, limits: Callable[[Point], Limits], 
     for k, iterations in enumerate((4, 8)):
         tell(0.6 + 0.15 * k, "weights on everything")
         whole = curves.renoised(whole, point)
-        fit = solve(whole, point, iterations, CLOSE, limits, damping=1e-3)
+        fit = solve(whole, point, iterations, SETTINGS.ends_close, limits, damping=1e-3)
         point = fit.point
     whole = curves.renoised(whole, point)
     tell(0.95, "weights on everything")
-    return whole, solve(whole, point, 6, CLOSE, limits, damping=fit.damping)
+    return whole, solve(whole, point, 6, SETTINGS.ends_close, limits, damping=fit.damping)

@@ -22,11 +22,11 @@ from .curve import Curve
 from .dense import Dense
 from .drive import NODES, SHARES, Drive
 from .equations import equations
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
 Shape = Curve | Dense
 OPTIONS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fassociative-math", "-fno-signed-zeros")
-ROOM = 4_000_000  # doubles of derivatives that are held at a time
 
 
 class _Net(ctypes.Structure):
@@ -88,7 +88,7 @@ class Engine:
         """Signals and derivatives, as many samples at a time as there is room for. Arrays are used again by the next block."""
         job, kept = self._job(drive, parameters, shapes, start, columns)
         n, n_z = len(drive.u), len(self.signals)
-        size = max(16, min(n, ROOM // max(1, n_z * columns)))
+        size = max(16, min(n, SETTINGS.engine_room // max(1, n_z * columns)))
         z, jacobian = np.empty((n, n_z)), np.empty((size, n_z, columns))
         job.z = z.ctypes.data
         for first in range(0, n, size):

@@ -20,9 +20,9 @@ from .data import Noise, Record
 from .problem import Point, Problem
 from .result import Error
 from .solve import solve
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-AFTER = 0.5  # [s] after a sample outside of the trained range that are left out: what happened there dies away
 
 
 def fitted_starts(problem: Problem, records: tuple[Record, ...], point: Point) -> tuple[Problem, Point]:
@@ -41,7 +41,7 @@ def errors(
     if found is None:
         return (), 0.0, 0.0
     residuals, seen = found
-    wait = int(AFTER / problem.model.sample_time)
+    wait = int(SETTINGS.judge_after / problem.model.sample_time)
     away = [_outside(inputs, ports, ranges) for inputs in seen]
     late = [np.convolve(a.astype(float), np.ones(wait + 1))[: len(a)] > 0.0 for a in away]
     kept = {"before": _replayed(before, measured, point), "deployed": _replayed(after, measured, point)}

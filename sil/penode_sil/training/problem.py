@@ -17,17 +17,9 @@ from .curve import Curve
 from .data import Noise, Record
 from .dense import Dense
 from .engine import Engine, Shape
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-LIMIT = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
-VAGUE = 10.0  # standard deviation of a parameter that is unknown, over its nominal value
-LEAST = 0.02  # of its nominal value, that a parameter keeps
-BENT = 0.3  # of a curve's span: standard deviation of a knot from the line between its neighbours
-LARGE = 30.0  # of the force scale: standard deviation of a value, so that what nothing shows stays finite
-DECAY = 3.0  # standard deviation of a weight of a network that is not a curve
-WIDE = 300  # columns from which on curvature is taken from every SPARSE-th sample
-SPARSE = 8
-TIED = 1e-4  # standard deviation along directions that no sensor sees, relative
 STARTS = {"m": 0.1, "rad": 0.3, "m/s": 1.0, "rad/s": 3.0}  # standard deviation of start states by unit; others 1 + 10 times their value
 
 
@@ -101,7 +93,7 @@ class Problem:
 
     def residuals(self, point: Point) -> tuple[list[Array], list[Array]] | None:
         """Measured less simulated signals and inputs of the networks, a recording each; None where the simulation diverges."""
-        if np.any(point.ratios < LEAST):
+        if np.any(point.ratios < SETTINGS.problem_least):
             return None
         found, seen = [], []
         for record, start in zip(self.records, point.starts):
@@ -158,8 +150,8 @@ class Problem:
                         one, memory[j] = lfilter(np.concatenate([[1.0], -c]), [1.0], one, axis=0, zi=memory[j])
                     one = one * (weight[rows, j] / self.noise.sigma[j])[:, None]
                     along += white[rows, j] @ one
-                    if columns > WIDE:
-                        few = one[::SPARSE]
+                    if columns > SETTINGS.problem_wide:
+                        few = one[::SETTINGS.problem_sparse]
                         part += few.T @ few * (len(one) / len(few))
                     else:
                         part += one.T @ one
@@ -173,7 +165,7 @@ class Problem:
         for name in self.engine.free:
             tolerance = self.model.parameters[name].tolerance
             known = tolerance <= 1.0
-            deviations.append(1e-9 if name in self.held or self.frozen else LIMIT * tolerance if known else VAGUE if not np.isfinite(tolerance) else tolerance)
+            deviations.append(1e-9 if name in self.held or self.frozen else SETTINGS.problem_limit * tolerance if known else SETTINGS.problem_vague if not np.isfinite(tolerance) else tolerance)
             origin.append(1.0)
         units = [u for b in self.model.bodies for u in (b.unit,)] + [f"{b.unit}/s" for b in self.model.bodies]
         spread = [STARTS[u] for u in units] + [1.0 + 10.0 * abs(s.start) for s in self.model.extra_states]
@@ -182,7 +174,7 @@ class Problem:
         first = np.diag(np.array(deviations) ** -2.0)
         if self.tied is not None and len(self.tied):
             n_f = len(self.engine.free)
-            first[:n_f, :n_f] += self.tied.T @ self.tied * TIED**-2.0
+            first[:n_f, :n_f] += self.tied.T @ self.tied * SETTINGS.problem_tied**-2.0
         blocks = [first]
         for shape, size in zip(point.shapes, self.scale):
             blocks.append(self._of_shape(shape, size))
@@ -204,9 +196,9 @@ class Problem:
         if isinstance(shape, Dense) and shape.activation == ("identity",):  # lines, in the units of the model
             return np.diag(np.full(len(shape.theta), 1e-12))
         if not isinstance(shape, Curve):
-            return np.diag(np.full(len(shape.theta), DECAY**-2.0))
-        rows = shape.bends() / (BENT * size)
-        return rows.T @ rows + np.eye(len(shape.theta)) * (LARGE * size) ** -2.0
+            return np.diag(np.full(len(shape.theta), SETTINGS.problem_decay**-2.0))
+        rows = shape.bends() / (SETTINGS.problem_bent * size)
+        return rows.T @ rows + np.eye(len(shape.theta)) * (SETTINGS.problem_large * size) ** -2.0
 
 
 def replaced(point: Point, index: int, shape: Shape) -> Point:

@@ -13,12 +13,12 @@ from penode_gen.model import Promises
 
 from .curve import Curve
 from .solve import NONE, Limits
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-FIRST = 1e-5  # margin that is tried first: of the largest slope or force
 
 
-def bound(promises: Promises, margin: float = FIRST, size: float = 0.0) -> Callable[[Curve], Limits]:
+def bound(promises: Promises, margin: float = SETTINGS.promised_first, size: float = 0.0) -> Callable[[Curve], Limits]:
     """Limits on the free values of a curve. `margin` is relative to its own size, or to `size` [N] where that is more."""
 
     def limits(curve: Curve) -> Limits:

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
 
-from .problem import WIDE, Normal, Point, Problem
+from .problem import Normal, Point, Problem
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-CLOSE = 1.0  # gain in chi2 below which a step counts as none; twice in a row ends a fit
-FLOOR = 1e-9  # smallest damping of an unknown, as a part of the largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +72,7 @@ def least(curvature: Array, slope: Array, limits: Limits, at: Array) -> Array:
 
 
 def solve(
-    problem: Problem, point: Point, iterations: int, close: float = CLOSE, limits: Callable[[Point], Limits] = lambda point: NONE,
+    problem: Problem, point: Point, iterations: int, close: float = SETTINGS.solve_close, limits: Callable[[Point], Limits] = lambda point: NONE,
     damping: float = 1e-3, tell: Callable[[int], None] = lambda k: None, patience: int = 2,
 ) -> Fit:  # fmt: skip
     """From a point to the least cost. Two dampings are tried at once, then larger ones until one gains."""
@@ -88,9 +87,9 @@ def solve(
         precision, origin = problem.prior(point)
         curvature, slope = normal.curvature + precision, normal.slope - precision @ (point.vector - origin)
         diagonal = np.diag(curvature)
-        extra = np.maximum(diagonal, FLOOR * float(diagonal.max()))
+        extra = np.maximum(diagonal, SETTINGS.solve_floor * float(diagonal.max()))
         best, found, used = cost, None, 0.0
-        full = ((0.0, 1.0), (0.0, 0.5)) if len(slope) <= WIDE else ()
+        full = ((0.0, 1.0), (0.0, 0.5)) if len(slope) <= SETTINGS.problem_wide else ()
         for d, share in (*full, *((by * damping, 1.0) for by in (0.1, 1.0, 10.0, 1e2, 1e3, 1e5))):
             try:
                 step = least(curvature + np.diag(d * extra), slope, limits(point), point.vector)

@@ -30,14 +30,9 @@ from .engine import Engine
 from .problem import Problem
 from .result import Error, Force, Trained
 from .solve import Fit, solve
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-BINS = 60  # of the density of visits
-ACROSS = 201  # places at which a force and its band are given
-TIGHTER = 4.0  # margin of a promise from one try to the next
-TRIES = 8
-STILL = 1e-9  # a network's input that moves less against 1 has not been excited
-LOUD = 1.25  # times the noise that a sensor states, from which on a fit did not converge, or the model lacks something
 
 
 @dataclass(frozen=True)
@@ -143,7 +138,7 @@ def _with_known(model: Model, options: Options) -> tuple[Model, tuple[str, ...]]
 def _check_excited(model: Model, ports: Sequence[Port], visited: Sequence[Array]) -> None:
     problems = [
         f"{model.path}: the recordings do not move the input of {p.name} ({model.networks[p.name].input_units[k]}): nothing can be learnt of it; record the plant while it moves"
-        for p, x in zip(ports, visited) for k in range(x.shape[1]) if np.ptp(x[:, k]) < STILL
+        for p, x in zip(ports, visited) for k in range(x.shape[1]) if np.ptp(x[:, k]) < SETTINGS.story_still
     ]  # fmt: skip
     if problems:
         raise UserError(*problems)
@@ -157,7 +152,7 @@ def written(
     for k, (port, template, x) in enumerate(zip(ports, templates, visited)):
         low, high = x.min(axis=0), x.max(axis=0)
         given = model.networks[port.name].promises
-        for n in range(TRIES):
+        for n in range(SETTINGS.story_tries):
             shape = fit.point.shapes[k]
             if isinstance(shape, Dense):
                 network = dense.network_of(shape, template, low, high)
@@ -166,8 +161,8 @@ def written(
             network = unfold.unfold(shape, template, float(low[0]), float(high[0]))
             if not given or not promises.broken(given, network, model.outside == "clamp"):
                 break
-            margin = promised.FIRST * TIGHTER ** (n + 1)
-            bounds = [promised.bound(model.networks[p.name].promises, margin if p is port else promised.FIRST, 1.0) for p in ports]
+            margin = SETTINGS.promised_first * SETTINGS.story_tighter ** (n + 1)
+            bounds = [promised.bound(model.networks[p.name].promises, margin if p is port else SETTINGS.promised_first, 1.0) for p in ports]
             fit = solve(problem, fit.point, 2, 1.0, curves.limits_of(problem, bounds), damping=1e-6)
         else:
             raise UserError(f"{model.path}: network {port.name} cannot keep its promises by their margin: {promises.broken(given, network, model.outside == 'clamp')[0]}; relax them")
@@ -203,7 +198,7 @@ def _judged(
         own = spread[at : at + shape.columns, at : at + shape.columns]
         at += shape.columns
         forces.append(_force(model, port, shape, network, x, own))
-    loud = [e.signal for e in training if any(s.name == e.signal and s.noise > 0.0 and e.after > LOUD * s.noise for s in (*model.sensors, *model.outputs))]
+    loud = [e.signal for e in training if any(s.name == e.signal and s.noise > 0.0 and e.after > SETTINGS.story_loud * s.noise for s in (*model.sensors, *model.outputs))]
     notes = [f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"] if loud else []
     notes += [f"{p}" for m in train_ for p in m.quality.problems]
     if model.method not in ("euler", "heun", "rk4"):
@@ -232,15 +227,15 @@ def _force(model: Model, port: Port, shape: Curve | Dense, network: Network, x: 
     """A force along each of its inputs, with its band."""
     xs, ys, sigmas, edges, counts = [], [], [], [], []
     for k in range(x.shape[1]):
-        along = np.linspace(float(x[:, k].min()), float(x[:, k].max()), ACROSS)
-        at = np.zeros((ACROSS, x.shape[1]))
+        along = np.linspace(float(x[:, k].min()), float(x[:, k].max()), SETTINGS.story_across)
+        at = np.zeros((SETTINGS.story_across, x.shape[1]))
         at[:, k] = along
         slopes = shape.hats(along) if isinstance(shape, Curve) else _slopes(shape, at)
         xs.append(along)
         ys.append(shape(along) if isinstance(shape, Curve) else shape(at))
         chord = shape.chord(along) if isinstance(shape, Curve) else 0.0
         sigmas.append(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, spread, slopes), 0.0) + chord**2))
-        count, edge = np.histogram(x[:, k], BINS)
+        count, edge = np.histogram(x[:, k], SETTINGS.story_bins)
         edges.append(edge)
         counts.append(count.astype(float))
     declared = model.networks[port.name]

@@ -14,12 +14,9 @@ from .curve import Curve
 from .port import Port
 from .problem import Problem
 from .solve import Fit
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-INVISIBLE = 0.5  # of its prior deviation: what data leave uncertain by more rests on the model file, not on the recordings
-NOTHING = 1e-2  # of what the model file says of a direction: what data say less of is not seen at all
-PART = 0.25  # of the largest: components of a direction that are named
-SPLIT = 0.01  # of a force's span: a constant that is known no better is reported
 
 
 @dataclass(frozen=True)
@@ -43,15 +40,15 @@ def _parameters(problem: Problem, fit: Fit) -> list[Unknown]:
     names, values, vectors, deviation = _seen(problem, fit)
     return [
         _direction(problem, names, vector * deviation / np.sqrt(max(value, 0.0) + 1.0))
-        for value, vector in zip(values, vectors.T) if value < INVISIBLE**-2.0
+        for value, vector in zip(values, vectors.T) if value < SETTINGS.unknown_invisible**-2.0
     ]  # fmt: skip
 
 
 def invisible(problem: Problem, fit: Fit) -> Array:
     """Directions [., free] of the parameters, of length 1, along which no sensor changes at all."""
     names, values, vectors, deviation = _seen(problem, fit)
-    found = np.zeros((int(np.sum(values < NOTHING)), len(problem.engine.free)))
-    for row, vector in zip(found, vectors.T[values < NOTHING]):
+    found = np.zeros((int(np.sum(values < SETTINGS.unknown_nothing)), len(problem.engine.free)))
+    for row, vector in zip(found, vectors.T[values < SETTINGS.unknown_nothing]):
         row[[problem.engine.free.index(n) for n in names]] = vector * deviation / np.linalg.norm(vector * deviation)
     return found
 
@@ -76,7 +73,7 @@ def _seen(problem: Problem, fit: Fit) -> tuple[list[str], Array, Array, Array]:
 
 def _direction(problem: Problem, names: Sequence[str], by: Array) -> Unknown:
     """A direction in words; `by` are relative changes of one standard deviation."""
-    some = np.abs(by) >= PART * np.max(np.abs(by))
+    some = np.abs(by) >= SETTINGS.unknown_part * np.max(np.abs(by))
     chosen = tuple(n for n, s in zip(names, some) if s)
     size = float(np.sqrt(np.mean(by[some] ** 2)))
     like = np.ptp(by[some]) < 0.3 * np.max(np.abs(by[some])) and some.sum() > 1
@@ -116,7 +113,7 @@ def _splits(problem: Problem, fit: Fit, ports: Sequence[Port], visited: Sequence
                 continue
             size = _constant(*rows[one], spread)
             span = max(float(np.ptp(rows[n][1](rows[n][2]))) for n in (one, other))
-            if size > SPLIT * span / 4.0:
+            if size > SETTINGS.unknown_split * span / 4.0:
                 text = f"a constant force may move between {one} and {other} by {size:.2g} N (1 sigma): only the few samples where one of them passes 0 tell them apart"
                 found.append(Unknown("split", text, (one, other), size))
     return found
