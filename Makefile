@@ -53,6 +53,18 @@ campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings
 	    --command "PySINDy=build/rivals/bin/python test/diagnosis/rivals/sindy.py" \
 	    --command "neural=build/rivals/bin/python test/diagnosis/rivals/neural.py"
 
+train: setup ## From a recording to a running controller: record, train, check on host and Cortex-M4F, stage in chunks, adopt; with a picture
+	$(Q)$(PYTHON) test/training/generator.py build/train
+	$(Q)$(PENODE) train test/training/quarter.toml --data build/train/train.csv --holdout build/train/holdout.csv --known m_b -o build/train/trained
+	$(Q)cp test/training/adopt.toml build/train/
+	$(Q)$(PENODE) simulate build/train/trained/model_trained.toml --scenario build/train/adopt.toml --on sil -o build/train/sil.csv --plot build/train/adopted.png
+	$(Q)$(PENODE) simulate build/train/trained/model_trained.toml --scenario build/train/adopt.toml --on pil:m4f -o build/train/pil.csv
+	$(Q)cmp build/train/sil.csv build/train/pil.csv
+	@echo "host and Cortex-M4F agree to the bit; the picture is build/train/adopted.png, the report build/train/trained/report.html"
+
+campaign-train: setup ## Train on recordings of plants that are known, five seeds each: the table of test/training/CAMPAIGN.md, half an hour
+	$(Q)$(PYTHON) test/training/campaign.py --page test/training/CAMPAIGN.md
+
 hidden-mechanisms: setup ## Half-cars with pitch and two-mass drives with something hidden: places, missing forces, nulls; 20 cases of each, minutes
 	$(Q)$(PYTHON) test/diagnosis/mechanisms_campaign.py --cases 20
 
@@ -73,7 +85,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test prove figures bench campaign campaign-diagnosis campaign-worlds rigs hidden-mechanisms dist structure clean
+.PHONY: help setup run test prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train rigs hidden-mechanisms dist structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

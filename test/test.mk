@@ -5,7 +5,7 @@
 
 # Each takes one core there; the longest begin, so that none runs on alone.
 SUITES   := python-sil hidden-fixed hidden-fresh figures-check python-gen unit warnings misra accuracy python-tools \
-            python-diagnosis symbols builds board gen-check cmock
+            python-diagnosis python-training symbols builds board gen-check cmock
 PYTHONS  := $(filter python-%,$(SUITES))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
 RUNTIME  := $(wildcard src/*.c)

@@ -18,6 +18,7 @@ from .networks import Network, NetworkError, read_network
 from .read_places import show
 from .read_tables import Tables
 from .sets import network_pieces
+from .untrained import untrained
 
 UNKNOWN = "?"  # stands for a unit that was missing: no second complaint where it is used
 ROOM = 4096  # pieces of a folded network, at most
@@ -95,11 +96,22 @@ class NetworkTables(Tables):
                     self.problem((*where, n), "has another architecture than in the set 'default'", "train the same layers: sets share one code")
         return sets
 
+    def untrained(self, where: tuple[str, ...], name: str, entry: dict[str, Any], port: m.NetworkPort) -> Network | None:
+        """A network that has a shape only; None after reporting a problem."""
+        entry = self.table(where, {"layers": list, "activation": str}, entry, ("layers",))
+        try:
+            return untrained(entry, len(port.input_units), name) if port.input_units else None
+        except NetworkError as error:
+            self.problem(where, str(error), "see [sets] in gen/README.md")
+            return None
+
     def network(self, where: tuple[str, ...], name: str, entry: str | dict[str, Any], port: m.NetworkPort) -> Network | None:
         """The network file of one port, with its trust envelope; None after reporting a problem."""
         where = (*where, name)
         if isinstance(entry, str):
             entry = {"file": entry}
+        if "layers" in entry:
+            return self.untrained(where, name, entry, port)
         entry = self.table(where, {"file": str, "min": list, "max": list}, entry, ("file",))
         if "file" not in entry:
             return None

@@ -18,6 +18,7 @@ from .errors import UserError
 from .guard import guarded
 from .inspection import inspect
 from .simulate import simulate
+from .training.command import train
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -28,6 +29,7 @@ def cli() -> None:
 
 cli.add_command(inspect)
 cli.add_command(simulate)
+cli.add_command(train)
 
 
 @cli.command()

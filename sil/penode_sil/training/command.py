@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""`penode train`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from ..console import FILE, Several, staged
+
+
+@click.command(cls=Several)
+@click.argument("model", type=FILE)
+@click.option("--data", type=FILE, multiple=True, required=True, help="Recordings (CSV or MDF4) to learn from.")
+@click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on; not learnt from.")
+@click.option("-o", "--output", type=FILE, required=True, help="Directory for what is found; created if need be.")
+@click.option("--known", multiple=True, help="A parameter that was measured: m_b, or m_b='351 kg'.")
+@click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
+@click.option("--seed", default=0, show_default=True, help="Of the weights that a network starts from; curves need none.")
+@click.option("--json", "as_json", is_flag=True, help="Print training.json.")
+def train(
+    model: Path, data: tuple[Path, ...], holdout: tuple[Path, ...], output: Path, known: tuple[str, ...], channel: tuple[str, ...], seed: int, as_json: bool
+) -> None:
+    """Fit the networks of the model file MODEL, and its parameters within their tolerances, to recordings.
+
+    DIR gets an ONNX file for each network, model_trained.toml with a set `default` of them (and `before`), the set's serial form for a running
+    controller, training.json, and report.html, which also says what the recordings cannot tell.
+    """
+    from ..diagnosis.files import check_folder
+    from . import files, result  # SciPy's parts are slow to load
+
+    check_folder(output)
+    with staged() as tell:
+        found = files.run(files.Job(model, data, holdout, output, channel, known, seed), tell)
+    click.echo(json.dumps(found.as_json(), indent=2) if as_json else result.sentences(found, output))

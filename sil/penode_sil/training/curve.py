@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Curves of hat functions: what a piecewise linear network of one input can be, in as many numbers as it has kinks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Straight between `knots` [n], which ascend, with `values` there; beyond the outermost it goes on straight. `zero`: index of
+    the knot at 0 whose value stays 0, or -1."""
+
+    knots: Array
+    values: Array
+    zero: int
+
+    @property
+    def columns(self) -> int:
+        """Number of free values."""
+        return len(self.knots) - (self.zero >= 0)
+
+    @property
+    def theta(self) -> Array:
+        """The free values."""
+        return np.delete(self.values, self.zero) if self.zero >= 0 else self.values.copy()
+
+    def with_theta(self, theta: Array) -> Curve:
+        """The same knots with other free values."""
+        values = np.insert(theta, self.zero, 0.0) if self.zero >= 0 else np.array(theta)
+        return replace(self, values=values)
+
+    def __call__(self, x: Array) -> Array:
+        """Values at x."""
+        i = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(self.knots) - 2)
+        slope = np.diff(self.values) / np.diff(self.knots)
+        return self.values[i] + slope[i] * (x - self.knots[i])
+
+    def hats(self, x: Array) -> Array:
+        """Derivatives [n, columns] of the values at x by the free values."""
+        x = np.atleast_1d(x)
+        i = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(self.knots) - 2)
+        t = (x - self.knots[i]) / np.diff(self.knots)[i]
+        found = np.zeros((len(x), len(self.knots)))
+        found[np.arange(len(x)), i], found[np.arange(len(x)), i + 1] = 1.0 - t, t
+        return np.delete(found, self.zero, axis=1) if self.zero >= 0 else found
+
+    def chord(self, x: Array) -> Array:
+        """How far a smooth curve may be from the straight piece at each x, as a standard deviation: its bend at the piece's ends, spread
+        over the piece, makes width * change of slope / 8 in the middle of it, of which a fit that goes through the middle leaves half."""
+        wide = np.diff(self.knots)
+        change = np.abs(np.diff(np.diff(self.values) / wide))
+        ends = np.concatenate([change[:1], change, change[-1:]]) if len(change) else np.zeros(2)
+        i = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(wide) - 1)
+        return wide[i] * 0.5 * (ends[i] + ends[i + 1]) / 16.0
+
+    def on(self, knots: Array) -> Curve:
+        """The same curve on other knots, as near as they allow."""
+        zero = int(np.flatnonzero(knots == 0.0)[0]) if self.zero >= 0 else -1
+        return Curve(knots, self(knots) if zero < 0 else np.where(knots == 0.0, 0.0, self(knots)), zero)
+
+    def bends(self) -> Array:
+        """Rows [n - 2, columns]: how far a knot is from the line between its neighbours."""
+        k, n = self.knots, len(self.knots)
+        rows = np.zeros((max(n - 2, 0), n))
+        for j in range(1, n - 1):
+            t = (k[j] - k[j - 1]) / (k[j + 1] - k[j - 1])
+            rows[j - 1, j - 1 : j + 2] = t - 1.0, 1.0, -t
+        return np.delete(rows, self.zero, axis=1) if self.zero >= 0 else rows
+
+    def fill(self, net: Any) -> list[Any]:
+        """Fill in a net_t; what it points to."""
+        knots, values = np.ascontiguousarray(self.knots), np.ascontiguousarray(self.values)
+        net.kind, net.count, net.zero, net.layers, net.columns, net.widest, net.inputs = 0, len(knots), self.zero, 0, self.columns, 1, 1
+        net.knots, net.values = knots.ctypes.data, values.ctypes.data
+        return [knots, values]
+
+
+def three(reach: float, zero: bool) -> Curve:
+    """A curve of two slopes, all 0."""
+    return Curve(np.array([-reach, 0.0, reach]), np.zeros(3), 1 if zero else -1)
+
+
+def spaced(low: float, high: float, count: int, power: float) -> Array:
+    """`count` knots from low to high, dense about 0 by a power; one of them is 0 exactly."""
+    low, high = min(low, 0.0), max(high, 0.0)
+    wide = high ** (1.0 / power) + (-low) ** (1.0 / power)
+    left = int(round((count - 1) * (-low) ** (1.0 / power) / wide))
+    left = min(max(left, 1 if low < 0.0 else 0), count - 1 - (1 if high > 0.0 else 0))
+    right = count - 1 - left
+    below = low * np.linspace(1.0, 0.0, left + 1)[:-1] ** power if left else np.zeros(0)
+    above = high * np.linspace(0.0, 1.0, right + 1)[1:] ** power if right else np.zeros(0)
+    return np.concatenate([below, [0.0], above])
+
+
+def fewer(knots: Array, values: Array, spread: Array, count: int, fixed: Sequence[int]) -> NDArray[np.bool_]:
+    """Which knots to keep: those are dropped, one by one, that cost least; `spread` is the covariance of the values
+    at all knots, the knots `fixed` stay. The outermost stay too."""
+    keep = np.ones(len(knots), dtype=bool)
+    while keep.sum() > count:
+        at = np.flatnonzero(keep)
+        inner = [k for k in range(1, len(at) - 1) if at[k] not in fixed]
+        if not inner:
+            break
+        k = np.array(inner)
+        t = (knots[at[k]] - knots[at[k - 1]]) / (knots[at[k + 1]] - knots[at[k - 1]])
+        rows = np.zeros((len(k), len(knots)))
+        rows[np.arange(len(k)), at[k - 1]], rows[np.arange(len(k)), at[k]], rows[np.arange(len(k)), at[k + 1]] = t - 1.0, 1.0, -t
+        away, moved = rows @ values, rows @ spread
+        variance = np.maximum(np.einsum("ij,ij->i", moved, rows), 1e-12 * np.einsum("ij,j->i", rows**2, np.diag(spread)) + 1e-300)
+        best = int(np.argmin(away**2 / variance))
+        values = values - moved[best] * (away[best] / variance[best])
+        spread = spread - np.outer(moved[best], moved[best]) / variance[best]
+        keep[at[k[best]]] = False
+    return keep

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Piecewise linear networks of one input by way of curves: straight lines first, then knots where the recordings want them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import numpy as np
+from numpy.typing import NDArray
+
+from . import data, unknown
+from .curve import Curve, fewer, spaced, three
+from .port import Port, inputs_of
+from .problem import Point, Problem
+from .solve import NONE, Fit, Limits, solve
+from .settings import SETTINGS
+
+Array = NDArray[np.float64]
+Tell = Callable[[float, str], None]
+POWERS = {"rate": 2.0, "place": 1.2}  # how dense knots are about 0: friction turns within millimetres a second
+
+
+def grid(port: Port, low: float, high: float, count: int) -> Array:
+    """Knots over a range."""
+    return spaced(low, high, count, POWERS["rate" if port.rate else "place"])
+
+
+def curve_on(port: Port, before: Curve, seen: Sequence[Array], count: int) -> Curve:
+    """The curve of before on new knots over the range that is visited now."""
+    x = inputs_of(port, seen)[:, 0]
+    low, high = SETTINGS.curves_wider * min(float(x.min()), 0.0), SETTINGS.curves_wider * max(float(x.max()), 0.0)
+    reach = max(high, -low, 1e-12)
+    return before.on(grid(port, min(low, -1e-3 * reach), max(high, 1e-3 * reach), count))
+
+
+def limits_of(problem: Problem, bounds: Sequence[Callable[[Curve], Limits]]) -> Callable[[Point], Limits]:
+    """Limits on all unknowns from those on each curve."""
+
+    def found(point: Point) -> Limits:
+        n = len(point.vector)
+        at, rows, least = len(point.ratios) + point.starts.size, [], []
+        for shape, bound in zip(point.shapes, bounds):
+            if isinstance(shape, Curve):
+                own = bound(shape)
+                if own.some:
+                    wide = np.zeros((len(own.least), n))
+                    wide[:, at : at + shape.columns] = own.rows
+                    rows.append(wide)
+                    least.append(own.least)
+            at += len(shape.theta)
+        return Limits(np.vstack(rows), np.concatenate(least)) if rows else NONE
+
+    return found
+
+
+def rescaled(problem: Problem, point: Point, seen: Sequence[Array], ports: Sequence[Port]) -> Problem:
+    """The problem with the size of each network's force as it is now, and at least a hundredth of the largest."""
+    spans = np.array([float(np.ptp(s(inputs_of(p, seen) if p.knots == 0 else inputs_of(p, seen)[:, 0]))) for s, p in zip(point.shapes, ports)])
+    return problem.with_(scale=np.maximum(spans, max(1e-2 * float(spans.max(initial=0.0)), 1e-9)))
+
+
+def renoised(problem: Problem, point: Point) -> Problem:
+    """The problem with the noise that its residuals show."""
+    found = problem.residuals(point)
+    if found is None:
+        return problem
+    return problem.with_(noise=data.of_residuals(found[0], [r.good for r in problem.records], problem.noise))
+
+
+def seen_by(problem: Problem, point: Point) -> list[Array]:
+    """Inputs of the networks. FloatingPointError where the simulation diverges."""
+    found = problem.residuals(point)
+    if found is None:
+        raise FloatingPointError("the simulation left all bounds")
+    return found[1]
+
+
+def train(problem: Problem, ports: Sequence[Port], bounds: Sequence[Callable[[Curve], Limits]], tell: Tell) -> tuple[Problem, Fit]:
+    """Curves for all networks of a problem."""
+    limits = limits_of(problem, bounds)
+    tell(0.05, "straight lines")
+    problem, point = lines(problem, [three(1.0, p.zero) for p in ports], limits)
+    for share, count, iterations in ((0.15, SETTINGS.curves_coarse, 8), (0.35, SETTINGS.curves_coarse, 4)):
+        tell(share, f"curves of {count} knots")
+        seen = seen_by(problem, point)
+        problem = rescaled(problem, point, seen, ports)
+        for i, port in enumerate(ports):
+            point = Point(point.ratios, point.starts, (*point.shapes[:i], curve_on(port, point.shapes[i], seen, min(count, port.knots)), *point.shapes[i + 1 :]))
+        fit = solve(problem, point, iterations, 20.0, limits, patience=1)
+        point = fit.point
+        problem = renoised(problem, point)
+    tell(0.55, "where knots are wanted")
+    problem, point = chosen(problem, point, ports, limits)
+    tell(0.75, "the curves")
+    fit = solve(problem, point, 10, 1.0, limits, damping=1e-6)
+    problem = renoised(problem, fit.point)
+    tell(0.9, "the curves")
+    return problem, solve(problem, fit.point, 6, 1.0, limits, damping=1e-6)
+
+
+def lines(problem: Problem, shapes: Sequence[Curve], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
+    """Parameters, start states and two slopes of each network from the first seconds: everything later leans on it."""
+    samples = max(int(SETTINGS.curves_short / problem.model.sample_time), 100)
+    short = problem.with_(records=tuple(r.first(samples) for r in problem.records))
+    point = short.begin(shapes)
+    for _ in range(3):  # measured by what lines leave, not by noise: or the priors would count for nothing
+        short = renoised(short, point)
+        fit = solve(short, point, 5, 20.0, limits, damping=1e-2)
+        point = fit.point
+    tied = unknown.invisible(short, fit)
+    return problem.with_(noise=short.noise, tied=tied), solve(short.with_(tied=tied), point, 2, 20.0, limits).point
+
+
+def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
+    """Curves on twice the knots that there is room for, and of these the ones that matter most."""
+    seen = seen_by(problem, point)
+    problem = rescaled(problem, point, seen, ports)
+    point = Point(point.ratios, point.starts, tuple(curve_on(p, s, seen, 2 * p.knots - 1) for p, s in zip(ports, point.shapes)))
+    fit = solve(problem, point, 3, 20.0, limits, damping=1e-6, patience=1)
+    spread = covariance(problem, fit)
+    at, shapes = len(point.ratios) + point.starts.size, []
+    for port, shape in zip(ports, fit.point.shapes):
+        own = spread[at : at + shape.columns, at : at + shape.columns]
+        at += shape.columns
+        if shape.zero >= 0:
+            own = np.insert(np.insert(own, shape.zero, 0.0, axis=0), shape.zero, 0.0, axis=1)
+        shapes.append(shape.on(shape.knots[fewer(shape.knots, shape.values, own, port.knots, [shape.zero])]))
+    return problem, Point(fit.point.ratios, fit.point.starts, tuple(shapes))
+
+
+def covariance(problem: Problem, fit: Fit) -> Array:
+    """Of all unknowns, where a fit ended."""
+    curvature = fit.normal.curvature + problem.with_(tied=None).prior(fit.point)[0]
+    scale = 1.0 / np.sqrt(np.diag(curvature))
+    scaled = curvature * np.outer(scale, scale) + 1e-13 * np.eye(len(scale))
+    return np.linalg.inv(scaled) * np.outer(scale, scale)

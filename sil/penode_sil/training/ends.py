@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Networks of any shape, trained end to end: straight lines, then random small weights, start states, ten seconds, then all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from penode_gen.networks import Network
+
+from . import curves
+from .curve import Curve, three
+from .curves import Tell
+from .port import Port, inputs_of
+from .dense import Dense, like
+from .engine import Shape
+from .problem import Point, Problem
+from .solve import Fit, Limits, solve
+from .settings import SETTINGS
+
+Array = NDArray[np.float64]
+
+
+def straight(port: Port, inputs: int) -> Shape:
+    """A network's place with nothing but slopes."""
+    if port.knots:
+        return three(1.0, port.zero)
+    return Dense((inputs, 1), ("identity",), np.zeros(inputs + 1), np.ones(inputs), 1.0, port.zero)
+
+
+def loud(problem: Problem, point: Point) -> float:
+    """How much more the residuals are than the noise that sensors state, at the most; 1 where none states any."""
+    stated = np.array([s.noise for s in (*problem.model.sensors, *problem.model.outputs)])
+    level = curves.renoised(problem, point).noise.level
+    shown = np.array([any(r.good[:, j].any() for r in problem.records) for j in range(len(stated))])
+    some = shown & (stated > 0.0)
+    return float(np.max(level[some] / stated[some], initial=0.0)) if some.any() else 1.0
+
+
+def train(
+    problem: Problem, ports: Sequence[Port], shapes: Sequence[Network], bounds: Sequence[Callable[[Curve], Limits]], seed: int, tell: Tell,
+    kept: Callable[[str, Point], None] = lambda stage, point: None,
+) -> tuple[Problem, Fit]:  # fmt: skip
+    """All networks of a problem; several random starts if one does not come down to the noise."""
+    limits = curves.limits_of(problem, bounds)
+    tell(0.02, "straight lines")
+    first, lines = curves.lines(problem, [straight(p, n.n_inputs) for p, n in zip(ports, shapes)], limits)
+    seen = curves.seen_by(first, lines)
+    first = curves.rescaled(first, lines, seen, ports)
+    best: tuple[Problem, Fit] | None = None
+    for k in range(SETTINGS.ends_tries):
+        own = _begin(first, lines, seen, ports, shapes, seed + 1000 * k)
+        try:
+            found = _descend(first, own, limits, lambda share, doing, k=k: tell((k + share) / SETTINGS.ends_tries, f"{doing}, try {k + 1}"))
+        except FloatingPointError:
+            continue
+        kept(f"try {k + 1}", found[1].point)
+        if best is None or loud(*_of(found)) < loud(*_of(best)):
+            best = found
+        if loud(*_of(best)) < SETTINGS.ends_good:
+            break
+    if best is None:
+        raise FloatingPointError("the simulation left all bounds from every start")
+    return best
+
+
+def _of(found: tuple[Problem, Fit]) -> tuple[Problem, Point]:
+    return found[0], found[1].point
+
+
+def _begin(problem: Problem, lines: Point, seen: Sequence[Array], ports: Sequence[Port], shapes: Sequence[Network], seed: int) -> Point:
+    """Random weights in place of the lines."""
+    found: list[Shape] = []
+    for k, (port, network, line) in enumerate(zip(ports, shapes, lines.shapes)):
+        x = inputs_of(port, seen)
+        if isinstance(line, Curve):
+            found.append(curves.curve_on(port, line, seen, min(SETTINGS.curves_coarse, port.knots)))
+        else:
+            found.append(like(network, 2.0 * np.maximum(np.std(x, axis=0), 1e-12), float(np.max(problem.scale)), port.zero, seed + k))
+    return Point(lines.ratios, lines.starts, tuple(found))
+
+
+def _descend(problem: Problem, point: Point, limits: Callable[[Point], Limits], tell: Tell) -> tuple[Problem, Fit]:
+    """Start states alone, weights on the first seconds, then on everything."""
+    samples = max(int(SETTINGS.ends_horizon / problem.model.sample_time), 100)
+    short = problem.with_(records=tuple(r.first(samples) for r in problem.records))
+    tell(0.0, "start states")
+    point = solve(short.with_(frozen=True), point, 4, 1.0, damping=1e-3).point
+    for k, iterations in enumerate((8, 8, 10)):
+        tell(0.1 + 0.15 * k, "weights on the first seconds")
+        short = curves.renoised(short, point)
+        point = solve(short, point, iterations, 5.0, limits, damping=1e-2).point
+    whole = problem.with_(noise=short.noise)
+    for k, iterations in enumerate((4, 8)):
+        tell(0.6 + 0.15 * k, "weights on everything")
+        whole = curves.renoised(whole, point)
+        fit = solve(whole, point, iterations, SETTINGS.ends_close, limits, damping=1e-3)
+        point = fit.point
+    whole = curves.renoised(whole, point)
+    tell(0.95, "weights on everything")
+    return whole, solve(whole, point, 6, SETTINGS.ends_close, limits, damping=fit.damping)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Damped Gauss-Newton, within linear limits where promises ask for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.optimize import nnls
+
+from .problem import Normal, Point, Problem
+from .settings import SETTINGS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """rows @ unknowns >= least."""
+
+    rows: Array
+    least: Array
+
+    @property
+    def some(self) -> bool:
+        return len(self.least) > 0
+
+
+NONE = Limits(np.zeros((0, 0)), np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Where a fit ended. `ended`: it stopped because nothing more was gained, not because its iterations were used up."""
+
+    point: Point
+    cost: float
+    normal: Normal
+    damping: float
+    iterations: int
+    ended: bool
+
+
+def least(curvature: Array, slope: Array, limits: Limits, at: Array) -> Array:
+    """The step d of least d' curvature d / 2 - slope' d with limits on at + d (Lawson and Hanson, 1974: least distance)."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
+    scaled, along = curvature * np.outer(scale, scale), slope * scale
+    scaled = scaled + 1e-12 * np.eye(len(scaled))
+    if not limits.some:
+        return scale * cho_solve(cho_factor(scaled), along)
+    root = cholesky(scaled)  # scaled = root' root
+    free = solve_triangular(root, along, trans="T")
+    rows = solve_triangular(root, (limits.rows * scale).T, trans="T").T
+    short = limits.least - limits.rows @ at - rows @ free
+    size = np.maximum(np.linalg.norm(rows, axis=1), 1e-300)
+    rows, short = rows / size[:, None], short / size
+    if np.all(short <= 0.0):
+        return scale * solve_triangular(root, free)
+    most = max(float(np.max(short)), 1e-300)
+    stacked = np.vstack([rows.T, short[None, :] / most])
+    target = np.zeros(len(stacked))
+    target[-1] = 1.0
+    multipliers, _ = nnls(stacked, target, maxiter=30 * stacked.shape[1])
+    left = stacked @ multipliers - target
+    if not left[-1] < -1e-12:
+        raise RuntimeError("no step is within the limits")
+    return scale * solve_triangular(root, free - left[:-1] * most / left[-1])
+
+
+def solve(
+    problem: Problem, point: Point, iterations: int, close: float = SETTINGS.solve_close, limits: Callable[[Point], Limits] = lambda point: NONE,
+    damping: float = 1e-3, tell: Callable[[int], None] = lambda k: None, patience: int = 2,
+) -> Fit:  # fmt: skip
+    """From a point to the least cost. Two dampings are tried at once, then larger ones until one gains."""
+    cost = problem.cost(point)
+    if not np.isfinite(cost):
+        raise FloatingPointError("the simulation left all bounds")
+    poor, k = 0, 0
+    normal = problem.normal(point)
+    while k < iterations and poor < patience:
+        k += 1
+        tell(k)
+        precision, origin = problem.prior(point)
+        curvature, slope = normal.curvature + precision, normal.slope - precision @ (point.vector - origin)
+        diagonal = np.diag(curvature)
+        extra = np.maximum(diagonal, SETTINGS.solve_floor * float(diagonal.max()))
+        best, found, used = cost, None, 0.0
+        full = ((0.0, 1.0), (0.0, 0.5)) if len(slope) <= SETTINGS.problem_wide else ()
+        for d, share in (*full, *((by * damping, 1.0) for by in (0.1, 1.0, 10.0, 1e2, 1e3, 1e5))):
+            try:
+                step = least(curvature + np.diag(d * extra), slope, limits(point), point.vector)
+            except (np.linalg.LinAlgError, RuntimeError):
+                continue
+            new = point.moved(share * step)
+            value = problem.cost(new)
+            if value < best or (found is None and limits(point).some and k == 1 and np.isfinite(value)):
+                best, found, used = value, new, d
+                if share == 1.0 and d == 0.0 and k > 1:
+                    break
+            elif found is not None and d >= damping:
+                break
+        if found is None:
+            poor = patience
+            break
+        poor = poor + 1 if cost - best < close else 0
+        point, cost, damping = found, best, max(used, 0.1 * damping, 1e-9)
+        normal = problem.normal(point)
+    return Fit(point, cost, normal, damping, k, poor >= patience)

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""One training from recordings to networks: which way each network goes, the fit, what is known of it afterwards."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+import penode_gen
+from penode_gen import fold, promises, units
+from penode_gen.model import Model, NetworkPort
+from penode_gen.networks import Network
+
+from ..errors import UserError
+from ..measured import Measured
+from . import curves, data, dense, ends, judge, promised, unfold, unknown
+from .curve import Curve
+from .curves import Tell
+from .port import Port
+from .dense import Dense
+from .engine import Engine
+from .problem import Problem
+from .result import Error, Force, Trained
+from .solve import Fit, solve
+from .settings import SETTINGS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Options:
+    """`known`: parameters that were measured, with their values in SI, or None for that of the model file."""
+
+    known: tuple[tuple[str, float | None], ...] = ()
+    seed: int = 0
+
+
+def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], options: Options, tell: Tell) -> tuple[Model, Trained]:
+    """The model with trained networks, and all that is known of them. UserError for what cannot be trained."""
+    started = time.process_time()
+    model, known = _with_known(model, options)
+    check(model)
+    engine = Engine(model, [p.name for p in model.parameters.values() if p.tolerance > 0.0 and p.value != 0.0])
+    compiled = time.process_time()
+    ports = ports_of(model, engine)
+    templates = [model.sets["default"].networks[p.name] for p in ports]
+    records = tuple(data.record(model, m, engine.signals) for m in train_)
+    problem = Problem(engine, records, data.at_first(model, records, engine.signals), np.ones(len(ports)))
+    bounds = [promised.bound(model.networks[p.name].promises, size=1.0) for p in ports]
+    try:
+        if all(p.knots for p in ports):
+            problem, fit = curves.train(problem, ports, bounds, tell)
+        else:
+            problem, fit = ends.train(problem, ports, templates, bounds, options.seed, tell)
+    except FloatingPointError as exc:
+        raise UserError(
+            f"{model.path}: {exc}, whatever the networks are; check signs, units and start states of the model against the recording (penode inspect)"
+        ) from exc
+    problem, fit = coloured(problem, fit, bounds)
+    seen = curves.seen_by(problem, fit.point)
+    visited = judge.visited(ports, seen)
+    _check_excited(model, ports, visited)
+    networks, fit = written(model, problem, fit, ports, templates, visited)
+    spent = time.process_time() - started - (compiled - started)
+    return _judged(model, problem, fit, ports, networks, visited, train_, held, (options, known, spent), tell)
+
+
+def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], curves.Limits]]) -> tuple[Problem, Fit]:
+    """The fit with the colour of what it leaves, for its estimate and its band."""
+    found = problem.residuals(fit.point)
+    if found is None:
+        return problem, fit
+    noise = data.of_residuals(found[0], [r.good for r in problem.records], problem.noise, coloured=True)
+    own = problem.with_(noise=noise)
+    if not any(len(c) for c in noise.colour):
+        return own, replace(fit, normal=own.normal(fit.point))
+    return own, solve(own, fit.point, 6, 1.0, curves.limits_of(own, bounds), damping=1e-6)
+
+
+def check(model: Model) -> None:
+    """UserError for a model that has nothing to train, or a network whose shape cannot be."""
+    if not model.networks:
+        raise UserError(f"{model.path}: the model has no network to train; add one in [networks] and [sets.default] (gen/README.md)")
+    problems = []
+    for name, network in model.sets["default"].networks.items():
+        why = dense.trainable(network)
+        problems += [f"{model.path}: network {name} {why}"] if why else []
+    if model.outside == "fade":
+        problems.append(f'{model.path}: outside = "fade" changes what networks give within their range; train with "extrapolate" or "clamp"')
+    if problems:
+        raise UserError(*problems)
+
+
+def ports_of(model: Model, engine: Engine) -> list[Port]:
+    """What each network that acts is, in the engine's order."""
+    found = []
+    for name in engine.networks:
+        port, template = model.networks[name], model.sets["default"].networks[name]
+        at, seen = 0, []
+        for called, n in engine.calls:
+            if called == name:
+                seen.append(tuple(range(at, at + n)))
+            at += n
+        elements = [e for e in model.elements if e.network == name]
+        zero = port.promises.zero_at_zero or bool(elements and len(elements) == len(seen))
+        knots = unfold.capacity(template) if zero else 0
+        if port.promises.max_force is not None and model.outside != "clamp":
+            raise UserError(f'{model.path}: network {name} promises max_force, which training keeps with outside = "clamp" only; choose that, or promise max_slope')
+        if port.promises and not knots:
+            raise UserError(f"{model.path}: network {name} makes promises, which hold for a ReLU network of one input with room for kinks; give it layers = [16, 16]")
+        found.append(Port(name, tuple(seen), _is_rate(port), zero, max(knots, 0) if knots >= 3 else 0))
+    return found
+
+
+def _is_rate(port: NetworkPort) -> bool:
+    return any(units.same_dimension(port.input_units[0], u) for u in ("m/s", "rad/s"))
+
+
+def _with_known(model: Model, options: Options) -> tuple[Model, tuple[str, ...]]:
+    """The model with what was measured, exact."""
+    changed = dict(model.parameters)
+    for name, value in options.known:
+        if name not in changed:
+            raise UserError(f"--known {name}: the model has no such parameter; it has {', '.join(changed)}")
+        p = changed[name]
+        changed[name] = replace(p, tolerance=0.0, value=p.value if value is None else value)
+    return replace(model, parameters=changed), tuple(name for name, _ in options.known)
+
+
+def _check_excited(model: Model, ports: Sequence[Port], visited: Sequence[Array]) -> None:
+    problems = [
+        f"{model.path}: the recordings do not move the input of {p.name} ({model.networks[p.name].input_units[k]}): nothing can be learnt of it; record the plant while it moves"
+        for p, x in zip(ports, visited) for k in range(x.shape[1]) if np.ptp(x[:, k]) < SETTINGS.story_still
+    ]  # fmt: skip
+    if problems:
+        raise UserError(*problems)
+
+
+def written(
+    model: Model, problem: Problem, fit: Fit, ports: Sequence[Port], templates: Sequence[Network], visited: Sequence[Array],
+) -> tuple[list[Network], Fit]:  # fmt: skip
+    """Networks that are the fitted shapes, promises kept by the margin of the certificate."""
+    found: list[Network] = []
+    for k, (port, template, x) in enumerate(zip(ports, templates, visited)):
+        low, high = x.min(axis=0), x.max(axis=0)
+        given = model.networks[port.name].promises
+        for n in range(SETTINGS.story_tries):
+            shape = fit.point.shapes[k]
+            if isinstance(shape, Dense):
+                network = dense.network_of(shape, template, low, high)
+                break
+            low, high = (np.array([v]) for v in _envelope(float(low[0]), float(high[0]), model.pieces > 0))
+            network = unfold.unfold(shape, template, float(low[0]), float(high[0]))
+            if not given or not promises.broken(given, network, model.outside == "clamp"):
+                break
+            margin = SETTINGS.promised_first * SETTINGS.story_tighter ** (n + 1)
+            bounds = [promised.bound(model.networks[p.name].promises, margin if p is port else SETTINGS.promised_first, 1.0) for p in ports]
+            fit = solve(problem, fit.point, 2, 1.0, curves.limits_of(problem, bounds), damping=1e-6)
+        else:
+            raise UserError(f"{model.path}: network {port.name} cannot keep its promises by their margin: {promises.broken(given, network, model.outside == 'clamp')[0]}; relax them")
+        found.append(network)
+    return found, fit
+
+
+def _envelope(low: float, high: float, folded: bool) -> tuple[float, float]:
+    """The visited range with 0 in it: a folded network computes exactly 0 at 0 where the range is symmetric."""
+    low, high = min(low, 0.0), max(high, 0.0)
+    return (-max(high, -low), max(high, -low)) if folded else (low, high)
+
+
+def _judged(
+    model: Model, problem: Problem, fit: Fit, ports: Sequence[Port], networks: Sequence[Network], visited: Sequence[Array],
+    train_: Sequence[Measured], held: Sequence[Measured], given: tuple[Options, tuple[str, ...], float], tell: Tell,
+) -> tuple[Model, Trained]:  # fmt: skip
+    """What is known of a fit."""
+    tell(0.97, "what is known of it")
+    options, known, spent = given
+    spread = curves.covariance(problem, fit)
+    values = dict(zip(model.parameters, problem.parameters(fit.point)))
+    after = judge.with_networks(model, {p.name: n for p, n in zip(ports, networks)}, values)
+    ranges = [(x.min(axis=0), x.max(axis=0)) for x in visited]
+    training, _, _ = judge.errors(problem, fit.point, train_, model, after, ports, ranges, problem.noise)
+    holdout, outside, masked = (), 0.0, 0.0
+    if held:
+        records = tuple(data.record(model, m, problem.engine.signals) for m in held)
+        other, there = judge.fitted_starts(problem, records, fit.point)
+        holdout, outside, masked = judge.errors(other, there, held, model, after, ports, ranges, problem.noise)
+    forces, at = [], len(fit.point.ratios) + fit.point.starts.size
+    for port, shape, network, x in zip(ports, fit.point.shapes, networks, visited):
+        own = spread[at : at + shape.columns, at : at + shape.columns]
+        at += shape.columns
+        forces.append(_force(model, port, shape, network, x, own))
+    loud = [e.signal for e in training if any(s.name == e.signal and s.noise > 0.0 and e.after > SETTINGS.story_loud * s.noise for s in (*model.sensors, *model.outputs))]
+    notes = [f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"] if loud else []
+    notes += [f"{p}" for m in train_ for p in m.quality.problems]
+    if model.method not in ("euler", "heun", "rk4"):
+        notes.append(f"the deployed method is {model.method}; networks were trained through rk4 with the same steps")
+    sigma = {n: float(np.sqrt(spread[i, i])) * abs(model.parameters[n].value) for i, n in enumerate(problem.engine.free)}
+    parameters = {n: (float(values[n]), sigma[n], model.parameters[n].value, model.parameters[n].unit) for n in sigma}
+    found = Trained(
+        model.name, tuple(forces), parameters, known, tuple(unknown.find(problem, fit, ports, visited)), training, holdout, outside, masked,
+        (fit.ended or _all_stated(model, training)) and not loud, tuple(notes), problem.chi2(fit.point) / max(problem.samples, 1), spent, options.seed,
+        {m.path.name: hashlib.sha256(m.path.read_bytes()).hexdigest() for m in (*train_, *held)} | {model.path.name: model.digest}, _versions(),
+    )  # fmt: skip
+    return after, found
+
+
+def _all_stated(model: Model, training: Sequence[Error]) -> bool:
+    """Does every sensor that was recorded state its noise? Then a fit that came down to it has arrived, whatever it still gains."""
+    stated = {s.name for s in (*model.sensors, *model.outputs) if s.noise > 0.0}
+    return bool(training) and all(e.signal in stated for e in training)
+
+
+def _versions() -> dict[str, str]:
+    return {"penode": penode_gen.VERSION, "python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
+
+
+def _force(model: Model, port: Port, shape: Curve | Dense, network: Network, x: Array, spread: Array) -> Force:
+    """A force along each of its inputs, with its band."""
+    xs, ys, sigmas, edges, counts = [], [], [], [], []
+    for k in range(x.shape[1]):
+        along = np.linspace(float(x[:, k].min()), float(x[:, k].max()), SETTINGS.story_across)
+        at = np.zeros((SETTINGS.story_across, x.shape[1]))
+        at[:, k] = along
+        slopes = shape.hats(along) if isinstance(shape, Curve) else _slopes(shape, at)
+        xs.append(along)
+        ys.append(shape(along) if isinstance(shape, Curve) else shape(at))
+        chord = shape.chord(along) if isinstance(shape, Curve) else 0.0
+        sigmas.append(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, spread, slopes), 0.0) + chord**2))
+        count, edge = np.histogram(x[:, k], SETTINGS.story_bins)
+        edges.append(edge)
+        counts.append(count.astype(float))
+    declared = model.networks[port.name]
+    broken = promises.broken(declared.promises, network, model.outside == "clamp") if declared.promises else []
+    low, high = (tuple(float(v) for v in values) for values in (network.input_min, network.input_max))
+    pieces = fold.pieces(network, model.outside == "clamp") if fold.foldable(network) else 0
+    way = "curve" if isinstance(shape, Curve) else "network"
+    return Force(
+        port.name, way, declared.input_units, declared.output_unit, low, high, tuple(xs), tuple(ys), tuple(sigmas), tuple(edges), tuple(counts),
+        tuple(broken), pieces, network,
+    )  # fmt: skip
+
+
+def _slopes(shape: Dense, at: Array) -> Array:
+    """Derivatives [n, columns] of a network by its weights: differences, for a picture."""
+    found = np.empty((len(at), shape.columns))
+    for j in range(shape.columns):
+        step = np.zeros(shape.columns)
+        step[j] = 1e-4 * max(1.0, abs(shape.theta[j]))
+        found[:, j] = (shape.with_theta(shape.theta + step)(at) - shape.with_theta(shape.theta - step)(at)) / (2.0 * step[j])
+    return found
