@@ -80,7 +80,7 @@ def diagnose(
         more = dropouts.bursts(study.experiments, study.null.simulated)
         bursts = [b | m for b, m in zip(bursts, more)]
     faults = broken_sensors(model, train, study, study.null.simulated, bursts)
-    if any(p.tolerance > VAGUE for p in model.parameters.values()):
+    if weighed.able(model) and any(p.tolerance > VAGUE for p in model.parameters.values()):
         answer = by_innovations(replace(study, model=plain), unused, output, remarks, log, tell)
         return replace(answer, data=used(train, holdout), seconds=time.perf_counter() - started)
     tell(SEARCH[0], "looking for causes")
@@ -98,7 +98,8 @@ def diagnose(
     best = explanations[0] if explanations else None
     if weighed.missed(study, best.fit if best else study.null, log):
         answer = by_innovations(replace(study, model=plain), unused, output, remarks, log, tell)
-        return replace(answer, data=used(train, holdout), seconds=time.perf_counter() - started)
+        if answer.verdict != "partly_explained":  # what innovations explain but in part may still have no name at all
+            return replace(answer, data=used(train, holdout), seconds=time.perf_counter() - started)
     if best is not None:  # bursts and spikes that a cause explains were none
         kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
         rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
