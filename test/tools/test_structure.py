@@ -46,7 +46,7 @@ def tree(tmp_path: Path) -> Path:
 
 
 def test_counts_of_a_small_tree(tree: Path) -> None:
-    counts = {"long files": 1, "long functions": 0, "circular imports": 0, "named thresholds": 1, "runtime lines": 410, "elementary lines": 0, "wire protocol lines": 5}
+    counts = {"long files": 1, "long functions": 0, "circular imports": 0, "named thresholds": 1, "thresholds of innovations": 0, "settings of training": 0, "runtime lines": 410, "elementary lines": 0, "wire protocol lines": 5}
     assert structure.look(tree)[0] == counts
     assert structure.main(["--root", str(tree)]) == 0
 
@@ -66,6 +66,8 @@ def test_counts_of_a_small_tree(tree: Path) -> None:
         ("inc/penode/b.h", '#include "penode/a.h"\n', "circular imports"),
         ("sil/penode_sil/one.py", "MORE: float = -2 / 3\n", "named thresholds"),
         ("sil/penode_sil/rules.py", "class Rules:\n    more: float = 0.5  # of an interval\n", "named thresholds"),
+        ("sil/penode_sil/diagnosis/evidence/one.py", "LIMIT = 3.0\n", "thresholds of innovations"),
+        ("sil/penode_sil/training/settings.py", "class Settings:\n    more: float = 0.5\n", "settings of training"),
         ("src/a.c", "\n", "runtime lines"),
         ("src/pen_log.c", "\n", "elementary lines"),
         ("src/pen_xcp_a.c", "\n", "wire protocol lines"),
