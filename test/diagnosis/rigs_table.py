@@ -77,7 +77,8 @@ def case(command: str, folder: Path, place: Path, rig: dict, one: dict, out: Pat
     model.write_bytes((place / one["model"]).read_bytes())
     halves = bool(rig.get("halves"))
     train, held = (parts(folder, one[k], out, i, halves) for i, k in enumerate(("train", "holdout")))
-    asked = f"{command} diagnose" + "".join(f" --channel {shlex.quote(c)}" for c in rig.get("channels", []))
+    # --json ends the list of channels, which would take the model for one more
+    asked = f"{command} diagnose" + "".join(f" --channel {shlex.quote(c)}" for c in rig.get("channels", [])) + " --json"
     found, seconds, why = diagnose(asked, out, [*train, held[0]], timeout)
     form, terms = one["expert"]["form"], one["expert"]["terms"]
     tables = [rigs_expert.table(p, rig["columns"]) for p in (*train, held[0])]

@@ -11,7 +11,7 @@ import rigs_expert
 import rigs_table
 from worlds import solver, world
 from worlds_campaign import page
-from worlds_score import score
+from worlds_score import added_laws, score
 
 SEED = 5
 
@@ -86,6 +86,8 @@ FRICTION = {"kind": "coulomb_friction", "where": ["mount", "damper"], "parameter
 STIFF = {"kind": "wrong_parameter", "where": [], "parameters": {"k": 9.0}, "ratio": 5.0, "share": 0.2, "equivalents": []}
 
 
+SIDE = {"kind": "asymmetric_spring", "where": ["mount", "spring"], "parameters": {"difference": 40.0}, "ratio": 5.0, "share": 0.2, "equivalents": [],
+        "companions": ["k"]}  # fmt: skip
 GAIN = {"kind": "input_gain", "where": ["tau"], "parameters": {"gain": 0.8}, "ratio": 5.0, "share": 0.2,
         "equivalents": [{"kind": "wrong_parameter", "where": [], "parameters": ["J", "k"], "why": "all"}]}  # fmt: skip
 
@@ -119,6 +121,10 @@ RUB, SCALE, K = cause("coulomb_friction", "damper", force=41.0), cause("sensor_s
         ((STIFF,), [K], "explained", "right"),
         ((STIFF,), [cause("wrong_parameter", d=9.0)], "explained", "wrong name"),
         ((GAIN,), [K, cause("wrong_parameter", J=2.0)], "explained", "right"),
+        ((SIDE,), [K, cause("asymmetric_spring", "spring")], "explained", "right"),
+        ((SIDE,), [K], "explained", "wrong name"),
+        ((SIDE,), [cause("asymmetric_spring", "spring"), cause("wrong_parameter", d=2.0)], "explained", "extra name"),
+        ((), [cause("outside_taxonomy")], "unexplained", "right"),
         ((GAIN,), [K], "explained", "wrong name"),
         ((FRICTION, STIFF), [K, RUB], "explained", "right"),
         ((FRICTION, STIFF), [RUB], "explained", "part missed"),
@@ -139,6 +145,13 @@ def test_page_counts_what_is_wrong():
     rows = [score(truth(FRICTION), {"causes": [x], "verdict": "explained"}) | {"seconds": 1.0, "why": ""} for x in (RUB, SCALE)]
     assert "| single | 2 | 1 | 50% [9%, 91%] | 85% |" in page(rows, "two cases")
     assert rows[0]["covered"] == [["coulomb_friction.force", True]]
+
+
+def test_laws_are_counted():
+    """Two names and two laws at one place are one law each; a third law is one too many."""
+    before, more = '[elements]\na = {}\n', "b = {}\nc = {}\n"
+    assert added_laws(before, before + more, ["cubic_spring", "quadratic_damper"]) == (2, 2)
+    assert added_laws(before, before + more, ["cubic_spring", "wrong_parameter"]) == (2, 1)
 
 
 def test_expert_fit_finds_a_swing():

@@ -39,7 +39,7 @@ def one(seed: int, index: int, stratum: str, tolerances: bool | None, command: s
     row = score(truth, found) | {"seconds": round(seconds, 1), "why": why}
     extended = folder / "diagnosis" / "model_extended.toml"
     if row["answer"] and extended.exists():
-        row["laws"] = added_laws((folder / "model.toml").read_text(), extended.read_text())
+        row["laws"] = added_laws((folder / "model.toml").read_text(), extended.read_text(), [a.split()[0] for a in row["answer"]])
     world.write_truth(truth, out / "truth" / f"{stratum}-{seed}-{index}.json")
     if not keep:
         shutil.rmtree(folder)

@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from itertools import permutations
 
+OUTSIDE = "outside_taxonomy"
 FORCELESS = ("wrong_parameter", "sensor_", "input_", "integration_error")  # causes that need no law
 HONEST = ("no_discrepancy", "unexplained", "not_identifiable")  # verdicts of a null world; mis-modelling is real, and may be seen
 
@@ -34,8 +35,8 @@ def all_by(causes: Sequence[Mapping], effects: Sequence[Mapping]) -> bool:
 
 
 def named(diagnosis: Mapping) -> list[Mapping]:
-    """Causes of the answer, small deviations left out."""
-    return [c for c in diagnosis.get("causes") or [] if not c.get("small")]
+    """Causes of the answer, small deviations and the one that says that it is not on the list left out."""
+    return [c for c in diagnosis.get("causes") or [] if not c.get("small") and c.get("kind") != OUTSIDE]
 
 
 def together(causes: Sequence[Mapping], effects: Sequence[Mapping]) -> list[Mapping]:
@@ -49,12 +50,18 @@ def together(causes: Sequence[Mapping], effects: Sequence[Mapping]) -> list[Mapp
     return list(causes)
 
 
+def without_companions(causes: Sequence[Mapping], effects: Sequence[Mapping]) -> list[Mapping]:
+    """Causes, without wrong parameters that only say which side of a named asymmetric curve the file's value is."""
+    free = [p for e in effects for p in e.get("companions", ()) if any(names(c, e["kind"], e["where"], ()) for c in causes)]
+    return [c for c in causes if not any(names(c, "wrong_parameter", (), [p]) for p in free)]
+
+
 def outcome(truth: Mapping, diagnosis: Mapping | None) -> str:
     """Right, or what is wrong."""
     if diagnosis is None:
         return "no answer"
     effects = truth["effects"]
-    causes = together(named(diagnosis), effects)
+    causes = without_companions(together(named(diagnosis), effects), effects)
     if not effects:
         return "false alarm" if causes else "right" if diagnosis.get("verdict") in HONEST else "claim without a name"
     if all_by(causes, effects):
@@ -86,8 +93,7 @@ def score(truth: Mapping, diagnosis: Mapping | None) -> dict:
             "verdict": (diagnosis or {}).get("verdict"), "outcome": what, "right": what == "right", "covered": covered}  # fmt: skip
 
 
-def added_laws(nominal: str, extended: str) -> tuple[int, int]:
-    """Elements that the extended model has beyond the nominal one, and how many of them a textbook needs for its names."""
+def added_laws(nominal: str, extended: str, kinds: Sequence[str]) -> tuple[int, int]:
+    """Elements that the extended model has beyond the nominal one, and how many of the kinds that it names act by a law of their own."""
     before, after = (tomllib.loads(x).get("elements", {}) for x in (nominal, extended))
-    new = [k for k in after if k not in before]
-    return len(new), len({tuple(after[k].get("between", ())) for k in new})
+    return len([k for k in after if k not in before]), sum(not k.startswith(FORCELESS) for k in kinds)

@@ -12,6 +12,7 @@ import numpy as np
 
 from . import effects, plants
 from .effects import Array, At
+from .plants import Site
 from .signals import LEAD, RATE, beside, coloured, rms, roads, waves
 from .solver import STEP, Law, Run, Runaway, run
 
@@ -358,12 +359,17 @@ class World:
             return [e.site, "actuator"]
         return [] if e.kind == "wrong_parameter" else [e.site, *self.kind.sites[e.site][0].elements]
 
+    def companions(self, e: Effect) -> list[str]:
+        """Parameters whose value beside an asymmetric curve is a convention: it may be that of either side, or of their mean."""
+        site = self.kind.sites.get(e.site, (Site(()), ()))[0]
+        return [{"asymmetric_spring": site.spring, "asymmetric_damper": site.damper}[e.kind]] if e.kind.startswith("asymmetric") else []
+
     def truth(self) -> dict:
         """Kind, place, parameters, sizes and equivalents of every effect."""
         from .equivalents import equivalents  # noqa: PLC0415
 
         found = [{"kind": e.kind, "where": self.places(e), "parameters": e.parameters, "ratio": round(e.ratio, 3), "share": round(e.share, 4),
-                  "equivalents": equivalents(self, i)} for i, e in enumerate(self.effects)]  # fmt: skip
+                  "equivalents": equivalents(self, i), "companions": self.companions(e)} for i, e in enumerate(self.effects)]  # fmt: skip
         return {"seed": self.seed, "index": self.index, "stratum": self.stratum, "group": self.group or ("single" if found else "null"),
                 "plant": self.kind.name, "tolerance": self.tolerance, "mismodelling": round(self.e, 4), "effects": found}  # fmt: skip
 
