@@ -56,6 +56,11 @@ def absorber(s: float, v: float, own: np.ndarray) -> tuple[float, list[float]]:
     return force, [own[1], force / 0.4]
 
 
+def tuned_mass(s: float, v: float, own: np.ndarray) -> tuple[float, list[float]]:
+    pulls = 14.0**2 * (s - own[0]) + 2.0 * 0.1 * 14.0 * (v - own[1])
+    return 0.3 * pulls, [own[1], pulls]
+
+
 CASES: dict[str, tuple[dict[str, str], Law]] = {
     "linear_spring": ({"stiffness": "100 N/m"}, plain(lambda s, v: 100.0 * s)),
     "linear_damper": ({"damping": "3 N*s/m"}, plain(lambda s, v: 3.0 * v)),
@@ -106,6 +111,7 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
     "loose_damper": ({"damping": "6 N*s/m", "gap": "2 mm", "relaxation": "30 ms"}, loose_damper),
     "maxwell_bushing": ({"stiffness": "300 N/m", "relaxation": "60 ms"}, lambda s, v, own: (own[0], [300.0 * v - own[0] / 0.06])),
     "absorber": ({"mass": "0.4 kg", "stiffness": "90 N/m", "cubic": "2e4 N/m^3", "damping": "0.8 N*s/m"}, absorber),
+    "tuned_mass": ({"mass": "0.3 kg", "omega": "14 1/s", "loss": "0.1 1"}, tuned_mass),
 }  # fmt: skip
 
 

@@ -99,7 +99,9 @@ def diagnose(
     if weighed.missed(study, best.fit if best else study.null, log):
         answer = by_innovations(replace(study, model=plain), unused, output, remarks, log, tell)
         if answer.verdict != "partly_explained":  # what innovations explain but in part may still have no name at all
-            return replace(answer, data=used(train, holdout), seconds=time.perf_counter() - started)
+            told = plausible.doubt(study, best, answer.verdict) if answer.verdict == "unexplained" else ""
+            notes = (*filter(None, [told]), *answer.notes)
+            return replace(answer, notes=notes, data=used(train, holdout), seconds=time.perf_counter() - started)
     if best is not None:  # bursts and spikes that a cause explains were none
         kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
         rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
