@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache, reduce
 from typing import Callable, Sequence
 
 import numpy as np
@@ -15,6 +16,15 @@ _NUMPY = [
     {"Root": np.sqrt, "Logarithm": np.log, "Softplus": lambda x: np.logaddexp(0.0, x), "Sigmoid": lambda x: 1.0 / (1.0 + np.exp(-x)), "Sign": np.sign, "Absolute": np.abs},
     "numpy",
 ]
+
+
+@lru_cache(maxsize=256)
+def along(expression: str, names: tuple[str, ...]) -> Callable[..., np.ndarray]:
+    """An expression of the model language as a function of arrays of one shape, or numbers, in the order of `names`."""
+    parsed = ex.parse(expression, names, {})
+    parsed = parsed.replace(sp.Max, sp.Function("larger")).replace(sp.Min, sp.Function("smaller"))  # NumPy's own take arrays of one shape only
+    modules = [{"larger": lambda *x: reduce(np.maximum, x), "smaller": lambda *x: reduce(np.minimum, x)}, *_NUMPY]
+    return sp.lambdify([ex.symbol(n) for n in names], parsed, modules=modules)
 
 
 class Numeric:

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from campaign import commit, diagnose
 from score import wilson
-from worlds import world
+from worlds import equivalents, world
 from worlds_score import added_laws, score
 
 DEMANDED = {"single": 0.85, "null": 0.98, "pair": 0.65, "halfcar": 0.90, "drive": 0.90}  # of the issue; null: at most 2 % named
@@ -35,7 +35,7 @@ def one(seed: int, index: int, stratum: str, tolerances: bool | None, command: s
     folder = out / "cases" / f"{stratum}-{seed}-{index}"
     shutil.rmtree(folder, ignore_errors=True)
     found, seconds, why = diagnose(command, folder, case.write(folder), timeout)
-    truth = case.truth()
+    truth = equivalents.truth(case)
     row = score(truth, found) | {"seconds": round(seconds, 1), "why": why}
     extended = folder / "diagnosis" / "model_extended.toml"
     if row["answer"] and extended.exists():
@@ -117,7 +117,7 @@ def main() -> int:
         for s, i in chosen:
             case = world.make(seed, i, s, tolerances)
             case.write(args.out / "cases" / f"{s}-{seed}-{i}")
-            world.write_truth(case.truth(), args.out / "truth" / f"{s}-{seed}-{i}.json")
+            world.write_truth(equivalents.truth(case), args.out / "truth" / f"{s}-{seed}-{i}.json")
         return 0
     rows = []
     with ProcessPoolExecutor(args.jobs) as pool, (args.out / "rows.jsonl").open("w") as file:

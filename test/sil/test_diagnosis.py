@@ -21,7 +21,7 @@ import penode_gen
 from penode_sil import diagnosis
 from penode_sil.diagnosis import build, dropouts, echo, extension, hypotheses, naming, noise, plant, score, search, steady, study
 from penode_sil.diagnosis.build import Term
-from penode_sil.diagnosis.engine import experiment
+from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.fit import Problem, delayed, longest, railed
 from penode_sil.measured import load
 from penode_sil.targets import Sil

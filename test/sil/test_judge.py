@@ -67,7 +67,7 @@ def test_a_load_put_on_at_rest_is_no_start_in_motion(losses, costs, told, loads,
 
 
 def test_nothing_found(values):
-    """Six deviations of chi2 are a discrepancy, fifteen hundredths of it or a tone or a kinship one that has no name."""
+    """Six deviations of chi2 are a discrepancy, fifteen hundredths of it or a tone or a correlation of sensors one that has no name."""
     assert judged(study=QUIET) == ([], "no_discrepancy")
     assert judged(study=QUIET, faults=[DROPOUT]) == (["sensor_dropout"], "explained")
     for sigmas, verdict in ((5.9, "no_discrepancy"), (6.1, "not_identifiable")):

@@ -11,7 +11,7 @@ from test_diagnosis import C, D, SAMPLES, STEP, MODEL, drive, record, road
 
 import penode_gen
 from penode_sil.diagnosis import noise, residual, study
-from penode_sil.diagnosis.engine import experiment
+from penode_sil.diagnosis.driven import experiment
 from penode_sil.measured import load
 
 N, H = 40_000, 2e-3  # samples, interval [s]

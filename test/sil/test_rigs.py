@@ -12,7 +12,7 @@ import pytest
 
 import penode_gen
 from penode_gen.model import Parameter
-from penode_sil.diagnosis.engine import experiment
+from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.plant import placeless
 from penode_sil.diagnosis.study import null_study, uncertain
 from penode_sil.measured import load

@@ -14,13 +14,14 @@ import penode_gen
 from penode_gen.model import Model
 
 from ..measured import Measured
-from . import extension, numerics, residual, search, weighed
+from . import extension, numerics, plausible, residual, search, weighed
 from .noise import Experiment
 from .result import OUTSIDE, Cause, Diagnosis, Recorded, separating
+from .search import Explanation
 from .study import Study, look
 
 
-def written(text: str, model: Model, output: Path) -> Model:
+def write_extended(text: str, model: Model, output: Path) -> Model:
     """Writes model_extended.toml beside the rest, with a path to the nominal one such that both can be moved together; the model of it."""
     output.mkdir(parents=True, exist_ok=True)
     nominal = model.path.resolve()
@@ -29,7 +30,7 @@ def written(text: str, model: Model, output: Path) -> Model:
     return penode_gen.load(output / "model_extended.toml")
 
 
-def used(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[Recorded, ...]:
+def recorded(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[Recorded, ...]:
     """All recordings, each with its role."""
     return tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
 
@@ -49,21 +50,23 @@ def alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
 
 
 def by_innovations(
-    study: Study, unused: Sequence[Experiment], output: Path | None, remarks: Sequence[str], log: Callable[[str], None],
-    tell: Callable[[float, str], None],
+    study: Study, best: Explanation | None, unused: Sequence[Experiment], output: Path | None, remarks: Sequence[str],
+    log: Callable[[str], None], tell: Callable[[float, str], None],
 ) -> Diagnosis:  # fmt: skip
-    """The diagnosis of recordings that sensor noise alone cannot judge; without recordings and time, which the caller has."""
+    """The diagnosis of recordings that sensor noise alone cannot judge, and of which `best` is what it would say; without recordings
+    and time, which the caller has."""
     tell(0.3, "weighing what is missed everywhere")
     study = replace(study, seen=look(study, study.null))
     w = weighed.weigh(study, unused, log)
-    extended = w.model if output is None else written(w.text, study.model, output)
+    extended = w.model if output is None else write_extended(w.text, study.model, output)
     tell(0.9, "showing what is wrong")
     shown = residual.show(study, w.fit, extended, w.held, w.verdict == "unexplained")
     rows = search.rows(study)
     evidence = (study.null.cost - rows) / np.sqrt(2.0 * rows)
     numbers, _ = numerics.numerics(study)
+    doubt = plausible.doubt(study, best, w.verdict) if w.verdict == "unexplained" else ""
     causes = w.causes or ((Cause(OUTSIDE, "", {}, 0.5),) if w.verdict == "unexplained" else ())
     return Diagnosis(
         w.verdict, tuple(replace(c, separate=separating(c)) for c in causes), w.gain, numbers, w.explained, evidence, 0.0,
-        tuple([*remarks, *w.notes]), residual=shown.numbers(), explanations=w.explanations, shown=shown,
+        (*[doubt] * bool(doubt), *remarks, *w.notes), residual=shown.numbers(), explanations=w.explanations, shown=shown,
     )  # fmt: skip

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from penode_gen.model import Model
 
 from .evidence.fit import Problem
-from .evidence.observer import Filter, Follower, Record, dressed, shown
+from .evidence.observer import Filter, Predictor, Record, augmented, sample_noise
 from .fit import Free
 from .fit import Problem as OutputError
 from .noise import Experiment
@@ -17,10 +17,10 @@ from .study import Study
 
 Array = NDArray[np.float64]
 FIRST = 50  # samples that a start is fitted to
-STEPS = 20  # of its fit
+ITERATIONS = 20  # of its fit
 
 
-def begun(model: Model, e: Experiment, study: Study, set_name: str = "") -> Array:
+def start_of(model: Model, e: Experiment, study: Study, set_name: str = "") -> Array:
     """Start states [n_x] of a model, the nominal one or one that extends it, for a recording: those of the model file where the training
     began at rest, else the likeliest ones of the first FIRST samples. Hidden states of laws begin at rest."""
     start = np.array(model.start, dtype=float)
@@ -32,11 +32,11 @@ def begun(model: Model, e: Experiment, study: Study, set_name: str = "") -> Arra
     size = dict(zip(study.model.states, 3.0 * np.sqrt(np.mean(np.where(np.abs(x) < 1e12, x, 0.0) ** 2, axis=0)) + 1e-9))
     record = Record.of(e)
     few = Record(record.name, record.step, record.u[:FIRST], record.y[:FIRST], record.held)
-    wide = dressed(model, study.places)
-    noise = shown([record], np.array([s.noise for s in model.sensors]))
+    wide = augmented(model, study.places)
+    noise = sample_noise([record], np.array([s.noise for s in model.sensors]))
     free = tuple(Free(("start", 0, i), start[i], 0.01 * size[model.states[i]], sigma=size[model.states[i]], origin=start[i]) for i in own)
-    follower = Follower(wide, [few], 1, set_name or study.set_name, study.linear.fastest)
-    fit = Problem(follower, noise**2, {}).solve(free, Filter.none(len(wide.states), len(noise)), STEPS)
+    predictor = Predictor(wide, [few], 1, set_name or study.set_name, study.linear.fastest)
+    fit = Problem(predictor, noise**2).solve(free, Filter.none(len(wide.states), len(noise)), ITERATIONS)
     for f in fit.free:
         start[f.target[2]] = f.value
     return start

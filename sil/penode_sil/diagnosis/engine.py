@@ -15,27 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
-from penode_gen import units
 from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, told_of_rails
 from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady, weighed
-from .answers import alternatives, by_innovations, used, written
-from .driven import experiment, settled
+from .answers import alternatives, by_innovations, recorded, write_extended
+from .broken import broken_sensors, still_wild
+from .driven import settled
 from .hypotheses import CLOCK, Basis
 from .noise import Experiment
-from .result import OUTSIDE, Cause, Diagnosis, Gain, Named, Value, separating
+from .result import OUTSIDE, Cause, Diagnosis, Gain, Named, separating
 from .search import Explanation
-from .evidence.bench import stated
+from .evidence.bench import with_tolerances
 from .study import MOVING, VAGUE, Study, begin, look
 
 Array = NDArray[np.float64]
-FEW = 5  # bad samples of a sensor that make a fault of it
-FAR = 3, 20.0  # or so many that are as many standard deviations of its noise off
-ENDS = 2.0  # samples by which the ends of a hole may be wrong
-WILD = 2.0  # standard deviations of the noise that bursts have together: one sample in nine that is far out
-STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
 CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
 PATCHED = 0.985  # share that several causes must take away if sensors still share a residual, and any cause if something changes too
 WHOLE = 0.94  # share of several causes from which on a residual beyond chance may be of their form
@@ -64,44 +59,25 @@ def diagnose(
     started = time.perf_counter()
     log = advancing(log, tell)
     tell(0.0, "fitting the model as it is")
-    plain, model = model, stated(model)
+    plain, model = model, with_tolerances(model)
     both = told_of_rails([*train, *holdout])
     train, holdout = both[: len(train)], both[len(train) :]
     experiments, unused, remarks = settled(model, train, holdout, set_name)
     if problems := plausible.misfits(model, [*experiments, *unused], set_name):
         raise UserError(*problems)
-    study, other = begin(model, experiments, set_name)
-    bursts = dropouts.bursts(study.experiments, study.null.simulated)
-    more = bursts
-    for _ in range(AGAIN):  # a fit that bursts have misled does not show all of them
-        if not any(b.any() for b in more):
-            break
-        study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, more)], set_name)
-        more = dropouts.bursts(study.experiments, study.null.simulated)
-        bursts = [b | m for b, m in zip(bursts, more)]
+    study, other, bursts = unburst(model, experiments, set_name)
     faults = broken_sensors(model, train, study, study.null.simulated, bursts)
-    if weighed.able(model) and any(p.tolerance > VAGUE for p in model.parameters.values()):
-        answer = by_innovations(replace(study, model=plain), unused, output, remarks, log, tell)
-        return replace(answer, data=used(train, holdout), seconds=time.perf_counter() - started)
+    if weighed.supports(model) and any(p.tolerance > VAGUE for p in model.parameters.values()):
+        answer = by_innovations(replace(study, model=plain), None, unused, output, remarks, log, tell)
+        return replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started)
     tell(SEARCH[0], "looking for causes")
     study, explanations = search.search(study, log)
-    if study.moving:
-        equals = [e for e in explanations if e.score > explanations[0].score - search.NEW]
-        other, found = search.at_rest(other, study, equals, log)
-    if study.moving and found:
-        costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
-        log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
-        losses = [s.nothing - max((x.gain for x in e), default=0.0) for s, e in ((study, equals), (other, found[:1]))]
-        told = set(found[0].groups) in (set(e.groups) for e in equals)
-        if rested(losses, costs, told, len(model.states) * len(experiments), search.numbers(found[0])):
-            study, explanations = other, found
+    study, explanations = resting(study, other, explanations, log)
     best = explanations[0] if explanations else None
-    if weighed.missed(study, best.fit if best else study.null, log):
-        answer = by_innovations(replace(study, model=plain), unused, output, remarks, log, tell)
+    if weighed.misfit(study, best.fit if best else study.null, log):
+        answer = by_innovations(replace(study, model=plain), best, unused, output, remarks, log, tell)
         if answer.verdict != "partly_explained":  # what innovations explain but in part may still have no name at all
-            told = plausible.doubt(study, best, answer.verdict) if answer.verdict == "unexplained" else ""
-            notes = (*filter(None, [told]), *answer.notes)
-            return replace(answer, notes=notes, data=used(train, holdout), seconds=time.perf_counter() - started)
+            return replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started)
     if best is not None:  # bursts and spikes that a cause explains were none
         kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
         rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
@@ -110,34 +86,25 @@ def diagnose(
     tell(SEARCH[1], "weighing them against numerics")
     study = replace(study, seen=look(study, best.fit if best else study.null))
     numbers, step = numerics.numerics(study)
-    kinship, shared = noise.kinship(study.experiments, study.metrics, best.fit.simulated if best else study.null.simulated)
-    log(f"kinship {kinship:.1f}, shared {shared:.0f}")
-    tone = noise.tone(study.experiments, study.metrics, best.fit.simulated if best else study.null.simulated)
+    left = best.fit if best else study.null
+    alike, shared = noise.correlation(study.experiments, study.metrics, left.simulated)
+    log(f"correlation {alike:.1f}, shared {shared:.0f}")
+    tone = noise.tone(study.experiments, study.metrics, left.simulated)
     log(str(tone))
-    change = steady.change(study, best.fit if best else study.null, study.seen)
+    change = steady.change(study, left, study.seen)
     log(str(change))
     fades = best is not None and any(kind == "damper_fading" for kind, _ in best.groups)  # which changes by its nature
     changed = change.gain if change.surprise > -np.log(CHANGING) and not fades else 0.0
-    causes, verdict, explained, evidence = judge(study, explanations, faults, kinship, shared, tone.heard, changed)
+    causes, verdict, explained, evidence = judge(study, explanations, faults, alike, shared, tone.heard, changed)
     doubt = plausible.doubt(study, best, verdict)
     behind = not doubt and verdict != "unexplained" and best is not None and pitching(best) and echo.echo(study, best.fit).heard
     if doubt or behind:
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
-    notes = [*remarks, *filter(None, [plant.placeless(study.places)])]
-    if behind:
-        notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
-    if changed and verdict == "unexplained":
-        notes.append(f"{change.what} of {change.place} changes while it is measured: a controller, a leak?")
-    if verdict == "unexplained" and best is not None:
-        masses = [cause(study, explanations, g) for g in best.groups if g[0] == "hidden_resonance"]
-        notes += damped([c for c in masses if worth(study, c)])
-    if tone.heard:
-        notes.append(f"{model.sensors[tone.sensor].name} has a tone of its own at {tone.frequency:.0f} Hz, or around it: an engine, a wheel, the mains?")
     drift = sum(t.gain for t in best.terms if t.candidate.kind == CLOCK) if best else 0.0
-    if drift:
-        notes.append(f"clocks of sensors and inputs drift apart by {1e6 * abs(drift):.3g} ppm: put both on one clock")
+    notes = [*remarks, *filter(None, [plant.placeless(study.places)])]
+    notes += hints(study, explanations, verdict, bool(behind), change if changed else None, tone, drift)
     gain: dict[str, Gain] = {}
     named = None  # what has no name does not go into a model
     if not any(c.kind == OUTSIDE for c in causes):
@@ -155,6 +122,7 @@ def diagnose(
         notes.append(f"a small network beside {nameless.beside(study, unnamed)} takes a part of it, and has no name")
     elif verdict == "unexplained":
         explained = 0.0
+    study = replace(study, model=plain)  # what the file does not state is not written down
     text, extended = extension.extend_file(study, named, causes)
     held: list[residual.Channel] = []
     if holdout:
@@ -182,7 +150,7 @@ def diagnose(
             causes, verdict, explained = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0
             notes.append(f"{', '.join(unseen)}: the hold-out shows what the training does not: train with recordings like it")
     if output is not None:
-        extended = written(text, model, output)
+        extended = write_extended(text, model, output)
     absorbed: dict[str, object] = {}
     if learnt := absorb.taught(study, named) if named is not None and named.terms else []:
         absorbed, more = absorbing(study, named, learnt, unused, output)
@@ -192,9 +160,64 @@ def diagnose(
     shown = residual.show(study, named.fit if whole else None, extended if whole else None, held, verdict == "unexplained")
     causes = tuple(replace(c, separate=separating(c)) for c in causes)
     return Diagnosis(
-        verdict, causes, gain, numbers, explained, evidence, kinship, tuple([doubt] * bool(doubt) + notes), used(train, holdout),
+        verdict, causes, gain, numbers, explained, evidence, alike, tuple([doubt] * bool(doubt) + notes), recorded(train, holdout),
         shown.numbers(), absorbed, alternatives(causes), time.perf_counter() - started, shown=shown,
     )  # fmt: skip
+
+
+def unburst(
+    model: Model, experiments: Sequence[Experiment], set_name: str
+) -> tuple[Study, Study, list[NDArray[np.bool_]]]:
+    """The two studies of `begin` without bursts of samples that are far out, and these bursts: a fit that they have misled does not show
+    all of them."""
+    study, other = begin(model, experiments, set_name)
+    bursts = more = dropouts.bursts(study.experiments, study.null.simulated)
+    for _ in range(AGAIN):
+        if not any(b.any() for b in more):
+            break
+        study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, more)], set_name)
+        more = dropouts.bursts(study.experiments, study.null.simulated)
+        bursts = [b | m for b, m in zip(bursts, more)]
+    return study, other, bursts
+
+
+def resting(
+    study: Study, other: Study, explanations: list[Explanation], log: Callable[[str], None]
+) -> tuple[Study, list[Explanation]]:
+    """Study and explanations at rest, where recordings that seem to start in motion are likelier to start at rest with other causes."""
+    if not study.moving:
+        return study, explanations
+    equals = [e for e in explanations if e.score > explanations[0].score - search.NEW]
+    other, found = search.at_rest(other, study, equals, log)
+    if not found:
+        return study, explanations
+    costs = [s.nothing - (e[0].score if e else 0.0) for s, e in ((study, explanations), (other, found))]
+    log(f"at rest {costs[1]:.0f}, moving {costs[0]:.0f}")
+    losses = [s.nothing - max((x.gain for x in e), default=0.0) for s, e in ((study, equals), (other, found[:1]))]
+    same = set(found[0].groups) in (set(e.groups) for e in equals)
+    starts = len(study.model.states) * len(study.experiments)
+    return (other, found) if rested(losses, costs, same, starts, search.numbers(found[0])) else (study, explanations)
+
+
+def hints(
+    study: Study, explanations: Sequence[Explanation], verdict: str, behind: bool, change: steady.Change | None, tone: noise.Tone,
+    drift: float,
+) -> list[str]:  # fmt: skip
+    """Notes on what is left: motion that comes late (`behind`), what changes with time, masses, a tone, a drift of clocks."""
+    notes = []
+    if behind:
+        notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
+    if change is not None and verdict == "unexplained":
+        notes.append(f"{change.what} of {change.place} changes while it is measured: a controller, a leak?")
+    if verdict == "unexplained" and explanations:
+        masses = [cause(study, explanations, g) for g in explanations[0].groups if g[0] == "hidden_resonance"]
+        notes += damped([c for c in masses if worth(study, c)])
+    if tone.heard:
+        own = study.model.sensors[tone.sensor].name
+        notes.append(f"{own} has a tone of its own at {tone.frequency:.0f} Hz, or around it: an engine, a wheel, the mains?")
+    if drift:
+        notes.append(f"clocks of sensors and inputs drift apart by {1e6 * abs(drift):.3g} ppm: put both on one clock")
+    return notes
 
 
 def rested(losses: Sequence[float], costs: Sequence[float], told: bool, starts: int, loads: int) -> bool:
@@ -233,91 +256,11 @@ def advancing(log: Callable[[str], None], tell: Callable[[float, str], None]) ->
     return both
 
 
-def still_wild(study: Study, e: Explanation, bursts: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
-    """Per recording, whether the bursts of each sensor [1, n_z] are as wild beside an explanation as they were without."""
-    found = []
-    for k, b in enumerate(bursts):
-        b = b[: len(study.experiments[k].time)]
-        sums = [np.sum(np.where(b, (study.experiments[k].y - f.simulated[k]) ** 2, 0.0), axis=0) for f in (e.fit, study.null)]
-        noise_there = np.sum(b, axis=0) * np.mean(study.levels[k], axis=0)
-        found.append((sums[0] > np.maximum(0.5 * sums[1], WILD**2 * noise_there))[None, :])
-    return found
-
-
-def broken_sensors(
-    model: Model, train: Sequence[Measured], study: Study, simulated: Sequence[Array], bursts: Sequence[NDArray[np.bool_]]
-) -> list[Cause]:
-    """Sensors that clip or drop out, by what their samples show and a simulation agrees with: it goes on where they stop."""
-    found = []
-    for j, sensor in enumerate(model.sensors):
-        unit = units.si(sensor.unit)
-        clipped, dropped, railed, lost, more, far, holes, total = 0, 0, 0, 0.0, 0, 0, 0, 0
-        proven = False
-        rails: dict[str, float] = {}
-        quantum = 0.0
-        for k, m in enumerate(train):
-            channel = m.quality.channels.get(sensor.name)
-            if channel is None:
-                continue
-            n = len(study.experiments[k].time)
-            total += len(m.mask[sensor.name])
-            quantum = max(quantum, channel.quantum)
-            sigma = float(np.sqrt(np.mean(study.levels[k][:, j])))
-            flagged = (m.shown[sensor.name] & ~m.mask[sensor.name])[:n]  # what the file itself calls lost is no fault of the sensor
-            away = np.abs(m.z[sensor.name][:n] - simulated[k][:, j])
-            off = away > 4.0 * sigma
-            railing = np.zeros(n, bool)
-            for side, name, rail in ((-1.0, "low", channel.low), (1.0, "high", channel.high)):
-                if rail is None:
-                    continue
-                at = flagged & (np.abs(m.z[sensor.name][:n] - rail) < 1e-6 * abs(rail))
-                beyond = side * (simulated[k][at, j] - rail) > -4.0 * sigma
-                railing |= at
-                if np.mean(beyond) > 0.5:
-                    clipped += np.count_nonzero(at)
-                    rails[name] = rail
-                else:  # a rail that the signal was not near
-                    railed += np.count_nonzero(at)
-            bad, wrong = channel.held + channel.spikes, flagged & off & ~railing
-            still = channel.held > max(FEW, STILL * n) and channel.quantum < 0.3 * sigma  # noise does not repeat itself
-            proven |= bad > 0 and bool(still or np.count_nonzero(wrong) > 0.2 * bad)
-            far += int(np.count_nonzero(wrong & (away > FAR[1] * sigma))) if channel.quantum < 0.3 * sigma else 0
-            lost += bad * len(m.mask[sensor.name]) / channel.rows  # of a file that may be parted, or slower
-            burst = bursts[k][:n, j] if len(bursts) > k else np.zeros(n, bool)
-            dropped += int(np.count_nonzero(burst))
-            y = m.z[sensor.name][:n]
-            again = dropouts.repeats(y, simulated[k][:, j], m.mask[sensor.name][:n], channel.quantum, sigma) & ~burst
-            more += int(np.count_nonzero(again))
-            holes += int(np.count_nonzero(np.diff((wrong | burst | again).astype(np.int8), prepend=0) > 0))
-            met = np.zeros(n, bool)
-            for side, name, rail in ((-1.0, "low", np.min(y)), (1.0, "high", np.max(y))):  # a rail that was met once or twice
-                at = burst & (y == rail) & (side * (simulated[k][:, j] - rail) > 0.0)
-                if np.count_nonzero(at) >= FEW:
-                    met |= at
-                    rails[name] = float(rail)
-            clipped += int(np.count_nonzero(met))
-            runs = np.cumsum(np.diff(burst.astype(np.int8), prepend=0) > 0)
-            went_on = burst & ~off & np.isin(runs, runs[met])  # between two rails
-            dropped -= int(np.count_nonzero(met | went_on))
-        dropped += 0 if clipped >= FEW else railed
-        if clipped >= FEW:
-            sizes = {"limit": max(map(abs, rails.values())), **rails}
-            sure = {k: 0.002 * abs(x) + 0.5 * quantum for k, x in sizes.items()}
-            exact = {k: Value(x, unit, (x - sure[k], x + sure[k])) for k, x in sizes.items()}
-            found.append(Cause("sensor_clipping", sensor.name, exact, 0.99))
-        dropped += round(lost) if proven else 0
-        if dropped >= FEW or dropped and far >= FAR[0]:
-            share, blur = (dropped + more) / total, ENDS * holes / total
-            size = Value(share, "1", (max(share - blur, 0.0), share + blur))
-            found.append(Cause("sensor_dropout", sensor.name, {"share": size}, 0.99))
-    return found
-
-
 def judge(
     study: Study, explanations: Sequence[Explanation], faults: list[Cause], alike: float, shared: float, pure: bool, changed: float = 0.0
 ) -> tuple[tuple[Cause, ...], str, float, float]:
     """Causes, verdict, share explained, and the evidence that there is anything at all; `alike`, `shared`: see
-    noise.kinship; `pure`: a tone is left; `changed`: chi2 of what changes with time, if that is beyond chance."""
+    noise.correlation; `pure`: a tone is left; `changed`: chi2 of what changes with time, if that is beyond chance."""
     rows = search.rows(study)
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)

@@ -22,7 +22,7 @@ from penode_gen.model import INTERPOLATIONS, Model, Signal
 
 from ..targets import Sil
 from . import stepped
-from .beginning import begun
+from .beginning import start_of
 from .build import SPREAD, Term
 from .dropouts import bursts
 from .fit import BLUNT, Free, Problem, moving
@@ -334,7 +334,7 @@ def measure(
     outside, notes = [], []
     for e in holdout:
         both = (study, replace(study, set_name=set_name or study.set_name))
-        starts = [begun(m, e, study, s.set_name) for m, s in zip((model, extended), both)]
+        starts = [start_of(m, e, study, s.set_name) for m, s in zip((model, extended), both)]
         before, after = (deployed(m, e, x, s.set_name) for m, x, s in zip((model, extended), starts, both))
         dropped = bursts([e], [after])[0] & [s.name in lost for s in model.sensors]
         e = replace(e, good=e.good & ~dropped)

@@ -483,7 +483,7 @@ def _followed(ratio: Array) -> tuple[float, int]:
     return float(best + np.log(np.mean(np.exp(surprise - best)))), int(np.argmax(where[np.argmax(surprise)]))
 
 
-def kinship(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> tuple[float, float]:
+def correlation(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> tuple[float, float]:
     """How much the residuals of different sensors are alike, in standard deviations of what independent noise makes, in that
     part of the spectrum where they are most alike; and in all of it the chi-square beyond what such noise makes.
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from penode_gen.model import Element, Model
 from . import catalogue
 from .catalogue import drives
 from .catalogue.form import Form, Motion, Moved, Part
-from .evidence.bench import Bench, leveled
+from .evidence.bench import Bench, fit_level
 from .evidence.fit import Fit
 from .evidence.gain import Level
 from .evidence.observer import Filter, scale
@@ -88,7 +88,7 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     for score, form in ranked:
         if score.gain > PROMISE and len(chosen) < TRIED:
             chosen.setdefault((form.kind, form.where, form.note), (score, form))
-    wide, made = grown(bench, [form for _, form in chosen.values()], moved, len(terms))
+    wide, made = with_forms(bench, [form for _, form in chosen.values()], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
     trials = [_fitted(bench, wide, t, s.sizes) for t, (s, _) in zip(made, chosen.values())]
     return sorted(trials, key=lambda t: -t.gain), wide
@@ -97,10 +97,8 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
 def _taken(form: Form, terms: Sequence[Term]) -> bool:
     """Has the model that form already, or one of a curve of which a place has only one?"""
     there = [t.form for t in terms if t.form.where == form.where]
-    if any((f.kind, f.note) == (form.kind, form.note) for f in there):
-        return True
-    file = catalogue.OF.get(form.kind)
-    return file is not None and getattr(file, "ONE", False) and any(catalogue.OF.get(f.kind) is file for f in there)
+    one = catalogue.curve(form.kind)
+    return any((f.kind, f.note) == (form.kind, form.note) or one != form.kind and catalogue.curve(f.kind) == one for f in there)
 
 
 def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence[Motion]) -> list[tuple[Score, Form]]:
@@ -145,7 +143,7 @@ def _free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
     raise ValueError(form.how)
 
 
-def grown(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], first: int) -> tuple[Model, list[Term]]:
+def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], first: int) -> tuple[Model, list[Term]]:
     """The model with all forms in it, each without any force yet, and their terms."""
     elements, where, parameters, terms = [], [], {}, []
     for i, form in enumerate(forms):
@@ -196,7 +194,7 @@ def _fitted(bench: Bench, wide: Model, term: Term, sizes: Array) -> Trial:
         runs = [problem.solve(f, still, FREE_RUN) for f in starts[1:]]
         starts.append(max(runs, key=lambda f: f.cost).free)
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
-    level, best = leveled(replace(bench, model=wide), problem, best, bench.level)
+    level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
     return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level)
 
 
@@ -209,7 +207,7 @@ def _sized(term: Term, sizes: Array) -> list[Free]:
 def adopt(bench: Bench, t: Trial) -> tuple[Bench, Term]:
     """The bench with a trial's form in its model, and the term that it has become."""
     moved = motions(Probe.of(bench))
-    wide, (term,) = grown(bench, [t.form], moved, 90 + len(bench.model.elements))
+    wide, (term,) = with_forms(bench, [t.form], moved, 90 + len(bench.model.elements))
     names = dict(zip([f.target for f in t.term.free], term.free))
     free = tuple(replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free)
     fresh = replace(bench, model=wide, free=free, level=t.level)

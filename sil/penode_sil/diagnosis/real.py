@@ -18,14 +18,13 @@ from .catalogue.form import Form, Sizes
 from .evidence.bench import UNSTATED, Bench, build
 from .evidence.blocks import posterior
 from .evidence.fit import Fit
-from .evidence.observer import Filter, Record, bias, shown
+from .evidence.observer import Filter, Record, bias, sample_noise
 from .evidence.screening import Probe
-from .fit import Free
-from .innovate import INTERVAL, Found
+from .innovate import Z_95, Found
 from .noise import Experiment
 from .propose import Term, Trial, motions
 from .plant import Place
-from .result import Cause, Named, Value
+from .result import Cause, Named, Value, place
 
 Array = NDArray[np.float64]
 WORTH = 0.06  # of the force at its place, of an input or of a signal: less is a small deviation, as any model has, of 2 to 5 %
@@ -50,7 +49,7 @@ def answer(
 ) -> Answer:
     """Searches recordings for causes by innovations, and weighs what is found."""
     records = [Record.of(e) for e in experiments]
-    noise = shown(records, np.array([s.noise for s in model.sensors]))
+    noise = sample_noise(records, np.array([s.noise for s in model.sensors]))
     bench = build(model, places, records, noise, fastest, set_name)
     log(f"corrected every {bench.update} samples; {bench.level.size:.3g} of what moves wanders, for {bench.level.tau:.3g} s")
     found = innovate.search(bench, log)
@@ -62,7 +61,7 @@ def answer(
         if size >= WORTH or any((c.kind, c.where) == (cause.kind, cause.where) for c in causes):
             causes = _merged(causes, cause)
         else:
-            notes.append(f"{cause.kind} at {cause.where} is real but small: {size:.1%} of what acts there; not named, but in model_extended.toml")
+            notes.append(f"{place(cause.kind, cause.where)} is real but small: {size:.1%} of what acts there; not named, but in model_extended.toml")
     wrong, more = _parameters(model, after, _shared(model, after, found.terms))
     notes += more + _offsets(model, after)
     still = Filter.none(*after.fit.by.gain.shape)
@@ -120,7 +119,7 @@ def _cause(model: Model, bench: Bench, term: Term, rivals: tuple[Named, ...], su
     form = term.form
     file = catalogue.OF.get(form.kind, drives)
     own = {t.target for t in term.free}
-    place = bench.places[form.index] if form.how == "force" else None
+    at = bench.places[form.index] if form.how == "force" else None
 
     def sizes(values: Mapping[object, float]) -> dict[str, tuple[str, float]]:
         if file is drives:
@@ -132,12 +131,12 @@ def _cause(model: Model, bench: Bench, term: Term, rivals: tuple[Named, ...], su
                 parts[k, key] = values.get(f"{name}_{key}", bench.model.parameters[f"{name}_{key}"].value)
         linear: dict[str, float] = {}
         for e in model.elements:
-            if any(e.name == n for n, _ in place.elements):
+            if any(e.name == n for n, _ in at.elements):
                 for argument, parameter in e.arguments.items():
                     key = f"{e.law}.{argument}"
                     linear[key] = linear.get(key, 0.0) + values.get(parameter, model.parameters[parameter].value)
         longest = max(len(r) * r.step for r in bench.records)
-        return {k: (place.unit(u), v) for k, (u, v) in file.sizes(form, Sizes(parts, linear, longest, bool(model.bodies))).items()}
+        return {k: (at.unit(u), v) for k, (u, v) in file.sizes(form, Sizes(parts, linear, longest, bool(model.bodies))).items()}
 
     values = {f.target: f.value for f in bench.fit.free}
     found = sizes(values)
@@ -152,7 +151,7 @@ def _cause(model: Model, bench: Bench, term: Term, rivals: tuple[Named, ...], su
     parameters = {}
     for key, (unit, value) in found.items():
         sd = float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
-        parameters[key] = Value(value, unit, (value - INTERVAL * sd, value + INTERVAL * sd))
+        parameters[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
     return Cause(form.kind, form.where, parameters, min(max(sure, 0.0), 0.99), rivals), _share(bench, term)
 
 
@@ -192,7 +191,7 @@ def _parameters(model: Model, bench: Bench, shared: Collection[str]) -> tuple[li
         sd = fit.deviation(name)
         limit = p.tolerance if p.tolerance > 0.0 else UNSTATED
         off = abs(f.value / p.value - 1.0)
-        low, high = f.value - INTERVAL * sd, f.value + INTERVAL * sd
+        low, high = f.value - Z_95 * sd, f.value + Z_95 * sd
         if off > limit and not low <= p.value * (1.0 + limit * np.sign(f.value / p.value - 1.0)) <= high and not low <= p.value <= high:
             if name in shared:
                 notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)} beside what was found at its place, which shares its straight part")
@@ -208,5 +207,5 @@ def _offsets(model: Model, bench: Bench) -> list[str]:
     for s in model.sensors:
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         if abs(value) > 3.0 * sd:
-            found.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, the height of ride, a zero that is off?")
+            found.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
     return found

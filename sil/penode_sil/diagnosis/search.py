@@ -20,7 +20,7 @@ from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
 from .hypotheses import BENDS, CLOCK, HALVES, KNEE, STRIBECK, VALUED, Basis, Fault
 from .naming import DAMPERS, FRICTION, christened, straight
-from .noise import ALIKE, kinship
+from .noise import ALIKE, correlation
 from .score import DAMPINGS, RESONANCES, Candidate, Regression, where
 from .study import Study, heard, loss, regression, requieted
 
@@ -585,7 +585,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
                 break  # of one curve, the worse form of it will not become the better one
             if any(len(e.terms) >= len(o.terms) and e.gain < o.gain - NEW for o in ended):
                 continue  # it would need more laws to become as good
-            akin, _ = kinship(study.experiments, study.metrics, e.fit.simulated)
+            akin, _ = correlation(study.experiments, study.metrics, e.fit.simulated)
             here = requieted(study, e.fit, coloured=akin < ALIKE)  # what sensors share is no noise
             if here is not study:
                 e = explain(here, e.terms, 4, e.fit, e.formulas)

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from penode_gen.model import Model
 
 from . import applied, extension, real
-from .evidence.bench import Bench, build
+from .evidence.bench import build
 from .evidence.gain import Level
-from .evidence.observer import Record, bias, shown
+from .evidence.observer import Record, bias, sample_noise
 from .fit import Fit, Problem
 from .noise import Experiment
 from .residual import Channel, rms
@@ -24,8 +24,8 @@ from .study import Study
 Array = NDArray[np.float64]
 SURE = 2.0  # standard deviations of an offset that goes into the extended model
 WHOLE = 0.85  # share of the residual that causes take away where they explain it
-MISSED = 20.0  # log likelihood that a wandering force gains beside the best explanation by sensor noise alone
-WANDERS = 0.02  # and its least size: coloured noise, and a curve that stands for another one, make up to 0.01; models that are wrong everywhere more
+MIN_MISFIT = 20.0  # log likelihood that a wandering force gains beside the best explanation by sensor noise alone
+MIN_UNMODELLED = 0.02  # and its least size: coloured noise, and a curve that stands for another one, make up to 0.01; models that are wrong everywhere more
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +45,14 @@ class Weighed:
     explained: float  # share of the power that the nominal model leaves in training
 
 
-def able(model: Model) -> bool:
+def supports(model: Model) -> bool:
     """Can innovations judge a model? Not yet where motion is prescribed, for nothing moves, nor laws of networks."""
     return bool(model.bodies) and not model.networks
 
 
-def missed(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> bool:
+def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> bool:
     """Does more act than an explanation has, beyond the noise of sensors? Then innovations have to decide."""
-    if not able(study.model):
+    if not supports(study.model):
         return False
     values = {f.target: f.value for f in fit.free if isinstance(f.target, str)}
     known = {n: replace(p, value=values.get(n, p.value), exact=True) for n, p in fit.model.parameters.items()}
@@ -63,12 +63,12 @@ def missed(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
     for e, x in enumerate(study.experiments):  # what faults of sensors explain is taken out of the recordings
         alone = np.array(problem.simulate(e, plain, np.zeros((1, len(plain))))[0][0])
         records.append(replace(Record.of(x), y=np.where(x.good, x.y - fit.simulated[e] + alone, np.nan)))
-    noise = shown(records, np.array([s.noise for s in model.sensors]))
+    noise = sample_noise(records, np.array([s.noise for s in model.sensors]))
     bench = build(model, study.places, records, noise, study.linear.fastest, study.set_name, study.model)
     still = bench.problem().solve(bench.fit.free, bench.gains(bench.fit).at(Level(0.0, 1.0)), 12)
     gained = bench.fit.likelihood - still.likelihood
     log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats")
-    return gained > MISSED and bench.level.size > WANDERS
+    return gained > MIN_MISFIT and bench.level.size > MIN_UNMODELLED
 
 
 def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]) -> Weighed:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 
@@ -81,8 +82,6 @@ def shifted(y: Array, by: float) -> Array:
 
 def lagged(y: Array, samples: float) -> Array:
     """A first-order lag, exact for straight lines between close samples."""
-    from scipy.signal import lfilter  # noqa: PLC0415
-
     a = np.exp(-1.0 / samples)
     return lfilter([1 - a], [1, -a], y, zi=[a * y[0]])[0]
 

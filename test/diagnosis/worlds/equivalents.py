@@ -5,16 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import effects
 from .effects import Array
 from .signals import RATE, beside, rms
-
-if TYPE_CHECKING:
-    from .world import World
+from .world import SAMPLE, World
 
 LEFT = 1.0  # of the mis-modelling's RMS: what is left then is no larger than what is wrong anyway
 BARE = {"time shift": "one sensor: plant and effects do not depend on time, a later input is a later answer",
@@ -58,8 +55,6 @@ def slip(v: Array, presliding: float, h: float) -> Array:
 
 
 def _near(world: World, i: int) -> list[dict]:
-    from .world import SAMPLE  # noqa: PLC0415
-
     e, r = world.effects[i], world.runs["train_1"]
     f = next(r.force[j] for j, law in enumerate(world.plant.laws) if law.role == f"effect{i}")
     wrong, columns = rms(world.wrong(e.site)), world.columns(e.site)
@@ -126,3 +121,11 @@ def _late(world: World, true: str) -> list[dict]:
             if kind == "input_delay" and len(world.kind.sensors) == 1:
                 found.append({"kind": "sensor_delay", "where": list(world.kind.sensors), "why": BARE["time shift"]})
     return found
+
+
+def truth(world: World) -> dict:
+    """Kind, place, parameters, sizes and equivalents of every effect."""
+    found = [{"kind": e.kind, "where": world.places(e), "parameters": e.parameters, "ratio": round(e.ratio, 3), "share": round(e.share, 4),
+              "equivalents": equivalents(world, i), "companions": world.companions(e)} for i, e in enumerate(world.effects)]  # fmt: skip
+    return {"seed": world.seed, "index": world.index, "stratum": world.stratum, "group": world.group or ("single" if found else "null"),
+            "plant": world.kind.name, "tolerance": world.tolerance, "mismodelling": round(world.e, 4), "effects": found}  # fmt: skip

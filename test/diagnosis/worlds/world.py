@@ -364,15 +364,6 @@ class World:
         site = self.kind.sites.get(e.site, (Site(()), ()))[0]
         return [{"asymmetric_spring": site.spring, "asymmetric_damper": site.damper}[e.kind]] if e.kind.startswith("asymmetric") else []
 
-    def truth(self) -> dict:
-        """Kind, place, parameters, sizes and equivalents of every effect."""
-        from .equivalents import equivalents  # noqa: PLC0415
-
-        found = [{"kind": e.kind, "where": self.places(e), "parameters": e.parameters, "ratio": round(e.ratio, 3), "share": round(e.share, 4),
-                  "equivalents": equivalents(self, i), "companions": self.companions(e)} for i, e in enumerate(self.effects)]  # fmt: skip
-        return {"seed": self.seed, "index": self.index, "stratum": self.stratum, "group": self.group or ("single" if found else "null"),
-                "plant": self.kind.name, "tolerance": self.tolerance, "mismodelling": round(self.e, 4), "effects": found}  # fmt: skip
-
 
 LIMIT = effects.LIMITS
 

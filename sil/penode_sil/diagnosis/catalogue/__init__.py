@@ -6,3 +6,9 @@ from . import bushings, dampers, friction, loads, masses, plays, springs, tyres
 
 FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres)
 OF = {kind: file for file in FILES for kind in file.KINDS}
+
+
+def curve(kind: str) -> object:
+    """What only one of is at a place: the file of a kind where its kinds are forms of one curve, else the kind itself."""
+    file = OF.get(kind)
+    return file if getattr(file, "ONE", False) else kind

@@ -12,14 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from penode_gen import laws
 from penode_gen.model import Model
+from penode_gen.numeric import along
 
 from ..plant import Place
 
 Array = NDArray[np.float64]
-NAMES = {
-    "abs": np.abs, "max": np.maximum, "min": np.minimum, "tanh": np.tanh, "exp": np.exp, "sqrt": np.sqrt,
-    "softplus": lambda x: np.logaddexp(0.0, x),
-}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +77,7 @@ class Part:
             return self.force(m)
         text = laws.LAWS[self.law].force if self.law in laws.LAWS else self.law
         values = {self.gain[0]: 1.0, **{k: v for k, (v, _) in self.shapes.items()}, "s": m.s, "v": m.v}
-        return np.broadcast_to(eval(text.replace("^", "**"), {"__builtins__": {}}, {**NAMES, **values}), m.s.shape)  # noqa: S307
+        return np.broadcast_to(along(text, tuple(values))(*values.values()), m.s.shape)
 
 
 @dataclass(frozen=True, eq=False)

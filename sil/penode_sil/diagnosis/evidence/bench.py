@@ -15,7 +15,7 @@ from ..fit import Free
 from ..plant import Place
 from .fit import Fit, Problem, likelihood
 from .gain import Gains, Level, linear
-from .observer import WANDER, Filter, Follower, Record, bias, dressed
+from .observer import WANDER, Filter, Predictor, Record, bias, augmented
 
 Array = NDArray[np.float64]
 UPDATES = 16  # a period of the motion
@@ -24,21 +24,21 @@ SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is 
 UNSTATED = 0.05  # tolerance of a parameter for which the file has none: one that is farther off is worth a name
 FAR = 1e3  # a parameter is at most so many times as large or small as the file has it
 SIZES = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3)  # of what wanders, relative to what moves: levels that are tried
-STAYS = 0.5  # updates for which it stays: about white. One that stays longer winds up against a friction that sticks
+CORRELATION = 0.5  # updates for which it stays: about white. One that stays longer winds up against a friction that sticks
 AGAIN = 6  # iterations with another level
 TURNS = 3  # how often levels and values are fitted in turn
 
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A dressed model, its recordings and what is known of both: `forces` [wandering] rms acceleration of each body (without bodies, rms
+    """A augmented model, its recordings and what is known of both: `forces` [wandering] rms acceleration of each body (without bodies, rms
     force of each place), `noise` [n_z] of a sample."""
 
     model: Model
     set_name: str
     places: tuple[Place, ...]
     records: tuple[Record, ...]
-    base: Model  # of which the filter is: the nominal one, dressed, without laws that are steep where it stands still
+    base: Model  # of which the filter is: the nominal one, augmented, without laws that are steep where it stands still
     free: tuple[Free, ...]
     update: int
     forces: Array
@@ -52,19 +52,17 @@ class Bench:
     def step(self) -> float:
         return self.records[0].step
 
-    def problem(self, model: Model | None = None, update: int | None = None, left: Array | None = None, fixed: dict[str, float] = {}) -> Problem:
+    def problem(self, model: Model | None = None) -> Problem:
         """Fits of this model, or of one with more in it."""
-        update = update or self.update
-        follower = Follower(model or self.model, self.records, update, self.set_name, self.fastest)
-        return Problem(follower, self.noise**2 / update, {**fixed}, left)
+        predictor = Predictor(model or self.model, self.records, self.update, self.set_name, self.fastest)
+        return Problem(predictor, self.noise**2 / self.update)
 
-    def gains(self, fit: Fit | None = None, model: Model | None = None, update: int | None = None) -> Gains:
+    def gains(self, fit: Fit | None = None, model: Model | None = None) -> Gains:
         """The linear plant with the values of a fit."""
-        update, model = update or self.update, model or self.model
+        model = model or self.model
         values = {} if fit is None else fit.values
-        plant = linear(self.base, len(self.noise), values, self.set_name)
-        shaken = np.array([i.noise for i in self.base.inputs])
-        return Gains(self.base.states, model.states, *plant, shaken, self.forces, self.noise, update * self.step, update)
+        noise = np.array([i.noise for i in self.base.inputs])
+        return Gains(self.base.states, model.states, linear(self.base, values), noise, self.forces, self.noise, self.update * self.step, self.update)
 
 
 def parameter(p: Parameter) -> Free | None:
@@ -79,7 +77,7 @@ def parameter(p: Parameter) -> Free | None:
     return Free(p.name, p.value, size, log=True, sigma=sigma, origin=p.value, low=ends[0], high=ends[1])
 
 
-def stated(model: Model) -> Model:
+def with_tolerances(model: Model) -> Model:
     """The model with a tolerance of each parameter: where its file states none and does not call it exact, UNSTATED."""
     known = {n: p if p.exact or p.tolerance or not p.value else replace(p, tolerance=UNSTATED) for n, p in model.parameters.items()}
     return replace(model, parameters=known)
@@ -87,7 +85,7 @@ def stated(model: Model) -> Model:
 
 def build(model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default", base: Model | None = None) -> Bench:  # fmt: skip
     """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]; `base`: the nominal one, if it is not."""
-    wide = dressed(model, places)
+    wide = augmented(model, places)
     free = [f for f in map(parameter, model.parameters.values()) if f]
     spans = np.array([max(np.nanstd(np.concatenate([r.y[:, j] for r in records])), noise[j]) for j in range(len(noise))])
     means = np.array([max(abs(np.nanmean(r.y[:, j])) for r in records) if any(np.isfinite(r.y[:, j]).any() for r in records) else 0.0 for j in range(len(noise))])
@@ -97,14 +95,14 @@ def build(model: Model, places: Sequence[Place], records: Sequence[Record], nois
     longest = sum(map(len, records)) * records[0].step
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
     wanders = [n for n in wide.states if n.startswith(WANDER)]
-    bench = Bench(wide, set_name, tuple(places), tuple(records), dressed(base or model, places), (), first, np.ones(len(wanders)), noise, fastest, Level(0.0, 1.0), plain)
+    bench = Bench(wide, set_name, tuple(places), tuple(records), augmented(base or model, places), (), first, np.ones(len(wanders)), noise, fastest, Level(0.0, 1.0), plain)
     bench, x = _moved(bench, model, spans)
     starts = []
     for e, states in enumerate(x):
         for i, start in enumerate(model.start):
             size = max(float(np.std(states[:, i])), 1e-9)
             starts.append(Free(("start", e, i), float(states[0, i]), 0.1 * size, sigma=3.0 * size + 3.0 * abs(float(np.mean(states[:, i]))), origin=start))
-    return settle(replace(bench, free=(*free, *starts), nominal=(*free, *starts)))
+    return fit_null(replace(bench, free=(*free, *starts), nominal=(*free, *starts)))
 
 
 def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]]:
@@ -113,10 +111,10 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
     n_q = len(model.bodies)
     x: list[Array] = []
     for again in range(3):
-        follower = bench.problem().follower
+        predictor = bench.problem().predictor
         scale = bench.forces if again else _guess(bench, model, spans)
         by = replace(bench.gains(), forces=scale).at(Level(1.0, 2.0 * bench.update * bench.step))
-        moved = follower.follow((), np.zeros((1, 0)), by, states=names)[2]
+        moved = predictor.predict((), np.zeros((1, 0)), by, states=names)[2]
         x = [np.array(m[0]) for m in moved]
         if not n_q:
             rms = np.array([np.sqrt(np.nanmean(np.concatenate([r.y[:, j] for r in bench.records]) ** 2)) for j in range(len(spans))])
@@ -139,7 +137,7 @@ def _guess(bench: Bench, model: Model, spans: Array) -> Array:
     gains = bench.gains()
     wanders = [i for i, n in enumerate(gains.names) if n.startswith(WANDER)]
     step = gains.period
-    reach = np.abs(gains.c @ np.linalg.matrix_power(np.eye(len(gains.a)) + gains.a * step, 3)[:, wanders])
+    reach = np.abs(gains.plant.c @ np.linalg.matrix_power(np.eye(len(gains.plant.a)) + gains.plant.a * step, 3)[:, wanders])
     return np.array([float(np.min(spans / np.maximum(reach[:, k], 1e-300))) for k in range(len(wanders))])
 
 
@@ -151,23 +149,22 @@ def smooth(x: Array, width: int) -> Array:
     return (total[high] - total[low]) / (high - low)[:, None]
 
 
-def settle(bench: Bench, start: Sequence[Free] | None = None) -> Bench:
+def fit_null(bench: Bench) -> Bench:
     """The bench with its free values fitted, first as a free run, then in turn with the level of the forces that wander."""
     problem = bench.problem()
-    free = tuple(start or bench.free)
     n_x = len(bench.model.states)
     level = Level(0.0, 1.0)
-    fit = problem.solve(free, Filter.none(n_x, len(bench.noise)), 12)
+    fit = problem.solve(bench.free, Filter.none(n_x, len(bench.noise)), 12)
     for _ in range(TURNS):
-        level, fit = leveled(bench, problem, fit, level)
+        level, fit = fit_level(bench, problem, fit, level)
     return replace(bench, free=fit.free, level=level, fit=fit)
 
 
-def leveled(bench: Bench, problem: Problem, fit: Fit, level: Level) -> tuple[Level, Fit]:
+def fit_level(bench: Bench, problem: Problem, fit: Fit, level: Level) -> tuple[Level, Fit]:
     """The likeliest level, and the values fitted with it, from those of a fit."""
-    gains = bench.gains(fit, problem.follower.model)
+    gains = bench.gains(fit, problem.predictor.model)
     period = gains.period
-    tried = [level] + [Level(size, STAYS * period) for size in SIZES]
+    tried = [level] + [Level(size, CORRELATION * period) for size in SIZES]
     filters = [gains.at(l) for l in tried]
     nu = problem.nu(fit.free, np.zeros((len(tried), len(fit.free))), Filter.many(filters))
     worth = [likelihood(n, problem.used(n), problem.floor)[1] for n in nu]

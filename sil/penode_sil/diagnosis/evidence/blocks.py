@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .bench import STAYS, Bench
+from .bench import CORRELATION, Bench
 from .fit import Fit, Problem
 from .gain import Level
 
@@ -46,17 +46,17 @@ class Blocks:
         found = []
         for b in range(BLOCKS):
             left = self.number == b
-            part = Problem(problem.follower, problem.floor, problem.fixed, left).solve(fit.free, fit.by, REFIT)
+            part = Problem(problem.predictor, problem.floor, left).solve(fit.free, fit.by, REFIT)
             found.append(predictive(part, left, problem.floor))
         return np.array(found)
 
-    def leveled(self, bench: Bench, problem: Problem, fit: Fit, level: Level, sizes: Sequence[float]) -> tuple[Level, Fit, Array]:
+    def fit_level(self, bench: Bench, problem: Problem, fit: Fit, level: Level, sizes: Sequence[float]) -> tuple[Level, Fit, Array]:
         """The level with which left-out blocks are predicted best, that of a fit or one of other `sizes`, the fit with it, and its scores. The
         likeliest level in training is too small where few updates meet many free values: they then follow what should wander."""
         best = level, fit, self.scores(problem, fit)
-        gains = bench.gains(fit, problem.follower.model)
+        gains = bench.gains(fit, problem.predictor.model)
         for size in sizes:
-            more = Level(size, STAYS * gains.period)
+            more = Level(size, CORRELATION * gains.period)
             wider = problem.solve(fit.free, gains.at(more), REFIT)
             scores = self.scores(problem, wider)
             if np.sum(scores) > np.sum(best[2]):

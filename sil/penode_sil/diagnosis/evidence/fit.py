@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..fit import Free
-from .observer import Filter, Follower
+from .observer import Filter, Predictor
 
 Array = NDArray[np.float64]
 DAMPING = np.array([0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
@@ -42,7 +42,7 @@ class Fit:
     def curvature(self) -> Array:
         """Of the negative log posterior, in units of the free values."""
         rows = (self.slopes / np.sqrt(self.variance)[None, :, None])[self.used]
-        return rows.T @ rows + np.diag([(f.unit / f.sigma) ** 2 if not f.log else (1.0 / f.sigma) ** 2 for f in self.free])
+        return rows.T @ rows + np.diag(precisions(self.free) ** 2)
 
     def covariance(self) -> Array:
         """Of the free values, in their units (log: relative)."""
@@ -59,10 +59,15 @@ class Fit:
     def criterion(self) -> float:
         """Log marginal likelihood by Laplace (Kass and Raftery 1995, eq. 6), but for constants that all fits of the same data share:
         likelihood, priors, and the width of the posterior against theirs."""
-        prior = np.array([(f.unit / f.sigma) if not f.log else 1.0 / f.sigma for f in self.free])
+        prior = precisions(self.free)
         own = prior > 0.0  # what has no prior is free in all fits
-        sign, volume = np.linalg.slogdet(self.curvature())
+        _, volume = np.linalg.slogdet(self.curvature())
         return self.likelihood - 0.5 * sum(away(f) ** 2 for f in self.free) + float(np.sum(np.log(prior[own]))) - 0.5 * volume
+
+
+def precisions(free: Sequence[Free]) -> Array:
+    """Of the priors of free values, in their units (log: relative); 0 for those without."""
+    return np.array([(1.0 if f.log else f.unit) / f.sigma for f in free])
 
 
 def away(f: Free) -> float:
@@ -82,17 +87,16 @@ def likelihood(nu: Array, used: NDArray[np.bool_], floor: Array) -> tuple[Array,
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Fits of a follower's innovations; `floor` [n_z]: variance that sensor noise alone leaves; `fixed` values of parameters; `left`
-    [updates]: those that are not fitted."""
+    """Fits of a predictor's innovations; `floor` [n_z]: variance that sensor noise alone leaves; `left` [updates]: those
+    that are not fitted."""
 
-    follower: Follower
+    predictor: Predictor
     floor: Array
-    fixed: Mapping[str, float]
     left: NDArray[np.bool_] | None = None
 
     def nu(self, free: Sequence[Free], shifts: Array, by: Filter) -> Array:
         """[runs, updates, n_z], of all recordings in turn."""
-        lanes = self.follower.follow(free, shifts, by, self.fixed)[0]
+        lanes = self.predictor.predict(free, shifts, by)[0]
         nu = np.concatenate(lanes.nu, axis=1)
         nu[~lanes.sane] = np.where(np.isfinite(nu[~lanes.sane]), 1e12, np.nan)
         return nu
@@ -139,7 +143,7 @@ class Problem:
     def _steps(self, fit: Fit) -> Array:
         rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
         rest = (fit.nu / np.sqrt(fit.variance))[fit.used]
-        weight = np.array([(f.unit / f.sigma) if not f.log else 1.0 / f.sigma for f in fit.free])
+        weight = precisions(fit.free)
         curvature = rows.T @ rows + np.diag(weight**2)
         slope = -rows.T @ rest - weight * np.array([away(f) for f in fit.free])
         stuck = [f.value <= f.low and s <= 0.0 or f.value >= f.high and s >= 0.0 for f, s in zip(fit.free, slope)]

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import penode_gen
 from numpy.typing import NDArray
 from penode_gen.model import Model
 from scipy import linalg
 
+from ..plant import Linear, linearise
 from .observer import WANDER, Filter
 
 Array = NDArray[np.float64]
-FORGETS = 1e-6  # by which states decay at an update: one that no sensor shows then has a bounded variance
+FORGETTING = 1e-6  # by which states decay at an update: one that no sensor shows then has a bounded variance
 DOUBLINGS = 30  # of the time for which the filter has run: 1e9 updates
 
 
@@ -30,17 +30,14 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """Linear plant of a dressed model, x' = a x + b u, y = c x + d u; `shaken` [n_u]: noise of a sample of each input; `forces` [wandering] are the sizes of force to which levels are relative,
-    `noise` [n_z] the standard deviations of a sample of each sensor, `period` [s] the time between updates, `samples` how many; `names` of its states, `into`: those of the
-    model that follows, of which others are not corrected."""
+    """The linear `plant` of a augmented model with states `names`; `into`: states of the model that follows, of which others are not
+    corrected. `input_noise` [n_u] and `noise` [n_z]: standard deviations of a sample of each input and sensor; `forces` [wandering]:
+    what levels are relative to; `period` [s] between updates, and how many `samples` that are."""
 
     names: tuple[str, ...]
     into: tuple[str, ...]
-    a: Array
-    b: Array
-    c: Array
-    d: Array
-    shaken: Array
+    plant: Linear
+    input_noise: Array
     forces: Array
     noise: Array
     period: float
@@ -52,10 +49,10 @@ class Gains:
 
     def at(self, level: Level) -> Filter:
         """The steady filter: what an update does with the mean innovation since the one before."""
-        n_x, n_z = len(self.a), len(self.noise)
-        if not n_x or level.size == 0.0 and not self.shaken.any():
+        n_x, n_z = len(self.plant.a), len(self.noise)
+        if not n_x or level.size == 0.0 and not self.input_noise.any():
             return Filter.none(len(self.into), n_z)
-        a = self.a.copy()
+        a = self.plant.a.copy()
         for i in self._wanders:
             a[i, i] = -1.0 / level.tau
         drive = np.zeros((n_x, n_x))
@@ -64,11 +61,11 @@ class Gains:
         step, q = sampled(a, drive, self.period / self.samples)
         # states, and means of the sensors at the samples since the last update, from one sample to the next
         n = n_x + n_z
-        seen = self.c / self.samples
+        seen = self.plant.c / self.samples
         once = np.block([[step, np.zeros((n_x, n_z))], [seen @ step, np.eye(n_z)]])
         into = np.vstack([np.eye(n_x), seen])
-        drive_noise = np.vstack([self.b * (self.period / self.samples), self.d / self.samples]) * self.shaken
-        noise = into @ q @ into.T + drive_noise @ drive_noise.T
+        shaken = np.vstack([self.plant.b * (self.period / self.samples), self.plant.d / self.samples]) * self.input_noise
+        noise = into @ q @ into.T + shaken @ shaken.T
         f, total = np.eye(n), np.zeros((n, n))
         for _ in range(self.samples):
             f, total = once @ f, once @ total @ once.T + noise
@@ -92,7 +89,7 @@ def sampled(a: Array, drive: Array, step: float) -> tuple[Array, Array]:
 def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
     """Steady gain k of x+ = f x + w, y = h x + v with covariances q of w, r of v and s of both: x+ = f x + k (y - h x). By doubling
     (Anderson and Moore, Optimal Filtering, 1979, sections 5.5 and 6.7)."""
-    f = f * (1.0 - FORGETS)
+    f = f * (1.0 - FORGETTING)
     size = np.sqrt(np.maximum(np.diag(q), 1e-12 * np.max(np.diag(q)) + 1e-300))
     deviation = np.sqrt(np.diag(r))
     f, h, q = f * size / size[:, None], h * size / deviation[:, None], q / np.outer(size, size)
@@ -111,20 +108,7 @@ def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
     return np.where(np.isfinite(gain), size[:, None] * gain / deviation, 0.0)
 
 
-def linear(model: Model, n_z: int, values: dict[str, float], set_name: str) -> tuple[Array, Array, Array, Array]:
-    """a [n_x, n_x], b [n_x, n_u], c [n_z, n_x] and d [n_z, n_u] of a dressed model where it stands still."""
+def linear(model: Model, values: dict[str, float]) -> Linear:
+    """A augmented model with these parameters where it stands still."""
     known = {n: replace(p, value=values.get(n, p.value)) for n, p in model.parameters.items()}
-    system = penode_gen.numeric(replace(model, parameters=known, interpolation="linear"), set_name)
-    n_x, n_u = len(model.states), len(model.inputs)
-    x, u = np.zeros(n_x), np.zeros(n_u)
-    a, c = np.zeros((n_x, n_x)), np.zeros((n_z, n_x))
-    for j in range(n_x):
-        step = 1e-4 * np.eye(n_x)[j]
-        a[:, j] = (system.rates(x + step, u, u) - system.rates(x - step, u, u)) / 2e-4
-        c[:, j] = (system.sensors(x + step, u, u) - system.sensors(x - step, u, u))[:n_z] / 2e-4
-    b, d = np.zeros((n_x, n_u)), np.zeros((n_z, n_u))
-    for j in range(n_u):
-        step = 1e-4 * np.eye(n_u)[j]
-        b[:, j] = (system.rates(x, u + step, u) - system.rates(x, u - step, u)) / 2e-4
-        d[:, j] = (system.sensors(x, u + step, u) - system.sensors(x, u - step, u))[:n_z] / 2e-4
-    return a, b, c, d
+    return linearise(replace(model, parameters=known), (), np.zeros((1, len(model.states))), np.zeros((1, len(model.inputs))))

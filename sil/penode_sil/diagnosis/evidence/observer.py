@@ -13,20 +13,20 @@ from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter,
 
 from ...batch import Observer
 from ..fit import Free, compiled, ordered
+from ..hypotheses import lag
 from ..noise import Experiment
 from ..plant import Place, anonymous, extend, rotational_unit
 
 Array = NDArray[np.float64]
 WANDER = "wander"  # stem of the forces that wander, and of their states
-TURN = 0.15  # of a period of the fastest mode, in one step of the integration: Runge-Kutta of order 4 then errs by 1e-4 of it a step
-CROSSED = 5  # steps between updates: the edge of a friction, 0.02 of the rms rate wide, then damps less than Runge-Kutta bears
-LOST = 1e15  # innovation of a run that left all bounds
+MAX_TURN = 0.15  # of a period of the fastest mode, in one step of the integration: Runge-Kutta of order 4 then errs by 1e-4 of it a step
+MIN_STEPS = 5  # steps between updates: the edge of a friction, 0.02 of the rms rate wide, then damps less than Runge-Kutta bears
+MAX_INNOVATION = 1e15  # innovation of a run that left all bounds
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A recording: inputs u [n, n_u], sensors y [n, n_z] (NaN: nothing measured), `step` [s] apart; the noise of each sensor that the
-    model file states [n_z] (0: none). `held`: inputs that move in steps."""
+    """A recording: inputs u [n, n_u], sensors y [n, n_z] (NaN: nothing measured), `step` [s] apart; `held`: inputs move in steps."""
 
     name: str
     step: float
@@ -43,7 +43,7 @@ class Record:
         return len(self.y)
 
 
-def shown(records: Sequence[Record], stated: Array) -> Array:
+def sample_noise(records: Sequence[Record], stated: Array) -> Array:
     """Noise [n_z] of a sample: what the model file states (0: nothing), but not more than neighbouring samples show, whose second
     differences have six times its variance where the motion is smooth."""
     own = []
@@ -63,7 +63,7 @@ def scale(sensor: str) -> str:
     return f"{sensor}_scale"
 
 
-def dressed(model: Model, places: Sequence[Place]) -> Model:
+def augmented(model: Model, places: Sequence[Place]) -> Model:
     """The model with a bias and a scale of each sensor as parameters, and with an acceleration that wanders, w' = -w/tau, of each body;
     without bodies, with a force at each place. The parameter wander_tau is tau [s]. An acceleration, so that the observer stays the
     same where masses and forces are scaled together, which no sensor of motion shows."""
@@ -86,8 +86,8 @@ def dressed(model: Model, places: Sequence[Place]) -> Model:
     return replace(wide, sensors=sensors)
 
 
-def probed(model: Model, places: Sequence[Place]) -> Model:
-    """A dressed model with a force at_k as a further input at each place, and its deflection, its rate and what acts there already as
+def with_probes(model: Model, places: Sequence[Place]) -> Model:
+    """A augmented model with a force at_k as a further input at each place, and its deflection, its rate and what acts there already as
     further sensors."""
     forces = [Element(f"probe{k}", p.ends, "expression", expression=f"at{k}") for k, p in enumerate(places)]
     wide = replace(model, inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(places))))
@@ -138,38 +138,31 @@ class Lanes:
     sane: NDArray[np.bool_]
 
 
-class Follower:
-    """A dressed model that follows recordings, corrected every `update` samples."""
+class Predictor:
+    """A augmented model that follows recordings, corrected every `update` samples."""
 
     def __init__(self, model: Model, records: Sequence[Record], update: int, set_name: str = "default", fastest: float = 0.0):
         self.model, self.records, self.update, self.set_name = model, tuple(records), update, set_name
         causal, moves = ordered(model)
         step = model.sample_time
-        substeps = max(1, int(np.ceil(step * fastest / TURN)), -(-CROSSED // update), model.substeps)
+        substeps = max(1, int(np.ceil(step * fastest / MAX_TURN)), -(-MIN_STEPS // update), model.substeps)
         way = "cubic" if moves else "held" if any(r.held for r in records) else "linear"
         self.batch = compiled(anonymous(replace(model, method="rk4", interpolation=way, substeps=substeps)), causal)
         self.n_z = len(records[0].y[0])  # sensors that were measured; the model may have more
 
-    def follow(
-        self, free: Sequence[Free], shifts: Array, by: Filter, fixed: Mapping[str, float] = {}, extra: Mapping[int, Array] = {},
-        watched: int = 0, states: Sequence[str] = (), parts: Sequence[tuple[int, int]] | None = None,
+    def predict(
+        self, free: Sequence[Free], shifts: Array, by: Filter, extra: Mapping[int, Array] = {}, watched: int = 0,
+        states: Sequence[str] = (),
     ) -> tuple[Lanes, list[Array], list[Array]]:  # fmt: skip
-        """Runs with free values after shifts [runs, free], corrected `by` a filter. `extra`: further inputs of a
-        probed model per recording, [n, .] or [runs, n, .]; `watched`: how many sensors more to give, per recording [runs, n, watched].
-        `parts`: samples of each recording, from and to, that are followed. Returns innovations, watched sensors, states."""
+        """Runs with free values after shifts [runs, free], corrected `by` a filter. `extra`: further inputs of a probed model per
+        recording, [runs, n, .]; `watched`: how many sensors more to give, per recording [runs, n, watched]. Returns innovations,
+        watched sensors, and states per recording [runs, n, n_x]."""
         nus, seen, moved, sane = [], [], [], np.ones(len(shifts), bool)
-        for e, record in enumerate(self.records):
-            first, last = (0, len(record)) if parts is None else parts[e]
-            start, parameters, u, y = self._given(e, free, shifts, fixed)
+        for e in range(len(self.records)):
+            start, parameters, u, y = self._given(e, free, shifts)
             parameters[f"{WANDER}_tau"] = by.tau
-            u, y = u[..., first:last, :], y[..., first:last, :]
             if e in extra:
-                more = extra[e][..., first:last, :]
-                if more.ndim == 3 and u.ndim == 2:
-                    u = np.broadcast_to(u, (len(more), *u.shape))
-                if u.ndim == 3 and more.ndim == 2:
-                    more = np.broadcast_to(more, (len(u), *more.shape))
-                u = np.concatenate([u, more], axis=-1)
+                u = np.concatenate([np.broadcast_to(u, (len(extra[e]), *u.shape[-2:])), extra[e]], axis=-1)
             blank = np.full((*y.shape[:-1], len(self.model.sensors) - self.n_z), np.nan)
             wide = np.zeros((*by.gain.shape[:-1], len(self.model.sensors)))
             wide[..., : self.n_z] = by.gain
@@ -179,7 +172,7 @@ class Follower:
             )  # fmt: skip
             z = run.z
             sane &= (run.first_bad < 0) & np.isfinite(z).all(axis=(1, 2))
-            nus.append(self._means(y - np.where(np.abs(z[:, :, : self.n_z]) < LOST, z[:, :, : self.n_z], LOST)))
+            nus.append(self._means(y - np.where(np.abs(z[:, :, : self.n_z]) < MAX_INNOVATION, z[:, :, : self.n_z], MAX_INNOVATION)))
             seen.append(z[:, :, self.n_z : self.n_z + watched])
             moved.append(run.x)
         return Lanes(nus, sane), seen, moved
@@ -193,10 +186,10 @@ class Follower:
         total = np.sum(np.where(there, whole, 0.0), axis=2)
         return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
-    def _given(self, e: int, free: Sequence[Free], shifts: Array, fixed: Mapping[str, float]) -> tuple[Array, dict[str, Array], Array, Array]:
+    def _given(self, e: int, free: Sequence[Free], shifts: Array) -> tuple[Array, dict[str, Array], Array, Array]:
         record, runs = self.records[e], len(shifts)
         start = np.tile(np.array(self.model.start, dtype=float), (runs, 1))
-        parameters: dict[str, Array] = {name: np.array([value]) for name, value in fixed.items()}
+        parameters: dict[str, Array] = {}
         u, y = record.u, record.y
         for f, shift in zip(free, shifts.T):
             values = f.at(shift)
@@ -211,16 +204,21 @@ class Follower:
             else:
                 u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
                 u[:, :, f.target[1]] = driven(f.target[0], u[:, :, f.target[1]], values, record.step)
-        return np.clip(np.nan_to_num(start), -LOST, LOST), parameters, u, y
+        return np.clip(np.nan_to_num(start), -MAX_INNOVATION, MAX_INNOVATION), parameters, u, y
+
+
+def moved(x: Array, samples: Array) -> Array:
+    """A signal [n] later by so many samples [runs], below zero earlier, joined by straight lines: [runs, n]; its ends stay as they are."""
+    at = np.arange(len(x))
+    return np.array([np.interp(at - d, at, x) for d in samples])
 
 
 def earlier(y: Array, samples: Array) -> Array:
     """A signal [n] as it was so many samples [runs] before it was seen: [runs, n]; what was not seen is NaN."""
-    at = np.arange(len(y)) + samples[:, None]
-    low = np.clip(np.floor(at).astype(int), 0, len(y) - 1)
-    part = at - low
-    found = y[low] * (1.0 - part) + y[np.minimum(low + 1, len(y) - 1)] * np.where(part > 0.0, part, 0.0)
-    return np.where((at >= 0) & (at <= len(y) - 1), found, np.nan)
+    seen = np.arange(len(y)) + samples[:, None] <= len(y) - 1
+    good = np.isfinite(y)
+    near = moved(good.astype(float), -samples) == 1.0  # both neighbours were measured
+    return np.where(seen & near, moved(np.where(good, y, 0.0), -samples), np.nan)
 
 
 def driven(how: str, u: Array, values: Array, step: float) -> Array:
@@ -231,16 +229,7 @@ def driven(how: str, u: Array, values: Array, step: float) -> Array:
         case "input_offset":
             return u + values[:, None]
         case "input_delay":
-            at = np.arange(u.shape[1]) - values[:, None] / step
-            low = np.clip(np.floor(at).astype(int), 0, u.shape[1] - 1)
-            part = np.clip(at - low, 0.0, 1.0)
-            after = np.minimum(low + 1, u.shape[1] - 1)
-            return np.take_along_axis(u, low, 1) * (1.0 - part) + np.take_along_axis(u, after, 1) * part
+            return moved(u[0], values / step)
         case "input_lag":
-            keep = np.exp(-step / np.maximum(values, 1e-3 * step))
-            out = np.empty_like(u)
-            out[:, 0] = u[:, 0]
-            for k in range(1, u.shape[1]):
-                out[:, k] = keep * out[:, k - 1] + (1.0 - keep) * u[:, k]
-            return out
+            return np.array([x[0] + lag(x - x[0], max(tau, 1e-3 * step), step) for x, tau in zip(u, values)])
     raise ValueError(how)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bench import Bench
-from .fit import Fit
-from .observer import Filter, Follower, probed
+from .fit import Fit, precisions
+from .observer import Filter, Predictor, with_probes
 
 Array = NDArray[np.float64]
 AT_ONCE = 32  # runs that are simulated together
@@ -24,19 +24,19 @@ class Probe:
     """A bench with a force to be put on each place."""
 
     bench: Bench
-    follower: Follower
+    predictor: Predictor
     by: Filter
     motions: list[Array]  # deflection, rate and force of every place per recording [n, 3 places]
 
     @staticmethod
     def of(bench: Bench) -> Probe:
-        wide = probed(bench.model, bench.places)
-        follower = Follower(wide, bench.records, bench.update, bench.set_name, bench.fastest)
+        wide = with_probes(bench.model, bench.places)
+        predictor = Predictor(wide, bench.records, bench.update, bench.set_name, bench.fastest)
         by = bench.fit.by
-        none = {e: np.zeros((len(r), len(bench.places))) for e, r in enumerate(bench.records)}
+        none = {e: np.zeros((1, len(r), len(bench.places))) for e, r in enumerate(bench.records)}
         watched = 3 * len(bench.places)
-        seen = follower.follow(bench.fit.free, np.zeros((1, len(bench.fit.free))), by, {}, none, watched)[1]
-        return Probe(bench, follower, by, [s[0] for s in seen])
+        seen = predictor.predict(bench.fit.free, np.zeros((1, len(bench.fit.free))), by, none, watched)[1]
+        return Probe(bench, predictor, by, [s[0] for s in seen])
 
     def columns(self, forces: Sequence[tuple[int, Sequence[Array]]], size: float) -> Array:
         """Changes [forces, updates, n_z] of the innovations for a force of 1; each is a place and its series [n] per recording; `size` is
@@ -51,7 +51,7 @@ class Probe:
                 for k, (place, series) in enumerate(some):
                     u[k + 1, :, place] = sizes[k] * series[e]
                 extra[e] = u
-            lanes = self.follower.follow(free, np.zeros((len(some) + 1, len(free))), self.by, {}, extra)[0]
+            lanes = self.predictor.predict(free, np.zeros((len(some) + 1, len(free))), self.by, extra)[0]
             nu = np.concatenate(lanes.nu, axis=1)
             found.append((nu[1:] - nu[0]) / np.array(sizes)[:, None, None])
         return np.concatenate(found) if found else np.zeros((0, *bench.fit.nu.shape))
@@ -69,7 +69,7 @@ def scores(fit: Fit, hypotheses: Sequence[Array]) -> list[Score]:
     """Scores of hypotheses [updates, n_z, sizes] each, linearised about a fit (Rao 1948), with the level of the innovations profiled out."""
     white = 1.0 / np.sqrt(fit.variance)
     used = fit.used
-    weights = np.array([(f.unit / f.sigma) if not f.log else 1.0 / f.sigma for f in fit.free])
+    weights = precisions(fit.free)
     own = np.vstack([(fit.slopes * white[None, :, None])[used], np.diag(weights)])
     rest = np.concatenate([(fit.nu * white)[used], np.zeros(len(weights))])
     size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
