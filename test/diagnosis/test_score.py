@@ -13,6 +13,7 @@ import pytest
 from scipy import stats
 
 import campaign
+import frozen
 import score
 
 FRICTION = {
@@ -318,3 +319,13 @@ def test_a_draw_that_was_stopped_goes_on(tmp_path):
     assert len((tmp_path / "rows.jsonl").read_text().splitlines()) == 5  # none is timed a third time
     other = run("--cases", "2", "--command", "true", "--resume")
     assert other.returncode == 2 and f"seed {seed}; remove it, or leave --resume out" in other.stderr
+
+
+def test_two_diagnoses_of_the_same_cases():
+    """Exact McNemar by hand: of six cases that one of two has right, all six lost is 2/2^6; as many won as lost is chance."""
+    cases = [f"1:{i}" for i in range(8)]
+    right, wrong = dict.fromkeys(cases, True), dict.fromkeys(cases, True) | dict.fromkeys(cases[:6], False)
+    assert frozen.mcnemar(right, wrong) == (cases[:6], [], 2 / 2**6)
+    even = dict.fromkeys(cases, True) | {cases[0]: False}
+    assert frozen.mcnemar(even, even | {cases[0]: True, cases[1]: False}) == ([cases[1]], [cases[0]], 1.0)
+    assert frozen.mcnemar(right, right) == ([], [], 1.0)
