@@ -15,6 +15,8 @@ __all__ = ["FORMATS", "ExportError", "Exporter", "Option", "Options", "export", 
 
 # Name on the command line -> module of this package, whose EXPORTER it is. A new format is a new line.
 FORMATS: dict[str, str] = {
+    "fmu3": "fmu3",
+    "fmu2": "fmu2",
 }
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The templates of the exports, in templates/ beside this file. Filters: `xml` escapes a text for XML, `c` for a C string."""
+"""The templates of the exports, in templates/ beside this file. Filters: `xml` and `c` escape a text, `number` prints all digits of a double."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ENVIRONMENT = jinja2.Environment(
     loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"), bytecode_cache=compiled_templates(),
     undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
 )  # fmt: skip
-_ENVIRONMENT.filters |= {"xml": xml, "c": c_string}
+_ENVIRONMENT.filters |= {"xml": xml, "c": c_string, "number": lambda x: repr(float(x))}
 
 
 def render(template: str, **context: Any) -> str:
