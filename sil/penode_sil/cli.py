@@ -17,6 +17,7 @@ from .console import FILE, Several, counted, staged
 from .errors import UserError
 from .export import export
 from .guard import guarded
+from .importing import import_
 from .inspection import inspect
 from .simulate import simulate
 from .training.command import train
@@ -29,6 +30,7 @@ def cli() -> None:
 
 
 cli.add_command(export)
+cli.add_command(import_)
 cli.add_command(inspect)
 cli.add_command(simulate)
 cli.add_command(train)

@@ -17,6 +17,7 @@ __all__ = ["FORMATS", "ExportError", "Exporter", "Option", "Options", "export", 
 FORMATS: dict[str, str] = {
     "fmu3": "fmu3",
     "fmu2": "fmu2",
+    "modelica": "modelica",
 }
 
 
