@@ -15,6 +15,7 @@ import penode_gen
 
 from .console import FILE, Several, counted, staged
 from .errors import UserError
+from .export import export
 from .guard import guarded
 from .inspection import inspect
 from .simulate import simulate
@@ -27,6 +28,7 @@ def cli() -> None:
     """Physics-enhanced neural ODEs: from a model file to checked C, in the loop on host and Cortex-M."""
 
 
+cli.add_command(export)
 cli.add_command(inspect)
 cli.add_command(simulate)
 cli.add_command(train)
