@@ -15,6 +15,7 @@ __all__ = ["FORMATS", "ExportError", "Exporter", "Option", "Options", "export", 
 
 # Name on the command line -> module of this package, whose EXPORTER it is. A new format is a new line.
 FORMATS: dict[str, str] = {
+    "a2l": "a2l",
 }
 
 
