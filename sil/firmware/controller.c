@@ -15,15 +15,17 @@ static MODEL(t) controller;
 static MODEL(banks_t) banks;
 static pen_xcp_daq_t daq;
 
-/* What a master may read, besides the instance. Written by the step. */
-static volatile uint32_t sample;       /* steps so far                                      */
-static volatile uint32_t set_in_force; /* id of the set that the last step ran with         */
-static volatile uint32_t adopted_at;   /* the step, counted from 1, that last adopted a set */
-static volatile uint32_t late_steps;
-static volatile uint32_t step_status;  /* flags of the last step                            */
+/* What a master may read, besides the instance. Written by the step. One region: a master may read neighbours at once. */
+static struct {
+    uint32_t sample;       /* steps so far                                      */
+    uint32_t set_in_force; /* id of the set that the last step ran with         */
+    uint32_t adopted_at;   /* the step, counted from 1, that last adopted a set */
+    uint32_t late_steps;
+    uint32_t step_status;  /* flags of the last step                            */
 #ifdef MODEL_SENSORS
-static MODEL(z_t) sensors;
+    MODEL(z_t) sensors;
 #endif
+} shown;
 
 #define TEXT_OF(name) TEXT_OF_(name)
 #define TEXT_OF_(name) #name
@@ -33,7 +35,7 @@ static const char name_text[] = TEXT_OF(MODEL(controller));
 static pen_status_t commit(void) { return MODEL(tune_commit)(&controller); }
 static pen_status_t choose(const pen_set_t *set) { return MODEL(tune_select)(&controller, set); }
 
-#define REGIONS 8U
+#define REGIONS 3U
 static pen_xcp_region_t region[REGIONS];
 static pen_xcp_region_t name_region;
 static pen_xcp_region_t epk_region;
@@ -72,14 +74,7 @@ static void declare(const volatile void *at, uint32_t size)
 static void declare_all(const controller_config_t *config)
 {
     declare(&controller, sizeof(controller));
-    declare(&sample, sizeof(sample));
-    declare(&set_in_force, sizeof(set_in_force));
-    declare(&adopted_at, sizeof(adopted_at));
-    declare(&late_steps, sizeof(late_steps));
-    declare(&step_status, sizeof(step_status));
-#ifdef MODEL_SENSORS
-    declare(&sensors, sizeof(sensors));
-#endif
+    declare(&shown, sizeof(shown));
     declare(penode_epk, sizeof(penode_epk));
     name_region = region_of(name_text, sizeof(name_text) - 1U);
     epk_region = region_of(penode_epk, sizeof(penode_epk) - 1U);
@@ -109,31 +104,31 @@ bool controller_start(const controller_config_t *config)
     xcp_config.address = address_of(MODEL(set_default).value);
     xcp_config.max_cto = config->max_cto;
     xcp_config.quiet = config->quiet;
-    set_in_force = MODEL(set_default).head.id;
+    shown.set_in_force = MODEL(set_default).head.id;
     start_lists(config);
     return (MODEL(init)(&controller, &MODEL(set_default), &banks) == PEN_OK) && (pen_xcp_init(&controller_xcp, &xcp_config) == PEN_OK);
 }
 
 void controller_step(const MODEL(u_t) *u, bool late)
 {
-    const uint32_t now = sample + 1U;
+    const uint32_t now = shown.sample + 1U;
     MODEL(y_t) y;
     const pen_status_t status = MODEL(step)(&controller, u, &y);
 
     if ((status & PEN_ADOPTED) != PEN_OK) {
         pen_set_head_t running;
         (void)MODEL(tune_running)(&controller, &running);
-        set_in_force = running.id;
-        adopted_at = now;
+        shown.set_in_force = running.id;
+        shown.adopted_at = now;
     }
 #ifdef MODEL_SENSORS
-    (void)MODEL(sensors)(&controller, &sensors);
+    (void)MODEL(sensors)(&controller, &shown.sensors);
 #endif
-    step_status = status;
-    late_steps += late ? 1U : 0U;
-    sample = now;
+    shown.step_status = status;
+    shown.late_steps += late ? 1U : 0U;
+    pen_port_store(&shown.sample, now);
     pen_xcp_sample(&controller_xcp, now * CONTROLLER_PERIOD); /* the model's time: wraps */
 }
 
-uint32_t controller_samples(void) { return sample; }
-uint32_t controller_late(void) { return late_steps; }
+uint32_t controller_samples(void) { return pen_port_load(&shown.sample); }
+uint32_t controller_late(void) { return pen_port_load(&shown.late_steps); }

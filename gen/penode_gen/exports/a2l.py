@@ -62,7 +62,7 @@ def _measured(model: Model, program: Program, instance: str, named: str | None) 
     sensors = program.names(f"{model.name}_z_t")
     for name in others or sensors[:1]:
         try:
-            found.of_sensors(model, name) if name in sensors else found.of_variable(name)
+            found.of_variable(model, name)
         except KeyError as exc:
             problems.append(f"--measure: {program.path} has no variable {exc.args[0]}; name variables outside of functions, with commas between")
     if problems:

@@ -135,15 +135,25 @@ class Measurements:
         for n in range(2):
             self.add("set", f"set.id_{n}", f"{instance}.head.tuning.slot[{n}].head.id", text=f"id of the set in slot {n}")
 
-    def of_sensors(self, model: Model, variable: str) -> None:
-        """A struct of the program that holds what NAME_sensors wrote."""
-        for sensor in model.sensors:
-            self.add("sensor", sensor.name, f"{variable}.{sensor.name}", sensor.unit, sensor.description)
+    def of_variable(self, model: Model, variable: str) -> None:
+        """The numbers of another variable of the program, by the names of its members. Raises KeyError if it has none of that name."""
+        whole = self.program.find(variable)
+        for place in self.program.numbers(whole):
+            member = place.path[len(whole.path) :].lstrip(".")
+            self._of_sensors(model, place) or self.add("program", _plain(member) if member else variable, place.path)
 
-    def of_variable(self, name: str) -> None:
-        """The numbers of another variable of the program. Raises KeyError if it has none."""
-        for place in self.program.numbers(self.program.find(name)):
-            self.add("program", place.path.replace("[", "._").replace("]", "_"), place.path)
+    def _of_sensors(self, model: Model, place: Place) -> bool:
+        """Is it a member of what NAME_sensors writes? Then it is measured as that sensor."""
+        struct, _, name = place.path.rpartition(".")
+        found = [sensor for sensor in model.sensors if sensor.name == name] if struct and type_name(self.program.find(struct).type) == f"{model.name}_z_t" else []
+        for sensor in found:
+            self.add("sensor", sensor.name, place.path, sensor.unit, sensor.description)
+        return bool(found)
+
+
+def _plain(path: str) -> str:
+    """A path as an identifier of A2L."""
+    return path.replace("[", "._").replace("]", "_")
 
 
 def _state_units(model: Model) -> Iterator[str]:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +34,7 @@ class Samples:
 
     stamps: list[int] = field(default_factory=list)
     rows: list[list[float]] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)  # of the columns: pyxcp puts them in the order of their addresses
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,9 @@ def _policy(entries: list[Entry], every: int) -> tuple[Any, Samples]:
 
     measured = [(entry.name, entry.address, 0, _TYPES[entry.type.str[1:]]) for entry in entries]
     lists = [DaqList(name="step", event_num=_STEP, stim=False, enable_timestamps=True, measurements=measured, priority=0, prescaler=every)]
-    return Collector(lists), kept
+    policy = Collector(lists, logger=logging.getLogger("penode.measure"))  # else pyxcp reads the command line, which is ours
+    policy.pid_off = False  # which it sets only then
+    return policy, kept
 
 
 def choose(a2l: A2l, names: list[str]) -> list[Entry]:
@@ -91,7 +95,7 @@ def _log(link: Link, entries: list[Entry], kept: Samples, every: int) -> Log:
     time_ = np.concatenate([[0.0], np.cumsum(steps) * 1e-6]) if stamps.size else np.zeros(0)
     lost = int(np.maximum(np.rint(steps * 1e-6 / period) - 1, 0).sum()) if period > 0.0 else 0
     columns = np.array(kept.rows, dtype=object).reshape(stamps.size, len(entries))
-    values = {entry.name: columns[:, n].astype(np.float64).astype(entry.type) for n, entry in enumerate(entries)}
+    values = {entry.name: columns[:, kept.names.index(entry.name)].astype(np.float64).astype(entry.type) for entry in entries}
     return Log(time_, values, lost, period)
 
 
@@ -101,6 +105,7 @@ def record(address: addresses.Address, a2l: A2l, names: list[str], duration: flo
     policy, kept = _policy(entries, every)
     with connected(address, policy) as link:
         link.ask("the DAQ commands", policy.setup)
+        kept.names = [header[0] for header in policy.daq_lists[0].headers]
         link.ask("START_STOP_SYNCH", policy.start)
         try:
             if during is not None:

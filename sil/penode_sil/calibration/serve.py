@@ -29,7 +29,7 @@ from ..targets import FLAGS, ROOT, _files, _kept, _version, generated, model_opt
 
 FIRST_ID = 1000  # of the sets that a master opens: sil/firmware/controller.c
 MAX_CTO = 252
-MEASURED = "sample,set_in_force,adopted_at,late_steps,step_status"
+MEASURED = "shown"  # the variable of it with what may be measured besides the instance
 TROUBLE = {2: "it refused the model, or its inputs", 3: "the port is taken, or the address is not one of this machine"}
 
 
@@ -54,8 +54,7 @@ def build(model: Any) -> Path:
 
 def describe(model: Any, program: Path, transport: str) -> str:
     """The A2L of a virtual controller."""
-    sensors = "sensors," if model.sensors else ""
-    return exports.export(model, "a2l", Path("served.a2l"), {"elf": program, "measure": sensors + MEASURED, "transport": transport}).decode()
+    return exports.export(model, "a2l", Path("served.a2l"), {"elf": program, "measure": MEASURED, "transport": transport}).decode()
 
 
 def inputs(model: Any, scenario: Path | None) -> NDArray[np.float32]:
