@@ -88,7 +88,7 @@ class Program:
         try:
             self._file = open(path, "rb")
             self._elf = ELFFile(self._file)
-            if not self._elf.has_dwarf_info():
+            if not self._elf.has_dwarf_info(strict=True):
                 raise ExportError(f"{path}: the program has no debug information; compile and link it with -g, and do not strip it")
             self._dwarf = self._elf.get_dwarf_info()
             self._variables = dict(self._global_variables())
