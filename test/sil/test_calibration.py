@@ -18,6 +18,7 @@ import pytest
 
 import penode_gen
 from penode_sil.calibration import a2l_read, address, link as links, measure, pages, serve, stage
+from penode_sil.calibration.codes import Page, Slave
 from penode_sil.errors import UserError
 from penode_sil.schedule import Call
 from penode_sil.targets import Sil
@@ -110,13 +111,13 @@ def test_log_is_that_of_a_sil_run_with_the_exchange_where_it_shows_the_new_id(ki
         def exchange(link: links.Link) -> None:
             time.sleep(0.2)
             staged = stage.stage_set(link, a2l, chosen)
-            assert (staged.bytes, staged.id) == (4 * 1198, serve.FIRST_ID)
+            assert (staged.bytes, staged.id) == (4 * 1198, Slave.FIRST_ID)
 
         log = measure.record(where, a2l, SIGNALS, 0.3, every, exchange)
     sample, ids = log.values["sample"].astype(int), log.values["set_in_force"]
     assert log.lost == 0 and (np.diff(sample) == every).all()
     changes = np.flatnonzero(np.diff(ids)) + 1
-    assert len(changes) == 1 and (ids[0], ids[-1]) == (1, serve.FIRST_ID)
+    assert len(changes) == 1 and (ids[0], ids[-1]) == (1, Slave.FIRST_ID)
     adopting = int(log.values["adopted_at"][-1])
     assert sample[changes[0]] - every < adopting <= sample[changes[0]]  # the log shows the new id with the step that adopts it
     expected = sil_with_exchange(model, u, int(sample[-1]), adopting, "altered_friction")[sample - 1]
@@ -173,7 +174,7 @@ def test_refused_set_changes_nothing_and_says_why() -> None:
             stage.stage_set(link, a2l, bad)
         with links.connected(where) as link:
             seen = pages.look(link, a2l)
-            assert seen.page == links.REFERENCE and not seen.differing(a2l, pages.segment(a2l)[0])
+            assert seen.page == Page.REFERENCE and not seen.differing(a2l, pages.segment(a2l)[0])
             foreign = pages.ChosenSet("foreign", bad.layout ^ 1, bad.values)
             with pytest.raises(UserError, match="set of another model"):
                 stage.stage_set(link, a2l, foreign)

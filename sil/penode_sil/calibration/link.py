@@ -19,11 +19,8 @@ from .. import status
 from ..errors import UserError
 from .a2l_read import A2l, Entry, parse
 from .address import Address
+from .codes import Page, Text, Who
 
-ECU, TOOL = 0x01, 0x02
-WORKING, REFERENCE = 0, 1
-TIMEOUT = 10  # [s] for an answer: more than any command takes, on a serial line too
-_GET_ID_A2L, _GET_ID_EPK = 4, 5
 _CRC_32 = "XCP_CRC_32"
 
 
@@ -126,33 +123,33 @@ class Link:
             raise UserError(f"{self.address.text}: its checksum is {answer.checksumType}; a slave of penode has {_CRC_32}")
         return int(answer.checksum)
 
-    def set_page(self, who: int, page: int) -> None:
+    def set_page(self, who: Who, page: Page) -> None:
         """SET_CAL_PAGE of segment 0. Of the ECU: what was written is checked, and in force with the next step, or Refused."""
-        self.ask("SET_CAL_PAGE", self.master.setCalPage, who, 0, page)
+        self.ask("SET_CAL_PAGE", self.master.setCalPage, int(who), 0, int(page))
 
-    def page(self, who: int) -> int:
+    def page(self, who: Who) -> Page:
         """GET_CAL_PAGE of segment 0."""
-        return int(self.ask("GET_CAL_PAGE", self.master.getCalPage, who, 0))
+        return Page(self.ask("GET_CAL_PAGE", self.master.getCalPage, int(who), 0))
 
-    def text(self, kind: int) -> str:
+    def text(self, kind: Text) -> str:
         """GET_ID; "" if the slave has no such text."""
-        return str(self.ask("GET_ID", self.master.identifier, kind) or "")
+        return str(self.ask("GET_ID", self.master.identifier, int(kind)) or "")
 
     def a2l(self, path: Path | None) -> A2l:
         """The A2L of a file, or the one that the slave offers, once it is known to be that of the program. Raises UserError."""
-        text = path.read_text(encoding="utf-8", errors="replace") if path is not None else self.text(_GET_ID_A2L)
+        text = path.read_text(encoding="utf-8", errors="replace") if path is not None else self.text(Text.A2L)
         if not text:
             raise UserError(f"{self.address.text}: the controller offers no A2L; name it by --a2l (penode export --format a2l writes it)")
         found = parse(text, str(path or self.address.text))
-        epk = self.text(_GET_ID_EPK) if found.epk is not None else ""
+        epk = self.text(Text.EPK) if found.epk is not None else ""
         if found.epk is not None and epk and epk != found.epk[0]:
             raise UserError(f'{path or self.address.text}: the A2L is that of "{found.epk[0]}", the controller is "{epk}"; export the A2L of its program')
         return found
 
 
 @contextmanager
-def connected(address: Address, policy: Any = None) -> Iterator[Link]:
-    """A link, disconnected at the end. Raises UserError."""
+def connected(address: Address, policy: Any = None, patience: float = 10.0) -> Iterator[Link]:
+    """A link, disconnected at the end. `patience` [s] for an answer: more than any command takes, on a serial line too. Raises UserError."""
     if importlib.util.find_spec("pyxcp") is None:
         raise UserError("XCP needs the Python package pyxcp, which is not installed; pip install penode[xcp]")
     from pyxcp.config import create_application_from_config, set_application
@@ -170,7 +167,7 @@ def connected(address: Address, policy: Any = None) -> Iterator[Link]:
         raise UserError(f"{address.text}: it cannot be opened; name a device, or a host, that is there") from exc
     finally:
         sys.argv = arguments
-    master.transport.timeout = TIMEOUT * 1_000_000_000  # pyxcp takes it from no configuration
+    master.transport.timeout = round(patience * 1e9)  # pyxcp takes it from no configuration
     link = Link(master, spy, address)
     try:
         master.transport.connect()

@@ -21,11 +21,10 @@ from ..output import Column, check_writable
 from ..units import UnitError, quantity
 from . import address as addresses
 from .a2l_read import A2l, Entry
+from .codes import Slave
 from .link import Link, connected
 
 _TYPES = {"u1": "U8", "i1": "I8", "u2": "U16", "i2": "I16", "u4": "U32", "i4": "I32", "u8": "U64", "i8": "I64", "f4": "F32", "f8": "F64"}
-_WRAP = 1 << 32  # of the time stamps [us]
-_STEP = 0  # the event
 
 
 @dataclass
@@ -67,7 +66,7 @@ def _policy(entries: list[Entry], every: int) -> tuple[Any, Samples]:
             """Nothing to close."""
 
     measured = [(entry.name, entry.address, 0, _TYPES[entry.type.str[1:]]) for entry in entries]
-    lists = [DaqList(name="step", event_num=_STEP, stim=False, enable_timestamps=True, measurements=measured, priority=0, prescaler=every)]
+    lists = [DaqList(name="step", event_num=int(Slave.STEP), stim=False, enable_timestamps=True, measurements=measured, priority=0, prescaler=every)]
     policy = Collector(lists, logger=logging.getLogger("penode.measure"))  # else pyxcp reads the command line, which is ours
     policy.pid_off = False  # which it sets only then
     return policy, kept
@@ -87,11 +86,11 @@ def choose(a2l: A2l, names: list[str]) -> list[Entry]:
 
 def _log(link: Link, entries: list[Entry], kept: Samples, every: int) -> Log:
     """Unwrap the time stamps and count what is missing between them."""
-    info = link.ask("GET_DAQ_EVENT_INFO", link.master.getDaqEventInfo, _STEP)
+    info = link.ask("GET_DAQ_EVENT_INFO", link.master.getDaqEventInfo, int(Slave.STEP))
     unit = int(info.eventChannelTimeUnit) if not isinstance(info.eventChannelTimeUnit, str) else 6
     period = float(info.eventChannelTimeCycle) * 10.0 ** (unit - 9) * every
     stamps = np.array(kept.stamps, dtype=np.int64) // 1000  # us
-    steps = np.diff(stamps) % _WRAP
+    steps = np.diff(stamps) % (1 << 32)  # they are of 32 bits
     time_ = np.concatenate([[0.0], np.cumsum(steps) * 1e-6]) if stamps.size else np.zeros(0)
     lost = int(np.maximum(np.rint(steps * 1e-6 / period) - 1, 0).sum()) if period > 0.0 else 0
     columns = np.array(kept.rows, dtype=object).reshape(stamps.size, len(entries))
@@ -156,7 +155,7 @@ def measure(signals: str, to: str, a2l: Path | None, duration: str | None, every
     log = record(address, described, names, seconds, every)
     if not log.time.size:
         raise UserError(f"{to}: no sample has come; is the controller stepping?")
-    write_mf4(output, columns(log, described))
+    write_mf4(output, columns(log, described), "penode measure")
     click.echo(f"{to}: {log.time.size} samples in {log.time[-1]:.3f} s, {log.lost} lost -> {output}")
     if log.lost:
         note("the line was too slow for some samples: measure fewer signals, or --every 2")

@@ -16,7 +16,8 @@ import penode_gen
 
 from ..errors import UserError, hint
 from .a2l_read import A2l, Entry
-from .link import ECU, REFERENCE, TOOL, WORKING, Link
+from .codes import Page, Who
+from .link import Link
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +79,7 @@ def choose(text: str, kind: np.dtype[Any]) -> ChosenSet:
 class Pages:
     """What runs, and the reference page: checksums and values; `page` is that of the ECU."""
 
-    page: int
+    page: Page
     running: tuple[int, NDArray[Any]]
     reference: tuple[int, NDArray[Any]]
 
@@ -97,11 +98,11 @@ class Pages:
 def look(link: Link, a2l: A2l) -> Pages:
     """Both pages of a controller, whose tool page is the working page afterwards. A set that is open is not looked at: none is after CONNECT."""
     address, size, kind = segment(a2l)
-    page = link.page(ECU)
+    page = link.page(Who.ECU)
     whole = Entry("segment", "", address, kind, (size // kind.itemsize,), "")
     found = {}
-    for tool in {page, REFERENCE}:
-        link.set_page(TOOL, tool)
+    for tool in {page, Page.REFERENCE}:
+        link.set_page(Who.TOOL, tool)
         found[tool] = (link.checksum(address, size), link.values(whole))
-    link.set_page(TOOL, WORKING)
-    return Pages(page, found[page], found[REFERENCE])
+    link.set_page(Who.TOOL, Page.WORKING)
+    return Pages(page, found[page], found[Page.REFERENCE])

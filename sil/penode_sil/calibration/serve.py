@@ -26,9 +26,8 @@ from .. import scenario as scenarios
 from ..console import FILE, note
 from ..errors import UserError
 from ..targets import FLAGS, ROOT, _files, _kept, _version, generated, model_options
+from .codes import Slave
 
-FIRST_ID = 1000  # of the sets that a master opens: sil/firmware/controller.c
-MAX_CTO = 252
 MEASURED = "shown"  # the variable of it with what may be measured besides the instance
 TROUBLE = {2: "it refused the model, or its inputs", 3: "the port is taken, or the address is not one of this machine"}
 
@@ -86,7 +85,7 @@ class Served:
 
 
 @contextmanager
-def served(model: Any, kind: str, host: str, port: int, u: NDArray[np.float32], quiet: int = 0, max_cto: int = MAX_CTO) -> Iterator[Served]:
+def served(model: Any, kind: str, host: str, port: int, u: NDArray[np.float32], quiet: int = 0, max_cto: int = Slave.MAX_CTO) -> Iterator[Served]:
     """Run a virtual controller; `kind` is tcp, udp or frames (CAN frames as datagrams). Raises UserError."""
     program = build(model)
     try:
@@ -98,7 +97,7 @@ def served(model: Any, kind: str, host: str, port: int, u: NDArray[np.float32], 
         stimulus, offered = Path(folder, "inputs"), Path(folder, "a2l")
         stimulus.write_bytes(u.astype(np.float32).tobytes())
         offered.write_text(a2l, encoding="utf-8")
-        words = [program, kind, host, port, max_cto, quiet, stimulus, offered if a2l else "-"]
+        words = [program, kind, host, port, int(max_cto), quiet, stimulus, offered if a2l else "-"]
         with subprocess.Popen(
             [str(word) for word in words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
         ) as process:

@@ -18,11 +18,10 @@ from ..console import FILE, note
 from ..errors import UserError
 from . import address as addresses, pages
 from .a2l_read import A2l
-from .link import ECU, REFERENCE, WORKING, Link, connected
+from .codes import Page, Who
+from .link import Link, connected
 from .pages import ChosenSet, Pages
 
-ADOPTED_WITHIN = 5.0  # [s] from the switch to the step that adopts: any controller steps more often
-LISTED = 20  # differing values that are printed; --json has all
 
 
 @dataclass(frozen=True)
@@ -45,9 +44,9 @@ def _running_id(link: Link, a2l: A2l) -> int | None:
     return int(link.number(a2l.measurements[names[1 + (active & 1)]]))
 
 
-def _await(link: Link, a2l: A2l, before: int | None) -> int | None:
-    """The id of the new set, once a step has adopted it. Raises UserError."""
-    end = time.monotonic() + ADOPTED_WITHIN
+def _await(link: Link, a2l: A2l, before: int | None, patience: float = 5.0) -> int | None:
+    """The id of the new set, once a step has adopted it; any controller steps more often than every `patience` [s]. Raises UserError."""
+    end = time.monotonic() + patience
     while (now := _running_id(link, a2l)) is not None and now == before:
         if time.monotonic() > end:
             raise UserError(f"{link.address.text}: the set is committed, but no step adopts it; is the controller stepping?")
@@ -76,7 +75,7 @@ def stage_set(link: Link, a2l: A2l, chosen: ChosenSet) -> Staged:
     address, size, kind = pages.segment(a2l)
     checksum, seconds = write(link, a2l, chosen)
     before = _running_id(link, a2l)
-    link.set_page(ECU, WORKING)
+    link.set_page(Who.ECU, Page.WORKING)
     identity = _await(link, a2l, before)
     if link.read(address, size) != chosen.values.astype(kind.newbyteorder(link.order)).tobytes():
         raise UserError(f"{chosen.name}: it does not read back as it was written; compare the pages (penode compare)")
@@ -106,7 +105,7 @@ def stage(chosen: str | None, to: str, a2l: Path | None, back: bool, as_json: bo
     with connected(addresses.parse(to)) as link:
         found = link.a2l(a2l)
         if back:
-            link.set_page(ECU, REFERENCE)
+            link.set_page(Who.ECU, Page.REFERENCE)
             click.echo(json.dumps({"page": "reference"}) if as_json else f"{to}: {found.name} runs the reference page")
             return
         staged = stage_set(link, found, pages.choose(str(chosen), pages.segment(found)[2]))
@@ -123,8 +122,9 @@ def stage(chosen: str | None, to: str, a2l: Path | None, back: bool, as_json: bo
 @click.argument("model", type=FILE)
 @click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
 @click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
+@click.option("--list", "listed", type=click.IntRange(min=0), default=20, show_default=True, help="How many differing values to print.")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
-def compare(model: Path, to: str, a2l: Path | None, as_json: bool) -> None:
+def compare(model: Path, to: str, a2l: Path | None, listed: int, as_json: bool) -> None:
     """Which of the sets of the model file MODEL a controller runs, and what differs from its reference page."""
     loaded = penode_gen.load(model)
     with connected(addresses.parse(to)) as link:
@@ -138,7 +138,7 @@ def compare(model: Path, to: str, a2l: Path | None, as_json: bool) -> None:
         click.echo(json.dumps({"running": running, "reference": reference, "differing": [dict(zip(keys, row)) for row in differing]}, indent=1))
         return
     click.echo(f"running: {running}, reference: {reference}")
-    for name, unit, now, then in differing[:LISTED]:
+    for name, unit, now, then in differing[:listed]:
         click.echo(f"  {name:<32} {now:14.7g} {then:14.7g} {unit}".rstrip())
-    if len(differing) > LISTED:
-        click.echo(f"  and {len(differing) - LISTED} more values of {found.running[1].size} (--json lists all)")
+    if len(differing) > listed:
+        click.echo(f"  and {len(differing) - listed} more values of {found.running[1].size} (--list, --json)")
