@@ -17,11 +17,10 @@ import numpy as np
 import pytest
 
 import penode_gen
+from exchanges import check_log, drive
 from penode_sil.calibration import a2l_read, address, link as links, measure, pages, serve, stage
 from penode_sil.calibration.codes import Page, Slave
 from penode_sil.errors import UserError
-from penode_sil.schedule import Call
-from penode_sil.targets import Sil
 
 ROOT = Path(__file__).resolve().parents[2]
 NQVM = ROOT / "gen" / "nqvm" / "nqvm.toml"
@@ -32,12 +31,6 @@ CAN_MASTER, CAN_SLAVE = 0x100, 0x101
 pytestmark = pytest.mark.skipif(
     not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")), reason="pyxcp or pyelftools is not installed: pip install penode[xcp]"
 )
-
-
-def drive(model: Any, n: int = 2000) -> np.ndarray:
-    """Inputs that never repeat within n samples: 30 mm, two incommensurate waves."""
-    k = np.arange(n)
-    return (0.02 * np.sin(0.02 * k) + 0.01 * np.sin(0.0313 * k)).reshape(-1, 1).astype(np.float32)
 
 
 class Bridge(threading.Thread):
@@ -87,14 +80,6 @@ def reached(kind: str, model: Any, u: np.ndarray) -> Iterator[tuple[address.Addr
             bridge.bus.shutdown()
 
 
-def sil_with_exchange(model: Any, u: np.ndarray, steps: int, adopting: int, name: str) -> np.ndarray:
-    """Outputs [steps, n_y] of a SiL run whose step `adopting`, counted from 1, adopts a set."""
-    values = np.asarray(penode_gen.set_values(model, name))
-    calls = [Call(adopting - 1, "begin", head=penode_gen.set_head(model, name)), Call(adopting - 1, "write", values=values), Call(adopting - 1, "commit")]
-    driven = np.tile(u, (steps // len(u) + 1, 1))[:steps]
-    return np.asarray(Sil(model).run(driven, calls).y)
-
-
 EVERY = 20  # on CAN: a sample of 28 bytes takes 5 frames, and the virtual bus of python-can carries few thousand a second
 
 
@@ -114,17 +99,7 @@ def test_log_is_that_of_a_sil_run_with_the_exchange_where_it_shows_the_new_id(ki
             assert (staged.bytes, staged.id) == (4 * 1198, Slave.FIRST_ID)
 
         log = measure.record(where, a2l, SIGNALS, 0.3, every, exchange)
-    sample, ids = log.values["sample"].astype(int), log.values["set_in_force"]
-    assert log.lost == 0 and (np.diff(sample) == every).all()
-    changes = np.flatnonzero(np.diff(ids)) + 1
-    assert len(changes) == 1 and (ids[0], ids[-1]) == (1, Slave.FIRST_ID)
-    adopting = int(log.values["adopted_at"][-1])
-    assert sample[changes[0]] - every < adopting <= sample[changes[0]]  # the log shows the new id with the step that adopts it
-    expected = sil_with_exchange(model, u, int(sample[-1]), adopting, "altered_friction")[sample - 1]
-    for n, name in enumerate(("z_b", "z_w")):
-        assert (log.values[name].view(np.uint32) == expected[:, n].view(np.uint32)).all()
-    other = sil_with_exchange(model, u, int(sample[-1]), adopting - 1, "altered_friction")[sample - 1]
-    assert (log.values["z_b"] != other[:, 0]).any()  # one sample earlier is another log
+    check_log(model, u, log, every)
 
 
 EIGHT = ["z_b", "z_w", "v_b", "v_w", "z_road", "a_body", "a_wheel", "deflection"]

@@ -40,25 +40,31 @@ def build(model: Any, machine: str) -> Path:
 
 
 @contextmanager
-def emulated(model: Any, machine: str, host: str, port: int, u: NDArray[np.float32]) -> Iterator[Served]:
-    """Run it; its serial line is a TCP port, which XCP over Ethernet finds there too: the frames are the same. Raises UserError."""
+def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[np.float32]) -> Iterator[Served]:
+    """
+    Run it. Its serial line is a TCP port, which XCP over Ethernet finds there too: the frames are the same; with port None a device of this
+    machine. Raises UserError.
+    """
     if shutil.which(_EMULATOR) is None:
         raise UserError(f"{_EMULATOR}: the emulator is not installed; install it (make test does)")
     program = build(model, machine)
-    port = port or free_port(host, False)
-    a2l = describe(model, program, f"tcp:{host}:{port}")
+    port = port if port is None else port or free_port(host, False)
+    line = "pty" if port is None else f"tcp:{host}:{port},server=on,wait=off"
+    a2l = describe(model, program, "serial:115200" if port is None else f"tcp:{host}:{port}")
     with tempfile.TemporaryDirectory() as folder:
         stimulus = Path(folder, "inputs")
         stimulus.write_bytes(u.astype(np.float32).tobytes())
         words = [
-            _EMULATOR, "-machine", MACHINES[machine], "-display", "none", "-monitor", "none", "-serial", f"tcp:{host}:{port},server=on,wait=off",
+            _EMULATOR, "-machine", MACHINES[machine], "-display", "none", "-monitor", "none", "-serial", line,
             "-semihosting-config", f"enable=on,target=native,arg=program,arg={stimulus}", "-kernel", str(program),
         ]  # fmt: skip
         with subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True) as process:
+            assert process.stdout
+            device = process.stdout.readline().partition("redirected to ")[2].split()[:1] if port is None else []
             time.sleep(0.5)
-            if process.poll() is not None and process.stdout:
-                raise UserError(f"tcp:{host}:{port}: the emulator has ended ({process.stdout.read().strip() or process.returncode}); choose another port")
+            if process.poll() is not None:
+                raise UserError(f"{line}: the emulator has ended ({process.stdout.read().strip() or process.returncode}); choose another port")
             try:
-                yield Served(f"tcp:{host}:{port}", a2l)
+                yield Served(f"serial:{device[0]}" if device else f"tcp:{host}:{port}", a2l)
             finally:
                 process.terminate()
