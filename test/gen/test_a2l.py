@@ -17,7 +17,7 @@ import pytest
 import penode_gen
 from models import RICH, network_file
 from penode_gen import exports, layout
-from penode_sil.calibration import a2l_read, serve
+from penode_sil.calibration import a2l_read, virtual
 
 ROOT = Path(__file__).resolve().parents[2]
 NQVM = ROOT / "gen" / "nqvm" / "nqvm.toml"
@@ -39,12 +39,12 @@ def rich(tmp_path_factory: pytest.TempPathFactory) -> tuple[penode_gen.Model, di
 
 @pytest.fixture(scope="module")
 def program(rich: tuple[penode_gen.Model, dict]) -> Path:
-    return serve.build(rich[0])
+    return virtual.build(rich[0])
 
 
 @pytest.fixture(scope="module")
 def text(rich: tuple[penode_gen.Model, dict], program: Path) -> str:
-    return serve.describe(rich[0], program, "tcp:127.0.0.1:5555")
+    return virtual.describe(rich[0], program, "tcp:127.0.0.1:5555")
 
 
 def in_elf(program: Path, address: int, n: int) -> bytes:
@@ -90,7 +90,7 @@ def test_a2ltool_has_nothing_to_say(rich: tuple[penode_gen.Model, dict], program
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout + done.stderr
 
-    path.write_text(serve.describe(rich[0], program, transport))
+    path.write_text(virtual.describe(rich[0], program, transport))
     assert tool(path, "--strict", "--check").strip() == "Consistency check complete. No problems found."
     tool(path, "--insert-a2ml", "--ifdata-cleanup", "-o", kept)  # drops each IF_DATA that is not as the standard's A2ML has it
     assert kept.read_text().count("/begin IF_DATA") == path.read_text().count("/begin IF_DATA")

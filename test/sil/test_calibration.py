@@ -18,7 +18,7 @@ import pytest
 
 import penode_gen
 from exchanges import check_log, drive
-from penode_sil.calibration import a2l_read, address, link as links, measure, pages, serve, stage
+from penode_sil.calibration import a2l_read, address, link as links, measure, pages, stage, virtual
 from penode_sil.calibration.codes import Page, Slave
 from penode_sil.errors import UserError
 
@@ -60,14 +60,14 @@ class Bridge(threading.Thread):
 
 
 @contextmanager
-def reached(kind: str, model: Any, u: np.ndarray) -> Iterator[tuple[address.Address, serve.Served]]:
+def reached(kind: str, model: Any, u: np.ndarray) -> Iterator[tuple[address.Address, virtual.Served]]:
     """A virtual controller, and where it is; `can` is 8-byte frames on a virtual bus."""
     if kind != "can":
-        with serve.served(model, kind, "127.0.0.1", 0, u) as found:
+        with virtual.served(model, kind, "127.0.0.1", 0, u) as found:
             yield address.parse(found.address), found
         return
     pytest.importorskip("can", reason="python-can is not installed")
-    with serve.served(model, "frames", "127.0.0.1", 0, u, max_cto=8) as found:
+    with virtual.served(model, "frames", "127.0.0.1", 0, u, max_cto=8) as found:
         channel = found.address
         bridge = Bridge(channel, int(found.address.rpartition(":")[2]))
         bridge.start()

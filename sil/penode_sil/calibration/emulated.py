@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import UserError, hint
 from ..targets import FLAGS, MACHINES, PORT, ROOT, _files, _included, _kept, _version, generated, model_options
-from .serve import Served, describe, free_port, identity
+from .virtual import Served, describe, free_port, identity
 
 WITH_UART = ("m4f", "m3", "m7")  # port/cortex-m/uart.c knows their serial line
 _EMULATOR = "qemu-system-arm"

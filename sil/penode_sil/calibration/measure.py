@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,11 @@ from ..errors import UserError, hint
 from ..mdf_write import write_mf4
 from ..output import Column, check_writable
 from ..units import UnitError, quantity
-from . import address as addresses
+from . import address as addresses, pages
 from .a2l_read import A2l, Entry
 from .codes import Slave
 from .link import Link, connected
+from .stage import Staged, stage_set
 
 _TYPES = {"u1": "U8", "i1": "I8", "u2": "U16", "i2": "I16", "u4": "U32", "i4": "I32", "u8": "U64", "i8": "I64", "f4": "F32", "f8": "F64"}
 
@@ -98,8 +100,10 @@ def _log(link: Link, entries: list[Entry], kept: Samples, every: int) -> Log:
     return Log(time_, values, lost, period)
 
 
-def record(address: addresses.Address, a2l: A2l, names: list[str], duration: float | None, every: int = 1, during: Any = None) -> Log:
-    """Measure for `duration` seconds, or until an interrupt; `during(link)` is called meanwhile. Raises UserError."""
+def record(
+    address: addresses.Address, a2l: A2l, names: list[str], duration: float | None, every: int = 1, during: Callable[[Link], object] = lambda link: None
+) -> Log:
+    """Measure while `during(link)` runs, and then for `duration` seconds, or until an interrupt. Raises UserError."""
     entries = choose(a2l, names)
     policy, kept = _policy(entries, every)
     with connected(address, policy) as link:
@@ -107,8 +111,7 @@ def record(address: addresses.Address, a2l: A2l, names: list[str], duration: flo
         kept.names = [header[0] for header in policy.daq_lists[0].headers]
         link.ask("START_STOP_SYNCH", policy.start)
         try:
-            if during is not None:
-                during(link)
+            during(link)
             _wait(duration)
         except KeyboardInterrupt:
             pass
@@ -125,13 +128,13 @@ def _wait(duration: float | None) -> None:
             tell(min(time.monotonic() - begin, duration or 0.0))
 
 
-def _seconds(text: str) -> float:
+def _seconds(option: str, text: str) -> float:
     try:
         found = quantity(text, "s")
     except UnitError as exc:
-        raise UserError(f"--duration: {exc}") from exc
+        raise UserError(f"{option}: {exc}") from exc
     if not 0.0 < found < 1e6:
-        raise UserError(f'--duration: "{text}" is no time to measure for; give one like "10 s"')
+        raise UserError(f'{option}: "{text}" is no such time; give one like "10 s"')
     return found
 
 
@@ -140,11 +143,15 @@ def _seconds(text: str) -> float:
 @click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
 @click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
 @click.option("--duration", help='How long, like "10 s"; until Ctrl-C if not given.')
+@click.option("--stage", "staged", metavar="SET", help="Write this set meanwhile, as penode stage does: MODEL.toml:NAME, or a file in serial form.")
+@click.option("--after", default="1 s", show_default=True, help="When to begin with that.")
 @click.option("--every", type=click.IntRange(1, 255), default=1, show_default=True, help="Every so many steps a sample.")
 @click.option("-o", "--output", type=FILE, required=True, help="File to write (.mf4).")
-def measure(signals: str, to: str, a2l: Path | None, duration: str | None, every: int, output: Path) -> None:
+def measure(
+    signals: str, to: str, a2l: Path | None, duration: str | None, staged: str | None, after: str, every: int, output: Path
+) -> None:
     """Record signals of a controller that runs, a sample a step, with units and its own time stamps."""
-    seconds = None if duration is None else _seconds(duration)
+    seconds, wait = None if duration is None else _seconds("--duration", duration), _seconds("--after", after)
     if output.suffix.lower() != ".mf4":
         raise UserError(f'{output}: a log cannot be written as "{output.suffix}"; end its name in .mf4')
     check_writable(output)
@@ -152,7 +159,17 @@ def measure(signals: str, to: str, a2l: Path | None, duration: str | None, every
     with connected(address) as link:
         described = link.a2l(a2l)
     names = [name.strip() for name in signals.split(",") if name.strip()]
-    log = record(address, described, names, seconds, every)
+    chosen = None if staged is None else pages.choose(staged, pages.segment(described)[2])
+    done: list[Staged] = []
+
+    def during(link: Link) -> None:
+        if chosen is not None:
+            time.sleep(wait)
+            done.append(stage_set(link, described, chosen))
+
+    log = record(address, described, names, seconds, every, during)
+    for one in done:
+        click.echo(one.sentence())
     if not log.time.size:
         raise UserError(f"{to}: no sample has come; is the controller stepping?")
     write_mf4(output, columns(log, described), "penode measure")

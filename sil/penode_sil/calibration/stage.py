@@ -34,6 +34,11 @@ class Staged:
     checksum: int
     id: int | None
 
+    def sentence(self) -> str:
+        """For people."""
+        within = "" if self.id is None else f", as set {self.id} of the controller"
+        return f"{self.bytes} bytes written in {self.seconds:.2f} s, proven (CRC-32 0x{self.checksum:08x}), read back\nin force: {self.set}{within}"
+
 
 def _running_id(link: Link, a2l: A2l) -> int | None:
     """The id of the set that runs; None if the A2L does not say where it lies."""
@@ -112,10 +117,9 @@ def stage(chosen: str | None, to: str, a2l: Path | None, back: bool, as_json: bo
     if as_json:
         click.echo(json.dumps(vars(staged)))
         return
-    click.echo(f"{to}: {found.name}: {staged.bytes} bytes written in {staged.seconds:.2f} s, proven (CRC-32 0x{staged.checksum:08x}), read back")
+    click.echo(staged.sentence())
     if staged.id is None:
         note("the A2L does not say where the id of the running set lies; measure it yourself")
-    click.echo(f"in force: {staged.set}{'' if staged.id is None else f', as set {staged.id} of the controller'}")
 
 
 @click.command()
