@@ -112,19 +112,21 @@ def lines(problem: Problem, shapes: Sequence[Curve], limits: Callable[[Point], L
 
 
 def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
-    """Curves on twice the knots that there is room for, and of these the ones that matter most."""
+    """Curves on a regular grid of as many knots as there is room for, and on others in the middle between them where data want them there."""
     seen = seen_by(problem, point)
     problem = rescaled(problem, point, seen, ports)
-    point = Point(point.ratios, point.starts, tuple(curve_on(p, s, seen, 2 * p.knots - 1) for p, s in zip(ports, point.shapes)))
+    grids = [curve_on(p, s, seen, p.knots) for p, s in zip(ports, point.shapes)]
+    point = Point(point.ratios, point.starts, tuple(g.middled() for g in grids))
     fit = solve(problem, point, 3, 20.0, limits, damping=1e-6, patience=1)
     spread = covariance(problem, fit)
     at, shapes = len(point.ratios) + point.starts.size, []
-    for port, shape in zip(ports, fit.point.shapes):
+    for port, grid_, shape in zip(ports, grids, fit.point.shapes):
         own = spread[at : at + shape.columns, at : at + shape.columns]
         at += shape.columns
         if shape.zero >= 0:
             own = np.insert(np.insert(own, shape.zero, 0.0, axis=0), shape.zero, 0.0, axis=1)
-        shapes.append(shape.on(shape.knots[fewer(shape.knots, shape.values, own, port.knots, [shape.zero])]))
+        regular = np.isin(shape.knots, grid_.knots)
+        shapes.append(shape.on(shape.knots[fewer(shape.knots, shape.values, own, port.knots, regular, shape.zero)]))
     return problem, Point(fit.point.ratios, fit.point.starts, tuple(shapes))
 
 
