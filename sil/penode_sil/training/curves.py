@@ -75,17 +75,22 @@ def seen_by(problem: Problem, point: Point) -> list[Array]:
     return found[1]
 
 
-def train(problem: Problem, ports: Sequence[Port], bounds: Sequence[Callable[[Curve], Limits]], tell: Tell) -> tuple[Problem, Fit]:
-    """Curves for all networks of a problem."""
+def train(
+    problem: Problem, ports: Sequence[Port], bounds: Sequence[Callable[[Curve], Limits]], tell: Tell,
+    start: Callable[[Problem, Point], Point] = lambda problem, point: point,
+) -> tuple[Problem, Fit]:  # fmt: skip
+    """Curves for all networks of a problem; `start` puts what is known already in place of straight lines."""
     limits = limits_of(problem, bounds)
     tell(0.05, "straight lines")
     problem, point = lines(problem, [three(1.0, p.zero) for p in ports], limits)
+    point = start(problem, point)
     for share, count, iterations in ((0.15, SETTINGS.curves_coarse, 8), (0.35, SETTINGS.curves_coarse, 4)):
         tell(share, f"curves of {count} knots")
         seen = seen_by(problem, point)
         problem = rescaled(problem, point, seen, ports)
         for i, port in enumerate(ports):
-            point = Point(point.ratios, point.starts, (*point.shapes[:i], curve_on(port, point.shapes[i], seen, min(count, port.knots)), *point.shapes[i + 1 :]))
+            knots = min(max(count, len(point.shapes[i].knots)), port.knots)
+            point = Point(point.ratios, point.starts, (*point.shapes[:i], curve_on(port, point.shapes[i], seen, knots), *point.shapes[i + 1 :]))
         fit = solve(problem, point, iterations, 20.0, limits, patience=1)
         point = fit.point
         problem = renoised(problem, point)

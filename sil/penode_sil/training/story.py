@@ -8,7 +8,7 @@ import hashlib
 import platform
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
@@ -21,13 +21,13 @@ from penode_gen.networks import Network
 
 from ..errors import UserError
 from ..measured import Measured
-from . import bands, curves, data, dense, ends, judge, promised, unfold, unknown
+from . import bands, begin, curves, data, dense, ends, judge, promised, unfold, unknown
 from .curve import Curve
 from .curves import Tell
-from .port import Port
+from .port import Port, inputs_of
 from .dense import Dense
 from .engine import Engine
-from .problem import Problem
+from .problem import Point, Problem
 from .result import Error, Force, Trained
 from .solve import Fit, solve
 from .settings import SETTINGS
@@ -41,6 +41,7 @@ class Options:
 
     known: tuple[tuple[str, float | None], ...] = ()
     seed: int = 0
+    start: begin.Start = field(default_factory=begin.Start)
 
 
 def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], options: Options, tell: Tell) -> tuple[Model, Trained]:
@@ -57,9 +58,9 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
     bounds = [promised.bound(model.networks[p.name].promises, size=1.0) for p in ports]
     try:
         if all(p.knots for p in ports):
-            problem, fit = curves.train(problem, ports, bounds, tell)
+            problem, fit = curves.train(problem, ports, bounds, tell, lambda own, point: _started(own, point, ports, options.start))
         else:
-            problem, fit = ends.train(problem, ports, templates, bounds, options.seed, tell)
+            problem, fit = ends.train(problem, ports, templates, bounds, options.seed, tell, options.start)
     except FloatingPointError as exc:
         raise UserError(
             f"{model.path}: {exc}, whatever the networks are; check signs, units and start states of the model against the recording (penode inspect)"
@@ -71,6 +72,15 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
     networks, fit = written(model, problem, fit, ports, templates, visited)
     spent = time.process_time() - started - (compiled - started)
     return _judged(model, problem, fit, ports, networks, visited, train_, held, (options, known, spent), tell)
+
+
+def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin.Start) -> Point:
+    """Curves and parameters of a start in place of straight lines."""
+    seen = curves.seen_by(problem, point)
+    shapes = tuple(
+        begin.curve(p, start.networks[p.name], float(np.max(np.abs(inputs_of(p, seen))))) if p.name in start.networks else s for p, s in zip(ports, point.shapes)
+    )
+    return Point(begin.ratios(start, problem.engine.free, problem.model, point.ratios), point.starts, shapes)
 
 
 def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], curves.Limits]]) -> tuple[Problem, Fit]:
