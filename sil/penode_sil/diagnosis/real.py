@@ -21,17 +21,17 @@ from .evidence.blocks import posterior
 from .evidence.fit import Fit
 from .evidence.observer import Filter, Record, bias, sample_noise
 from .evidence.screening import Probe
+from .fit import Free
 from .innovate import Z_95, Found
 from .noise import Experiment
 from .propose import SMALL, motions
 from .plant import Place
 from .result import Cause, Named, Value, place
 from .terms import Term, Trial
-from .worth import WORTH, share, shift
+from .worth import SYSTEMATIC, WORTH, share, shift
 
 Array = NDArray[np.float64]
 INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
-ALIKE = 0.1  # of the effect of an offset: what a constant force may leave of it
 RIVAL = 0.1  # posterior from which on an explanation is listed
 
 
@@ -64,8 +64,8 @@ def answer(
     probabilities = [_weighed(r) for r in found.rounds]
     named = found.terms[: found.named]
     for k, term in enumerate(named):
-        cause = _cause(model, plain, term, _rivals(probabilities[k], term), _sure(probabilities[k], term))
         size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
+        cause = _cause(model, plain, term, size, _rivals(probabilities[k], term), _sure(probabilities[k], term))
         log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")
         if size >= WORTH:
             causes = _merged(causes, cause)
@@ -134,7 +134,7 @@ def _explanations(terms: Sequence[Term], names: Sequence[Sequence[tuple[Form, fl
     return tuple(sets)
 
 
-def _cause(model: Model, bench: Bench, term: Term, rivals: tuple[Named, ...], sure: float) -> Cause:
+def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Named, ...], sure: float) -> Cause:
     """A term as a cause with sizes and intervals."""
     form = term.form
     file = catalogue.OF.get(form.kind, drives)
@@ -168,11 +168,23 @@ def _cause(model: Model, bench: Bench, term: Term, rivals: tuple[Named, ...], su
             moved = sizes({**values, f.target: float(f.value * np.exp(step) if f.log else f.value + step * f.unit)})
             for key in found:
                 slopes[key][i] = (moved[key][1] - found[key][1]) / step
+    wider = _wider(bench, term, size)
     parameters = {}
     for key, (unit, value) in found.items():
-        sd = float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
+        sd = wider * float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
         parameters[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
     return Cause(form.kind, form.where, parameters, min(max(sure, 0.0), 0.99), rivals)
+
+
+def _wider(bench: Bench, term: Term, size: float) -> float:
+    """Factor of the deviations of a term of this share of what acts: noise alone makes less of them than what the model leaves out."""
+    known = min(bench.fit.deviation(f.target) / max(abs(f.value - f.origin), 1e-300) for f in _fitted(bench, term) if not f.log)
+    return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
+
+
+def _fitted(bench: Bench, term: Term) -> list[Free]:
+    """The free values of a term as they are in the bench."""
+    return [f for f in bench.fit.free if f.target in {t.target for t in term.free}]
 
 
 def _shared(model: Model, bench: Bench, terms: Sequence[Term]) -> set[str]:
@@ -194,8 +206,9 @@ def _parameters(model: Model, bench: Bench, moved: Sequence[Motion], shared: Col
         limit = p.tolerance if p.tolerance > 0.0 else UNSTATED
         off = abs(f.value / p.value - 1.0)
         size = shift(model, bench, moved, name)
-        log(f"{name}: {f.value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of what acts there")
+        sd = float(np.hypot(sd, SYSTEMATIC / max(size, SYSTEMATIC) * abs(f.value - p.value)))
         low, high = f.value - Z_95 * sd, f.value + Z_95 * sd
+        log(f"{name}: {f.value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of what acts there")
         if off > limit and not low <= p.value * (1.0 + limit * np.sign(f.value / p.value - 1.0)) <= high and not low <= p.value <= high:
             if name in shared:
                 notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)} beside what was found at its place, which shares its straight part")
@@ -242,7 +255,7 @@ def _load(model: Model, bench: Bench, probe: Probe, sensor: str) -> Cause | None
         columns = np.column_stack([column[bench.fit.used], starts])
         columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
         sizes = np.linalg.lstsq(columns, seen, rcond=1e-9)[0]
-        if np.linalg.norm(seen - columns @ sizes) < ALIKE * np.linalg.norm(seen):
+        if np.linalg.norm(seen - columns @ sizes) < WORTH * np.linalg.norm(seen):
             factor = float(sizes[0]) / float(np.linalg.norm(column[bench.fit.used]))
             value, sd = -factor * f.value, abs(factor) * bench.fit.deviation(bias(sensor))
             alike = (Named("sensor_bias", sensor), *(Named("input_offset", x.name) for x in model.inputs if p.unit("N") == x.unit))

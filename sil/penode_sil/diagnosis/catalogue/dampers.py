@@ -12,6 +12,12 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("asymmetric_damper", "degressive_damper", "quadratic_damper", "damper_fading")
+MEANING = {
+    "asymmetric_damper": "A damper with different damping in rebound and in compression.",
+    "degressive_damper": "A damper whose damping falls at higher rates.",
+    "quadratic_damper": "A damper whose damping grows with the rate.",
+    "damper_fading": "A damper that loses damping while the recording goes on, as with heat.",
+}
 STRAIGHT = ("asymmetric_damper", "degressive_damper")
 KNEES = (0.3, 1.0)  # of the rms rate
 

@@ -9,6 +9,14 @@ from penode_gen.model import Model
 from .form import Form, Sizes
 
 KINDS = ("input_gain", "input_offset", "input_delay", "input_lag", "sensor_scale", "sensor_delay")
+MEANING = {
+    "input_gain": "The plant is driven by more, or less, than the recording of the input says.",
+    "input_offset": "A constant acts on top of the recorded input.",
+    "input_delay": "The input acts later than the recording says.",
+    "input_lag": "The input acts with a lag: an actuator that the model does not have.",
+    "sensor_scale": "The sensor's scale is off.",
+    "sensor_delay": "The sensor is late.",
+}
 
 
 def inputs(model: Model, count: int) -> Iterable[Form]:

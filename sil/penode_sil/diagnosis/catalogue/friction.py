@@ -12,6 +12,11 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("coulomb_friction", "stribeck_friction", "bouc_wen")
+MEANING = {
+    "coulomb_friction": "Friction: a force against the motion that hardly depends on how fast it is.",
+    "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",
+    "bouc_wen": "Hysteresis: the force depends on the way since the last reversal, elastic at first, then yielding.",
+}
 ONE = True  # friction at a place is one curve, with a peak or with memory
 EDGES = (0.04, 0.12)  # of the rms rate: transitions of a friction, within a factor of 2; smooth enough for Gauss-Newton, steep enough for any motion
 PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway

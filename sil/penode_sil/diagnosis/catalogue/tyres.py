@@ -11,6 +11,11 @@ from ..plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("tyre_damping", "tyre_liftoff", "tyre_nonlinear")
+MEANING = {
+    "tyre_damping": "The tyre also damps.",
+    "tyre_liftoff": "The tyre leaves the road: it cannot pull.",
+    "tyre_nonlinear": "The tyre's stiffness changes with its load.",
+}
 STRAIGHT = ("tyre_nonlinear",)
 SHARES = (0.3, 0.6)  # of the greatest stretch: where a tyre leaves the road
 
