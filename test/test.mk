@@ -32,7 +32,7 @@ WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wd
             -Wwrite-strings -Werror
 FIRMWARE := $(if $(MODEL),$(wildcard sil/firmware/*.c))
 TOLD     := '-DMODEL_HEADER="nqvm.h"' '-DMODEL(name)=nqvm_\#\#name' '-DMODEL_SIZE(name)=NQVM_\#\#name' \
-            '-DMODEL_SETS=&nqvm_set_default' -DBOARD_TICK_MHZ=25U
+            '-DMODEL_SETS=&nqvm_set_default' -DBOARD_TICK_MHZ=25U -Iport/xcp -Iport/cortex-m
 BOARD.gcc   := $(wildcard port/host/*.c)
 BOARD.clang := $(BOARD.gcc)
 $(foreach m,$(MACHINES),$(eval BOARD.$m := $(wildcard port/cortex-m/*.c)))

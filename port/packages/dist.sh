@@ -55,7 +55,7 @@ expand()
 rm -rf "$tree" "$one" "$tree.tar.gz" "$one.tar.gz"
 mkdir -p "$tree/models/nqvm" "$tree/port"
 cp -R inc src LICENSE CHANGELOG.md "$tree"
-cp -R port/gnu port/template port/cortex-m "$tree/port"
+cp -R port/gnu port/template port/cortex-m port/xcp "$tree/port"
 cp sil/firmware/board.h "$tree/port/cortex-m"
 cp gen/nqvm/c/* "$tree/models/nqvm"
 cp port/README.md "$tree/README.md"

@@ -7,6 +7,10 @@
 
 #include "penode/pen_port.h"
 
+#ifndef CONTROLLER_EPK
+#define CONTROLLER_EPK "penode" /* identifies the program: give each its own */
+#endif
+
 #define FIRST_ID 1000U /* of the sets that a master opens */
 
 pen_xcp_t controller_xcp;
@@ -53,19 +57,19 @@ static pen_xcp_config_t xcp_config = {
     .daq_command = pen_xcp_daq_command,
 };
 
-static uint32_t address_of(const volatile void *at)
+static uint32_t address_of(const void *at)
 {
     return (uint32_t)(uintptr_t)at;
 }
 
-static pen_xcp_region_t region_of(const volatile void *at, uint32_t size)
+static pen_xcp_region_t region_of(const void *at, uint32_t size)
 {
     const pen_xcp_region_t found = { address_of(at), size, (const uint8_t *)at };
 
     return found;
 }
 
-static void declare(const volatile void *at, uint32_t size)
+static void declare(const void *at, uint32_t size)
 {
     region[xcp_config.regions] = region_of(at, size);
     xcp_config.regions++;

@@ -3,7 +3,7 @@
 
 /**
  * A controller that a calibration tool connects to: one instance of any generated model, an XCP slave, and what may be read.
- * The compiler is told which model by the options of sample.h; and CONTROLLER_EPK, a text that identifies the program.
+ * The compiler is told which model by the options of sample.h, and by CONTROLLER_EPK, a text, which program it is.
  *
  * Addresses are those of the program: on a host, link it with -no-pie.
  */

@@ -4,7 +4,7 @@
 # The gates of `make prove`, each also a target of its own; README.md beside this file says what each shows.
 
 PROVE_STATIC  := prove-rules prove-eva prove-coverage
-PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-xcp-fuzz prove-readers prove-flip prove-longrun prove-stack prove-bits \
+PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-xcp-fuzz prove-xcp-preempt prove-xcp-cost prove-readers prove-flip prove-longrun prove-stack prove-bits \
                  prove-accuracy prove-cost prove-kernels prove-promise prove-promises
 
 .PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC)
@@ -32,6 +32,10 @@ prove-fuzz: | $(READY) ## libFuzzer: any calls of the interface, against an orac
 	@$(PYTHON) test/prove/fuzz_check.py
 prove-xcp-fuzz: | $(READY) ## libFuzzer: any packets to the XCP slave, against an oracle
 	@$(PYTHON) test/prove/xcp_fuzz_check.py --keep
+prove-xcp-preempt: | $(READY) ## An emulated core: a step and a packet to the XCP slave interrupt each other at every instruction
+	@$(PYTHON) test/prove/xcp_preempt_check.py
+prove-xcp-cost: | $(READY) ## Packets to the XCP slave take the instructions that port/xcp/README.md states
+	@$(PYTHON) test/prove/xcp_cost_check.py
 prove-readers: | $(READY) ## Damaged files: every reader takes them or says what is wrong
 	@$(PYTHON) test/prove/readers_check.py
 prove-flip: | $(READY) ## One flipped bit anywhere in an instance or its banks: no write beside them, no hang

@@ -179,3 +179,12 @@ def test_nobody_answers_in_one_line() -> None:
         pass
     with pytest.raises(UserError, match="is no address"):
         address.parse("tcp:nowhere")
+
+
+def test_port_that_is_taken_is_one_line() -> None:
+    model = penode_gen.load(NQVM)
+    with virtual.served(model, "tcp", "127.0.0.1", 0, drive(model)) as found:
+        port = int(found.address.rpartition(":")[2])
+        with pytest.raises(UserError, match="the port is taken"), virtual.served(model, "tcp", "127.0.0.1", port, drive(model)):
+            pass
+    assert found.steps > 0  # it has ended, and said how much it did

@@ -14,8 +14,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from penode_sil.calibration.virtual import free_port
+from penode_sil.cli import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "sil" / "CALIBRATION.md").read_text(encoding="utf-8")
@@ -32,9 +34,10 @@ def steps(port: int) -> Iterator[tuple[list[str], str]]:
         yield shlex.split(command), output
 
 
-def test_page(tmp_path: Path) -> None:
+def test_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from asammdf import MDF
 
+    monkeypatch.chdir(tmp_path)
     port = free_port("127.0.0.1", False)
     (serve, first), *others = steps(port)
     assert serve[0] == "serve" and len(others) == 6
@@ -42,8 +45,8 @@ def test_page(tmp_path: Path) -> None:
         try:
             assert controller.stdout and controller.stdout.readline() == first
             for command, output in others:
-                done = subprocess.run([sys.executable, "-m", "penode_sil", *command], cwd=tmp_path, capture_output=True, text=True, timeout=120)
-                assert done.returncode == 0, done.stderr
+                done = CliRunner().invoke(cli, command, catch_exceptions=False, standalone_mode=False)
+                assert done.exception is None
                 expected = re.escape(output).replace(r"\ N\ ", r"\ [\d.]+\ ").replace("N\\ ", r"[\d.]+\ ")
                 assert re.fullmatch(expected, done.stdout), done.stdout
         finally:

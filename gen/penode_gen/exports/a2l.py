@@ -11,7 +11,7 @@ from typing import Any
 from ..emit_c import VERSION
 from ..model import Model
 from .a2l_entries import Characteristic, Measurement, Measurements, characteristics, instance_of, page
-from .elf_types import Program
+from .elf_types import Program, read_program
 from .interface import Exporter, ExportError, Option, Options
 from .templating import render
 
@@ -83,7 +83,7 @@ def _build(model: Model, options: Options) -> bytes:
     if options["elf"] is None:
         raise ExportError("--elf: it is missing; name the linked program, compiled with -g, that the addresses are to be taken from")
     wire = transport(options["transport"])
-    program = Program(options["elf"])
+    program = read_program(options["elf"])
     values = page(model, program)
     instance = instance_of(model, program, options["instance"])
     measured = _measured(model, program, instance, options["measure"])

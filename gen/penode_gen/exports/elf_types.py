@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -86,8 +88,7 @@ class Program:
 
         self.path = path
         try:
-            self._file = open(path, "rb")
-            self._elf = ELFFile(self._file)
+            self._elf = ELFFile(io.BytesIO(path.read_bytes()))
             if not self._elf.has_dwarf_info(strict=True):
                 raise ExportError(f"{path}: the program has no debug information; compile and link it with -g, and do not strip it")
             self._dwarf = self._elf.get_dwarf_info()
@@ -163,6 +164,19 @@ class Program:
             raise KeyError(hex(address))
         at = address - section["sh_addr"]
         return bytes(n) if section["sh_type"] == "SHT_NOBITS" else bytes(section.data()[at : at + n])
+
+
+@lru_cache(maxsize=1)
+def _read(path: Path, changed: int) -> Program:
+    return Program(path)
+
+
+def read_program(path: Path) -> Program:
+    """A linked program; the last one is kept: reading it takes a second. Raises ExportError."""
+    try:
+        return _read(path, path.stat().st_mtime_ns)
+    except OSError as exc:
+        raise ExportError(f"{path}: it cannot be read as an ELF program ({exc.strerror}); name the linked program") from exc
 
 
 def _uleb(code: bytes) -> int:

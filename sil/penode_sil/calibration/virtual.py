@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A virtual controller: the compiled model in real time, in a process of its own (sil/firmware/serve.c)."""
+"""A virtual controller: the compiled model in real time, in a process of its own (port/host/serve.c)."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ def build(model: Any) -> Path:
     """The virtual controller of a model."""
     source, firmware = generated(model), ROOT / "sil" / "firmware"
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], _files(("src", "*.c"))
-    own = [firmware / "serve.c", firmware / "controller.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
+    own = [ROOT / "port" / "host" / "serve.c", firmware / "controller.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
     include = [f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/port/xcp", f"-I{firmware}", f"-I{source}"]
-    options = ["gcc", "-O2", "-g", *FLAGS, "-D_GNU_SOURCE", "-fno-pie", *include]
+    options = ["gcc", "-O2", "-g", *FLAGS, "-fno-pie", *include]
     read = [_version("gcc"), *_files(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("sil/firmware", "*.h"))]
     same = _kept("runtime-serve", ".o", [*options[:-1], "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     epk = f'-DCONTROLLER_EPK="{identity(model)}"'

@@ -10,6 +10,8 @@
  * A2L: the file that GET_ID offers, or "-". `frames` is UDP with a CAN frame a datagram, without header. Prints its port; ends
  * with its standard input, and then prints the number of steps, and of late ones: more than a period after their time.
  */
+#define _GNU_SOURCE
+
 #include <arpa/inet.h>
 #include <netinet/tcp.h>
 #include <poll.h>
