@@ -111,6 +111,9 @@ class _Reader:
         owner = self.attribute(component, "name", name)
         kinds = {self.attribute(c, "name", name): self.attribute(c, "kind", name) for c in system.findall("ssd:Connectors/ssd:Connector", _SPACE)}
         wires = dict(self.wire(c, owner, name) for c in system.findall("ssd:Connections/ssd:Connection", _SPACE))
+        if not kinds:  # players of SSP 1.0 take connections between components only: the component's own connectors are the signals
+            kinds = {self.attribute(c, "name", name): self.attribute(c, "kind", name) for c in component.findall("ssd:Connectors/ssd:Connector", _SPACE)}
+            wires = {connector: connector for connector in kinds}
         start: Values = {}
         for binding in component.findall("ssd:ParameterBindings/ssd:ParameterBinding", _SPACE):
             mapping = binding.find("ssd:ParameterMapping", _SPACE)
