@@ -16,7 +16,6 @@ from .errors import UserError
 SSP = "http://ssp-standard.org/SSP1/SystemStructure"
 SCHEDULE = "extra/penode/schedule.xml"
 _SPACE = {"ssd": f"{SSP}Description", "ssv": f"{SSP}ParameterValues", "ssm": f"{SSP}ParameterMapping", "ps": "urn:penode:parameter-schedule:1"}
-_LARGEST = 200_000_000  # bytes of a file in the archive
 _TYPES = ("Real", "Float64", "Float32", "Integer", "Enumeration", "Int64", "Int32", "UInt32", "Boolean")
 
 Values = dict[str, tuple[float, ...]]  # by name in the component
@@ -63,11 +62,11 @@ class _Reader:
     def error(self, where: str, what: str, remedy: str) -> UserError:
         return UserError(f"{self.path}: {where}: {' '.join(what.split())}; {remedy}")
 
-    def data(self, name: str, named_by: str) -> bytes:
-        """A file of the archive."""
+    def data(self, name: str, named_by: str, limit: int = 200_000_000) -> bytes:
+        """A file of the archive, of up to `limit` bytes."""
         try:
-            if self.archive.getinfo(name).file_size > _LARGEST:
-                raise self.error(name, f"more than {_LARGEST} bytes", "this is no file of values or system")
+            if self.archive.getinfo(name).file_size > limit:
+                raise self.error(name, f"more than {limit} bytes", "this is no file of values or system")
             return self.archive.read(name)
         except KeyError:
             raise self.error(named_by, f"there is no {name!r} in the archive", "export it again") from None
