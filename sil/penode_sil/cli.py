@@ -13,6 +13,9 @@ import click
 
 import penode_gen
 
+from .calibration.measure import measure
+from .calibration.serve import serve
+from .calibration.stage import compare, stage
 from .console import FILE, Several, counted, staged
 from .errors import UserError
 from .export import export
@@ -30,9 +33,13 @@ def cli() -> None:
 
 
 cli.add_command(export)
+cli.add_command(compare)
 cli.add_command(import_)
 cli.add_command(inspect)
+cli.add_command(measure)
+cli.add_command(serve)
 cli.add_command(simulate)
+cli.add_command(stage)
 cli.add_command(train)
 
 

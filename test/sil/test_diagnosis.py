@@ -882,7 +882,7 @@ def test_a_delay_is_written_in_steps_that_it_is_stable_in(roll_off):
     assert extension._fastest(stiff, drag) == pytest.approx({0.0: 12.0**0.5, 0.3: 2.5 * (1.0 + 0.2**0.5), 0.5: 1.0}[roll_off])
 
 
-@pytest.mark.parametrize("fault", sample(FAULTS, "late", "warming up", "drifting gain", "near its limits", "named like a state"))
+@pytest.mark.parametrize("fault", sample(FAULTS, "late", "drifting gain", "near its limits"))
 def test_the_file_has_the_fault_of_a_sensor(tmp_path, fault, show):
     """Named; the C of the extended file shows it as well: what is left of a new recording is its noise. The height of the body is
     measured too, so no load looks like a bias."""

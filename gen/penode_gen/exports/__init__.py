@@ -19,6 +19,7 @@ FORMATS: dict[str, str] = {
     "fmu2": "fmu2",
     "modelica": "modelica",
     "ssp": "ssp",
+    "a2l": "a2l",
 }
 
 

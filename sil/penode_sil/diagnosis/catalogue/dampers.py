@@ -25,7 +25,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     yield Form(KINDS[0], place.name, "force", index, (Part("rebound_damper", ("damping", "N*s/m")),))
     for share in KNEES:
-        bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1)
+        bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1, span=3.0)
         yield Form(KINDS[1], place.name, "force", index, (bent,))
     yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2")),))
     time = 0.5 * motion.longest

@@ -22,7 +22,8 @@ def sensors(model: Model, count: int) -> Iterable[Form]:
     """Forms of the first `count` sensors: what physics cannot do in any place."""
     for j, s in enumerate(model.sensors[:count]):
         yield Form("sensor_scale", s.name, "scale", j)
-        yield Form("sensor_delay", s.name, "late", j)
+        if count > 1 or model.inputs:  # there is something to be late against
+            yield Form("sensor_delay", s.name, "late", j)
 
 
 def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:

@@ -62,7 +62,8 @@ class Motion:
 class Part:
     """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies
     it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values.
-    `force` gives its force [n] for gain 1 along a motion, where the expression alone does not."""
+    `force` gives its force [n] for gain 1 along a motion, where the expression alone does not. A shape stays within a factor of `span`: a
+    bend that is far below the motion is an edge, and another kind."""
 
     law: str
     gain: tuple[str, str]
@@ -70,6 +71,7 @@ class Part:
     sign: int = 0
     fixed: tuple[str, ...] = ()
     force: Callable[[Moved], Array] | None = None
+    span: float = 30.0
 
     def along(self, m: Moved) -> Array:
         """Force [n] for gain 1."""

@@ -13,7 +13,7 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("hidden_resonance",)
-RATIOS = (0.6, 1.2, 2.5, 5.0)  # of v_rms/s_rms, to which its frequency is tried
+RATIOS = (0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.2, 3.2, 5.0)  # of v_rms/s_rms, to which its frequency is tried
 LOSS = 0.1  # damping ratio at first
 
 
