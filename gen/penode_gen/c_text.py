@@ -37,15 +37,17 @@ def real(value: float) -> str:
 def _decimal(text: str) -> str:
     """Plain notation where it is short, and always a decimal point or an exponent."""
     number = float(text)
-    plain = np.format_float_positional(float(text), unique=True, trim="0")
-    digits, exponent = np.format_float_scientific(float(text), unique=True, trim="-").split("e")
-    if "e" in text:  # digits of the narrower type
-        digits, exponent = text.split("e")
+    short = number == 0.0 or 1e-4 <= abs(number) < 1e7
+    if "e" not in text:
+        if short:
+            return np.format_float_positional(number, unique=True, trim="0")
+        digits, exponent = np.format_float_scientific(number, unique=True, trim="-").split("e")
+        return f"{digits if '.' in digits else digits + '.0'}e{int(exponent)}"
+    digits, exponent = text.split("e")  # those of the narrower type
+    if short:
         mantissa = digits.replace(".", "").lstrip("-")
         shift = int(exponent) - (len(mantissa) - 1)
-        plain = np.format_float_positional(float(f"{int(mantissa)}e{shift}") * (-1 if digits.startswith("-") else 1), unique=True, trim="0")
-    if number == 0.0 or 1e-4 <= abs(number) < 1e7:
-        return plain
+        return np.format_float_positional(float(f"{int(mantissa)}e{shift}") * (-1 if digits.startswith("-") else 1), unique=True, trim="0")
     return f"{digits if '.' in digits else digits + '.0'}e{int(exponent)}"
 
 
@@ -75,7 +77,7 @@ def _fold_comment(line: str, width: int) -> list[str]:
 def _fold_code(line: str, width: int) -> list[str]:
     """A statement broken where the fewest parentheses are open; a comment behind it goes above."""
     indent = line[: len(line) - len(line.lstrip())]
-    if remark := re.fullmatch(r"\s*(.*\S)\s*(/\*.*\*/)", line):
+    if "/*" in line and (remark := re.fullmatch(r"\s*(.*\S)\s*(/\*.*\*/)", line)):
         above, code = indent + remark[2], indent + remark[1]
         return [*(_fold_comment(above, width) if len(above) > width else [above]), *_fold_code(code, width)]
     hang = indent if re.match(r"\s*(\(pen_real_t\))?-?\d", line) else f"{indent}    "  # rows of numbers, and all else
@@ -86,8 +88,13 @@ def _fold_code(line: str, width: int) -> list[str]:
     return [*folded, line]
 
 
+_ROW = re.compile(r"\s*(?:(?:\(pen_real_t\))?-?[\d.]+(?:e-?\d+)?F?, ?)+(?:(?:\(pen_real_t\))?-?[\d.]+(?:e-?\d+)?F?,?)?")  # of numbers
+
+
 def _break(line: str, width: int) -> int:
     """The last space at which a line may be broken with the fewest parentheses open, 0 if there is none."""
+    if _ROW.fullmatch(line):
+        return line.rfind(", ", width // 3 - 1, width + 1) + 1
     best, depth, found = 0, 0, 0
     for at, c in enumerate(line[: width + 1]):
         depth += (c in "([{") - (c in ")]}")

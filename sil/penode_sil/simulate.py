@@ -23,6 +23,7 @@ from .mdf_write import write_mf4
 from .output import write_csv
 from .results import Result
 from .schedule import instance_calls
+from .ssp_command import play
 from .targets import MACHINES, Pil, Sil
 
 ENDINGS = (".csv", ".mf4")
@@ -30,7 +31,8 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 @click.command(cls=Several)
-@click.argument("model", type=FILE)
+@click.argument("model", type=FILE, required=False)
+@click.option("--ssp", type=FILE, help="SSP to play with its schedule of sets, instead of MODEL (gen/SCHEDULE.md); inputs by --input.")
 @click.option("--scenario", type=FILE, help="Scenario file (TOML) to run.")
 @click.option("--input", "records", type=FILE, multiple=True, help="Recordings (CSV with units, or MDF) that drive the model.")
 @click.option(
@@ -49,8 +51,13 @@ PICTURES = (".png", ".svg", ".pdf")
 @click.option("--start", multiple=True, help='Start: "state=0.01 m", or measured[:K], fitted to the first K samples of the sensors.')
 @click.option("--replay", "how", type=click.Choice(replay.HOW), default="linear", show_default=True, help="What an input does between rows.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
-def simulate(model: Path, target: str, as_json: bool, **given: Any) -> None:
-    """Run the model file MODEL on a scenario or on recorded inputs."""
+def simulate(model: Path | None, ssp: Path | None, target: str, as_json: bool, **given: Any) -> None:
+    """Run the model file MODEL on a scenario or on recorded inputs, or play an SSP."""
+    if ssp is not None:
+        play(model, ssp, as_json or target != "sil", given)
+        return
+    if model is None:
+        raise UserError("simulate needs a model file, or --ssp FILE; name one")
     asked = _Asked(model, target, **given)
     place, machine = asked.place()
     outputs = asked.outputs()

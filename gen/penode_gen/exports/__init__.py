@@ -18,6 +18,7 @@ FORMATS: dict[str, str] = {
     "fmu3": "fmu3",
     "fmu2": "fmu2",
     "modelica": "modelica",
+    "ssp": "ssp",
     "a2l": "a2l",
 }
 

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""`penode simulate --ssp`: the FMU of an SSP with its schedule of parameter sets, run by FMPy."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import ssp_file
+from .errors import UserError
+from .output import Column
+
+Array = NDArray[np.float64]
+
+
+def play(path: Path, record: Path | None, tell: Any = lambda line: None) -> list[Column]:
+    """
+    Time, inputs and outputs at each sample, as columns. Raises UserError.
+
+    `record`: CSV with `time [s]` and inputs of the system; a value holds from its row to the next. Without it inputs keep their
+    start values until the stop time of the SSP. `tell` takes a line for each warning of the FMU.
+    """
+    if importlib.util.find_spec("fmpy") is None:
+        raise UserError("--ssp: it needs the Python package FMPy, which is not installed; pip install penode[fmi]")
+    system = ssp_file.read(path)
+    table = _record(record, system.inputs) if record else {}
+    stop = float(table["time"][-1]) if table else system.stop
+    if stop is None:
+        raise UserError(f"{path}: it has no stop time; give inputs with --input")
+    with _component(path, system, tell) as fmu:
+        steps = int(round(stop / fmu.step_size))
+        rows = _run(path, system, fmu, table, steps)
+    times = np.arange(steps + 1) * fmu.step_size
+    names = [*system.inputs, *system.outputs]
+    return [Column("time", "s", times), *(Column(name, fmu.unit(system.wires[name]), values) for name, values in zip(names, rows.T))]
+
+
+def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array], steps: int) -> Array:
+    """Rows of inputs and outputs: an output beside the input at its own sample."""
+    times = np.arange(steps + 1) * fmu.step_size
+    half = fmu.step_size / 2
+    at = np.maximum(np.searchsorted(table["time"], times + half * 1e-3, side="right") - 1, 0) if table else None
+    inputs = np.array([table[name][at] if name in table else np.full(steps + 1, fmu.get(system.wires[name])) for name in system.inputs]).reshape(-1, steps + 1)
+    outputs = np.empty((steps + 1, len(system.outputs)))
+    waiting = list(system.schedule)
+    fmu.initialise({**system.start, **{system.wires[n]: (u[0],) for n, u in zip(system.inputs, inputs)}}, f"{path}: start")
+    for k in range(steps + 1):
+        outputs[k] = [fmu.get(system.wires[name]) for name in system.outputs]
+        if k == steps:
+            break
+        while waiting and waiting[0].time <= times[k] + half * 1e-3:
+            exchange = waiting.pop(0)
+            fmu.set(exchange.values, f"{path}: {exchange.source} at {exchange.time:g} s")
+        fmu.set({system.wires[n]: (u[k],) for n, u in zip(system.inputs, inputs)}, f"{path}: inputs")
+        fmu.step(k)
+    return np.column_stack([inputs.T, outputs])
+
+
+def _record(path: Path, known: tuple[str, ...]) -> dict[str, Array]:
+    """Columns of a CSV by name, "time" among them."""
+    try:
+        with open(path, encoding="utf-8", newline="") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}; name a file that can be read") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise UserError(f"{path}: no table that can be read: {error}; save it as CSV in UTF-8") from None
+    names = [re.sub(r"\s*\[.*?\]\s*$", "", word).strip() for word in rows[0]] if rows else []
+    if "time" not in names or len(rows) < 2:
+        raise UserError(f"{path}: it has no column time, or no rows; write time [s] and the inputs: {', '.join(known)}")
+    try:
+        values = np.array(rows[1:], float)
+    except ValueError as error:
+        raise UserError(f"{path}: {' '.join(str(error).split())[:200]}; give every row as many numbers as the header has names") from None
+    if values.shape[1] != len(names) or not np.isfinite(values).all() or (np.diff(values[:, names.index("time")]) <= 0).any():
+        raise UserError(f"{path}: a row that does not fit the header, a number that is not finite, or times that do not ascend; mend the table")
+    return {name: values[:, i] for i, name in enumerate(names) if name == "time" or name in known}
+
+
+class _Fmu:
+    """The component in FMPy; every refusal is a UserError with what the FMU logged."""
+
+    def __init__(self, path: Path, folder: str, description: Any, name: str, tell: Any):
+        from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+        from fmpy.fmi3 import FMU3Slave
+
+        self.path, self.tell, self.now, self.lines = path, tell, 0.0, [""]
+        self.new = description.fmiVersion.startswith("3")
+        self.variables = {v.name: v for v in description.modelVariables}
+        experiment = description.defaultExperiment
+        self.step_size = float((experiment and experiment.stepSize) or 1e-3)
+        identifier = description.coSimulation.modelIdentifier
+        self.fmu: Any = (FMU3Slave if self.new else FMU2Slave)(guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName=name)
+        if self.new:
+            self.fmu.instantiate(logMessage=lambda env, status, category, text: self.line(status, text))
+        else:
+            self.callbacks = fmi2CallbackFunctions()
+            self.callbacks.logger = fmi2CallbackLoggerTYPE(lambda env, instance, status, category, text: self.line(status, text))
+            self.fmu.instantiate(callbacks=self.callbacks)
+
+    def line(self, status: int, text: bytes) -> None:
+        self.lines.append(text.decode("utf-8", "replace"))
+        if status == 1:
+            self.tell(self.lines[-1])
+
+    @contextmanager
+    def guarded(self, doing: str) -> Iterator[None]:
+        from fmpy.fmi1 import FMICallException
+
+        try:
+            yield
+        except FMICallException as error:
+            raise UserError(f"{doing}: the FMU refuses it: {self.lines[-1] or error}; mend the SSP") from None
+
+    def unit(self, name: str) -> str:
+        variable = self.variables[name]
+        return variable.unit or (variable.declaredType.unit if variable.declaredType else None) or "1"
+
+    def known(self, name: str, where: str) -> Any:
+        if name not in self.variables:
+            raise UserError(f"{where}: the FMU has no variable {name!r}; mend the SSP")
+        return self.variables[name]
+
+    def set(self, values: ssp_file.Values, where: str) -> None:
+        for name, given in values.items():
+            variable = self.known(name, where)
+            size = int(np.prod(variable.shape or (1,))) if self.new else 1
+            if len(given) != size:
+                raise UserError(f"{where}: {name} has {size} elements, and {len(given)} values are given; mend the SSP")
+            with self.guarded(f"{where}: {name}"):
+                if variable.type == "Enumeration":
+                    (self.fmu.setInt64 if self.new else self.fmu.setInteger)([variable.valueReference], [int(v) for v in given])
+                else:
+                    (self.fmu.setFloat64 if self.new else self.fmu.setReal)([variable.valueReference], list(given))
+
+    def get(self, name: str) -> float:
+        reference = [self.known(name, str(self.path)).valueReference]
+        with self.guarded(name):
+            return float((self.fmu.getFloat64 if self.new else self.fmu.getReal)(reference)[0])
+
+    def initialise(self, values: ssp_file.Values, where: str) -> None:
+        with self.guarded(where):
+            if not self.new:
+                self.fmu.setupExperiment(startTime=0.0)
+            self.fmu.enterInitializationMode()
+            self.set(values, where)
+            self.fmu.exitInitializationMode()
+
+    def step(self, k: int) -> None:
+        with self.guarded(f"{self.path}: step at {k * self.step_size:g} s"):
+            self.fmu.doStep(k * self.step_size, self.step_size)
+
+
+@contextmanager
+def _component(path: Path, system: ssp_file.System, tell: Any) -> Iterator[_Fmu]:
+    """The FMU in a folder of its own for as long as it runs."""
+    import fmpy
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "component.fmu"
+        file.write_bytes(system.fmu)
+        try:
+            description = fmpy.read_model_description(str(file))
+            fmpy.extract(str(file), str(Path(folder) / "fmu"))
+            fmu = _Fmu(path, str(Path(folder) / "fmu"), description, system.component, tell)
+        except Exception as error:  # FMPy raises many kinds
+            raise UserError(f"{path}: its FMU cannot be used: {' '.join(str(error).split())[:300]}; export it again, with a binary for this machine") from None
+        missing = [name for name in system.wires.values() if name not in fmu.variables]
+        if missing:
+            raise UserError(f"{path}: the FMU has no variable {missing[0]!r}; mend the SSP")
+        try:
+            yield fmu
+        finally:
+            fmu.fmu.freeInstance()
