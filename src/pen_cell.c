@@ -232,6 +232,9 @@ void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *
     part->guard = (FOUR * (PEN_REAL_EPSILON * pen_port_abs(x))) + PEN_REAL_MIN;
     part->length = PEN_REAL_MAX;
     part->open = 0U;
+    for (size_t i = 0U; i < PEN_CELL_OPEN; i++) {
+        part->neuron[i] = 0U;
+    }
     h->x[0] = x;
     h->error[0] = ZERO;
     t->x[0] = ONE;

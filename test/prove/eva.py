@@ -51,6 +51,10 @@ OPTIONS = [
     *("-warn-unsigned-downcast", "-warn-signed-downcast", "-eva-no-show-progress", "-eva-msg-key=-final-states"),
 ]
 
+# Loops over layers and neurons, with states merged between: numbers of rows stay known, and no decision multiplies states.
+UNROLLED = ["-eva-precision", "0", "-eva-min-loop-unroll", "24"]
+OPTIONS_OF = {"promises": UNROLLED, "trial": UNROLLED}
+
 LIMIT = 1800  # seconds that an analysis may take
 
 
@@ -89,6 +93,7 @@ class Seed:
 
 MODEL = Run("nqvm_euler", "corrupted")
 ORDER = Run("nqvm_euler", "in_order")
+PROMISE = Run(None, "promises")
 SEEDS = [
     Seed("pen_set.c", " || (n > (length - offset))", "", MODEL),
     Seed("pen_set.c", "((offset > length) || (n", "((n", MODEL),
@@ -125,6 +130,11 @@ SEEDS = [
     Seed("pen_net.c", "(row + 4U) <= n_out", "row < n_out", Run(None, "all_layers")),
     Seed("pen_fold.c", "while (more && (left > 0U) && ", "while (more && ", Run(None, "folding")),
     Seed("pen_fold.c", "        } else if ((kink < walk->chain->neurons) && !flat) {", "        } else if (!flat) {", Run(None, "folding")),
+    Seed("pen_cell.c", "part->neuron[(part->open < PEN_CELL_OPEN) ? part->open : 0U]", "part->neuron[part->open]", PROMISE),
+    Seed("pen_cell.c", " && (part->open <= PEN_CELL_OPEN)", "", PROMISE),
+    Seed("pen_cell.c", "at[stride * (i + 1U)]", "at[stride * (i + 2U)]", PROMISE),
+    Seed("pen_cell.c", "&work[7U * width]", "&work[8U * width]", PROMISE),
+    Seed("pen_promise.c", "p = &p[layer->n_out * (layer->n_in + 1U)]", "p = &p[layer->n_out * (layer->n_in + 2U)]", PROMISE),
     Seed("pen_fold.h", "&at[n - 1U]; /* of the two", "&at[n]; /* of the two", Run(None, "folding")),
 ]
 
@@ -182,7 +192,7 @@ def analyse(run: Run, place: Path) -> Seen:
     last = ["-then", "-metrics", "-metrics-eva-cover"]
     machine = "ppc_32" if run.big_endian else "gcc_x86_32"  # 32 bits, as a Cortex-M
     # Half an hour of processor time, however busy the machine is.
-    command = ["prlimit", f"--cpu={LIMIT}", "frama-c", "-machdep", machine, f"-cpp-extra-args={' '.join(words)}", *split, *files, "-main", run.entry, *OPTIONS, *last]
+    command = ["prlimit", f"--cpu={LIMIT}", "frama-c", "-machdep", machine, f"-cpp-extra-args={' '.join(words)}", *split, *files, "-main", run.entry, *OPTIONS, *OPTIONS_OF.get(run.entry, []), *last]
     done = gate.run(command, limit=48 * LIMIT)
     text = done.stdout + done.stderr
     alarms = [f"{run}: {' '.join(m.split())}" for m in re.findall(r"^\[eva:alarm\] (.*\n(?:  .*\n)*)", text, re.M)]
