@@ -40,7 +40,8 @@ PROMISED = {
     "folded_and_promised": ['outside = "clamp"', "pieces = 96", "trial = 8", 'on_damage = "rollback"', *PROMISES],
 }
 OWNED = ("nqvm_sets.h", "nqvm_params.c")  # the sets of all others
-PARTS = ("all_layers", "elements", "elementary", "networks_of_16", "systems", "folding", "sets", "serial")
+PARTS = ("all_layers", "elements", "elementary", "networks_of_16", "systems", "folding", "sets", "serial", "selftest")
+LEFT_OUT = "pen_xcp*.c"  # README.md says why
 # Parts in a file of their own.
 OF_FILE = {"trial": "promise.c", "promises": "promise.c"}
 
@@ -135,6 +136,7 @@ SEEDS = [
     Seed("pen_cell.c", "at[stride * (i + 1U)]", "at[stride * (i + 2U)]", PROMISE),
     Seed("pen_cell.c", "&work[7U * width]", "&work[8U * width]", PROMISE),
     Seed("pen_promise.c", "p = &p[layer->n_out * (layer->n_in + 1U)]", "p = &p[layer->n_out * (layer->n_in + 2U)]", PROMISE),
+    Seed("pen_selftest.c", "pen_dense(WIDE, 2U, w, x, y)", "pen_dense(WIDE, 3U, w, x, y)", Run(None, "selftest")),
     Seed("pen_fold.h", "&at[n - 1U]; /* of the two", "&at[n]; /* of the two", Run(None, "folding")),
 ]
 
@@ -181,7 +183,7 @@ def sources(seed: Seed | None = None) -> Path:
 def analyse(run: Run, place: Path) -> Seen:
     """Let Eva look at one run."""
     words = [f"-I{place}/inc", f"-I{place}/src", "-Iport/template", *(["-D__OPTIMIZE_SIZE__"] if run.size_build else [])]
-    files = sorted((place / "src").glob("pen_*.c"))
+    files = sorted(set((place / "src").glob("pen_*.c")) - set((place / "src").glob(LEFT_OUT)))
     if run.model:
         words += [f"'{word}'" for word in told(run.model)]
         files += [place / "src" / f"{run.model}.c", place / "src" / f"{owner(run.model)}_params.c", HARNESS / "model.c"]
@@ -257,6 +259,7 @@ def main(only: Sequence[str]) -> int:
         good &= gate.report(f"eva: {run}", seen[run].alarms + seen[run].trouble)
     if only:
         return int(not good)
+    print(f"skip  eva: {LEFT_OUT}: left to xcp-fuzz")
     good &= gate.report("eva: every NaN through the elementary functions", nan())
     total, missing = reached(seen)
     good &= gate.report(f"eva: {total} statements reached", missing)
