@@ -5,7 +5,7 @@
 
 # Each takes one core there; the longest begin, so that none runs on alone.
 SUITES   := python-sil hidden-fixed hidden-fresh figures-check python-gen unit warnings misra accuracy python-tools \
-            python-diagnosis python-training symbols builds board gen-check cmock
+            python-diagnosis python-training python-exports symbols builds board gen-check cmock
 PYTHONS  := $(filter python-%,$(SUITES))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
 ALIKE    := $(filter-out mps2-an385 mps2-an386,$(MACHINES)) # same compiler as these two, same integer instructions as the second
@@ -217,7 +217,7 @@ $(PYTHONS): python-%: | $(READY)
 	@HYPOTHESIS_STORAGE_DIRECTORY=build/hypothesis OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q test/$* # one thread each: parts run side by side
 python-long: | $(READY) ## The Python tests of which `make test` takes a sample: the others
 	@PENODE_LONG=1 $(PYTHON) -m pytest -q test/gen/test_emit.py
-	@for part in gen sil tools; do OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q -m long test/$$part || exit; done
+	@for part in gen sil tools exports; do OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q -m long test/$$part || exit; done
 
 # -- hidden effects: a draw that never changes, and one that nobody has seen --------------------------------------------
 

@@ -104,6 +104,12 @@ LAWS: dict[str, Law] = {
         {"damping": "N*s/m", "gap": "m", "relaxation": "s"},
         {"eye": LawState("m", "v - (max(eye - gap, 0) + min(eye + gap, 0))/relaxation")},
     ),
+    # takes from a parallel damper what it loses behind gas, which a rate of `rate` presses by `pocket`
+    "aerated_damper": Law(
+        "damping*(rate*(pressed/pocket)^3 - v)",
+        {"damping": "N*s/m", "pocket": "m", "rate": "m/s"},
+        {"pressed": LawState("m", "v - rate*(pressed/pocket)^3")},
+    ),
     # spring and damper in series, relaxation = damping/stiffness
     "maxwell_bushing": Law(
         "pull", {"stiffness": "N/m", "relaxation": "s"}, {"pull": LawState("N", "stiffness*v - pull/relaxation")}

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .networks import ACTIVATIONS, Affine, Dense, Layer, Network, NetworkError, Vector
+from .networks import ACTIVATIONS, FORMS, Affine, Dense, Layer, Network, NetworkError, Vector
 
 _TOP = ("input", "output", "normalise", "layers", "denormalise", "trained_range")
 
@@ -45,7 +45,7 @@ class _Reader:
         low, high = None, None
         if "trained_range" in top:
             low, high = self.bounds(top["trained_range"], "trained_range", ("min", "max"))
-        return self.fitting(layers, low, high)
+        return self.fitting(layers, low, high, "normalise" in top, "denormalise" in top)
 
     def load(self) -> Any:
         try:
@@ -84,8 +84,19 @@ class _Reader:
 
     def dense_layers(self, value: Any) -> list[Layer]:
         if not isinstance(value, list) or not value:
-            raise self.error("layers", "no layers", "give a list with one object for each dense layer")
-        return [self.dense(entry, f"layers[{i}]") for i, entry in enumerate(value)]
+            raise self.error("layers", "no layers", "give a list with one object for each layer")
+        scaled = [isinstance(entry, dict) and "form" in entry for entry in value]
+        return [(self.scale if scales else self.dense)(entry, f"layers[{i}]") for i, (entry, scales) in enumerate(zip(value, scaled))]
+
+    def scale(self, value: Any, where: str) -> Affine:
+        """"centre": (x - shift) * factor; "rescale": x * factor + shift."""
+        table = self.table(value, where, ("form", "shift", "factor"), ("form", "shift", "factor"))
+        if table["form"] not in FORMS:
+            raise self.error(f"{where}.form", f"unknown form {table['form']!r}", f"known are {', '.join(FORMS)}")
+        shift, factor = (self.vector(table[key], f"{where}.{key}") for key in ("shift", "factor"))
+        if shift.shape != factor.shape:
+            raise self.error(where, f"{shift.size} shifts, but {factor.size} factors", "give one of each per value")
+        return Affine(shift, factor, table["form"])
 
     def dense(self, value: Any, where: str) -> Dense:
         table = self.table(value, where, ("activation", "weights", "bias"), ("activation", "weights", "bias"))
@@ -115,10 +126,9 @@ class _Reader:
                 raise self.error(f"{where}[{i}]", "too large for a double", "train or export the network again")
         return np.array(value, dtype=np.float64)
 
-    def fitting(self, layers: list[Layer], low: Vector | None, high: Vector | None) -> Network:
+    def fitting(self, layers: list[Layer], low: Vector | None, high: Vector | None, before: bool, behind: bool) -> Network:
         """The network, or an error that counts layers as the file does."""
-        names = [f"layers[{i}]" for i in range(sum(isinstance(layer, Dense) for layer in layers))]
-        names = ["normalise"] * isinstance(layers[0], Affine) + names + ["denormalise"] * isinstance(layers[-1], Affine)
+        names = ["normalise"] * before + [f"layers[{i}]" for i in range(len(layers) - before - behind)] + ["denormalise"] * behind
         for i in range(1, len(layers)):
             if layers[i].n_in != layers[i - 1].n_out:
                 what = f"takes {layers[i].n_in} values, but {names[i - 1]} gives {layers[i - 1].n_out}"

@@ -13,9 +13,14 @@ import click
 
 import penode_gen
 
+from .calibration.measure import measure
+from .calibration.serve import serve
+from .calibration.stage import compare, stage
 from .console import FILE, Several, counted, staged
 from .errors import UserError
+from .export import export
 from .guard import guarded
+from .importing import import_
 from .inspection import inspect
 from .simulate import simulate
 from .training.command import train
@@ -27,8 +32,14 @@ def cli() -> None:
     """Physics-enhanced neural ODEs: from a model file to checked C, in the loop on host and Cortex-M."""
 
 
+cli.add_command(export)
+cli.add_command(compare)
+cli.add_command(import_)
 cli.add_command(inspect)
+cli.add_command(measure)
+cli.add_command(serve)
 cli.add_command(simulate)
+cli.add_command(stage)
 cli.add_command(train)
 
 

@@ -7,12 +7,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-FLAGS = (
-    "input_nonfinite", "state_nonfinite", "step_nonfinite", "singular", "outside", "held", "adopted", "badarg",
-    "weight_nonfinite", "input_range", "withdrawn",
-    "set_busy", "set_closed", "set_range", "set_short", "set_checksum", "set_nonfinite", "set_layout", "set_no_previous",
-    "set_pieces", "set_badarg", "set_promise", "set_trial", "set_damaged", "set_idle",
-)  # fmt: skip
+from penode_gen.flags import FLAGS
+
 BIT = {name: 1 << n for n, name in enumerate(FLAGS)}
 
 

@@ -51,6 +51,12 @@ def loose_damper(s: float, v: float, own: np.ndarray) -> tuple[float, list[float
     return 6.0 * (slide - v), [v - slide]
 
 
+def aerated_damper(s: float, v: float, own: np.ndarray) -> tuple[float, list[float]]:
+    """Gas that 0.5 m/s press by 3 mm, ever stiffer."""
+    slide = 0.5 * (own[0] / 0.003) ** 3
+    return 6.0 * (slide - v), [v - slide]
+
+
 def absorber(s: float, v: float, own: np.ndarray) -> tuple[float, list[float]]:
     force = 90.0 * (s - own[0]) + 2e4 * (s - own[0]) ** 3 + 0.8 * (v - own[1])
     return force, [own[1], force / 0.4]
@@ -108,6 +114,7 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
         ),
     ),
     "slack_friction": ({"force": "9 N", "presliding": "10 mm"}, lambda s, v, own: (9.0 * own[0] ** 5, bouc_wen(s, v, own)[1])),
+    "aerated_damper": ({"damping": "6 N*s/m", "pocket": "3 mm", "rate": "0.5 m/s"}, aerated_damper),
     "loose_damper": ({"damping": "6 N*s/m", "gap": "2 mm", "relaxation": "30 ms"}, loose_damper),
     "maxwell_bushing": ({"stiffness": "300 N/m", "relaxation": "60 ms"}, lambda s, v, own: (own[0], [300.0 * v - own[0] / 0.06])),
     "absorber": ({"mass": "0.4 kg", "stiffness": "90 N/m", "cubic": "2e4 N/m^3", "damping": "0.8 N*s/m"}, absorber),

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -108,3 +109,14 @@ def test_budget_may_be_left_unused(tree: Path) -> None:
 )
 def test_functions_of_c(text: str, lengths: list[int]) -> None:
     assert [n for _, n in structure.c_functions(text)] == lengths
+
+
+def test_each_package_is_installed() -> None:
+    """What a wheel holds is the list in pyproject.toml; a folder that is not in it works from a checkout alone."""
+    project = tomllib.loads((structure.ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    there = {
+        ".".join([name, *p.parent.relative_to(structure.ROOT / folder).parts])
+        for name, folder in project["package-dir"].items()
+        for p in (structure.ROOT / folder).rglob("__init__.py")
+    }
+    assert sorted(project["packages"]) == sorted(there)

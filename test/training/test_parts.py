@@ -14,7 +14,7 @@ import penode_gen
 from penode_gen import promises
 from penode_gen.model import Promises
 from penode_gen.untrained import untrained
-from penode_sil.training import curve, data, dense, drive, promised, story, unfold
+from penode_sil.training import bands, curve, data, dense, drive, promised, story, unfold
 from penode_sil.training.engine import Engine
 from penode_sil.training.solve import Limits, least
 from penode_sil.training.settings import SETTINGS
@@ -97,12 +97,28 @@ def test_a_curve_is_its_network_exactly(layers: list[int]) -> None:
 
 
 def test_knots_that_matter_stay() -> None:
-    """Of 41 knots on a curve of three kinks, the three and the ends are left."""
+    """Of 41 knots on a curve of three kinks, the three and the ends are left; a regular grid stays where noise alone says otherwise."""
     knots = np.linspace(-1.0, 1.0, 41)
     kinks = np.array([-1.0, -0.5, 0.0, 0.3, 1.0])
     truth = np.interp(knots, kinks, [3.0, -2.0, 0.0, 1.0, -4.0])
-    kept = curve.fewer(knots, truth, np.eye(41) * 1e-4, 5, [20])
+    regular = np.arange(41) % 10 == 0
+    kept = curve.fewer(knots, truth, np.eye(41) * 1e-4, 5, regular, 20)
     assert np.allclose(knots[kept], kinks)
+    # Where all is noise, risk inflation lets through less than one candidate a choice; without it nearly all are chosen by noise.
+    chosen = {True: 0, False: 0}
+    for seed in range(20):
+        noise = np.where(knots == 0.0, 0.0, np.random.default_rng(seed).normal(0.0, 1.0, 41))
+        for grid in chosen:
+            found = curve.fewer(knots, noise, np.eye(41), 5, regular & grid, 20)
+            chosen[grid] += int(np.sum(found & ~regular))
+    assert chosen[True] < 20 < chosen[False]
+
+
+def test_sag_of_a_smooth_curve_is_in_its_band() -> None:
+    """A parabola a x^2 between knots h apart sags by a h^2 / 4 in the middle of each piece; on a straight line next to nothing."""
+    knots = np.linspace(-1.0, 1.0, 11)
+    assert np.allclose(bands.sag(curve.Curve(knots, 3.0 * knots**2, 5)), 3.0 * 0.2**2 / 4.0)
+    assert np.all(bands.sag(curve.Curve(knots, 3.0 * knots, 5)) < 1e-8)
 
 
 @pytest.mark.parametrize(

@@ -22,16 +22,6 @@ from penode_sil.errors import UserError
 HERE = Path(__file__).parent
 
 
-@pytest.fixture(scope="module")
-def trained(recordings: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("trained")
-    train, held = recordings
-    result = CliRunner().invoke(cli, ["train", str(HERE / "quarter.toml"), "--data", str(train), "--holdout", str(held), "-o", str(folder), "--json"])
-    assert result.exit_code == 0, result.output
-    assert json.loads(result.output) == json.loads((folder / "training.json").read_text())
-    return folder
-
-
 def test_forces_are_those_of_the_plant(trained: Path) -> None:
     """Within 2.5 % of the span over 2 sigma, after the best common scale: the bar for 42 s of recording is 1 %; what noise does grows
     with the root of 42/12, 1.9."""

@@ -17,7 +17,7 @@ from .evidence.fit import Fit
 from .evidence.observer import bias, scale
 from .extension import extends, table, toml, unlike
 from .plant import extend
-from .propose import Term
+from .terms import Term
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,29 +11,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .catalogue import curve
-from .evidence.bench import Bench
+from .evidence.bench import SIZES, Bench
 from .evidence.blocks import Blocks
 from .evidence.fit import Problem
-from .propose import Term, Trial, adopt, propose
+from .evidence.prior import stated
+from .propose import PROMISE, adopt, propose
+from .terms import Term, Trial
+from .worth import WORTH
 
 Array = NDArray[np.float64]
-SCORED = 3  # of which so many have to predict blocks
+SCORED = 4  # of which so many have to predict blocks
 MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
 MIN_SHARE = 0.1  # and of what the first cause gains
+MIN_FORM = 0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
 MIN_BLOCKS = 3  # of the blocks in which it does
-MIN_CRITERION = 0.5  # of that, which a criterion has to promise before blocks are asked
 LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
-MIN_LEVEL = 1e-4  # level that is as good as none
 MAX_CAUSES = 4  # at most
 Z_95 = 1.96  # standard deviations that hold 95 %
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends with: the bench with all accepted terms in it, and of every round the trials compared, the best first."""
+    """What a search ends with: the bench with all accepted terms in it, the one before with the `named` first of them alone, which
+    are worth a name, their `shares` of what acts, and of every round the trials compared, the best first."""
 
     bench: Bench
+    plain: Bench
+    named: int
     terms: tuple[Term, ...]
+    shares: tuple[float, ...]
     rounds: tuple[tuple[Trial, ...], ...]
 
 
@@ -41,30 +47,40 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Causes one by one, each the one that predicts best, until none predicts enough better."""
     terms: list[Term] = []
     rounds: list[tuple[Trial, ...]] = []
+    shares: list[float] = []
+    plain: Bench | None = None
+    named = 0
     first = 0.0
     lengths = [len(r) // bench.update for r in bench.records]
     blocks = Blocks.of(lengths)
     bench, base = _based(bench, blocks)
     while len(terms) < MAX_CAUSES:
         trials, wide = propose(bench, terms, log)
-        trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED] if t.gain > MIN_CRITERION * MIN_GAIN]
+        trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (t.share < WORTH, -t.gain))
+        trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
         for t in trials:
-            log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, blocks {np.round(t.blocks - base, 1)}")
-        good = [t for t in trials if _accepted(t, base, first)]
+            log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, blocks {np.round(_better(t, base, bench), 1)}")
+        good = [t for t in trials if _accepted(t, _better(t, base, bench), first)]
+        good = [t for t in good if t.share >= WORTH] or good
         rounds.append(tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks)))))
         if not good:
             break
-        best = _simplest(rounds[-1])
-        first = first or float(np.sum(best.blocks - base))
+        best = _simplest(rounds[-1], base)
+        if plain is None and best.share < WORTH:
+            plain, named = bench, len(terms)
+        first = first or float(np.sum(_better(best, base, bench)))
         bench, term = adopt(bench, best)
         terms.append(term)
+        shares.append(best.share)
         bench, base = _based(bench, blocks)
-    return Found(bench, tuple(terms), tuple(rounds))
+    if plain is None:
+        plain, named = bench, len(terms)
+    return Found(bench, plain, named, tuple(terms), tuple(shares), tuple(rounds))
 
 
 def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
     """The bench with the level that predicts best, and its scores [blocks]."""
-    sizes = [max(bench.level.size, MIN_LEVEL) * factor for factor in LEVEL_FACTORS]
+    sizes = [max(bench.level.size, SIZES[1]) * factor for factor in LEVEL_FACTORS]
     level, fit, scores = blocks.fit_level(bench, bench.problem(), bench.fit, bench.level, sizes)
     return replace(bench, level=level, fit=fit), scores
 
@@ -75,24 +91,27 @@ def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
     return replace(t, level=level, fit=fit, blocks=scores)
 
 
-def _simplest(trials: Sequence[Trial]) -> Trial:
+def _simplest(trials: Sequence[Trial], base: Array) -> Trial:
     """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
-    them by MIN_GAIN."""
+    them by MIN_FORM of what it gains."""
     first = trials[0].form
     same = [t for t in trials if t.form.where == first.where and curve(t.form.kind) == curve(first.kind)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
     for t in more:
         better = t.blocks - found.blocks
-        if np.all(better > 0.0) and np.sum(better) > MIN_GAIN:
+        if np.all(better > 0.0) and np.sum(better) > max(MIN_GAIN, MIN_FORM * np.sum(found.blocks - base)):
             found = t
     return found
 
 
-def _accepted(t: Trial, base: Array, first: float) -> bool:
-    """Does a form predict left-out blocks enough better, with a size that is not zero?"""
-    better = t.blocks - base
+def _better(t: Trial, base: Array, bench: Bench) -> Array:
+    """By how much a form predicts left-out blocks better [blocks], and lets parameters be what the file states."""
+    relief = stated(bench.fit.free) - stated(t.fit.free)
+    return t.blocks - base + relief / len(base)
+
+
+def _accepted(t: Trial, better: Array, first: float) -> bool:
+    """Is a form enough better, with a size that is not zero?"""
     if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > max(MIN_GAIN, MIN_SHARE * first)):
         return False
     return all(abs(t.fit.value(f.target) - f.origin) > Z_95 * t.fit.deviation(f.target) for f in t.term.free if not f.log)
-
-

@@ -109,8 +109,9 @@ def _trained(model: Model, e: Element, set_name: str) -> list[tuple[str, str, fl
 
 
 def _external(model: Model, e: Element) -> bool:
-    """A measured force that is put on a body: an expression without deflection or rate."""
-    return e.law == "expression" and not re.search(r"\b[sv]\b|\b[sv]_", e.expression)
+    """A measured force that is put on a body: an expression without deflection or rate, and without any state."""
+    moves = "|".join(["[sv]", r"[sv]_\w+", *map(re.escape, model.states)])
+    return e.law == "expression" and not re.search(rf"\b({moves})\b", e.expression)
 
 
 def extend(

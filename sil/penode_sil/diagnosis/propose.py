@@ -4,25 +4,22 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from penode_gen.laws import LAWS
-from penode_gen.model import Element, Model
+from penode_gen.model import Model
 
 from . import catalogue
 from .catalogue import drives
-from .catalogue.form import Form, Motion, Moved, Part
+from .catalogue.form import Form, Motion, Moved
 from .evidence.bench import Bench, fit_level
-from .evidence.fit import Fit
-from .evidence.gain import Level
-from .evidence.observer import Filter, scale
+from .evidence.observer import Filter
 from .evidence.screening import Probe, Score, scores
 from .fit import Free
-from .plant import extend
+from .terms import Term, Trial, free_of, with_forms
+from .worth import share
 
 Array = NDArray[np.float64]
 TRIED = 6  # forms that are fitted in a round, the best of each name and place first
@@ -31,27 +28,6 @@ SMALL = 0.02  # of the force at a place: a force that is put on to see what it d
 LITTLE = 0.4  # of a unit, which is 0.05 of the force at the place
 VAGUE = 0.5  # standard deviation of the logarithm of a parameter from which on it is hardly known
 FREE_RUN, FOLLOWED = 10, 12  # iterations of a form's fits
-
-
-@dataclass(frozen=True, eq=False)
-class Term:
-    """A form in a model: its elements there, one for each part, and its free values."""
-
-    form: Form
-    elements: tuple[str, ...]
-    free: tuple[Free, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """A form beside what was accepted already, fitted: `gain` of the criterion, `blocks` [blocks] of predictive density."""
-
-    form: Form
-    term: Term
-    fit: Fit
-    gain: float
-    level: Level
-    blocks: Array | None = None
 
 
 def motions(probe: Probe) -> list[Motion]:
@@ -90,7 +66,7 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
             chosen.setdefault((form.kind, form.where, form.note), (score, form))
     wide, made = with_forms(bench, [form for _, form in chosen.values()], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
-    trials = [_fitted(bench, wide, t, s.sizes) for t, (s, _) in zip(made, chosen.values())]
+    trials = [_fitted(bench, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen.values())]
     return sorted(trials, key=lambda t: -t.gain), wide
 
 
@@ -115,73 +91,17 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
 
 
 def _slope(bench: Bench, form: Form) -> Array:
-    """Change [updates, n_z] of the innovations with what is wrong with an input or a sensor."""
-    (f,) = _free_of(bench, form)
+    """Change [updates, n_z] of the innovations with what is wrong with an input or a sensor, for a value of 1."""
+    (f,) = free_of(bench, form)
     problem = bench.problem()
     free = (*bench.fit.free, f)
     shifts = np.zeros((2, len(free)))
     shifts[1, -1] = 0.1
     nu = problem.nu(free, shifts, bench.fit.by)
-    return (nu[1] - nu[0]) / 0.1
+    return (nu[1] - nu[0]) / (0.1 * f.unit)
 
 
-def _free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
-    """The value of a form of an input or a sensor."""
-    step = bench.update * bench.step
-    match form.how:
-        case "input_gain":
-            return (Free((form.how, form.index), 0.0, 0.01, sigma=0.3),)
-        case "input_offset":
-            size = max(float(np.std(np.concatenate([r.u[:, form.index] for r in bench.records]))), 1e-12)
-            return (Free((form.how, form.index), 0.0, 0.01 * size, sigma=size),)
-        case "input_delay" | "input_lag":
-            return (Free((form.how, form.index), 0.2 * bench.step, 0.2 * step, sigma=2.0 * step, low=0.0),)
-        case "scale":
-            return (Free(scale(form.where), 1.0, 0.01, sigma=0.3, origin=1.0),)
-        case "late":
-            return (Free((form.how, form.index), 0.2 * bench.step, 0.1 * step, sigma=step, low=0.0),)
-    raise ValueError(form.how)
-
-
-def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], first: int) -> tuple[Model, list[Term]]:
-    """The model with all forms in it, each without any force yet, and their terms."""
-    elements, where, parameters, terms = [], [], {}, []
-    for i, form in enumerate(forms):
-        if form.how != "force":
-            terms.append(Term(form, (), _free_of(bench, form)))
-            continue
-        place, names, free = bench.places[form.index], [], []
-        for j, part in enumerate(form.parts):
-            name = f"x{first}_{i}_{j}"
-            own = {part.gain[0]: (0.0, part.gain[1]), **part.shapes}
-            parameters |= {f"{name}_{key}": entry for key, entry in own.items()}
-            elements.append(_element(name, place.ends, part))
-            where.append(place)
-            names.append(name)
-            size = moved[form.index].force / max(_rms([part.along(m) for m in moved[form.index].parts]), 1e-300)
-            low, high = (0.0 if part.sign > 0 else -np.inf), (0.0 if part.sign < 0 else np.inf)
-            free.append(Free(f"{name}_{part.gain[0]}", 0.0, 0.05 * size, sigma=size, low=low, high=high))
-            for key, (value, _) in part.shapes.items():
-                if key not in part.fixed:
-                    free.append(Free(f"{name}_{key}", value, value, log=True, sigma=1.0, origin=value, low=value / 30.0, high=30.0 * value))
-        terms.append(Term(form, tuple(names), tuple(free)))
-    return extend(bench.model, elements, parameters, where), terms
-
-
-def _element(name: str, ends: tuple[str, str], part: Part) -> Element:
-    """A part as an element whose parameters begin with its name."""
-    if part.law in LAWS:
-        return Element(name, ends, part.law, {a: f"{name}_{a}" for a in LAWS[part.law].arguments})
-    keys = [part.gain[0], *part.shapes]
-    text = re.sub(r"\b(" + "|".join(keys) + r")\b", lambda m: f"{name}_{m[1]}", part.law)
-    return Element(name, ends, "expression", expression=re.sub(r"\b([sv])\b", lambda m: f"{m[1]}_{name}", text))
-
-
-def _rms(series: Sequence[Array]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(list(series)) ** 2)))
-
-
-def _fitted(bench: Bench, wide: Model, term: Term, sizes: Array) -> Trial:
+def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], term: Term, sizes: Array) -> Trial:
     """A term beside all that was accepted: from the best so far with the sizes that its score promises; where parameters are hardly known
     also from the nominal ones, and from its own free run, for the motion of a wrong plant promises little."""
     problem = bench.problem(wide)
@@ -194,8 +114,9 @@ def _fitted(bench: Bench, wide: Model, term: Term, sizes: Array) -> Trial:
         runs = [problem.solve(f, still, FREE_RUN) for f in starts[1:]]
         starts.append(max(runs, key=lambda f: f.cost).free)
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
+    same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
     level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
-    return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level)
+    return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved))
 
 
 def _sized(term: Term, sizes: Array) -> list[Free]:

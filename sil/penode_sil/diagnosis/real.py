@@ -10,24 +10,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from penode_gen import units
-from penode_gen.model import Model
+from penode_gen.model import GROUND, Model
+from scipy import constants
 
 from . import catalogue, innovate
 from .catalogue import drives
-from .catalogue.form import Form, Sizes
+from .catalogue.form import Form, Motion, Sizes
 from .evidence.bench import UNSTATED, Bench, build
 from .evidence.blocks import posterior
 from .evidence.fit import Fit
 from .evidence.observer import Filter, Record, bias, sample_noise
 from .evidence.screening import Probe
+from .fit import Free
 from .innovate import Z_95, Found
 from .noise import Experiment
-from .propose import Term, Trial, motions
+from .propose import SMALL, motions
 from .plant import Place
 from .result import Cause, Named, Value, place
+from .terms import Term, Trial
+from .worth import SYSTEMATIC, WORTH, share, shift
 
 Array = NDArray[np.float64]
-WORTH = 0.06  # of the force at its place, of an input or of a signal: less is a small deviation, as any model has, of 2 to 5 %
+INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
 RIVAL = 0.1  # posterior from which on an explanation is listed
 
 
@@ -53,20 +57,34 @@ def answer(
     bench = build(model, places, records, noise, fastest, set_name)
     log(f"corrected every {bench.update} samples; {bench.level.size:.3g} of what moves wanders, for {bench.level.tau:.3g} s")
     found = innovate.search(bench, log)
-    after = found.bench
-    causes, notes = [], []
+    plain, after = found.plain, found.bench
+    causes: list[Cause] = []
+    notes = []
+    moved = motions(Probe.of(plain))
     probabilities = [_weighed(r) for r in found.rounds]
-    for k, term in enumerate(found.terms):
-        cause, size = _cause(model, after, term, _rivals(probabilities[k], term), _sure(probabilities[k], term))
-        if size >= WORTH or any((c.kind, c.where) == (cause.kind, cause.where) for c in causes):
+    named = found.terms[: found.named]
+    for k, term in enumerate(named):
+        size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
+        cause = _cause(model, plain, term, size, _rivals(probabilities[k], term), _sure(probabilities[k], term))
+        log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")
+        if size >= WORTH:
             causes = _merged(causes, cause)
         else:
-            notes.append(f"{place(cause.kind, cause.where)} is real but small: {size:.1%} of what acts there; not named, but in model_extended.toml")
-    wrong, more = _parameters(model, after, _shared(model, after, found.terms))
-    notes += more + _offsets(model, after)
-    still = Filter.none(*after.fit.by.gain.shape)
-    run = after.problem().solve(after.fit.free, still, 20)
-    return Answer((*wrong, *causes), tuple(notes), _explanations(found, probabilities), found, run, after.model)
+            notes.append(_small(term, size))
+    notes += [_small(t, s) for t, s in zip(found.terms[found.named :], found.shares[found.named :])]
+    wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
+    biased, remarks = _offsets(model, plain, Probe.of(plain))
+    notes += more + remarks
+    run = after.problem().solve(after.fit.free, Filter.none(*after.fit.by.gain.shape), 20)
+    return Answer((*wrong, *causes, *biased), tuple(notes), _explanations(named, probabilities), found, run, after.model)
+
+
+def _name(t: Term) -> tuple[str, str]:
+    return t.form.kind, t.form.where
+
+
+def _small(t: Term, size: float) -> str:
+    return f"{place(*_name(t))} is real but small: {size:.1%} of what acts there; not named, but in model_extended.toml"
 
 
 def _merged(causes: list[Cause], new: Cause) -> list[Cause]:
@@ -97,16 +115,18 @@ def _rivals(names: Sequence[tuple[Form, float]], term: Term) -> tuple[Named, ...
 
 
 def _sure(names: Sequence[tuple[Form, float]], term: Term) -> float:
-    return next((p for f, p in names if (f.kind, f.where) == (term.form.kind, term.form.where)), 0.5)
+    """Posterior of a name, with that of the other forms of its curve: of these the simplest that will do is taken."""
+    own = (catalogue.curve(term.form.kind), term.form.where)
+    return sum(p for f, p in names if (catalogue.curve(f.kind), f.where) == own)
 
 
-def _explanations(found: Found, names: Sequence[Sequence[tuple[Form, float]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
+def _explanations(terms: Sequence[Term], names: Sequence[Sequence[tuple[Form, float]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
     """Sets of causes with their posterior: the one found, and it with one cause exchanged for a rival."""
-    own = tuple(dict.fromkeys(Named(t.form.kind, t.form.where) for t in found.terms))
+    own = tuple(dict.fromkeys(Named(t.form.kind, t.form.where) for t in terms))
     if not own:
         return ()
-    sets = [(own, float(np.prod([_sure(n, t) for n, t in zip(names, found.terms)])))]
-    for k, (options, term) in enumerate(zip(names, found.terms)):
+    sets = [(own, float(np.prod([_sure(n, t) for n, t in zip(names, terms)])))]
+    for k, (options, term) in enumerate(zip(names, terms)):
         for r in _rivals(options, term):
             p = next(p for f, p in options if (f.kind, f.where) == (r.kind, r.where))
             here = Named(term.form.kind, term.form.where)
@@ -114,8 +134,8 @@ def _explanations(found: Found, names: Sequence[Sequence[tuple[Form, float]]]) -
     return tuple(sets)
 
 
-def _cause(model: Model, bench: Bench, term: Term, rivals: tuple[Named, ...], sure: float) -> tuple[Cause, float]:
-    """A term as a cause with sizes and intervals, and its share of what acts at its place."""
+def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Named, ...], sure: float) -> Cause:
+    """A term as a cause with sizes and intervals."""
     form = term.form
     file = catalogue.OF.get(form.kind, drives)
     own = {t.target for t in term.free}
@@ -148,29 +168,23 @@ def _cause(model: Model, bench: Bench, term: Term, rivals: tuple[Named, ...], su
             moved = sizes({**values, f.target: float(f.value * np.exp(step) if f.log else f.value + step * f.unit)})
             for key in found:
                 slopes[key][i] = (moved[key][1] - found[key][1]) / step
+    wider = _wider(bench, term, size)
     parameters = {}
     for key, (unit, value) in found.items():
-        sd = float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
+        sd = wider * float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
         parameters[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
-    return Cause(form.kind, form.where, parameters, min(max(sure, 0.0), 0.99), rivals), _share(bench, term)
+    return Cause(form.kind, form.where, parameters, min(max(sure, 0.0), 0.99), rivals)
 
 
-def _share(bench: Bench, term: Term) -> float:
-    """Rms of a term as a share of what acts at its place, of its input, or of its sensor."""
-    form, fit = term.form, bench.fit
-    if form.how != "force":
-        value = fit.value(term.free[0].target)
-        turn = 2.0 * np.pi / (16 * bench.update * bench.step)  # of the motion [rad/s]
-        if form.how == "input_offset":
-            return abs(value) / max(float(np.std(np.concatenate([r.u[:, form.index] for r in bench.records]))), 1e-300)
-        return 2.0 * abs(value - 1.0) if form.how == "scale" else 2.0 * abs(value) if form.how == "input_gain" else abs(value) * turn
-    moved = motions(Probe.of(bench))[form.index]
-    total = [np.zeros(len(m.s)) for m in moved.parts]
-    for name, part in zip(term.elements, form.parts):
-        shapes = {k: (fit.values.get(f"{name}_{k}", v), u) for k, (v, u) in part.shapes.items()}
-        now = replace(part, shapes=shapes)
-        total = [x + fit.value(f"{name}_{part.gain[0]}") * now.along(m) for x, m in zip(total, moved.parts)]
-    return float(np.sqrt(np.mean(np.concatenate(total) ** 2))) / moved.force
+def _wider(bench: Bench, term: Term, size: float) -> float:
+    """Factor of the deviations of a term of this share of what acts: noise alone makes less of them than what the model leaves out."""
+    known = min(bench.fit.deviation(f.target) / max(abs(f.value - f.origin), 1e-300) for f in _fitted(bench, term) if not f.log)
+    return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
+
+
+def _fitted(bench: Bench, term: Term) -> list[Free]:
+    """The free values of a term as they are in the bench."""
+    return [f for f in bench.fit.free if f.target in {t.target for t in term.free}]
 
 
 def _shared(model: Model, bench: Bench, terms: Sequence[Term]) -> set[str]:
@@ -181,7 +195,7 @@ def _shared(model: Model, bench: Bench, terms: Sequence[Term]) -> set[str]:
     return {p for e in model.elements if e.name in names for p in e.arguments.values()}
 
 
-def _parameters(model: Model, bench: Bench, shared: Collection[str]) -> tuple[list[Cause], list[str]]:
+def _parameters(model: Model, bench: Bench, moved: Sequence[Motion], shared: Collection[str], log: Callable[[str], None]) -> tuple[list[Cause], list[str]]:
     """Parameters that are not what the file says, beyond what it vouches for, and a note on those that are shared with a law."""
     fit, causes, notes = bench.fit, [], []
     for name, p in model.parameters.items():
@@ -191,21 +205,59 @@ def _parameters(model: Model, bench: Bench, shared: Collection[str]) -> tuple[li
         sd = fit.deviation(name)
         limit = p.tolerance if p.tolerance > 0.0 else UNSTATED
         off = abs(f.value / p.value - 1.0)
+        size = shift(model, bench, moved, name)
+        sd = float(np.hypot(sd, SYSTEMATIC / max(size, SYSTEMATIC) * abs(f.value - p.value)))
         low, high = f.value - Z_95 * sd, f.value + Z_95 * sd
+        log(f"{name}: {f.value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of what acts there")
         if off > limit and not low <= p.value * (1.0 + limit * np.sign(f.value / p.value - 1.0)) <= high and not low <= p.value <= high:
             if name in shared:
                 notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)} beside what was found at its place, which shares its straight part")
+                continue
+            if size < WORTH:
+                notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)}, which changes {size:.1%} of what acts there: as much as anything that the model leaves out might")
                 continue
             sure = 0.99 if p.tolerance else 0.95
             causes.append(Cause("wrong_parameter", name, {name: Value(f.value, units.si(p.unit), (low, high))}, sure))
     return causes, notes
 
 
-def _offsets(model: Model, bench: Bench) -> list[str]:
-    """Notes on offsets of sensors that the recordings show."""
-    found = []
-    for s in model.sensors:
+def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], list[str]]:
+    """Offsets of sensors that the recordings show: causes where they are worth it, notes where they are small, or as large as what is
+    not in a model by intent: gravity, ride height."""
+    causes, notes = [], []
+    for j, s in enumerate(model.sensors):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
-        if abs(value) > 3.0 * sd:
-            found.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
-    return found
+        size = abs(value) / max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
+        if abs(value) <= 3.0 * sd:
+            continue
+        if WORTH <= size < INTENDED and abs(abs(value) / constants.g - 1.0) > WORTH:
+            causes.append(_load(model, bench, probe, s.name) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
+        else:
+            notes.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
+    return causes, notes
+
+
+def _constant(kind: str, where: str, name: str, value: float, sd: float, unit: str, alike: tuple[Named, ...] = ()) -> Cause:
+    return Cause(kind, where, {name: Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))}, 0.95, alike)
+
+
+def _load(model: Model, bench: Bench, probe: Probe, sensor: str) -> Cause | None:
+    """The constant force on a body that does to all sensors what the offset of one does, if there is one: the simpler cause, and what an
+    input or the sensor itself may be off by as well."""
+    i = [f.target for f in bench.fit.free].index(bias(sensor))
+    f = bench.fit.free[i]
+    seen = bench.fit.slopes[:, :, i][bench.fit.used] / f.unit
+    starts = bench.fit.slopes[bench.fit.used][:, [not isinstance(x.target, str) and x.target[0] == "start" for x in bench.fit.free]]
+    for k, p in enumerate(bench.places):
+        if GROUND not in p.ends or p.role == "tyre":
+            continue
+        (column,) = probe.columns([(k, [np.ones(len(r)) for r in bench.records])], SMALL * float(np.min(bench.forces)))
+        columns = np.column_stack([column[bench.fit.used], starts])
+        columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        sizes = np.linalg.lstsq(columns, seen, rcond=1e-9)[0]
+        if np.linalg.norm(seen - columns @ sizes) < WORTH * np.linalg.norm(seen):
+            factor = float(sizes[0]) / float(np.linalg.norm(column[bench.fit.used]))
+            value, sd = -factor * f.value, abs(factor) * bench.fit.deviation(bias(sensor))
+            alike = (Named("sensor_bias", sensor), *(Named("input_offset", x.name) for x in model.inputs if p.unit("N") == x.unit))
+            return _constant("constant_force", p.name, "force", value, sd, p.unit("N"), alike)
+    return None

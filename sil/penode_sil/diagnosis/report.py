@@ -33,6 +33,7 @@ from penode_gen.model import Model
 from ..errors import UserError
 from ..output import whole
 from ..targets import build_object
+from . import catalogue
 from . import report_figure as fig
 from .report_figure import Axis, Figure, pretty, readable
 from .residual import LEAST, Channel, Residual, Shown, Surface, averages, cells, rms
@@ -44,36 +45,6 @@ SAMPLES = 800  # that a picture of forces shows one by one
 FINE = 40  # bins of a section through forces
 LIKE_NOISE = 1.1  # times the noise power
 BUDGET = 60_000  # points of all lines over time together, so that the page stays small
-
-MEANING = {
-    "coulomb_friction": "Friction: a force against the motion that hardly depends on how fast it is.",
-    "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",
-    "cubic_spring": "A spring whose stiffness changes with deflection, alike on both sides.",
-    "asymmetric_spring": "A spring that is stiffer on one side than on the other.",
-    "bump_stop": "A stop: beyond a gap an extra spring comes into contact.",
-    "backlash": "Play: within a gap the element transmits no force.",
-    "asymmetric_damper": "A damper with different damping in rebound and in compression.",
-    "degressive_damper": "A damper whose damping falls at higher rates.",
-    "quadratic_damper": "A damper whose damping grows with the rate.",
-    "damper_fading": "A damper that loses damping while the recording goes on, as with heat.",
-    "bouc_wen": "Hysteresis: the force depends on the way since the last reversal, elastic at first, then yielding.",
-    "maxwell_bushing": "Relaxation: an elastic force that a damper in series lets decay.",
-    "tyre_liftoff": "The tyre leaves the road: it cannot pull.",
-    "tyre_damping": "The tyre also damps.",
-    "tyre_nonlinear": "The tyre's stiffness changes with its load.",
-    "wrong_parameter": "A parameter of the model file is off by more than its tolerance.",
-    "hidden_resonance": "A mass on a spring of its own that the model does not have.",
-    "constant_force": "A constant force that the model does not have.",
-    "sensor_bias": "The sensor reads a constant or slowly drifting amount too much.",
-    "sensor_scale": "The sensor's scale is off.",
-    "sensor_delay": "The sensor is late.",
-    "sensor_clipping": "The sensor is cut off beyond a limit.",
-    "sensor_dropout": "The sensor lost samples.",
-    "network_extrapolation": "A network is used outside of what it was trained on.",
-    "integration_error": "The physics is right; the deployed step integrates it too coarsely.",
-    "outside_taxonomy": "Something is left that noise cannot make and that no kind on the list explains.",
-}
-
 
 def write(path: Path, model: Model, d: Diagnosis, extended: Path) -> None:
     """The page for a diagnosis whose `shown` is there; `extended`: model_extended.toml."""
@@ -103,7 +74,7 @@ def render(model: Model, d: Diagnosis, extended: Path) -> str:
         tiles=key_figures(d),
         train=[panel(c, points) for c in train],
         held=[panel(c, points) for c in held],
-        meaning=MEANING,
+        meaning=catalogue.MEANING,
         place=place,
         relative=relative,
         surfaces=[surface(s) for s in shown.surfaces],

@@ -16,13 +16,14 @@ from .evidence.bench import build
 from .evidence.gain import Level
 from .evidence.observer import Record, bias, sample_noise
 from .fit import Fit, Problem
+from .innovate import Z_95
 from .noise import Experiment
 from .residual import Channel, rms
 from .result import Cause, Gain
 from .study import Study
+from .worth import WORTH
 
 Array = NDArray[np.float64]
-SURE = 2.0  # standard deviations of an offset that goes into the extended model
 WHOLE = 0.85  # share of the residual that causes take away where they explain it
 MIN_MISFIT = 20.0  # log likelihood that a wandering force gains beside the best explanation by sensor noise alone
 MIN_UNMODELLED = 0.02  # and its least size: coloured noise, and a curve that stands for another one, make up to 0.01; models that are wrong everywhere more
@@ -76,7 +77,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     model = study.model
     found = real.answer(model, study.places, study.experiments, study.linear.fastest, study.set_name, log)
     bench = found.found.bench
-    offsets = {s.name for s in model.sensors if abs(bench.fit.value(bias(s.name))) > SURE * bench.fit.deviation(bias(s.name))}
+    offsets = {s.name for s in model.sensors if abs(bench.fit.value(bias(s.name))) > Z_95 * bench.fit.deviation(bias(s.name))}
     made = applied.apply(model, bench, found.run, found.found.terms, offsets)
     text, extended = extension.joined(study, made.text)
     gain, more, held = extension.measure(study, extended, unused) if unused else ({}, [], [])
@@ -98,7 +99,7 @@ def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: 
     signal. Small deviations that have been found are what any model has."""
     if causes:
         return "explained" if share > WHOLE else "partly_explained"
-    return "no_discrepancy" if not found.causes and left < real.WORTH and found.found.terms else "unexplained"
+    return "no_discrepancy" if not found.causes and left < WORTH and found.found.terms else "unexplained"
 
 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:

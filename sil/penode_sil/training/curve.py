@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -53,19 +52,14 @@ class Curve:
         found[np.arange(len(x)), i], found[np.arange(len(x)), i + 1] = 1.0 - t, t
         return np.delete(found, self.zero, axis=1) if self.zero >= 0 else found
 
-    def chord(self, x: Array) -> Array:
-        """How far a smooth curve may be from the straight piece at each x, as a standard deviation: its bend at the piece's ends, spread
-        over the piece, makes width * change of slope / 8 in the middle of it, of which a fit that goes through the middle leaves half."""
-        wide = np.diff(self.knots)
-        change = np.abs(np.diff(np.diff(self.values) / wide))
-        ends = np.concatenate([change[:1], change, change[-1:]]) if len(change) else np.zeros(2)
-        i = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(wide) - 1)
-        return wide[i] * 0.5 * (ends[i] + ends[i + 1]) / 16.0
-
     def on(self, knots: Array) -> Curve:
         """The same curve on other knots, as near as they allow."""
         zero = int(np.flatnonzero(knots == 0.0)[0]) if self.zero >= 0 else -1
         return Curve(knots, self(knots) if zero < 0 else np.where(knots == 0.0, 0.0, self(knots)), zero)
+
+    def middled(self) -> Curve:
+        """The same curve with a knot more in the middle of each piece."""
+        return self.on(np.sort(np.concatenate([self.knots, 0.5 * (self.knots[1:] + self.knots[:-1])])))
 
     def bends(self) -> Array:
         """Rows [n - 2, columns]: how far a knot is from the line between its neighbours."""
@@ -101,13 +95,18 @@ def spaced(low: float, high: float, count: int, power: float) -> Array:
     return np.concatenate([below, [0.0], above])
 
 
-def fewer(knots: Array, values: Array, spread: Array, count: int, fixed: Sequence[int]) -> NDArray[np.bool_]:
-    """Which knots to keep: those are dropped, one by one, that cost least; `spread` is the covariance of the values
-    at all knots, the knots `fixed` stay. The outermost stay too."""
+def fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArray[np.bool_], zero: int) -> NDArray[np.bool_]:
+    """Which `count` knots to keep: those are dropped, one by one, that cost least; `spread` is the covariance of the values at all knots.
+
+    Of so many candidates noise makes some look wanted, and a curve whose knots noise has chosen is wrong by more than its covariance shows. So
+    another knot than those of the `regular` grid must gain more than that by 2 ln(candidates) (risk inflation criterion; Foster and George,
+    Annals of Statistics 22, 1994). The outermost knots and that at 0 stay.
+    """
     keep = np.ones(len(knots), dtype=bool)
+    favour = 2.0 * np.log(len(knots))
     while keep.sum() > count:
         at = np.flatnonzero(keep)
-        inner = [k for k in range(1, len(at) - 1) if at[k] not in fixed]
+        inner = [k for k in range(1, len(at) - 1) if at[k] != zero]
         if not inner:
             break
         k = np.array(inner)
@@ -116,7 +115,7 @@ def fewer(knots: Array, values: Array, spread: Array, count: int, fixed: Sequenc
         rows[np.arange(len(k)), at[k - 1]], rows[np.arange(len(k)), at[k]], rows[np.arange(len(k)), at[k + 1]] = t - 1.0, 1.0, -t
         away, moved = rows @ values, rows @ spread
         variance = np.maximum(np.einsum("ij,ij->i", moved, rows), 1e-12 * np.einsum("ij,j->i", rows**2, np.diag(spread)) + 1e-300)
-        best = int(np.argmin(away**2 / variance))
+        best = int(np.argmin(away**2 / variance + favour * regular[at[k]]))
         values = values - moved[best] * (away[best] / variance[best])
         spread = spread - np.outer(moved[best], moved[best]) / variance[best]
         keep[at[k[best]]] = False

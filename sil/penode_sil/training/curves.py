@@ -75,17 +75,22 @@ def seen_by(problem: Problem, point: Point) -> list[Array]:
     return found[1]
 
 
-def train(problem: Problem, ports: Sequence[Port], bounds: Sequence[Callable[[Curve], Limits]], tell: Tell) -> tuple[Problem, Fit]:
-    """Curves for all networks of a problem."""
+def train(
+    problem: Problem, ports: Sequence[Port], bounds: Sequence[Callable[[Curve], Limits]], tell: Tell,
+    start: Callable[[Problem, Point], Point] = lambda problem, point: point,
+) -> tuple[Problem, Fit]:  # fmt: skip
+    """Curves for all networks of a problem; `start` puts what is known already in place of straight lines."""
     limits = limits_of(problem, bounds)
     tell(0.05, "straight lines")
     problem, point = lines(problem, [three(1.0, p.zero) for p in ports], limits)
+    point = start(problem, point)
     for share, count, iterations in ((0.15, SETTINGS.curves_coarse, 8), (0.35, SETTINGS.curves_coarse, 4)):
         tell(share, f"curves of {count} knots")
         seen = seen_by(problem, point)
         problem = rescaled(problem, point, seen, ports)
         for i, port in enumerate(ports):
-            point = Point(point.ratios, point.starts, (*point.shapes[:i], curve_on(port, point.shapes[i], seen, min(count, port.knots)), *point.shapes[i + 1 :]))
+            knots = min(max(count, len(point.shapes[i].knots)), port.knots)
+            point = Point(point.ratios, point.starts, (*point.shapes[:i], curve_on(port, point.shapes[i], seen, knots), *point.shapes[i + 1 :]))
         fit = solve(problem, point, iterations, 20.0, limits, patience=1)
         point = fit.point
         problem = renoised(problem, point)
@@ -112,19 +117,21 @@ def lines(problem: Problem, shapes: Sequence[Curve], limits: Callable[[Point], L
 
 
 def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
-    """Curves on twice the knots that there is room for, and of these the ones that matter most."""
+    """Curves on a regular grid of as many knots as there is room for, and on others in the middle between them where data want them there."""
     seen = seen_by(problem, point)
     problem = rescaled(problem, point, seen, ports)
-    point = Point(point.ratios, point.starts, tuple(curve_on(p, s, seen, 2 * p.knots - 1) for p, s in zip(ports, point.shapes)))
+    grids = [curve_on(p, s, seen, p.knots) for p, s in zip(ports, point.shapes)]
+    point = Point(point.ratios, point.starts, tuple(g.middled() for g in grids))
     fit = solve(problem, point, 3, 20.0, limits, damping=1e-6, patience=1)
     spread = covariance(problem, fit)
     at, shapes = len(point.ratios) + point.starts.size, []
-    for port, shape in zip(ports, fit.point.shapes):
+    for port, grid_, shape in zip(ports, grids, fit.point.shapes):
         own = spread[at : at + shape.columns, at : at + shape.columns]
         at += shape.columns
         if shape.zero >= 0:
             own = np.insert(np.insert(own, shape.zero, 0.0, axis=0), shape.zero, 0.0, axis=1)
-        shapes.append(shape.on(shape.knots[fewer(shape.knots, shape.values, own, port.knots, [shape.zero])]))
+        regular = np.isin(shape.knots, grid_.knots)
+        shapes.append(shape.on(shape.knots[fewer(shape.knots, shape.values, own, port.knots, regular, shape.zero)]))
     return problem, Point(fit.point.ratios, fit.point.starts, tuple(shapes))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from penode_gen.networks import Network
 
-from . import curves
+from . import begin, curves
 from .curve import Curve, three
 from .curves import Tell
 from .port import Port, inputs_of
@@ -42,9 +42,9 @@ def loud(problem: Problem, point: Point) -> float:
 
 def train(
     problem: Problem, ports: Sequence[Port], shapes: Sequence[Network], bounds: Sequence[Callable[[Curve], Limits]], seed: int, tell: Tell,
-    kept: Callable[[str, Point], None] = lambda stage, point: None,
+    start: begin.Start = begin.Start(),
 ) -> tuple[Problem, Fit]:  # fmt: skip
-    """All networks of a problem; several random starts if one does not come down to the noise."""
+    """All networks of a problem; several random starts if one does not come down to the noise. What a `start` knows is tried first."""
     limits = curves.limits_of(problem, bounds)
     tell(0.02, "straight lines")
     first, lines = curves.lines(problem, [straight(p, n.n_inputs) for p, n in zip(ports, shapes)], limits)
@@ -52,12 +52,11 @@ def train(
     first = curves.rescaled(first, lines, seen, ports)
     best: tuple[Problem, Fit] | None = None
     for k in range(SETTINGS.ends_tries):
-        own = _begin(first, lines, seen, ports, shapes, seed + 1000 * k)
+        own = _begin(first, lines, seen, ports, shapes, seed + 1000 * k, start if k == 0 else begin.Start())
         try:
             found = _descend(first, own, limits, lambda share, doing, k=k: tell((k + share) / SETTINGS.ends_tries, f"{doing}, try {k + 1}"))
         except FloatingPointError:
             continue
-        kept(f"try {k + 1}", found[1].point)
         if best is None or loud(*_of(found)) < loud(*_of(best)):
             best = found
         if loud(*_of(best)) < SETTINGS.ends_good:
@@ -71,16 +70,19 @@ def _of(found: tuple[Problem, Fit]) -> tuple[Problem, Point]:
     return found[0], found[1].point
 
 
-def _begin(problem: Problem, lines: Point, seen: Sequence[Array], ports: Sequence[Port], shapes: Sequence[Network], seed: int) -> Point:
-    """Random weights in place of the lines."""
+def _begin(problem: Problem, lines: Point, seen: Sequence[Array], ports: Sequence[Port], shapes: Sequence[Network], seed: int, start: begin.Start) -> Point:
+    """Random weights in place of the lines, or those of a start."""
     found: list[Shape] = []
     for k, (port, network, line) in enumerate(zip(ports, shapes, lines.shapes)):
         x = inputs_of(port, seen)
         if isinstance(line, Curve):
+            line = begin.curve(port, start.networks[port.name], float(np.max(np.abs(x)))) if port.name in start.networks else line
             found.append(curves.curve_on(port, line, seen, min(SETTINGS.curves_coarse, port.knots)))
         else:
-            found.append(like(network, 2.0 * np.maximum(np.std(x, axis=0), 1e-12), float(np.max(problem.scale)), port.zero, seed + k))
-    return Point(lines.ratios, lines.starts, tuple(found))
+            scale, size = 2.0 * np.maximum(np.std(x, axis=0), 1e-12), float(np.max(problem.scale))
+            known = start.networks.get(port.name)
+            found.append(begin.dense(port, known, scale, size) if known is not None else like(network, scale, size, port.zero, seed + k))
+    return Point(begin.ratios(start, problem.engine.free, problem.model, lines.ratios), lines.starts, tuple(found))
 
 
 def _descend(problem: Problem, point: Point, limits: Callable[[Point], Limits], tell: Tell) -> tuple[Problem, Fit]:

@@ -20,7 +20,7 @@ from ..diagnosis.files import all_or_none
 from ..errors import UserError
 from ..measured import load
 from ..output import whole
-from . import onnx_file, report, threads
+from . import begin, onnx_file, report, threads
 from .result import Trained
 from .story import Options, check, train
 
@@ -36,13 +36,14 @@ class Job:
     channels: tuple[str, ...] = ()
     known: tuple[str, ...] = ()
     seed: int = 0
+    start: tuple[Path, ...] = ()
 
 
 def run(job: Job, tell: Callable[[float, str], None] = lambda share, doing: None) -> Trained:
     """Train and write into the job's folder. UserError for bad input."""
     model = penode_gen.load(job.model)
     check(model)
-    options = Options(tuple(_known(text, model) for text in job.known), job.seed)
+    options = Options(tuple(_known(text, model) for text in job.known), job.seed, begin.read(job.start, model))
     measured, held = load(job.data, model, job.channels), load(job.holdout, model, job.channels)
     with threads.one():
         after, found = train(model, measured, held, options, tell)

@@ -8,7 +8,7 @@ import hashlib
 import platform
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
@@ -21,13 +21,13 @@ from penode_gen.networks import Network
 
 from ..errors import UserError
 from ..measured import Measured
-from . import curves, data, dense, ends, judge, promised, unfold, unknown
+from . import bands, begin, curves, data, dense, ends, judge, promised, unfold, unknown
 from .curve import Curve
 from .curves import Tell
-from .port import Port
+from .port import Port, inputs_of
 from .dense import Dense
 from .engine import Engine
-from .problem import Problem
+from .problem import Point, Problem
 from .result import Error, Force, Trained
 from .solve import Fit, solve
 from .settings import SETTINGS
@@ -41,6 +41,7 @@ class Options:
 
     known: tuple[tuple[str, float | None], ...] = ()
     seed: int = 0
+    start: begin.Start = field(default_factory=begin.Start)
 
 
 def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], options: Options, tell: Tell) -> tuple[Model, Trained]:
@@ -57,9 +58,9 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
     bounds = [promised.bound(model.networks[p.name].promises, size=1.0) for p in ports]
     try:
         if all(p.knots for p in ports):
-            problem, fit = curves.train(problem, ports, bounds, tell)
+            problem, fit = curves.train(problem, ports, bounds, tell, lambda own, point: _started(own, point, ports, options.start))
         else:
-            problem, fit = ends.train(problem, ports, templates, bounds, options.seed, tell)
+            problem, fit = ends.train(problem, ports, templates, bounds, options.seed, tell, options.start)
     except FloatingPointError as exc:
         raise UserError(
             f"{model.path}: {exc}, whatever the networks are; check signs, units and start states of the model against the recording (penode inspect)"
@@ -71,6 +72,15 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
     networks, fit = written(model, problem, fit, ports, templates, visited)
     spent = time.process_time() - started - (compiled - started)
     return _judged(model, problem, fit, ports, networks, visited, train_, held, (options, known, spent), tell)
+
+
+def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin.Start) -> Point:
+    """Curves and parameters of a start in place of straight lines."""
+    seen = curves.seen_by(problem, point)
+    shapes = tuple(
+        begin.curve(p, start.networks[p.name], float(np.max(np.abs(inputs_of(p, seen))))) if p.name in start.networks else s for p, s in zip(ports, point.shapes)
+    )
+    return Point(begin.ratios(start, problem.engine.free, problem.model, point.ratios), point.starts, shapes)
 
 
 def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], curves.Limits]]) -> tuple[Problem, Fit]:
@@ -183,7 +193,7 @@ def _judged(
     """What is known of a fit."""
     tell(0.97, "what is known of it")
     options, known, spent = given
-    spread = curves.covariance(problem, fit)
+    band = bands.of(problem, fit)
     values = dict(zip(model.parameters, problem.parameters(fit.point)))
     after = judge.with_networks(model, {p.name: n for p, n in zip(ports, networks)}, values)
     ranges = [(x.min(axis=0), x.max(axis=0)) for x in visited]
@@ -193,17 +203,16 @@ def _judged(
         records = tuple(data.record(model, m, problem.engine.signals) for m in held)
         other, there = judge.fitted_starts(problem, records, fit.point)
         holdout, outside, masked = judge.errors(other, there, held, model, after, ports, ranges, problem.noise)
-    forces, at = [], len(fit.point.ratios) + fit.point.starts.size
-    for port, shape, network, x in zip(ports, fit.point.shapes, networks, visited):
-        own = spread[at : at + shape.columns, at : at + shape.columns]
-        at += shape.columns
-        forces.append(_force(model, port, shape, network, x, own))
+    forces = [
+        _force(model, port, shape, network, x, band.deviation(k))
+        for k, (port, shape, network, x) in enumerate(zip(ports, fit.point.shapes, networks, visited))
+    ]
     loud = [e.signal for e in training if any(s.name == e.signal and s.noise > 0.0 and e.after > SETTINGS.story_loud * s.noise for s in (*model.sensors, *model.outputs))]
     notes = [f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"] if loud else []
     notes += [f"{p}" for m in train_ for p in m.quality.problems]
     if model.method not in ("euler", "heun", "rk4"):
         notes.append(f"the deployed method is {model.method}; networks were trained through rk4 with the same steps")
-    sigma = {n: float(np.sqrt(spread[i, i])) * abs(model.parameters[n].value) for i, n in enumerate(problem.engine.free)}
+    sigma = {n: float(band.deviations[i]) * abs(model.parameters[n].value) for i, n in enumerate(problem.engine.free)}
     parameters = {n: (float(values[n]), sigma[n], model.parameters[n].value, model.parameters[n].unit) for n in sigma}
     found = Trained(
         model.name, tuple(forces), parameters, known, tuple(unknown.find(problem, fit, ports, visited)), training, holdout, outside, masked,
@@ -223,18 +232,16 @@ def _versions() -> dict[str, str]:
     return {"penode": penode_gen.VERSION, "python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
 
 
-def _force(model: Model, port: Port, shape: Curve | Dense, network: Network, x: Array, spread: Array) -> Force:
-    """A force along each of its inputs, with its band."""
+def _force(model: Model, port: Port, shape: Curve | Dense, network: Network, x: Array, deviation: Callable[[Array], Array]) -> Force:
+    """A force along each of its inputs, with its band: the standard deviation at places [n, inputs]."""
     xs, ys, sigmas, edges, counts = [], [], [], [], []
     for k in range(x.shape[1]):
         along = np.linspace(float(x[:, k].min()), float(x[:, k].max()), SETTINGS.story_across)
         at = np.zeros((SETTINGS.story_across, x.shape[1]))
         at[:, k] = along
-        slopes = shape.hats(along) if isinstance(shape, Curve) else _slopes(shape, at)
         xs.append(along)
         ys.append(shape(along) if isinstance(shape, Curve) else shape(at))
-        chord = shape.chord(along) if isinstance(shape, Curve) else 0.0
-        sigmas.append(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, spread, slopes), 0.0) + chord**2))
+        sigmas.append(deviation(at))
         count, edge = np.histogram(x[:, k], SETTINGS.story_bins)
         edges.append(edge)
         counts.append(count.astype(float))
@@ -247,13 +254,3 @@ def _force(model: Model, port: Port, shape: Curve | Dense, network: Network, x: 
         port.name, way, declared.input_units, declared.output_unit, low, high, tuple(xs), tuple(ys), tuple(sigmas), tuple(edges), tuple(counts),
         tuple(broken), pieces, network,
     )  # fmt: skip
-
-
-def _slopes(shape: Dense, at: Array) -> Array:
-    """Derivatives [n, columns] of a network by its weights: differences, for a picture."""
-    found = np.empty((len(at), shape.columns))
-    for j in range(shape.columns):
-        step = np.zeros(shape.columns)
-        step[j] = 1e-4 * max(1.0, abs(shape.theta[j]))
-        found[:, j] = (shape.with_theta(shape.theta + step)(at) - shape.with_theta(shape.theta - step)(at)) / (2.0 * step[j])
-    return found

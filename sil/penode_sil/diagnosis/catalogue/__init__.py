@@ -2,9 +2,10 @@
 # Copyright (c) 2026 the penode authors
 """The causes that a diagnosis knows: one file for a kind, or for kinds of one curve. A new one is a file and a row here."""
 
-from . import bushings, dampers, friction, loads, masses, plays, springs, tyres
+from . import aerated, bushings, dampers, drives, friction, loads, masses, others, plays, springs, tyres
 
-FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres)
+FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aerated)
+MEANING = {kind: text for file in (*FILES, drives, others) for kind, text in file.MEANING.items()}
 OF = {kind: file for file in FILES for kind in file.KINDS}
 
 

@@ -12,6 +12,9 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("maxwell_bushing",)
+MEANING = {
+    "maxwell_bushing": "Relaxation: an elastic force that a damper in series lets decay.",
+}
 STRAIGHT = KINDS
 TIMES = (0.15, 0.6, 2.5)  # of s_rms/v_rms, which is the time of a radian
 

@@ -12,6 +12,12 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("asymmetric_damper", "degressive_damper", "quadratic_damper", "damper_fading")
+MEANING = {
+    "asymmetric_damper": "A damper with different damping in rebound and in compression.",
+    "degressive_damper": "A damper whose damping falls at higher rates.",
+    "quadratic_damper": "A damper whose damping grows with the rate.",
+    "damper_fading": "A damper that loses damping while the recording goes on, as with heat.",
+}
 STRAIGHT = ("asymmetric_damper", "degressive_damper")
 KNEES = (0.3, 1.0)  # of the rms rate
 
@@ -25,7 +31,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     yield Form(KINDS[0], place.name, "force", index, (Part("rebound_damper", ("damping", "N*s/m")),))
     for share in KNEES:
-        bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1)
+        bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1, span=3.0)
         yield Form(KINDS[1], place.name, "force", index, (bent,))
     yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2")),))
     time = 0.5 * motion.longest

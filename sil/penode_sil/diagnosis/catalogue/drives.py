@@ -9,6 +9,14 @@ from penode_gen.model import Model
 from .form import Form, Sizes
 
 KINDS = ("input_gain", "input_offset", "input_delay", "input_lag", "sensor_scale", "sensor_delay")
+MEANING = {
+    "input_gain": "The plant is driven by more, or less, than the recording of the input says.",
+    "input_offset": "A constant acts on top of the recorded input.",
+    "input_delay": "The input acts later than the recording says.",
+    "input_lag": "The input acts with a lag: an actuator that the model does not have.",
+    "sensor_scale": "The sensor's scale is off.",
+    "sensor_delay": "The sensor is late.",
+}
 
 
 def inputs(model: Model, count: int) -> Iterable[Form]:
@@ -22,7 +30,8 @@ def sensors(model: Model, count: int) -> Iterable[Form]:
     """Forms of the first `count` sensors: what physics cannot do in any place."""
     for j, s in enumerate(model.sensors[:count]):
         yield Form("sensor_scale", s.name, "scale", j)
-        yield Form("sensor_delay", s.name, "late", j)
+        if count > 1 or model.inputs:  # there is something to be late against
+            yield Form("sensor_delay", s.name, "late", j)
 
 
 def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:

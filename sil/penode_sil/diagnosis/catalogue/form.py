@@ -15,6 +15,7 @@ from penode_gen.model import Model
 from penode_gen.numeric import along
 
 from ..plant import Place
+from . import driven
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,9 @@ class Motion:
 class Part:
     """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies
     it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values.
-    `force` gives its force [n] for gain 1 along a motion, where the expression alone does not."""
+    `force` gives its force [n] for gain 1 along a motion, where that is quicker than
+    a simulation. A shape stays within a factor of `span`: a
+    bend that is far below the motion is an edge, and another kind."""
 
     law: str
     gain: tuple[str, str]
@@ -70,12 +73,16 @@ class Part:
     sign: int = 0
     fixed: tuple[str, ...] = ()
     force: Callable[[Moved], Array] | None = None
+    span: float = 30.0
 
     def along(self, m: Moved) -> Array:
         """Force [n] for gain 1."""
         if self.force is not None:
             return self.force(m)
-        text = laws.LAWS[self.law].force if self.law in laws.LAWS else self.law
+        known = laws.LAWS.get(self.law)
+        if known and known.states:
+            return driven.force(self.law, {self.gain[0]: 1.0, **{k: v for k, (v, _) in self.shapes.items()}}, m.s, m.step)
+        text = known.force if known else self.law
         values = {self.gain[0]: 1.0, **{k: v for k, (v, _) in self.shapes.items()}, "s": m.s, "v": m.v}
         return np.broadcast_to(along(text, tuple(values))(*values.values()), m.s.shape)
 
@@ -112,11 +119,12 @@ class Sizes:
 
 
 class Kind(Protocol):
-    """A file of the catalogue, for kinds of one curve. `forms` that may be at a place, given the motion of it; `sizes`: what a report gives
+    """A file of the catalogue, for kinds of one curve. `forms` that may be at a place, given the motion of it; `MEANING` of each in a sentence; `sizes`: what a report gives
     of a form, name to unit and value (SI); `ONE`: only one of them is at a place, another one is but a form of it; `STRAIGHT`:
     kinds with a straight part, which a place shares with its linear elements."""
 
     KINDS: tuple[str, ...]
+    MEANING: dict[str, str]
 
     @staticmethod
     def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]: ...

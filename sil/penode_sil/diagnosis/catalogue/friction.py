@@ -12,28 +12,36 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("coulomb_friction", "stribeck_friction", "bouc_wen")
+MEANING = {
+    "coulomb_friction": "Friction: a force against the motion that hardly depends on how fast it is.",
+    "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",
+    "bouc_wen": "Hysteresis: the force depends on the way since the last reversal, elastic at first, then yielding.",
+}
 ONE = True  # friction at a place is one curve, with a peak or with memory
-EDGE = 0.02  # of the rms rate: transition of a friction; smooth enough for Gauss-Newton, steep enough for any motion
+EDGES = (0.04, 0.12)  # of the rms rate: transitions of a friction, within a factor of 2; smooth enough for Gauss-Newton, steep enough for any motion
 PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway
 WAYS = (0.06, 0.25, 0.8)  # of the rms deflection: how far a hysteresis is bent before it slides
 
 
-def coulomb(motion: Motion) -> Part:
-    return Part("coulomb_friction", ("force", "N"), {"transition": (EDGE * motion.v_rms, "m/s")}, 1, ("transition",))
+def coulomb(motion: Motion, edge: float) -> Part:
+    return Part("coulomb_friction", ("force", "N"), {"transition": (edge * motion.v_rms, "m/s")}, 1, span=2.0)
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
     """See Kind."""
     if place.role == "tyre":
         return
-    yield Form(KINDS[0], place.name, "force", index, (coulomb(motion),))
-    if place.role == "body" or GROUND in place.ends:
-        yield Form(KINDS[0], place.name, "force", index, (coulomb(motion), Part("constant_force", ("force", "N"))), "with a constant")
+    grounded = place.role == "body" or GROUND in place.ends
+    for edge in EDGES:
+        slides = coulomb(motion, edge)
+        yield Form(KINDS[0], place.name, "force", index, (slides,))
+        if grounded:
+            yield Form(KINDS[0], place.name, "force", index, (slides, Part("constant_force", ("force", "N"))), "with a constant")
+        for share in PEAKS if place.role != "body" else ():
+            peak = Part("2.3316439815971242*rise*exp(-(v/width)^2)*v/width", ("rise", "N"), {"width": (share * motion.v_rms, "m/s")}, 1)
+            yield Form(KINDS[1], place.name, "force", index, (slides, peak))
     if place.role == "body":
         return
-    for share in PEAKS:
-        peak = Part("2.3316439815971242*rise*exp(-(v/width)^2)*v/width", ("rise", "N"), {"width": (share * motion.v_rms, "m/s")}, 1)
-        yield Form(KINDS[1], place.name, "force", index, (coulomb(motion), peak))
     for share in WAYS:
         way = share * motion.s_rms
         yield Form(KINDS[2], place.name, "force", index, (Part("bouc_wen", ("force", "N"), {"presliding": (way, "m")}, 1, (), partial(_slip, way=way)),))

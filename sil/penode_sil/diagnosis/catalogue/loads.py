@@ -10,6 +10,9 @@ from ..plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("constant_force",)
+MEANING = {
+    "constant_force": "A constant force that the model does not have.",
+}
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:

@@ -10,6 +10,11 @@ from ..plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("cubic_spring", "asymmetric_spring", "bump_stop")
+MEANING = {
+    "cubic_spring": "A spring whose stiffness changes with deflection, alike on both sides.",
+    "asymmetric_spring": "A spring that is stiffer on one side than on the other.",
+    "bump_stop": "A stop: beyond a gap an extra spring comes into contact.",
+}
 STRAIGHT = ("asymmetric_spring",)
 GAPS = (0.5, 0.75)  # of what the deflection reaches
 

@@ -11,6 +11,12 @@ from ..plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("tyre_damping", "tyre_liftoff", "tyre_nonlinear")
+MEANING = {
+    "tyre_damping": "The tyre also damps.",
+    "tyre_liftoff": "The tyre leaves the road: it cannot pull.",
+    "tyre_nonlinear": "The tyre's stiffness changes with its load.",
+}
+STRAIGHT = ("tyre_nonlinear",)
 SHARES = (0.3, 0.6)  # of the greatest stretch: where a tyre leaves the road
 
 
@@ -21,7 +27,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     yield Form(KINDS[0], place.name, "force", index, (Part("linear_damper", ("damping", "N*s/m"), {}, 1),))
     top = max(float(np.quantile(p.s, 0.9995)) for p in motion.parts)
     for share in SHARES if top > 0.0 else ():
-        yield Form(KINDS[1], place.name, "force", index, (Part("liftoff", ("stiffness", "N/m"), {"static": (share * top, "m")}, 1),))
+        yield Form(KINDS[1], place.name, "force", index, (Part("liftoff", ("stiffness", "N/m"), {"static": (share * top, "m")}, 1, span=2.0),))
     yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_spring", ("quadratic", "N/m^2")),))
 
 

@@ -16,10 +16,10 @@ from ..plant import Place
 from .fit import Fit, Problem, likelihood
 from .gain import Gains, Level, linear
 from .observer import WANDER, Filter, Predictor, Record, bias, augmented
+from .prior import Stated
 
 Array = NDArray[np.float64]
 UPDATES = 16  # a period of the motion
-GUESSED = 0.3  # standard deviation of the logarithm of a parameter for which the file states no tolerance
 SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 UNSTATED = 0.05  # tolerance of a parameter for which the file has none: one that is farther off is worth a name
 FAR = 1e3  # a parameter is at most so many times as large or small as the file has it
@@ -71,8 +71,10 @@ def parameter(p: Parameter) -> Free | None:
         return None
     size = abs(p.value)
     if 0.0 < p.tolerance <= 1.0:
-        return Free(p.name, p.value, size * p.tolerance * SHARE, sigma=size * p.tolerance * SHARE, origin=p.value)
-    sigma = GUESSED if p.tolerance == 0.0 else np.log1p(p.tolerance) * SHARE  # infinite for one that is unknown
+        return Stated(p.name, p.value, size * p.tolerance * SHARE, sigma=size * p.tolerance * SHARE, origin=p.value)
+    if p.tolerance == 0.0:
+        return Stated(p.name, p.value, size * UNSTATED * SHARE, sigma=size * UNSTATED * SHARE, origin=p.value)
+    sigma = np.log1p(p.tolerance) * SHARE  # infinite for one that is unknown
     ends = sorted((p.value / FAR, p.value * FAR))
     return Free(p.name, p.value, size, log=True, sigma=sigma, origin=p.value, low=ends[0], high=ends[1])
 

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ..fit import Free
 from .observer import Filter, Predictor
+from .prior import cost, precisions
+from .prior import slopes as prior_slopes
 
 Array = NDArray[np.float64]
 DAMPING = np.array([0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
@@ -59,22 +61,10 @@ class Fit:
     def criterion(self) -> float:
         """Log marginal likelihood by Laplace (Kass and Raftery 1995, eq. 6), but for constants that all fits of the same data share:
         likelihood, priors, and the width of the posterior against theirs."""
-        prior = precisions(self.free)
+        prior = np.array([(1.0 if f.log else f.unit) / f.sigma for f in self.free])
         own = prior > 0.0  # what has no prior is free in all fits
         _, volume = np.linalg.slogdet(self.curvature())
-        return self.likelihood - 0.5 * sum(away(f) ** 2 for f in self.free) + float(np.sum(np.log(prior[own]))) - 0.5 * volume
-
-
-def precisions(free: Sequence[Free]) -> Array:
-    """Of the priors of free values, in their units (log: relative); 0 for those without."""
-    return np.array([(1.0 if f.log else f.unit) / f.sigma for f in free])
-
-
-def away(f: Free) -> float:
-    """How far a value is from its prior, in deviations of that."""
-    if np.isinf(f.sigma):
-        return 0.0
-    return float(np.log(f.value / f.origin) / f.sigma) if f.log else f.offset
+        return self.likelihood - sum(map(cost, self.free)) + float(np.sum(np.log(prior[own]))) - 0.5 * volume
 
 
 def likelihood(nu: Array, used: NDArray[np.bool_], floor: Array) -> tuple[Array, float]:
@@ -117,8 +107,7 @@ class Problem:
         slopes = np.moveaxis((nu[1:] - nu[0]) / moves[:, None, None], 0, -1)
         slopes[~np.isfinite(slopes)] = 0.0
         variance, value = likelihood(nu[0], used, self.floor)
-        cost = value - 0.5 * sum(away(f) ** 2 for f in free)
-        return Fit(tuple(free), by, nu[0], slopes, used, variance, value, cost)
+        return Fit(tuple(free), by, nu[0], slopes, used, variance, value, value - sum(map(cost, free)))
 
     def solve(self, free: Sequence[Free], by: Filter, iterations: int = 10, close: float = 0.05) -> Fit:
         """The likeliest free values from those given on; ends where a step gains less than `close` in the log posterior."""
@@ -129,7 +118,7 @@ class Problem:
             costs = []
             for k, step in enumerate(steps):
                 there = put(fit.free, step)
-                costs.append(likelihood(nu[k], self.used(nu[k]), self.floor)[1] - 0.5 * sum(away(f) ** 2 for f in there))
+                costs.append(likelihood(nu[k], self.used(nu[k]), self.floor)[1] - sum(map(cost, there)))
             costs = [c if np.isfinite(c) else -np.inf for c in costs]
             best = int(np.argmax(costs))
             if not costs[best] > fit.cost + 1e-9:
@@ -143,9 +132,8 @@ class Problem:
     def _steps(self, fit: Fit) -> Array:
         rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
         rest = (fit.nu / np.sqrt(fit.variance))[fit.used]
-        weight = precisions(fit.free)
-        curvature = rows.T @ rows + np.diag(weight**2)
-        slope = -rows.T @ rest - weight * np.array([away(f) for f in fit.free])
+        curvature = rows.T @ rows + np.diag(precisions(fit.free) ** 2)
+        slope = -rows.T @ rest - prior_slopes(fit.free)
         stuck = [f.value <= f.low and s <= 0.0 or f.value >= f.high and s >= 0.0 for f, s in zip(fit.free, slope)]
         slope[stuck] = 0.0
         curvature[stuck], curvature[:, stuck] = 0.0, 0.0

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bench import Bench
-from .fit import Fit, precisions
+from .fit import Fit
 from .observer import Filter, Predictor, with_probes
+from .prior import precisions, slopes
 
 Array = NDArray[np.float64]
 AT_ONCE = 32  # runs that are simulated together
@@ -71,7 +72,7 @@ def scores(fit: Fit, hypotheses: Sequence[Array]) -> list[Score]:
     used = fit.used
     weights = precisions(fit.free)
     own = np.vstack([(fit.slopes * white[None, :, None])[used], np.diag(weights)])
-    rest = np.concatenate([(fit.nu * white)[used], np.zeros(len(weights))])
+    rest = np.concatenate([(fit.nu * white)[used], slopes(fit.free) / np.maximum(weights, 1e-300)])
     size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
     q = np.linalg.qr(own / size)[0] if own.shape[1] else np.zeros((len(own), 0))
     rest = rest - q @ (q.T @ rest)

@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+#include "controller.h"
+
+#include <stddef.h>
+
+#include "penode/pen_port.h"
+
+#define FIRST_ID 1000U /* of the sets that a master opens */
+
+pen_xcp_t controller_xcp;
+
+static MODEL(t) controller;
+static MODEL(banks_t) banks;
+static pen_xcp_daq_t daq;
+
+/* What a master may read, besides the instance. Written by the step. One region: a master may read neighbours at once. */
+static struct {
+    uint32_t sample;       /* steps so far                                      */
+    uint32_t set_in_force; /* id of the set that the last step ran with         */
+    uint32_t adopted_at;   /* the step, counted from 1, that last adopted a set */
+    uint32_t late_steps;
+    uint32_t step_status;  /* flags of the last step                            */
+#ifdef MODEL_SENSORS
+    MODEL(z_t) sensors;
+#endif
+} shown;
+
+#define TEXT_OF(name) TEXT_OF_(name)
+#define TEXT_OF_(name) #name
+const char penode_epk[] = CONTROLLER_EPK;
+static const char name_text[] = TEXT_OF(MODEL(controller));
+
+static pen_status_t commit(void) { return MODEL(tune_commit)(&controller); }
+static pen_status_t choose(const pen_set_t *set) { return MODEL(tune_select)(&controller, set); }
+
+#define REGIONS 3U
+static pen_xcp_region_t region[REGIONS];
+static pen_xcp_region_t name_region;
+static pen_xcp_region_t epk_region;
+static pen_xcp_region_t a2l_region;
+static pen_xcp_config_t xcp_config = {
+    .instance = &controller.head,
+    .layout = MODEL_SIZE(LAYOUT),
+    .length = MODEL_SIZE(SET_LENGTH),
+    .reference = &MODEL(set_default),
+    .commit = commit,
+    .select = choose,
+    .id = FIRST_ID,
+    .region = region,
+    .daq = &daq,
+    .daq_command = pen_xcp_daq_command,
+};
+
+static uint32_t address_of(const volatile void *at)
+{
+    return (uint32_t)(uintptr_t)at;
+}
+
+static pen_xcp_region_t region_of(const volatile void *at, uint32_t size)
+{
+    const pen_xcp_region_t found = { address_of(at), size, (const uint8_t *)at };
+
+    return found;
+}
+
+static void declare(const volatile void *at, uint32_t size)
+{
+    region[xcp_config.regions] = region_of(at, size);
+    xcp_config.regions++;
+}
+
+static void declare_all(const controller_config_t *config)
+{
+    declare(&controller, sizeof(controller));
+    declare(&shown, sizeof(shown));
+    declare(penode_epk, sizeof(penode_epk));
+    name_region = region_of(name_text, sizeof(name_text) - 1U);
+    epk_region = region_of(penode_epk, sizeof(penode_epk) - 1U);
+    a2l_region = region_of(config->a2l, config->a2l_size);
+    xcp_config.text[0] = &epk_region;
+    xcp_config.text[1] = &name_region;
+    xcp_config.text[4] = (config->a2l != NULL) ? &a2l_region : NULL;
+    xcp_config.text[5] = &epk_region;
+}
+
+/* A time as XCP codes it: a count of up to 255, and 3 for 1 us, 4 for 10 us, ... */
+static void start_lists(const controller_config_t *config)
+{
+    uint32_t cycle = CONTROLLER_PERIOD;
+    uint8_t unit = 3U;
+
+    while ((cycle > 255U) || (((cycle % 10U) == 0U) && (cycle > 9U))) {
+        cycle /= 10U;
+        unit++;
+    }
+    pen_xcp_daq_init(&daq, config->ring, config->slots, config->max_cto, (uint8_t)cycle, unit);
+}
+
+bool controller_start(const controller_config_t *config)
+{
+    declare_all(config);
+    xcp_config.address = address_of(MODEL(set_default).value);
+    xcp_config.max_cto = config->max_cto;
+    xcp_config.quiet = config->quiet;
+    shown.set_in_force = MODEL(set_default).head.id;
+    start_lists(config);
+    return (MODEL(init)(&controller, &MODEL(set_default), &banks) == PEN_OK) && (pen_xcp_init(&controller_xcp, &xcp_config) == PEN_OK);
+}
+
+void controller_step(const MODEL(u_t) *u, bool late)
+{
+    const uint32_t now = shown.sample + 1U;
+    MODEL(y_t) y;
+    const pen_status_t status = MODEL(step)(&controller, u, &y);
+
+    if ((status & PEN_ADOPTED) != PEN_OK) {
+        pen_set_head_t running;
+        (void)MODEL(tune_running)(&controller, &running);
+        shown.set_in_force = running.id;
+        shown.adopted_at = now;
+    }
+#ifdef MODEL_SENSORS
+    (void)MODEL(sensors)(&controller, &shown.sensors);
+#endif
+    shown.step_status = status;
+    shown.late_steps += late ? 1U : 0U;
+    pen_port_store(&shown.sample, now);
+    pen_xcp_sample(&controller_xcp, now * CONTROLLER_PERIOD); /* the model's time: wraps */
+}
+
+uint32_t controller_samples(void) { return pen_port_load(&shown.sample); }
+uint32_t controller_late(void) { return pen_port_load(&shown.late_steps); }

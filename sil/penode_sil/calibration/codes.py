@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Numbers that XCP and the slave of penode have chosen."""
+
+from enum import IntEnum
+
+
+class Who(IntEnum):
+    """Whose page: the mode of SET_CAL_PAGE and GET_CAL_PAGE."""
+
+    ECU = 0x01
+    TOOL = 0x02
+
+
+class Page(IntEnum):
+    """Of segment 0."""
+
+    WORKING = 0
+    REFERENCE = 1
+
+
+class Text(IntEnum):
+    """Types of GET_ID."""
+
+    A2L = 4
+    EPK = 5
+
+
+class Slave(IntEnum):
+    """Of the virtual controller (sil/firmware/controller.c): its event, the id of the first set that a master opens, its longest packet [bytes]."""
+
+    STEP = 0
+    FIRST_ID = 1000
+    MAX_CTO = 252

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A controller on an emulated Cortex-M: the step in its timer interrupt, the slave in its main loop, on its serial line."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UserError, hint
+from ..targets import FLAGS, MACHINES, PORT, ROOT, _files, _included, _kept, _version, generated, model_options
+from .virtual import Served, describe, free_port, identity
+
+WITH_UART = ("m4f", "m3", "m7")  # port/cortex-m/uart.c knows their serial line
+_EMULATOR = "qemu-system-arm"
+
+
+def build(model: Any, machine: str) -> Path:
+    """The program for one of WITH_UART, with debug information. Raises UserError."""
+    if machine not in WITH_UART:
+        raise UserError(f'--on: there is no controller for "{machine}"; {hint(machine, WITH_UART)}')
+    source, firmware = generated(model), ROOT / "sil" / "firmware"
+    code = [source / f"{model.name}.c", source / f"{model.owner}_params.c", *_files(("src", "*.c"))]
+    own = [firmware / "serve_uart.c", firmware / "controller.c", PORT / "uart.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
+    command = [
+        str(PORT / "cc"), MACHINES[machine], *FLAGS, "-O2", "-g", f"-I{ROOT}/port/xcp", f"-I{PORT}", f"-I{source}", *model_options(model),
+        f'-DCONTROLLER_EPK="{identity(model)} {machine}"', *map(str, [*own, *code]),
+    ]  # fmt: skip
+    headers = [*_files(("port/xcp", "*.h"), ("sil/firmware", "*.h")), source / f"{model.name}.h"]
+    return _kept(f"{model.name}-uart-{machine}", ".elf", command, [_version("arm-none-eabi-gcc"), *_included(), *headers, *own, *code])
+
+
+@contextmanager
+def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[np.float32]) -> Iterator[Served]:
+    """
+    Run it. Its serial line is a TCP port, which XCP over Ethernet finds there too: the frames are the same; with port None a device of this
+    machine. Raises UserError.
+    """
+    if shutil.which(_EMULATOR) is None:
+        raise UserError(f"{_EMULATOR}: the emulator is not installed; install it (make test does)")
+    program = build(model, machine)
+    port = port if port is None else port or free_port(host, False)
+    line = "pty" if port is None else f"tcp:{host}:{port},server=on,wait=off"
+    a2l = describe(model, program, "serial:115200" if port is None else f"tcp:{host}:{port}")
+    with tempfile.TemporaryDirectory() as folder:
+        stimulus = Path(folder, "inputs")
+        stimulus.write_bytes(u.astype(np.float32).tobytes())
+        words = [
+            _EMULATOR, "-machine", MACHINES[machine], "-display", "none", "-monitor", "none", "-serial", line,
+            "-semihosting-config", f"enable=on,target=native,arg=program,arg={stimulus}", "-kernel", str(program),
+        ]  # fmt: skip
+        with subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True) as process:
+            assert process.stdout
+            device = process.stdout.readline().partition("redirected to ")[2].split()[:1] if port is None else []
+            time.sleep(0.5)
+            if process.poll() is not None:
+                raise UserError(f"{line}: the emulator has ended ({process.stdout.read().strip() or process.returncode}); choose another port")
+            try:
+                yield Served(f"serial:{device[0]}" if device else f"tcp:{host}:{port}", a2l)
+            finally:
+                process.terminate()

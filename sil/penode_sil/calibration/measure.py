@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""`penode measure`: signals of a controller, a sample a step, by DAQ lists into an MDF4 file."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from ..console import FILE, note, progress
+from ..errors import UserError, hint
+from ..mdf_write import write_mf4
+from ..output import Column, check_writable
+from ..units import UnitError, quantity
+from . import address as addresses, pages
+from .a2l_read import A2l, Entry
+from .codes import Slave
+from .link import Link, connected
+from .stage import Staged, stage_set
+
+_TYPES = {"u1": "U8", "i1": "I8", "u2": "U16", "i2": "I16", "u4": "U32", "i4": "I32", "u8": "U64", "i8": "I64", "f4": "F32", "f8": "F64"}
+
+
+@dataclass
+class Samples:
+    """What has come: time stamps [ns of the controller], and a list of numbers each."""
+
+    stamps: list[int] = field(default_factory=list)
+    rows: list[list[float]] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)  # of the columns: pyxcp puts them in the order of their addresses
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A measurement: time [s] from the first sample, [n]; values [n] of each signal; samples that the controller took, but that never came."""
+
+    time: NDArray[np.float64]
+    values: dict[str, NDArray[Any]]
+    lost: int
+    period: float  # [s] between two samples
+
+
+def _policy(entries: list[Entry], every: int) -> tuple[Any, Samples]:
+    """What pyxcp feeds, and where it ends up."""
+    from pyxcp.daq_stim import DaqList, DaqOnlinePolicy
+
+    kept = Samples()
+
+    class Collector(DaqOnlinePolicy):
+        """Keeps every sample. Called by the thread that listens."""
+
+        def initialize(self) -> None:
+            """Nothing to open."""
+
+        def on_daq_list(self, daq_list: int, timestamp0: int, timestamp1: int, payload: list[float]) -> None:
+            kept.stamps.append(timestamp1)
+            kept.rows.append(list(payload))
+
+        def finalize(self) -> None:
+            """Nothing to close."""
+
+    measured = [(entry.name, entry.address, 0, _TYPES[entry.type.str[1:]]) for entry in entries]
+    lists = [DaqList(name="step", event_num=int(Slave.STEP), stim=False, enable_timestamps=True, measurements=measured, priority=0, prescaler=every)]
+    policy = Collector(lists, logger=logging.getLogger("penode.measure"))  # else pyxcp reads the command line, which is ours
+    policy.pid_off = False  # which it sets only then
+    return policy, kept
+
+
+def choose(a2l: A2l, names: list[str]) -> list[Entry]:
+    """The measurements of that name. Raises UserError."""
+    problems = [f'--signals: {a2l.name} has no "{name}"; {hint(name, a2l.measurements)}' for name in names if name not in a2l.measurements]
+    if problems:
+        raise UserError(*problems)
+    entries = [a2l.measurements[name] for name in dict.fromkeys(names)]
+    several = [entry.name for entry in entries if entry.count != 1]
+    if several:
+        raise UserError(f"--signals: {several[0]} is an array; name single numbers")
+    return entries
+
+
+def _log(link: Link, entries: list[Entry], kept: Samples, every: int) -> Log:
+    """Unwrap the time stamps and count what is missing between them."""
+    info = link.ask("GET_DAQ_EVENT_INFO", link.master.getDaqEventInfo, int(Slave.STEP))
+    unit = int(info.eventChannelTimeUnit) if not isinstance(info.eventChannelTimeUnit, str) else 6
+    period = float(info.eventChannelTimeCycle) * 10.0 ** (unit - 9) * every
+    stamps = np.array(kept.stamps, dtype=np.int64) // 1000  # us
+    steps = np.diff(stamps) % (1 << 32)  # they are of 32 bits
+    time_ = np.concatenate([[0.0], np.cumsum(steps) * 1e-6]) if stamps.size else np.zeros(0)
+    lost = int(np.maximum(np.rint(steps * 1e-6 / period) - 1, 0).sum()) if period > 0.0 else 0
+    columns = np.array(kept.rows, dtype=object).reshape(stamps.size, len(entries))
+    values = {entry.name: columns[:, kept.names.index(entry.name)].astype(np.float64).astype(entry.type) for entry in entries}
+    return Log(time_, values, lost, period)
+
+
+def record(
+    address: addresses.Address, a2l: A2l, names: list[str], duration: float | None, every: int = 1, during: Callable[[Link], object] = lambda link: None
+) -> Log:
+    """Measure while `during(link)` runs, and then for `duration` seconds, or until an interrupt. Raises UserError."""
+    entries = choose(a2l, names)
+    policy, kept = _policy(entries, every)
+    with connected(address, policy) as link:
+        link.ask("the DAQ commands", policy.setup)
+        kept.names = [header[0] for header in policy.daq_lists[0].headers]
+        link.ask("START_STOP_SYNCH", policy.start)
+        try:
+            during(link)
+            _wait(duration)
+        except KeyboardInterrupt:
+            pass
+        link.ask("START_STOP_SYNCH", policy.stop)
+        time.sleep(0.2)  # what is still on its way
+        return _log(link, entries, kept, every)
+
+
+def _wait(duration: float | None) -> None:
+    begin = time.monotonic()
+    with progress("measuring", duration or 1.0) as tell:
+        while duration is None or time.monotonic() - begin < duration:
+            time.sleep(min(0.1, (duration or 1.0)))
+            tell(min(time.monotonic() - begin, duration or 0.0))
+
+
+def _seconds(option: str, text: str) -> float:
+    try:
+        found = quantity(text, "s")
+    except UnitError as exc:
+        raise UserError(f"{option}: {exc}") from exc
+    if not 0.0 < found < 1e6:
+        raise UserError(f'{option}: "{text}" is no such time; give one like "10 s"')
+    return found
+
+
+@click.command()
+@click.option("--signals", required=True, help="Names of the A2L, with commas between; units and types come from there.")
+@click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
+@click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
+@click.option("--duration", help='How long, like "10 s"; until Ctrl-C if not given.')
+@click.option("--stage", "staged", metavar="SET", help="Write this set meanwhile, as penode stage does: MODEL.toml:NAME, or a file in serial form.")
+@click.option("--after", default="1 s", show_default=True, help="When to begin with that.")
+@click.option("--every", type=click.IntRange(1, 255), default=1, show_default=True, help="Every so many steps a sample.")
+@click.option("-o", "--output", type=FILE, required=True, help="File to write (.mf4).")
+def measure(
+    signals: str, to: str, a2l: Path | None, duration: str | None, staged: str | None, after: str, every: int, output: Path
+) -> None:
+    """Record signals of a controller that runs, a sample a step, with units and its own time stamps."""
+    seconds, wait = None if duration is None else _seconds("--duration", duration), _seconds("--after", after)
+    if output.suffix.lower() != ".mf4":
+        raise UserError(f'{output}: a log cannot be written as "{output.suffix}"; end its name in .mf4')
+    check_writable(output)
+    address = addresses.parse(to)
+    with connected(address) as link:
+        described = link.a2l(a2l)
+    names = [name.strip() for name in signals.split(",") if name.strip()]
+    chosen = None if staged is None else pages.choose(staged, pages.segment(described)[2])
+    done: list[Staged] = []
+
+    def during(link: Link) -> None:
+        if chosen is not None:
+            time.sleep(wait)
+            done.append(stage_set(link, described, chosen))
+
+    log = record(address, described, names, seconds, every, during)
+    for one in done:
+        click.echo(one.sentence())
+    if not log.time.size:
+        raise UserError(f"{to}: no sample has come; is the controller stepping?")
+    write_mf4(output, columns(log, described), "penode measure")
+    click.echo(f"{to}: {log.time.size} samples in {log.time[-1]:.3f} s, {log.lost} lost -> {output}")
+    if log.lost:
+        note("the line was too slow for some samples: measure fewer signals, or --every 2")
+
+
+def columns(log: Log, a2l: A2l) -> list[Column]:
+    """A log as a table."""
+    return [Column("time", "s", log.time), *(Column(name, a2l.measurements[name].unit or "1", values) for name, values in log.values.items())]

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A virtual controller: the compiled model in real time, in a process of its own (sil/firmware/serve.c)."""
+
+from __future__ import annotations
+
+import importlib.util
+import socket
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import penode_gen
+from penode_gen import exports, placeholder
+
+from .. import scenario as scenarios
+from ..console import note
+from ..errors import UserError
+from ..targets import FLAGS, ROOT, _files, _kept, _version, generated, model_options
+from .codes import Slave
+
+MEASURED = "shown"  # the variable of it with what may be measured besides the instance
+TROUBLE = {2: "it refused the model, or its inputs", 3: "the port is taken, or the address is not one of this machine"}
+
+
+def identity(model: Any) -> str:
+    """The EPK of a program of this model."""
+    return f"{model.name} {penode_gen.VERSION} {model.digest[:12]}"
+
+
+def build(model: Any) -> Path:
+    """The virtual controller of a model."""
+    source, firmware = generated(model), ROOT / "sil" / "firmware"
+    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], _files(("src", "*.c"))
+    own = [firmware / "serve.c", firmware / "controller.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
+    include = [f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/port/xcp", f"-I{firmware}", f"-I{source}"]
+    options = ["gcc", "-O2", "-g", *FLAGS, "-D_GNU_SOURCE", "-fno-pie", *include]
+    read = [_version("gcc"), *_files(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("sil/firmware", "*.h"))]
+    same = _kept("runtime-serve", ".o", [*options[:-1], "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
+    epk = f'-DCONTROLLER_EPK="{identity(model)}"'
+    command = [*options, "-no-pie", "-pthread", *model_options(model), epk, *map(str, [*own, *code, same])]
+    return _kept(f"{model.name}-serve", ".elf", command, [*read, *own, *code, source / f"{model.name}.h", same])
+
+
+def describe(model: Any, program: Path, transport: str) -> str:
+    """The A2L of a virtual controller."""
+    return exports.export(model, "a2l", Path("served.a2l"), {"elf": program, "measure": MEASURED, "transport": transport}).decode()
+
+
+def inputs(model: Any, scenario: Path | None) -> NDArray[np.float32]:
+    """What drives it, sample by sample, [n, n_u], played again and again; a row of zeros without a scenario."""
+    if scenario is None:
+        return np.zeros((1, max(len(model.inputs), 1)), np.float32)
+    plan = scenarios.load(scenario, model, int(penode_gen.set_head(model, "default")[1]))
+    if any(instance.exchanges for instance in plan.instances) or plan.initial:
+        note(f"{scenario}: only its inputs are used; exchanges and start states are those of the tool, and of the model file")
+    u = scenarios.sampled(plan, model, scenarios.sample_times(plan, model.sample_time))
+    return np.ascontiguousarray(placeholder.columns(model, u), dtype=np.float32)
+
+
+def free_port(host: str, datagrams: bool) -> int:
+    """A port that nobody listens to."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if datagrams else socket.SOCK_STREAM) as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])
+
+
+@dataclass
+class Served:
+    """A virtual controller that runs: `address` is what --to takes. steps and late are known at its end."""
+
+    address: str
+    a2l: str
+    steps: int = 0
+    late: int = 0
+
+
+@contextmanager
+def served(model: Any, kind: str, host: str, port: int, u: NDArray[np.float32], quiet: int = 0, max_cto: int = Slave.MAX_CTO) -> Iterator[Served]:
+    """Run a virtual controller; `kind` is tcp, udp or frames (CAN frames as datagrams). Raises UserError."""
+    program = build(model)
+    try:
+        port = port or free_port(host, kind != "tcp")
+    except OSError as exc:
+        raise UserError(f"--host: {host} is no address of this machine; use 127.0.0.1, or 0.0.0.0 for all") from exc
+    a2l = describe(model, program, f"{kind}:{host}:{port}" if kind != "frames" else "can:0x100:0x101") if importlib.util.find_spec("elftools") else ""
+    with tempfile.TemporaryDirectory() as folder:
+        stimulus, offered = Path(folder, "inputs"), Path(folder, "a2l")
+        stimulus.write_bytes(u.astype(np.float32).tobytes())
+        offered.write_text(a2l, encoding="utf-8")
+        words = [program, kind, host, port, int(max_cto), quiet, stimulus, offered if a2l else "-"]
+        with subprocess.Popen(
+            [str(word) for word in words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        ) as process:
+            assert process.stdin and process.stdout and process.stderr
+            if not process.stdout.readline():
+                process.wait()
+                raise UserError(f"{kind}:{host}:{port}: {TROUBLE.get(process.returncode, 'it did not start')}; choose another port")
+            found = Served(f"{kind}:{host}:{port}", a2l)
+            try:
+                yield found
+            finally:
+                process.stdin.close()
+                words_ = process.stdout.readline().split()
+                if len(words_) == 2:
+                    found.steps, found.late = int(words_[0]), int(words_[1])

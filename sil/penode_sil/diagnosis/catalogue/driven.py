@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Forces of laws with states of their own along a motion: from the same C as the model's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import penode_gen
+from numpy.typing import NDArray
+from penode_gen import laws
+
+from ...batch import Batch
+
+Array = NDArray[np.float64]
+MODEL = """[model]
+name = "driven"
+sample_time = "{step!r} s"
+substeps = 4
+[parameters]
+{parameters}
+[inputs]
+x = {{ unit = "m" }}
+[elements]
+e = {{ between = ["x", "ground"], law = "{law}", {arguments} }}
+[outputs]
+force = {{ value = "F_e", unit = "N" }}
+"""
+
+
+def force(law: str, values: Mapping[str, float], s: Array, step: float) -> Array:
+    """Force [n] of a law between ends that move apart by s [n], `step` [s] apart, from rest at s[0]. A call costs one simulation."""
+    parameters = {f"p_{k}": np.array([v]) for k, v in values.items()}
+    return _batch(law, step).run((s - s[0])[:, None], parameters=parameters, outputs=("force",)).y[0, :, 0]
+
+
+@cache
+def _batch(law: str, step: float) -> Batch:
+    arguments = laws.LAWS[law].arguments
+    text = MODEL.format(
+        step=step, law=law, arguments=", ".join(f'{a} = "p_{a}"' for a in arguments),
+        parameters="\n".join(f'p_{a} = {{ value = 1, unit = "{u}" }}' for a, u in arguments.items()),
+    )  # fmt: skip
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "driven.toml"
+        path.write_text(text)
+        return Batch(replace(penode_gen.load(path), interpolation="cubic"), exact=False)

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Forms of causes as terms of a model: its elements, its free values, and what a fit has made of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from penode_gen.laws import LAWS
+from penode_gen.model import Element, Model
+
+from .catalogue.form import Form, Motion, Part
+from .evidence.bench import Bench
+from .evidence.fit import Fit
+from .evidence.gain import Level
+from .evidence.observer import scale
+from .fit import Free
+from .plant import extend
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """A form in a model: its elements there, one for each part, and its free values."""
+
+    form: Form
+    elements: tuple[str, ...]
+    free: tuple[Free, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A form beside what was accepted already, fitted: `gain` of the criterion, its `share` of what acts (see `worth`), `blocks` [blocks] of
+    predictive density."""
+
+    form: Form
+    term: Term
+    fit: Fit
+    gain: float
+    level: Level
+    share: float = 0.0
+    blocks: Array | None = None
+
+
+def free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
+    """The value of a form of an input or a sensor."""
+    step = bench.update * bench.step
+    match form.how:
+        case "input_gain":
+            return (Free((form.how, form.index), 0.0, 0.01, sigma=0.3),)
+        case "input_offset":
+            size = max(float(np.std(np.concatenate([r.u[:, form.index] for r in bench.records]))), 1e-12)
+            return (Free((form.how, form.index), 0.0, 0.01 * size, sigma=size),)
+        case "input_delay" | "input_lag":
+            return (Free((form.how, form.index), 0.2 * bench.step, 0.2 * step, sigma=2.0 * step, low=0.0),)
+        case "scale":
+            return (Free(scale(form.where), 1.0, 0.01, sigma=0.3, origin=1.0),)
+        case "late":
+            return (Free((form.how, form.index), 0.2 * bench.step, 0.1 * step, sigma=step, low=0.0),)
+    raise ValueError(form.how)
+
+
+def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], first: int) -> tuple[Model, list[Term]]:
+    """The model with all forms in it, each without any force yet, and their terms."""
+    elements, where, parameters, terms = [], [], {}, []
+    for i, form in enumerate(forms):
+        if form.how != "force":
+            terms.append(Term(form, (), free_of(bench, form)))
+            continue
+        place, names, free = bench.places[form.index], [], []
+        for j, part in enumerate(form.parts):
+            name = f"x{first}_{i}_{j}"
+            own = {part.gain[0]: (0.0, part.gain[1]), **part.shapes}
+            parameters |= {f"{name}_{key}": entry for key, entry in own.items()}
+            elements.append(_element(name, place.ends, part))
+            where.append(place)
+            names.append(name)
+            size = moved[form.index].force / max(rms([part.along(m) for m in moved[form.index].parts]), 1e-300)
+            low, high = (0.0 if part.sign > 0 else -np.inf), (0.0 if part.sign < 0 else np.inf)
+            free.append(Free(f"{name}_{part.gain[0]}", 0.0, 0.05 * size, sigma=size, low=low, high=high))
+            for key, (value, _) in part.shapes.items():
+                if key not in part.fixed:
+                    free.append(Free(f"{name}_{key}", value, value, log=True, sigma=1.0, origin=value, low=value / part.span, high=part.span * value))
+        terms.append(Term(form, tuple(names), tuple(free)))
+    return extend(bench.model, elements, parameters, where), terms
+
+
+def _element(name: str, ends: tuple[str, str], part: Part) -> Element:
+    """A part as an element whose parameters begin with its name."""
+    if part.law in LAWS:
+        return Element(name, ends, part.law, {a: f"{name}_{a}" for a in LAWS[part.law].arguments})
+    keys = [part.gain[0], *part.shapes]
+    text = re.sub(r"\b(" + "|".join(keys) + r")\b", lambda m: f"{name}_{m[1]}", part.law)
+    return Element(name, ends, "expression", expression=re.sub(r"\b([sv])\b", lambda m: f"{m[1]}_{name}", text))
+
+
+def rms(series: Sequence[Array]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(list(series)) ** 2)))

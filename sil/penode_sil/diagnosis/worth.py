@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""How much a term matters: its force beside what acts at its place already, or the change of its input or sensor beside their motion."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from penode_gen.model import GROUND, Model
+
+from .catalogue.form import Motion
+from .evidence.bench import UPDATES, Bench
+from .evidence.fit import Fit
+from .terms import Term
+
+Array = NDArray[np.float64]
+WORTH = 0.07  # of what acts: less is a small deviation. Any model is 2 to 5 % wrong, a name is worth it from 10 % on; the middle
+BENT = 0.6  # of a friction or a cube along a Gaussian motion is beside a straight line, in rms: sqrt(1 - 2/pi), sqrt(1 - 9/15)
+SYSTEMATIC = 0.007  # of what acts: what mis-modelling of 3.5 % does to the size of a form, for it is like it to 0.2 in rms, one direction of 25
+LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of their parameter makes as large as they have to be
+STRAIGHT = LINEAR | {"expression": "s"}  # and those that are about straight
+
+
+def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]) -> float:
+    """Rms of terms of one name as a share of what acts at their place, of their input, or of their sensor: as much of it as nothing else
+    that is free could do as well, a parameter, an offset, a start: in forces, and in what sensors show. How much of a line is whose is a
+    matter of writing it down, so a force counts by what is left of it beside lines, over BENT."""
+    form, targets = terms[0].form, [f.target for t in terms for f in t.free]
+    if form.how == "force":
+        motion = moved[form.index]
+        force = np.sum([np.concatenate(_force(t, fit, motion)) for t in terms], axis=0)
+        beside = _beside(bench, form.index, motion, force)
+        return min(_rms(beside), _rms(force) * own(bench.model, fit, targets)) / (BENT * motion.force)
+    return max(_of_signal(bench, t, fit) for t in terms) * own(bench.model, fit, targets)
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def own(model: Model, fit: Fit, targets: Collection[object]) -> float:
+    """Share of what free values off their origins do to the innovations that no other one can do, 0 to 1. Masses stay as they are, for all
+    forces together with them are a scale that a sensor of motion does not show."""
+    masses = {b.mass for b in model.bodies} - set(targets)
+    rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
+    done, rest = np.zeros(len(rows)), []
+    for f, column in zip(fit.free, rows.T):
+        if f.target in targets:
+            done = done + (0.0 if f.log else (f.value - f.origin) / f.unit) * column
+        elif f.target not in masses and column.any():
+            rest.append(column / np.linalg.norm(column))
+    others = np.array(rest).T.reshape(len(rows), -1)
+    left = done - others @ np.linalg.lstsq(others, done, rcond=1e-9)[0]
+    return float(np.linalg.norm(left) / max(float(np.linalg.norm(done)), 1e-300))
+
+
+def shift(model: Model, bench: Bench, moved: Sequence[Motion], name: str) -> float:
+    """How much of what acts changes with a parameter as it is fitted instead of as the file has it, and nothing else could do as well:
+    of a linear law, as a share of the force at its place; of others, of the parameter itself."""
+    off = bench.fit.value(name) - model.parameters[name].value
+    shares = []
+    for e in model.elements:
+        if e.law in LINEAR and name in e.arguments.values():
+            place, motion = next((p, m) for p, m in zip(bench.places, moved) if any(e.name == n for n, _ in p.elements))
+            shares.append(abs(off) * (motion.s_rms if LINEAR[e.law] == "s" else motion.v_rms) / motion.force)
+    log = next(f.log for f in bench.fit.free if f.target == name)
+    return max(shares, default=abs(off / model.parameters[name].value)) * (1.0 if log else own(bench.model, bench.fit, [name]))
+
+
+def _beside(bench: Bench, place: int, motion: Motion, force: Array) -> Array:
+    """A force [n] without what the straight laws at its place could take over, or the mass of a body that it ties to ground."""
+    names, ends = {n for n, _ in bench.places[place].elements}, bench.places[place].ends
+    lines = {STRAIGHT[e.law] for e in bench.model.elements if e.name in names and e.law in STRAIGHT}
+    columns = [np.concatenate([getattr(p, q) for p in motion.parts]) for q in sorted(lines)]
+    if names and GROUND in ends and any(b.name in ends and not bench.model.parameters[b.mass].exact for b in bench.model.bodies):
+        columns.append(np.concatenate([np.gradient(p.v, p.step) for p in motion.parts]))
+    others = np.array([c / max(float(np.linalg.norm(c)), 1e-300) for c in columns]).T.reshape(len(force), -1)
+    return force - others @ np.linalg.lstsq(others, force, rcond=None)[0]
+
+
+def _force(term: Term, fit: Fit, motion: Motion) -> list[Array]:
+    """Of all parts of a term along every recording."""
+    values: Mapping[str, float] = fit.values
+    total = [np.zeros(len(m.s)) for m in motion.parts]
+    for name, part in zip(term.elements, term.form.parts):
+        now = replace(part, shapes={k: (values.get(f"{name}_{k}", v), u) for k, (v, u) in part.shapes.items()})
+        total = [x + fit.value(f"{name}_{part.gain[0]}") * now.along(m) for x, m in zip(total, motion.parts)]
+    return total
+
+
+def _of_signal(bench: Bench, term: Term, fit: Fit) -> float:
+    value = fit.value(term.free[0].target)
+    turn = 2.0 * np.pi / (UPDATES * bench.update * bench.step)  # of the motion [rad/s]
+    match term.form.how:
+        case "input_offset":
+            return abs(value) / max(float(np.std(np.concatenate([r.u[:, term.form.index] for r in bench.records]))), 1e-300)
+        case "scale":
+            return abs(value - 1.0)
+        case "input_gain":
+            return abs(value)
+    return abs(value) * turn

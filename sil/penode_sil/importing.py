@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""`penode import`: weights from the file of another tool, as a network file for a parameter set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from penode_gen import imports
+from penode_gen.networks import ACTIVATIONS
+from penode_gen.write_json import to_json
+
+from .console import FILE
+from .errors import UserError, hint
+from .output import check_writable, whole
+
+
+@click.command("import")
+@click.argument("file", type=FILE)
+@click.option("-o", "--output", type=FILE, required=True, help="Network file to write (.json), to be named in a set of a model file.")
+@click.option("--network", help="Which one, if the file has several.")
+@click.option("--activation", type=click.Choice(ACTIVATIONS), default="relu", show_default=True, help="Of hidden layers, where the file does not say.")
+def import_(file: Path, output: Path, network: str | None, activation: str) -> None:
+    """Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits."""
+    if output.suffix.lower() != ".json":
+        raise UserError(f'{output}: a network cannot be written as "{output.suffix}"; end its name in .json')
+    check_writable(output)
+    found = imports.read(file, imports.Options(activation))
+    if network is None and len(found) > 1:
+        raise UserError(f"{file}: it has {len(found)} networks: {', '.join(found)}; choose one with --network")
+    chosen = network or next(iter(found))
+    if chosen not in found:
+        raise UserError(f'--network: {file} has no network "{chosen}"; {hint(chosen, found)}')
+    text = to_json(found[chosen])
+    with whole(output) as part:
+        part.write_text(text, encoding="utf-8")
+    click.echo(str(output))

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What the tests of exports share: the case study's model, and a variant with held inputs to compare with."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import penode_gen
+
+ROOT = Path(__file__).resolve().parents[2]
+NQVM = ROOT / "gen" / "nqvm" / "nqvm.toml"
+sys.path.insert(0, str(Path(__file__).parent))
+
+if importlib.util.find_spec("fmpy") is None:
+    collect_ignore = ["test_fmu.py", "test_fmu_long.py"]
+
+
+def pytest_report_header() -> str:
+    """A line where tests are missing."""
+    return "" if importlib.util.find_spec("fmpy") else "FMPy is not installed: nothing is checked about FMUs (pip install penode[fmi])"
+
+
+@pytest.fixture(scope="session")
+def nqvm() -> Any:
+    return penode_gen.load(NQVM)
+
+
+@pytest.fixture(scope="session")
+def held(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The same model with inputs held between samples."""
+    path = tmp_path_factory.mktemp("held") / "held.toml"
+    path.write_text(f'[model]\nextends = "{NQVM}"\nname = "nqvm_held"\ninput = "held"\n')
+    return penode_gen.load(path)
+
+
+def chirp(duration: float) -> np.ndarray:
+    """The road of the case study's scenario, 0.15 m/s from 1 Hz on, faster by 0.25 Hz a second; sample by sample [n, 1], float."""
+    t = np.arange(round(duration / 1e-3) + 1) * 1e-3
+    rate = 2 * np.pi * (1 + 0.25 * t)
+    return (0.15 / rate * np.sin(2 * np.pi * (t + 0.125 * t**2))).astype(np.float32)[:, None]

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Calibration over XCP, by pyxcp, with a virtual controller: what the log shows is what a SiL run does, to the bit."""
+
+from __future__ import annotations
+
+import importlib.util
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import penode_gen
+from exchanges import check_log, drive
+from penode_sil.calibration import a2l_read, address, link as links, measure, pages, stage, virtual
+from penode_sil.calibration.codes import Page, Slave
+from penode_sil.errors import UserError
+
+ROOT = Path(__file__).resolve().parents[2]
+NQVM = ROOT / "gen" / "nqvm" / "nqvm.toml"
+FOLDED = ROOT / "gen" / "nqvm" / "nqvm_folded.toml"
+SIGNALS = ["z_b", "z_w", "sample", "set_in_force", "adopted_at"]
+CAN_MASTER, CAN_SLAVE = 0x100, 0x101
+
+pytestmark = pytest.mark.skipif(
+    not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")), reason="pyxcp or pyelftools is not installed: pip install penode[xcp]"
+)
+
+
+class Bridge(threading.Thread):
+    """Moves CAN frames between a virtual bus of python-can and datagrams of one frame each."""
+
+    def __init__(self, channel: str, port: int):
+        import can
+
+        super().__init__(daemon=True)
+        self.bus = can.Bus(interface="virtual", channel=channel)
+        self.line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.line.connect(("127.0.0.1", port))
+        self.line.settimeout(0.001)
+        self.ended = False
+
+    def run(self) -> None:
+        import can
+
+        while not self.ended:
+            while (message := self.bus.recv(0.0)) is not None:
+                if message.arbitration_id == CAN_MASTER:
+                    self.line.send(bytes(message.data))
+            try:
+                self.bus.send(can.Message(arbitration_id=CAN_SLAVE, is_extended_id=False, data=self.line.recv(64)))
+            except (TimeoutError, ConnectionRefusedError):
+                pass
+
+
+@contextmanager
+def reached(kind: str, model: Any, u: np.ndarray) -> Iterator[tuple[address.Address, virtual.Served]]:
+    """A virtual controller, and where it is; `can` is 8-byte frames on a virtual bus."""
+    if kind != "can":
+        with virtual.served(model, kind, "127.0.0.1", 0, u) as found:
+            yield address.parse(found.address), found
+        return
+    pytest.importorskip("can", reason="python-can is not installed")
+    with virtual.served(model, "frames", "127.0.0.1", 0, u, max_cto=8) as found:
+        channel = found.address
+        bridge = Bridge(channel, int(found.address.rpartition(":")[2]))
+        bridge.start()
+        settings = {"CAN": {"interface": "virtual", "channel": channel, "can_id_master": CAN_MASTER, "can_id_slave": CAN_SLAVE, "max_dlc_required": True}}
+        try:
+            yield address.Address(found.address, "can", settings), found
+        finally:
+            bridge.ended = True
+            bridge.join()
+            bridge.bus.shutdown()
+
+
+EVERY = 20  # on CAN: a sample of 28 bytes takes 5 frames, and the virtual bus of python-can carries few thousand a second
+
+
+@pytest.mark.parametrize(
+    ("kind", "path", "every"), [("tcp", NQVM, 1), ("udp", NQVM, 1), ("can", NQVM, EVERY), ("tcp", FOLDED, 1)], ids=["tcp", "udp", "can", "folded"]
+)
+def test_log_is_that_of_a_sil_run_with_the_exchange_where_it_shows_the_new_id(kind: str, path: Path, every: int) -> None:
+    model = penode_gen.load(path)
+    u = drive(model)
+    with reached(kind, model, u) as (where, found):
+        a2l = a2l_read.parse(found.a2l, "served")
+        chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
+
+        def exchange(link: links.Link) -> None:
+            time.sleep(0.2)
+            staged = stage.stage_set(link, a2l, chosen)
+            assert (staged.bytes, staged.id) == (4 * 1198, Slave.FIRST_ID)
+
+        log = measure.record(where, a2l, SIGNALS, 0.3, every, exchange)
+    check_log(model, u, log, every)
+
+
+EIGHT = ["z_b", "z_w", "v_b", "v_w", "z_road", "a_body", "a_wheel", "deflection"]
+
+
+@pytest.mark.parametrize("seconds", [2.0, pytest.param(60.0, marks=pytest.mark.long)])
+def test_eight_signals_at_1_khz_without_loss(seconds: float) -> None:
+    model = penode_gen.load(NQVM)
+    u = drive(model)
+    with reached("tcp", model, u) as (where, found):
+        log = measure.record(where, a2l_read.parse(found.a2l, "served"), [*EIGHT, "sample"], seconds)
+    assert log.lost == 0 and log.period == pytest.approx(1e-3)
+    assert (np.diff(log.values["sample"].astype(int)) == 1).all()
+    assert np.allclose(np.diff(log.time), 1e-3, rtol=0.0, atol=1e-9)  # rounding of the sum of whole microseconds: 60 s * 2^-53 and less
+    assert log.time[-1] > 0.9 * seconds  # a busy machine is late, but makes up for it
+
+
+def test_every_entry_of_the_a2l_is_the_models_value() -> None:
+    model = penode_gen.load(NQVM)
+    with reached("tcp", model, drive(model)) as (where, _), links.connected(where) as link:
+        a2l = link.a2l(None)  # GET_ID offers it
+        values = np.asarray(penode_gen.set_values(model, "default"))
+        first, size, kind = pages.segment(a2l)
+        seen = np.zeros(values.size, int)
+        for entry in a2l.characteristics.values():
+            at = (entry.address - first) // kind.itemsize
+            seen[at : at + entry.count] += 1
+            assert (link.values(entry) == values[at : at + entry.count]).all(), entry.name
+        assert (seen == 1).all() and size == values.nbytes
+        network = model.sets["default"].networks["damper_net"]
+        weights = [layer.weights for layer in network.layers if hasattr(layer, "weights")]
+        entry = a2l.characteristics["damper_net.weights_2"]
+        assert entry.sizes[:2] == weights[1].shape  # fastest: rows
+        assert (link.values(entry).reshape(weights[1].shape, order="F") == weights[1].astype(np.float32)).all()
+        for entry in a2l.measurements.values():
+            assert np.isfinite(link.values(entry)).all(), entry.name
+        assert link.number(a2l.measurements["set.layout"]) == penode_gen.set_head(model, "default")[0]
+
+
+def test_refused_set_changes_nothing_and_says_why() -> None:
+    model = penode_gen.load(NQVM)
+    bad = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
+    bad.values[700] = np.nan
+    with reached("tcp", model, drive(model)) as (where, found):
+        a2l = a2l_read.parse(found.a2l, "served")
+        with links.connected(where) as link, pytest.raises(links.Refused, match="set_nonfinite"):
+            stage.stage_set(link, a2l, bad)
+        with links.connected(where) as link:
+            seen = pages.look(link, a2l)
+            assert seen.page == Page.REFERENCE and not seen.differing(a2l, pages.segment(a2l)[0])
+            foreign = pages.ChosenSet("foreign", bad.layout ^ 1, bad.values)
+            with pytest.raises(UserError, match="set of another model"):
+                stage.stage_set(link, a2l, foreign)
+
+
+def test_compare_names_sets_and_values() -> None:
+    model = penode_gen.load(NQVM)
+    chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
+    with reached("tcp", model, drive(model)) as (where, found):
+        a2l = a2l_read.parse(found.a2l, "served")
+        with links.connected(where) as link:
+            stage.stage_set(link, a2l, chosen)
+        with links.connected(where) as link:
+            seen = pages.look(link, a2l)
+    assert stage._names(model, np.dtype("f4"), seen) == ("altered_friction (set 2)", "default (set 1)")
+    default = np.asarray(penode_gen.set_values(model, "default"))
+    rows = seen.differing(a2l, pages.segment(a2l)[0])
+    assert len(rows) == np.count_nonzero(default != chosen.values)
+    layers = [layer for layer in model.sets["altered_friction"].networks["damper_net"].layers if hasattr(layer, "weights")]
+    named = {name: running for name, _, running, _ in rows}
+    assert named["damper_net.weights_2[3][5]"] == np.float32(layers[1].weights[3, 5])
+    assert named["damper_net.bias_1[7]"] == np.float32(layers[0].bias[7])
+
+
+def test_nobody_answers_in_one_line() -> None:
+    with pytest.raises(UserError, match="nothing answers there"), links.connected(address.parse("tcp:127.0.0.1:1")):
+        pass
+    with pytest.raises(UserError, match="is no address"):
+        address.parse("tcp:nowhere")

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Calibration of an emulated Cortex-M4F over its serial line, by pyxcp: step in the timer interrupt, slave in the main loop."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import penode_gen
+from exchanges import check_log, drive
+from penode_sil.calibration import a2l_read, address, emulated, link as links, measure, pages, stage
+
+NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm" / "nqvm.toml"
+
+pytestmark = [
+    pytest.mark.skipif(
+        not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")), reason="pyxcp or pyelftools is not installed: pip install penode[xcp]"
+    ),
+    pytest.mark.skipif(not (shutil.which("qemu-system-arm") and shutil.which("arm-none-eabi-gcc")), reason="qemu-system-arm or arm-none-eabi-gcc is not installed"),
+]
+
+
+@pytest.fixture(scope="module", params=[pytest.param(0, id="TCP port"), pytest.param(None, id="serial device", marks=pytest.mark.long)])
+def running(request: pytest.FixtureRequest) -> Iterator[tuple[object, np.ndarray, address.Address, a2l_read.A2l]]:
+    """The emulated controller; its line is a TCP port, or a device."""
+    model = penode_gen.load(NQVM)
+    u = drive(model)
+    with emulated.emulated(model, "m4f", "127.0.0.1", request.param, u) as found:
+        yield model, u, address.parse(found.address), a2l_read.parse(found.a2l, "emulated")
+
+
+def test_every_entry_and_then_an_exchange(running: tuple) -> None:
+    model, u, where, a2l = running
+    values = np.asarray(penode_gen.set_values(model, "default"))
+    with links.connected(where) as link:
+        first, size, kind = pages.segment(a2l)
+        assert size == values.nbytes and link.text(links.Text.EPK) == a2l.epk[0]
+        for entry in a2l.characteristics.values():
+            at = (entry.address - first) // kind.itemsize
+            assert (link.values(entry) == values[at : at + entry.count]).all(), entry.name
+        for entry in a2l.measurements.values():
+            assert np.isfinite(link.values(entry)).all(), entry.name
+    chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
+    every = 10  # 23 bytes and a head each 10 ms of the emulated time
+    log = measure.record(where, a2l, ["z_b", "z_w", "sample", "set_in_force", "adopted_at"], 0.3, every, lambda link: stage.stage_set(link, a2l, chosen))
+    check_log(model, u, log, every)
