@@ -9,8 +9,6 @@
 #define HALF  ((pen_real_t)0.5F)
 #define ONE   ((pen_real_t)1)
 #define TWO   ((pen_real_t)2)
-#define THREE ((pen_real_t)3)
-#define FOUR  ((pen_real_t)4)
 #define TINY  (PEN_REAL_MIN * PEN_REAL_EPSILON) /* the smallest number: twice what underflow may lose */
 
 /*
@@ -160,10 +158,9 @@ static void rectify(pen_cell_t *part, bool active[], size_t neuron, const row_t 
         const pen_real_t least = (low < ZERO) ? low : ZERO;
         const pen_real_t most = (high > ZERO) ? high : ZERO;
         const pen_real_t leaving = pen_port_abs(rate) - spread;
-        const pen_real_t to_go = (THREE * error) - ((rate > ZERO) ? value : -value);
+        const pen_real_t to_go = ((pen_real_t)3 * error) - ((rate > ZERO) ? value : -value);
         const pen_real_t end = to_go / leaving;
-        const pen_real_t later = (end > part->guard) ? end : part->guard;
-        reach = (leaving > ZERO) ? later : PEN_REAL_MAX;
+        reach = (leaving > ZERO) ? ((end > part->guard) ? end : part->guard) : PEN_REAL_MAX;
         y->x[i] = (value > ZERO) ? value : ZERO;
         s->x[i] = HALF * (least + most);
         s->error[i] = safe(false, HALF * (most - least), 4U);
@@ -229,9 +226,12 @@ void pen_cell(const pen_line_t *line, pen_real_t x, pen_real_t way, pen_cell_t *
 
     part->x = x;
     part->way = way;
-    part->guard = (FOUR * (PEN_REAL_EPSILON * pen_port_abs(x))) + PEN_REAL_MIN;
+    part->guard = ((pen_real_t)4 * (PEN_REAL_EPSILON * pen_port_abs(x))) + PEN_REAL_MIN;
     part->length = PEN_REAL_MAX;
     part->open = 0U;
+    for (size_t i = 0U; i < PEN_CELL_OPEN; i++) {
+        part->neuron[i] = 0U;
+    }
     h->x[0] = x;
     h->error[0] = ZERO;
     t->x[0] = ONE;

@@ -8,6 +8,7 @@ SUITES   := python-sil hidden-fixed hidden-fresh figures-check python-gen unit w
             python-diagnosis python-training python-exports symbols builds board gen-check cmock
 PYTHONS  := $(filter python-%,$(SUITES))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
+ALIKE    := $(filter-out mps2-an385 mps2-an386,$(MACHINES)) # same compiler as these two, same integer instructions as the second
 RUNTIME  := $(wildcard src/*.c)
 MODEL    := $(wildcard gen/nqvm/c/*.c)
 MODELS   := $(filter-out %_sets,$(patsubst gen/nqvm/c/%.h,%,$(wildcard gen/nqvm/c/*.h)))
@@ -37,7 +38,7 @@ BOARD.gcc   := $(wildcard port/host/*.c)
 BOARD.clang := $(BOARD.gcc)
 $(foreach m,$(MACHINES),$(eval BOARD.$m := $(wildcard port/cortex-m/*.c)))
 
-warnings: $(COMPILERS:%=warnings-%-float) $(COMPILERS:%=warnings-%-double) warnings-everything ## Every compiler, strict, must be content
+warnings: $(COMPILERS:%=warnings-%-float) $(patsubst %,warnings-%-double,$(filter-out $(ALIKE),$(COMPILERS))) warnings-everything ## Every compiler, strict, must be content
 
 REAL.float  :=
 REAL.double := -DPEN_REAL_DOUBLE -Wno-double-promotion
@@ -74,7 +75,7 @@ CC.mips     := clang-19 --target=mips-none-elf
 CC.ppc      := clang-19 --target=ppc32-none-elf
 CC.s390x    := s390x-linux-gnu-gcc -fexcess-precision=fast
 
-symbols: $(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),symbols-$c$l)) symbols-m0-O2 symbols-rv32-O2 $(CORES:%=symbols-%-Os) ## Library and model must need nothing from outside
+symbols: $(foreach c,$(filter-out $(ALIKE),$(COMPILERS)),$(foreach l,$(LEVELS),symbols-$c$l)) $(ALIKE:%=symbols-%-O2) symbols-m0-O2 symbols-rv32-O2 $(CORES:%=symbols-%-Os) ## Library and model must need nothing from outside
 
 # (1) compiler, (2) optimisation; the port for bare metal keeps gcc from calling memcpy, here it may try
 define symbols
@@ -145,12 +146,11 @@ $(foreach t,$(UNITS),$(eval NEEDS.$t := $(shell sed -n 's|.*needs: \(.*\) \*/.*|
 objects  = $(patsubst %.c,build/unit/$(1)/%.o,$(2))
 UNIT_CFLAGS := -std=c99 -g -Wall -Wextra -Werror $(INCLUDE) -Itest/unit -Ibuild/unity/src -include unity_config.h
 
-# Tests without arithmetic run on a core without and on one with FPU: the others execute the same instructions. Those: unit-long.
+# Tests without arithmetic run on a core without and on one with FPU: the others execute the same instructions. Those: cores-long.
 INTEGERS := $(filter test_pen_recover test_pen_saved test_pen_serial test_pen_set test_pen_set_staging test_pen_status test_pen_xcp% test_xcp_frame,$(UNITS))
-ALIKE    := $(filter-out mps2-an386,$(FPUS))
 UNIT_LONG := $(foreach v,$(ALIKE),$(INTEGERS:%=unit-$v-%))
-.PHONY: unit-long
-unit-long: $(UNIT_LONG) ## The C unit tests that `make unit` leaves out
+.PHONY: cores-long
+cores-long: $(UNIT_LONG) $(ALIKE:%=warnings-%-double) $(ALIKE:%=symbols-%-Os) $(ALIKE:%=symbols-%-O3) ## What suites leave out on cores that are like others
 unit: $(filter-out $(UNIT_LONG),$(foreach v,$(VARIANTS),$(UNITS:%=unit-$v-%)) $(foreach t,$(KERNELS),$(FPUS:%=unit-small-%-$t))) ## The C unit tests, on this machine and on the emulated ones
 
 build/unit/runner/%.c: test/unit/%.c build/setup/unity
@@ -217,7 +217,7 @@ $(PYTHONS): python-%: | $(READY)
 	@HYPOTHESIS_STORAGE_DIRECTORY=build/hypothesis OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q test/$* # one thread each: parts run side by side
 python-long: | $(READY) ## The Python tests of which `make test` takes a sample: the others
 	@PENODE_LONG=1 $(PYTHON) -m pytest -q test/gen/test_emit.py
-	@for part in sil tools exports; do OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q -m long test/$$part || exit; done
+	@for part in gen sil tools exports; do OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q -m long test/$$part || exit; done
 
 # -- hidden effects: a draw that never changes, and one that nobody has seen --------------------------------------------
 

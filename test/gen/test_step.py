@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 
 import models
 import numpy as np
 import pytest
+from samples import sample
 from scipy.integrate import solve_ivp
 
 import penode_gen
@@ -17,10 +19,14 @@ from penode_sil.targets import Sil
 
 ORDERS = {"euler": 1, "heun": 2, "rk4": 4, "ros1": 1, "ros2": 2}
 EXTRA = 0x10  # PEN_OUTSIDE
+INPUTS = {"cubic": 3, "parabola": 2, "linear": 1, "held": 0}  # how many samples before count
+SPAN = list(itertools.product(ORDERS, INPUTS))
+SOME = [case for k, case in enumerate(SPAN) if (k // 4 + k) % 2 == 0]  # of each method two inputs, by turns
+WIDE = list(itertools.product(ORDERS, INPUTS, ["extrapolate", "clamp", "fade"]))
+FEW = [case for k, case in enumerate(WIDE) if (k // 12 + k // 3 + k) % 3 == 0]  # of each method each input, in one of three
 
 
-@pytest.mark.parametrize("input", ["cubic", "parabola", "linear", "held"])
-@pytest.mark.parametrize("method", ORDERS)
+@pytest.mark.parametrize("method, input", sample(SPAN, *SOME))
 def test_order_of_convergence(tmp_path, method, input, show):
     """Halving the sample time divides the error by 2^order. The inputs are cubics, parabolas, straight lines or constant,
     so that sampling them loses nothing; the reference is the model's equations by hand, integrated by SciPy to 1e-12. The
@@ -107,14 +113,12 @@ def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: int) -> 
     return parts
 
 
-@pytest.mark.parametrize("outside", ["extrapolate", "clamp", "fade"])
-@pytest.mark.parametrize("input, moving", [("held", 0), ("linear", 1), ("parabola", 2), ("cubic", 3)])
-@pytest.mark.parametrize("method", ORDERS)
-def test_step_jacobian_against_differences(tmp_path, method, input, moving, outside):
+@pytest.mark.parametrize("method, input, outside", sample(WIDE, *FEW))
+def test_step_jacobian_against_differences(tmp_path, method, input, outside):
     """Central differences of the discrete step in double, at random states inside, on and outside of the envelope, behind one
     to three samples."""
     model = penode_gen.load(models.rich(tmp_path, method, 5e-3, input, outside, substeps=2, low=-0.3, high=0.3))
-    sil, draw = Sil(model, np.float64), np.random.default_rng(11)
+    sil, draw, moving = Sil(model, np.float64), np.random.default_rng(11), INPUTS[input]
     n_x, n_u, n_y = 3, 2, 2
     size = n_x * n_x + max(moving + 1, 2) * n_x * n_u + n_y * n_x + n_y * n_u * (1 + moving)
 

@@ -9,6 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import test_folder
+from samples import sample
 from test_diagnosis import MODEL, drive, record, road
 
 import penode_gen
@@ -91,9 +93,28 @@ def test_a_law_is_absorbed_by_the_network_beside_it(tmp_path):
         assert gain.after_rmse - gain.noise_floor < 0.2 * (gain.before_rmse - gain.noise_floor), name
 
 
-def test_what_has_no_name_is_taken_by_a_network_without_one(tmp_path):
+def moved(tmp_path, force):
+    """The same of spring and damper alone, which are moved from rest by twelve harmonics."""
+    (tmp_path / "rig.toml").write_text(test_folder.MODEL)
+    model, paths = penode_gen.load(tmp_path / "rig.toml"), []
+    for seed in (1, 2):
+        path = test_folder.record(tmp_path / f"{seed}.csv", seed, 0.0)
+        t, x, f = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
+        columns = np.stack([t, x, f + force(x, np.gradient(x, t))], axis=1)
+        np.savetxt(path, columns, delimiter=",", header="time [s],x [m],force [N]", comments="", fmt="%.9g")
+        paths.append(path)
+    train, holdout = (load([path], model) for path in paths)
+    return model, diagnosis.diagnose(model, train, holdout, tmp_path / "found")
+
+
+@pytest.mark.parametrize("vehicle", sample([False, True], False))
+def test_what_has_no_name_is_taken_by_a_network_without_one(tmp_path, vehicle):
     """Damping that depends on the deflection is on no list."""
-    _, found = diagnosed(tmp_path, MODEL, lambda s, v: 2500.0 * np.tanh((s / 0.006) ** 2) * v)
+
+    def force(s, v):
+        return 2500.0 * np.tanh((s / 0.006) ** 2) * v
+
+    _, found = diagnosed(tmp_path, MODEL, force) if vehicle else moved(tmp_path, force)
     assert (found.verdict, [c.kind for c in found.causes]) == ("unexplained", ["outside_taxonomy"])
     assert "nameless_k1*tanh(" in (tmp_path / "found" / "model_extended.toml").read_text()
     assert any("has no name" in note for note in found.notes)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples import sample
 
 from penode_sil.cli import main
 from penode_sil.diagnosis import folder, table
@@ -143,7 +144,7 @@ def dying(one: Job) -> folder.Answer:
     return {"verdict": "no_discrepancy", "causes": [], "gain": {}, "seconds": 0.0}, ""
 
 
-@pytest.mark.parametrize("where", ["processes", "cluster"])
+@pytest.mark.parametrize("where", sample(["processes", "cluster"], "processes"))
 def test_a_process_that_dies_takes_only_its_recording_along(place, tmp_path, monkeypatch, where, request):
     monkeypatch.setattr(folder, "attempt", dying)
     scheduler = ""

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import HERE
+from samples import sample
 from test_targets import BOARDS, HARD_FLOAT, need
 
 import penode_gen
@@ -45,7 +46,7 @@ def test_step_follows_the_reference(model, dtype):
     assert np.max(np.abs(run.z - exact.z)) < 2e-3 * 10  # log(level) at 0.1 m
 
 
-@pytest.mark.parametrize("machine", BOARDS)
+@pytest.mark.parametrize("machine", sample(BOARDS, "m3", "m4f"))
 def test_boards_have_the_bits_of_the_host(model, machine):
     need("gcc", "qemu-system-arm", "arm-none-eabi-gcc")
     u = drive(400)

@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 
 import numpy as np
 import pytest
@@ -62,13 +63,18 @@ def every_call(model):
     return u, calls
 
 
+@cache
+def every_call_on(machine, name):
+    """Host and target through every call; emulated once for bits and for cost."""
+    nqvm = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml")
+    return Sil(nqvm).run(*every_call(nqvm)), Pil(nqvm, machine).run(*every_call(nqvm))
+
+
 @pytest.mark.parametrize("name", ["nqvm", "nqvm_folded"])
 @pytest.mark.parametrize("machine", list(MACHINES))
 def test_sil_and_pil_agree_to_the_bit_in_every_sample(name, machine):
     need("gcc", *(["qemu-system-arm", "arm-none-eabi-gcc"] if MACHINES[machine] else []))
-    nqvm = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml")
-    u, calls = every_call(nqvm)
-    sil, pil = Sil(nqvm).run(u, calls), Pil(nqvm, machine).run(u, calls)
+    sil, pil = every_call_on(machine, name)
     for name in ("x", "y", "z", "status"):
         assert getattr(sil, name).tobytes() == getattr(pil, name).tobytes(), name
     assert [status for _, status in sil.calls] == [status for _, status in pil.calls]
@@ -96,9 +102,7 @@ def test_steps_are_the_same_everywhere(name, monkeypatch, show):
 def test_every_step_costs_the_same(name, machine, show):
     """Held, bad, adopting and normal steps, any input: one number, because no branch depends on data."""
     need("qemu-system-arm", "arm-none-eabi-gcc")
-    nqvm = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml")
-    u, calls = every_call(nqvm)
-    run = Pil(nqvm, machine).run(u, calls)
+    run = every_call_on(machine, name)[1]
     show(
         f"{machine}: "
         + ", ".join(f"{kind} step {c.least}..{c.most} instructions" for kind, c in run.cost.items())

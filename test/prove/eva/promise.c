@@ -16,15 +16,18 @@
 
 extern volatile uint32_t any; /* each read gives any number */
 
-#define WIDTH   5U /* one neuron more than are tried on and off */
-#define NEURONS 5U
+#define WIDTH   21U /* blocks of 16, 4 and 1 rows; more neurons than are tried on and off */
+#define NEURONS 21U
+#define BENT    3U /* neurons of a network that ends in one */
 
 volatile pen_real_t seen; /* results go here: nothing is left out */
 
 static const pen_layer_t layer[] = {
     { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, WIDTH }, { PEN_LAYER_DENSE, WIDTH, 1U }, { PEN_LAYER_RESCALE, 1U, 1U },
 };
-static const pen_layer_t bent[] = { { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U } };
+static const pen_layer_t bent[] = {
+    { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U },
+};
 
 static void fill(void *at, size_t bytes)
 {
@@ -46,16 +49,16 @@ static void check(const pen_chain_t *chain, const pen_real_t p[], pen_real_t wor
 void promises(void)
 {
     static const pen_chain_t straight = { layer, 4U, WIDTH, NEURONS };
-    static const pen_chain_t ends_bent = { bent, 3U, 1U, 2U };
-    static pen_real_t p[2U + 2U + 10U + 6U + 2U];
-    static pen_real_t q[2U + 2U + 2U + 2U];
+    static const pen_chain_t ends_bent = { bent, 5U, 1U, BENT };
+    static pen_real_t p[2U + 2U + (2U * WIDTH) + (WIDTH + 1U) + 2U];
+    static pen_real_t q[2U + 2U + 2U + 2U + 2U + 2U];
     static pen_real_t work[8U * WIDTH];
     static bool active[NEURONS];
 
     fill(p, sizeof p);
     fill(q, sizeof q);
     check(&straight, p, work, active);
-    check(&ends_bent, q, &work[8U * (WIDTH - 1U)], &active[NEURONS - 2U]);
+    check(&ends_bent, q, &work[8U * (WIDTH - 1U)], &active[NEURONS - BENT]);
 }
 
 void trial(void)

@@ -16,6 +16,7 @@
 #include "penode/pen_math.h"
 #include "penode/pen_net.h"
 #include "penode/pen_net16.h"
+#include "penode/pen_selftest.h"
 #include "penode/pen_serial.h"
 #include "penode/pen_set.h"
 #include "penode/pen_solve.h"
@@ -257,6 +258,13 @@ void serial(void)
     seen = (pen_real_t)pen_status_times(&report, any);
 }
 
+void selftest(void)
+{
+    seen = (pen_real_t)pen_selftest_of(any);
+    fill_all();
+    seen = (pen_real_t)pen_selftest_hash(any, WIDE, x);
+}
+
 void runtime(void)
 {
     all_layers();
@@ -267,4 +275,5 @@ void runtime(void)
     folding();
     sets();
     serial();
+    selftest();
 }
