@@ -64,6 +64,7 @@ train: setup ## From a recording to a running controller: record, train, check o
 
 campaign-train: setup ## Train on recordings of plants that are known, five seeds each: the table of test/training/CAMPAIGN.md, half an hour
 	$(Q)$(PYTHON) test/training/campaign.py --page test/training/CAMPAIGN.md
+	$(Q)$(PYTHON) test/training/campaign_more.py --page test/training/CAMPAIGN.md
 
 hidden-mechanisms: setup ## Half-cars with pitch and two-mass drives with something hidden: places, missing forces, nulls; 20 cases of each, minutes
 	$(Q)$(PYTHON) test/diagnosis/mechanisms_campaign.py --cases 20

@@ -56,7 +56,8 @@ def limits_of(problem: Problem, bounds: Sequence[Callable[[Curve], Limits]]) -> 
 def rescaled(problem: Problem, point: Point, seen: Sequence[Array], ports: Sequence[Port]) -> Problem:
     """The problem with the size of each network's force as it is now, and at least a hundredth of the largest."""
     spans = np.array([float(np.ptp(s(inputs_of(p, seen) if p.knots == 0 else inputs_of(p, seen)[:, 0]))) for s, p in zip(point.shapes, ports)])
-    return problem.with_(scale=np.maximum(spans, max(1e-2 * float(spans.max(initial=0.0)), 1e-9)))
+    apart = tuple(a.visited(inputs_of(ports[a.shape], seen)[:, 0]) for a in problem.apart)
+    return problem.with_(scale=np.maximum(spans, max(1e-2 * float(spans.max(initial=0.0)), 1e-9)), apart=apart)
 
 
 def renoised(problem: Problem, point: Point) -> Problem:
