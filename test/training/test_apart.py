@@ -36,6 +36,11 @@ def test_row_measures_the_part_along_the_sensitivity() -> None:
     assert abs(pair.row(even) @ even.theta) < 1e-10
     both = Curve(knots, 3.0 * knots + even.values, 20)
     assert abs(pair.row(both) @ both.theta - 3.0 * np.sqrt(np.mean(x**2))) < 1e-10
+    many = np.concatenate([np.linspace(-1.0, 1.0, 15_001), np.full(3_000, 0.5)])  # groups of 17 and of 18: each sample counts once
+    line = Curve(knots, 3.0 * knots, 20)
+    # a group of up to 18 samples is replaced by its mean, which loses its own variance
+    lost = (18 * 2.0 / 15_000) ** 2 / 12.0 / np.mean(many**2)
+    assert abs(pair.visited(many).row(line) @ line.theta / (3.0 * np.sqrt(np.mean(many**2))) - 1.0) < lost
 
 
 def test_damping_beside_a_network_is_within_its_interval(tmp_path: Path) -> None:

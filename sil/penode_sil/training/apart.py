@@ -22,17 +22,15 @@ from penode_gen.causalise import causalise
 from penode_gen.model import Model
 
 from .curve import Curve
+from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-GROUPS = 1000  # of samples, by which a range is known: curves have some forty pieces
-PLACES = 7  # random states at which two functions are compared
-CLOSE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Apart:
     """A network (its index among the shapes) and a parameter beside it, whose `sensitivity` is a function of the network's input; `x` [n]:
-    where the network has been, means of groups of equal size; `g` [n]: mean sensitivity of each."""
+    where the network has been, means of groups of samples; `g` [n]: the sum of the sensitivities of each group, over `size`."""
 
     shape: int
     network: str
@@ -40,15 +38,18 @@ class Apart:
     sensitivity: Callable[[Array], Array]
     x: Array
     g: Array
+    size: float
 
     def visited(self, x: Array) -> Apart:
         """The same over another visited range."""
-        groups = np.array_split(np.sort(x), min(len(x), GROUPS))
-        return replace(self, x=np.array([part.mean() for part in groups]), g=np.array([self.sensitivity(part).mean() for part in groups]))
+        groups = np.array_split(np.sort(x), min(len(x), 5 * SETTINGS.story_across))
+        g = [self.sensitivity(part) for part in groups]
+        size = float(np.sqrt(sum(float(part @ part) for part in g) * len(x)))
+        return replace(self, x=np.array([part.mean() for part in groups]), g=np.array([part.sum() for part in g]), size=max(size, 1e-300))
 
     def row(self, curve: Curve) -> Array:
         """The part of a curve along the sensitivity, as RMS force by its free values [columns]."""
-        return curve.hats(self.x).T @ self.g / max(float(np.sqrt(np.sum(self.g**2) * len(self.g))), 1e-300)
+        return curve.hats(self.x).T @ self.g / self.size
 
 
 def find(model: Model, free: Sequence[str], networks: Sequence[str]) -> tuple[Apart, ...]:
@@ -76,8 +77,8 @@ def find(model: Model, free: Sequence[str], networks: Sequence[str]) -> tuple[Ap
                 continue
             sensitivity = _along(g.xreplace(numbers), arguments[0].xreplace(numbers), [*causal.states, *causal.inputs, *causal.input_rates])
             if sensitivity is not None:
-                at = np.linspace(-1.0, 1.0, 201)
-                found.append(Apart(networks.index(name), name, parameter, sensitivity, at, sensitivity(at)))
+                begun = Apart(networks.index(name), name, parameter, sensitivity, np.zeros(0), np.zeros(0), 1.0)
+                found.append(begun.visited(np.linspace(-1.0, 1.0, SETTINGS.story_across)))
     return tuple(found)
 
 
@@ -106,7 +107,8 @@ def _along(g: sp.Expr, argument: sp.Expr, symbols: Sequence[sp.Symbol]) -> Calla
         at = (np.asarray(x, dtype=float)[:, None] - rest) * way / (way @ way)
         return np.broadcast_to(np.asarray(evaluate(*at.T), dtype=float), len(at)).copy()
 
-    places = np.random.default_rng(0).normal(size=(PLACES, len(way)))
-    expected, given = np.broadcast_to(evaluate(*places.T), PLACES), found(places @ way + rest)
-    same = np.allclose(expected, given, rtol=CLOSE, atol=CLOSE * max(float(np.max(np.abs(given))), 1e-300))
+    places = np.random.default_rng(0).normal(size=(3 + 2 * len(way), len(way)))
+    given = found(places @ way + rest)
+    close = 1e-9  # functions that differ do so by more than rounding at random states
+    same = np.allclose(np.broadcast_to(evaluate(*places.T), len(places)), given, rtol=close, atol=close * max(float(np.max(np.abs(given))), 1e-300))
     return found if same else None
