@@ -4,7 +4,7 @@
 
 Where a network could do all that a parameter does (a damping, and a network of the same rate between the same ends), recordings show
 their sum only. So the network is held orthogonal to the parameter's sensitivity over the visited range: sum of N(x) g(x) = 0 with
-g = (d rates / d parameter) / (d rates / d N). The parameter is then the least-squares one of the whole force, and stays what its name says.
+g = (d f / d parameter) / (d f / d N), f all rates and signals. The parameter is then the least-squares one of the whole force, and stays what its name says.
 Parameters that a network cannot stand for (a mass, a stiffness beside a network of the rate) are left to the recordings.
 """
 
@@ -57,14 +57,15 @@ def find(model: Model, free: Sequence[str], networks: Sequence[str]) -> tuple[Ap
     causal = causalise(model)
     swap: dict[sp.Basic, sp.Basic] = {ex.derivative(q.name): v for q, v in causal.kinematics.items()}
     calls: list[tuple[str, sp.Symbol, tuple[sp.Expr, ...]]] = []
-    for step in causal.needed(causal.rates):
+    shown = (*causal.rates, *causal.sensors, *causal.outputs)
+    for step in causal.needed(shown):
         if step.network:
             value = sp.Symbol(f"N{len(calls)}", real=True)
             calls.append((step.network, value, tuple(a.xreplace(swap) for a in step.arguments)))
             swap[step.target] = value
         else:
             swap[step.target] = step.value.xreplace(swap)
-    rates = [r.xreplace(swap) for r in causal.rates]
+    rates = [r.xreplace(swap) for r in shown]
     numbers = {ex.symbol(n): p.value for n, p in model.parameters.items()}
     found = []
     for name, value, arguments in calls:

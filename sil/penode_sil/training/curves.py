@@ -57,6 +57,9 @@ def rescaled(problem: Problem, point: Point, seen: Sequence[Array], ports: Seque
     """The problem with the size of each network's force as it is now, and at least a hundredth of the largest."""
     spans = np.array([float(np.ptp(s(inputs_of(p, seen) if p.knots == 0 else inputs_of(p, seen)[:, 0]))) for s, p in zip(point.shapes, ports)])
     apart = tuple(a.visited(inputs_of(ports[a.shape], seen)[:, 0]) for a in problem.apart)
+    values = dict(zip(problem.model.parameters, problem.parameters(point)))
+    for a in apart:  # a network that takes only what a parameter cannot has no slopes of its own at first: it is measured by the parameter
+        spans[a.shape] = max(spans[a.shape], float(np.ptp(values[a.parameter] * a.sensitivity(a.x))))
     return problem.with_(scale=np.maximum(spans, max(1e-2 * float(spans.max(initial=0.0)), 1e-9)), apart=apart)
 
 
@@ -107,7 +110,8 @@ def train(
 def lines(problem: Problem, shapes: Sequence[Curve], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
     """Parameters, start states and two slopes of each network from the first seconds: everything later leans on it."""
     samples = max(int(SETTINGS.curves_short / problem.model.sample_time), 100)
-    short = problem.with_(records=tuple(r.first(samples) for r in problem.records))
+    free = np.full(len(problem.scale), 1e6)  # slopes are free, in the units of the model: how large forces are is not known yet
+    short = problem.with_(records=tuple(r.first(samples) for r in problem.records), scale=free)
     point = short.begin(shapes)
     for _ in range(3):  # measured by what lines leave, not by noise: or the priors would count for nothing
         short = renoised(short, point)
