@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import data, unknown
-from .curve import Curve, fewer, spaced, three
+from .curve import Curve, bent, fewer, spaced, three
 from .port import Port, inputs_of
 from .problem import Point, Problem
 from .solve import NONE, Fit, Limits, solve
@@ -136,7 +136,8 @@ def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callab
         if shape.zero >= 0:
             own = np.insert(np.insert(own, shape.zero, 0.0, axis=0), shape.zero, 0.0, axis=1)
         regular = np.isin(shape.knots, grid_.knots)
-        shapes.append(shape.on(shape.knots[fewer(shape.knots, shape.values, own, port.knots, regular, shape.zero)]))
+        want = fewer(shape.knots, shape.values, own, port.knots, regular, shape.zero) if bent(shape.knots, shape.values, own, regular) else regular
+        shapes.append(shape.on(shape.knots[want]))
     return problem, Point(fit.point.ratios, fit.point.starts, tuple(shapes))
 
 
