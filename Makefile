@@ -62,8 +62,12 @@ train: setup ## From a recording to a running controller: record, train, check o
 	$(Q)cmp build/train/sil.csv build/train/pil.csv
 	@echo "host and Cortex-M4F agree to the bit; the picture is build/train/adopted.png, the report build/train/trained/report.html"
 
+onnx-table: setup ## Which operators of ONNX are read, by the cases of its own project; why others are refused
+	$(Q)$(PYTHON) test/gen/onnx_table.py
+
 campaign-train: setup ## Train on recordings of plants that are known, five seeds each: the table of test/training/CAMPAIGN.md, half an hour
 	$(Q)$(PYTHON) test/training/campaign.py --page test/training/CAMPAIGN.md
+	$(Q)$(PYTHON) test/training/campaign_more.py --page test/training/CAMPAIGN.md
 
 hidden-mechanisms: setup ## Half-cars with pitch and two-mass drives with something hidden: places, missing forces, nulls; 20 cases of each, minutes
 	$(Q)$(PYTHON) test/diagnosis/mechanisms_campaign.py --cases 20
@@ -85,7 +89,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train rigs hidden-mechanisms dist structure clean
+.PHONY: help setup run test prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table rigs hidden-mechanisms dist structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

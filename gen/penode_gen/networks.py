@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Feed-forward networks as plain data, read from ONNX files or from the JSON form of a published case study."""
+"""Feed-forward networks as plain data; network_files reads them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -140,16 +139,6 @@ class Network:
         if h.ndim == 0 or h.shape[-1] != self.n_inputs:
             raise ValueError(f"{self.source}: inputs have the shape {h.shape}; the last axis must be {self.n_inputs}")
         return h
-
-
-def read_network(path: Path) -> Network:
-    """The network in an .onnx or .json file; raises NetworkError for everything that is not one we can run."""
-    from . import read_json, read_onnx  # they need the classes above
-
-    readers = {".onnx": read_onnx.read_onnx, ".json": read_json.read_json}
-    if path.suffix.lower() not in readers:
-        raise NetworkError(f"{path}: unknown suffix '{path.suffix}'; a network is an .onnx or a .json file")
-    return readers[path.suffix.lower()](path)
 
 
 def layer_value(layer: Layer, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,7 +14,8 @@ from . import expressions as ex
 from . import model as m
 from . import promises, units
 from .fold import foldable, pieces, room
-from .networks import Network, NetworkError, read_network
+from .network_files import read_network
+from .networks import Network, NetworkError
 from .read_places import show
 from .read_tables import Tables
 from .sets import network_pieces

@@ -5,7 +5,7 @@ Networks from ONNX files, as training tools write them.
 
 The graph must be one chain from its only input [batch, n] or [n] to its only output. Dense layers come as Gemm or as
 MatMul and Add, scaling as Sub, Div, Mul, Add, Neg with constants or as Scaler; operators that only rename, reshape or
-convert are checked and dropped. Two patterns that are no chain are known: the Softplus of PyTorch
+convert are checked and dropped; onnx_rewrites turns others into such. Two patterns that are no chain are known: the Softplus of PyTorch
 (Where(Greater(x, 20), x, Softplus(x))) and the unit step (a comparison, then Cast or Where(., 1, 0)).
 The layers follow from the operators alone, not from the numbers, so sets trained on one architecture stay exchangeable.
 """
@@ -23,8 +23,8 @@ from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 
+from . import onnx_rewrites
 from .networks import Affine, Dense, Layer, Network, NetworkError, Vector
-
 Shape = tuple[int, ...]
 
 _ACTIVATIONS = {"Relu": "relu", "Tanh": "tanh", "Sigmoid": "sigmoid", "Softplus": "softplus"}
@@ -43,7 +43,7 @@ _SIMPLIFY = "simplify or rewrite the graph before the export"
 
 def read_onnx(path: Path) -> Network:
     """The network in the file; weights may lie in a second file beside it. Raises NetworkError."""
-    return _Reader(path, _load(path)).network()
+    return onnx_rewrites.read(path, _load(path), lambda model: _Reader(path, model).network())
 
 
 def _load(path: Path) -> onnx.ModelProto:

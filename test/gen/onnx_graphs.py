@@ -13,7 +13,8 @@ import pytest
 from numpy.typing import NDArray
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 from onnx.reference import ReferenceEvaluator
-from penode_gen.networks import Network, NetworkError, read_network
+from penode_gen.network_files import read_network
+from penode_gen.networks import Network, NetworkError
 
 FLOAT, DOUBLE = TensorProto.FLOAT, TensorProto.DOUBLE
 RNG = np.random.default_rng(0)

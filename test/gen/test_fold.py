@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 import penode_gen
 from penode_gen import fold
-from penode_gen.networks import Affine, Dense, Network, read_network
+from penode_gen.network_files import read_network
+from penode_gen.networks import Affine, Dense, Network
 from penode_sil.status import BIT
 from penode_sil.targets import Sil
 

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from penode_gen.networks import ACTIVATIONS, Affine, Dense, Network, NetworkError, read_network
+from penode_gen.network_files import read_network
+from penode_gen.networks import ACTIVATIONS, Affine, Dense, Network, NetworkError
 
 SHARED = Path(os.environ.get("PENODE_SHARED", Path(__file__).resolve().parents[3] / "shared"))
 PUBLISHED = SHARED / "nqvm-published"

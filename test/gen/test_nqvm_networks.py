@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 from onnx import numpy_helper
 from onnx.reference import ReferenceEvaluator
-from penode_gen.networks import read_network
+from penode_gen.network_files import read_network
 
 NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm"
 Law = Callable[[float], float]

@@ -17,7 +17,8 @@ from onnx.reference import ReferenceEvaluator
 from onnx_graphs import (
     B1, B2, DOUBLE, FACTOR, FLOAT, MLP, MLP_CONSTANTS, RNG, SHIFT, W1, W2, Constants, model, node, refused, same, save,
 )  # fmt: skip
-from penode_gen.networks import Affine, Dense, NetworkError, read_network
+from penode_gen.network_files import read_network
+from penode_gen.networks import Affine, Dense, NetworkError
 
 # ---- dense layers ----
 

@@ -14,19 +14,22 @@ import pytest
 from numpy.typing import NDArray
 from onnx import ModelProto, numpy_helper
 from onnx.backend.test.case.node import collect_testcases
-from penode_gen.networks import Network, NetworkError, read_network
+from penode_gen.network_files import read_network
+from penode_gen.networks import Network, NetworkError
 
 DATA = Path(onnx.__file__).parent / "backend" / "test" / "data"
 
 # Cases with a float input of one or two axes whose other inputs, made constant, leave one chain. Refused with reason:
 # a bias for each row of the batch (gemm_default_matrix_bias), a transposed signal, more than two axes, integers, a
-# graph that only copies.
+# graph that only copies, limits of Clip that depend on nothing else but cross each other.
 NODE_CASES = """
     test_gemm_default_zero_bias test_gemm_default_no_bias test_gemm_default_scalar_bias test_gemm_transposeB
     test_gemm_default_single_elem_vector_bias test_gemm_default_vector_bias test_gemm_alpha test_gemm_beta
     test_matmul_2d test_matmul_1d_1d
     test_sigmoid_example test_softplus_example test_tanh_example
     test_sub_example test_mul_example test_div_example test_neg_example
+    test_clip_example test_clip_inbounds test_clip_outbounds test_clip_splitbounds test_leakyrelu_example
+    test_max_float32 test_max_float64 test_max_two_inputs test_min_float32 test_min_float64 test_min_two_inputs
 """.split()
 PYTORCH_CASES = """
     test_Linear test_Linear_no_bias test_Softplus

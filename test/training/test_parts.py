@@ -114,6 +114,15 @@ def test_knots_that_matter_stay() -> None:
     assert chosen[True] < 20 < chosen[False]
 
 
+def test_regular_knots_stay_unless_data_speak() -> None:
+    """Wald's test of 20 middles: noise alone does not pass it, a kink in one of ten deviations does."""
+    knots, regular = np.linspace(-1.0, 1.0, 41), np.arange(41) % 2 == 0
+    draws = [np.random.default_rng(k).normal(0.0, 1.0, 41) for k in range(50)]
+    assert sum(curve.bent(knots, d, np.eye(41), regular) for d in draws) <= 2  # 0.4 % of them on average
+    kink = np.where(np.arange(41) == 7, 10.0 * np.sqrt(1.5), 0.0)
+    assert all(curve.bent(knots, d + kink, np.eye(41), regular) for d in draws)
+
+
 def test_sag_of_a_smooth_curve_is_in_its_band() -> None:
     """A parabola a x^2 between knots h apart sags by a h^2 / 4 in the middle of each piece; on a straight line next to nothing."""
     knots = np.linspace(-1.0, 1.0, 11)

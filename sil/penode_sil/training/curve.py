@@ -95,6 +95,19 @@ def spaced(low: float, high: float, count: int, power: float) -> Array:
     return np.concatenate([below, [0.0], above])
 
 
+def bent(knots: Array, values: Array, spread: Array, regular: NDArray[np.bool_]) -> bool:
+    """Do data say at all that a curve is more than one of its regular knots? Wald's test of all others together, at three deviations: each may
+    look wanted by itself, and for each a regular knot goes, whose loss moves the constant that two curves share."""
+    at = np.flatnonzero(~regular)
+    t = (knots[at] - knots[at - 1]) / (knots[at + 1] - knots[at - 1])
+    rows = np.zeros((len(at), len(knots)))
+    rows[np.arange(len(at)), at - 1], rows[np.arange(len(at)), at], rows[np.arange(len(at)), at + 1] = t - 1.0, 1.0, -t
+    away, variance = rows @ values, rows @ spread @ rows.T
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(variance), 1e-300))
+    chi2 = float((away * scale) @ np.linalg.solve(variance * np.outer(scale, scale) + 1e-9 * np.eye(len(at)), away * scale))
+    return chi2 > len(at) + 3.0 * np.sqrt(2.0 * len(at))
+
+
 def fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArray[np.bool_], zero: int) -> NDArray[np.bool_]:
     """Which `count` knots to keep: those are dropped, one by one, that cost least; `spread` is the covariance of the values at all knots.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import data, unknown
-from .curve import Curve, fewer, spaced, three
+from .curve import Curve, bent, fewer, spaced, three
 from .port import Port, inputs_of
 from .problem import Point, Problem
 from .solve import NONE, Fit, Limits, solve
@@ -56,7 +56,11 @@ def limits_of(problem: Problem, bounds: Sequence[Callable[[Curve], Limits]]) -> 
 def rescaled(problem: Problem, point: Point, seen: Sequence[Array], ports: Sequence[Port]) -> Problem:
     """The problem with the size of each network's force as it is now, and at least a hundredth of the largest."""
     spans = np.array([float(np.ptp(s(inputs_of(p, seen) if p.knots == 0 else inputs_of(p, seen)[:, 0]))) for s, p in zip(point.shapes, ports)])
-    return problem.with_(scale=np.maximum(spans, max(1e-2 * float(spans.max(initial=0.0)), 1e-9)))
+    apart = tuple(a.visited(inputs_of(ports[a.shape], seen)[:, 0]) for a in problem.apart)
+    values = dict(zip(problem.model.parameters, problem.parameters(point)))
+    for a in apart:  # a network that takes only what a parameter cannot has no slopes of its own at first: it is measured by the parameter
+        spans[a.shape] = max(spans[a.shape], float(np.ptp(values[a.parameter] * a.sensitivity(a.x))))
+    return problem.with_(scale=np.maximum(spans, max(1e-2 * float(spans.max(initial=0.0)), 1e-9)), apart=apart)
 
 
 def renoised(problem: Problem, point: Point) -> Problem:
@@ -106,7 +110,8 @@ def train(
 def lines(problem: Problem, shapes: Sequence[Curve], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
     """Parameters, start states and two slopes of each network from the first seconds: everything later leans on it."""
     samples = max(int(SETTINGS.curves_short / problem.model.sample_time), 100)
-    short = problem.with_(records=tuple(r.first(samples) for r in problem.records))
+    free = np.full(len(problem.scale), 1e6)  # slopes are free, in the units of the model: how large forces are is not known yet
+    short = problem.with_(records=tuple(r.first(samples) for r in problem.records), scale=free)
     point = short.begin(shapes)
     for _ in range(3):  # measured by what lines leave, not by noise: or the priors would count for nothing
         short = renoised(short, point)
@@ -131,7 +136,8 @@ def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callab
         if shape.zero >= 0:
             own = np.insert(np.insert(own, shape.zero, 0.0, axis=0), shape.zero, 0.0, axis=1)
         regular = np.isin(shape.knots, grid_.knots)
-        shapes.append(shape.on(shape.knots[fewer(shape.knots, shape.values, own, port.knots, regular, shape.zero)]))
+        want = fewer(shape.knots, shape.values, own, port.knots, regular, shape.zero) if bent(shape.knots, shape.values, own, regular) else regular
+        shapes.append(shape.on(shape.knots[want]))
     return problem, Point(fit.point.ratios, fit.point.starts, tuple(shapes))
 
 

@@ -46,7 +46,7 @@ def record(model: Model, m: Measured, signals: Sequence[str]) -> Record:
     n = len(m.time)
     y, good, noise = np.zeros((n, len(signals))), np.zeros((n, len(signals)), dtype=bool), np.full(len(signals), np.nan)
     for j, name in enumerate(signals):
-        if name in m.z:
+        if name in m.z and name not in signals[:j]:  # an output that is called as a sensor is the same rows
             y[:, j], good[:, j] = m.z[name], m.mask[name]
             y[~np.isfinite(y[:, j]), j] = 0.0
             found = m.quality.channels[name].noise

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 
 from penode_gen.model import Model
 
+from .apart import Apart
 from .curve import Curve
 from .data import Noise, Record
 from .dense import Dense
@@ -66,6 +67,7 @@ class Problem:
     held: frozenset[str] = frozenset()
     frozen: bool = False  # only start states move
     tied: Array | None = None  # [directions, free]: of the parameters, that no sensor sees; they stay where the model file has them
+    apart: tuple[Apart, ...] = ()  # networks beside free parameters in the same place
     model: Model = field(init=False)
 
     def __post_init__(self) -> None:
@@ -73,7 +75,7 @@ class Problem:
 
     def with_(self, **changes: object) -> Problem:
         """The same problem but for some of it."""
-        given = {k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied")}
+        given = {k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied", "apart")}
         return Problem(**(given | changes))  # type: ignore[arg-type]
 
     @property
@@ -176,8 +178,10 @@ class Problem:
             n_f = len(self.engine.free)
             first[:n_f, :n_f] += self.tied.T @ self.tied * SETTINGS.problem_tied**-2.0
         blocks = [first]
-        for shape, size in zip(point.shapes, self.scale):
+        for k, (shape, size) in enumerate(zip(point.shapes, self.scale)):
             blocks.append(self._of_shape(shape, size))
+            rows = [a.row(shape) / (SETTINGS.problem_tied * size) for a in self.apart if a.shape == k and isinstance(shape, Curve)]
+            blocks[-1] = blocks[-1] + sum((np.outer(r, r) for r in rows), np.zeros(blocks[-1].shape))
             origin += [0.0] * len(shape.theta)
         n = len(origin)
         matrix, at = np.zeros((n, n)), 0

@@ -21,7 +21,7 @@ from penode_gen.networks import Network
 
 from ..errors import UserError
 from ..measured import Measured
-from . import bands, begin, curves, data, dense, ends, judge, promised, unfold, unknown
+from . import apart, bands, begin, curves, data, dense, ends, judge, promised, unfold, unknown
 from .curve import Curve
 from .curves import Tell
 from .port import Port, inputs_of
@@ -54,7 +54,7 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
     ports = ports_of(model, engine)
     templates = [model.sets["default"].networks[p.name] for p in ports]
     records = tuple(data.record(model, m, engine.signals) for m in train_)
-    problem = Problem(engine, records, data.at_first(model, records, engine.signals), np.ones(len(ports)))
+    problem = Problem(engine, records, data.at_first(model, records, engine.signals), np.ones(len(ports)), apart=apart.find(model, engine.free, engine.networks))
     bounds = [promised.bound(model.networks[p.name].promises, size=1.0) for p in ports]
     try:
         if all(p.knots for p in ports):
@@ -210,6 +210,7 @@ def _judged(
     loud = [e.signal for e in training if any(s.name == e.signal and s.noise > 0.0 and e.after > SETTINGS.story_loud * s.noise for s in (*model.sensors, *model.outputs))]
     notes = [f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"] if loud else []
     notes += [f"{p}" for m in train_ for p in m.quality.problems]
+    notes += [f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, the network takes the rest" for a in problem.apart]
     if model.method not in ("euler", "heun", "rk4"):
         notes.append(f"the deployed method is {model.method}; networks were trained through rk4 with the same steps")
     sigma = {n: float(band.deviations[i]) * abs(model.parameters[n].value) for i, n in enumerate(problem.engine.free)}
