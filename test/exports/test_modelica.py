@@ -21,7 +21,8 @@ from conftest import chirp
 import penode_gen
 from penode_gen import exports
 from penode_gen.imports import ImportProblem, Options, modelica
-from penode_gen.networks import Affine, read_network
+from penode_gen.network_files import read_network
+from penode_gen.networks import Affine
 from penode_gen.write_json import to_json
 from penode_sil.targets import Sil
 
