@@ -24,7 +24,7 @@ from .evidence.screening import Probe
 from .fit import Free
 from .innovate import Z_95, Found
 from .noise import Experiment
-from .propose import SMALL, motions
+from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
 from .result import Cause, Named, Value, place
 from .terms import Term, Trial
@@ -38,13 +38,14 @@ RIVAL = 0.1  # posterior from which on an explanation is listed
 @dataclass(frozen=True, eq=False)
 class Answer:
     """Causes, notes on what is small, the sets of explanations that held-out blocks cannot tell apart with their posterior, and where
-    the search ended; `free` values of the free run that fits best."""
+    the search ended; the free `run` that fits best, and the share `taken` by it of what the free run of the file's own model leaves."""
 
     causes: tuple[Cause, ...]
     notes: tuple[str, ...]
     explanations: tuple[tuple[tuple[Named, ...], float], ...]
     found: Found
     run: Fit
+    taken: float
     model: Model
 
 
@@ -56,6 +57,8 @@ def answer(
     noise = sample_noise(records, np.array([s.noise for s in model.sensors]))
     bench = build(model, places, records, noise, fastest, set_name)
     log(f"corrected every {bench.update} samples; {bench.level.size:.3g} of what moves wanders, for {bench.level.tau:.3g} s")
+    still = Filter.none(*bench.fit.by.gain.shape)
+    alone = bench.problem().solve(bench.fit.free, still, FREE_RUN)
     found = innovate.search(bench, log)
     plain, after = found.plain, found.bench
     causes: list[Cause] = []
@@ -76,7 +79,9 @@ def answer(
     biased, remarks = _offsets(model, plain, Probe.of(plain))
     notes += more + remarks
     run = after.problem().solve(after.fit.free, Filter.none(*after.fit.by.gain.shape), 20)
-    return Answer((*wrong, *causes, *biased), tuple(notes), _explanations(named, probabilities), found, run, after.model)
+    powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
+    taken = 1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300)))
+    return Answer((*wrong, *causes, *biased), tuple(notes), _explanations(named, probabilities), found, run, taken, after.model)
 
 
 def _name(t: Term) -> tuple[str, str]:

@@ -87,7 +87,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, study.null.simulated))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
-    share = max(1.0 - powers[1] / powers[0], 0.0)
+    share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
     verdict = _verdict(found, causes, share, left)
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
