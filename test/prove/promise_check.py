@@ -29,14 +29,14 @@ LAYERS = {"dense": 0, "relu": 1, "centre": 2, "rescale": 3}
 # Faults: file, and the change of gate.faulty.
 FAULTS = {
     "no rounding errors": ("pen_cell", ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "ZERO")),
-    "the margin is eight times as wide": ("pen_cell", ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "(FOUR * PEN_REAL_EPSILON)")),
+    "the margin is eight times as wide": ("pen_cell", ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "((pen_real_t)4 * PEN_REAL_EPSILON)")),
     "a promise is not looked at": ("pen_promise", ("broken |= bounded ? 0U : PEN_PROMISE_MAX_SLOPE;", 0, "(void)bounded;")),
     "the outer pieces are not looked at": ("pen_promise", ("broken |= at_edge ? 0U :", 0, "broken |= (at_edge || endless) ? 0U :")),
     "one side only": ("pen_promise", ("broken = travel(&line, promise, start, -ONE, lowest, &looks, &at);", 0, "broken = 0U;")),
     "undecided neurons are off": ("pen_cell", ("(((pattern >> i) & 1U) != 0U)", 0, "false")),
     "undecided neurons are on or off at once": ("pen_cell", ("pattern < ((uint32_t)1U << part->open)", 0, "pattern < 1U")),
     "many undecided neurons are off": ("pen_cell", ("const pen_real_t most = (high > ZERO) ? high : ZERO;", 0, "const pen_real_t most = ZERO;")),
-    "a cell goes on past the kink": ("pen_cell", ("? ((size - error) / closing)", 0, "? (FOUR * ((size - error) / closing))")),
+    "a cell goes on past the kink": ("pen_cell", ("? ((size - error) / closing)", 0, "? ((pen_real_t)4 * ((size - error) / closing))")),
 }  # fmt: skip
 
 
