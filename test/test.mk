@@ -221,7 +221,7 @@ python-long: | $(READY) ## The Python tests of which `make test` takes a sample:
 
 # -- hidden effects: a draw that never changes, and one that nobody has seen --------------------------------------------
 
-HIDDEN := $(PYTHON) test/diagnosis/campaign.py --cases 9 --brief --gate --command "$(PENODE) diagnose"
+HIDDEN := $(PYTHON) test/diagnosis/campaign.py --cases 12 --brief --gate --command "$(PENODE) diagnose"
 
 hidden: hidden-fixed hidden-fresh ## The diagnosis has to find what recordings hide; a right program fails less than once in 1000 runs
 hidden-fixed: | $(READY)
