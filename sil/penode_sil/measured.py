@@ -84,7 +84,7 @@ class Measured:
         return f"{self.path.name}, part {self.part}" if self.part else self.path.name
 
 
-def told_of_rails(recordings: Sequence[Measured]) -> list[Measured]:
+def with_shared_rails(recordings: Sequence[Measured]) -> list[Measured]:
     """The recordings, with the rails that a sensor shows in one of them known in all: there they may be touched too rarely."""
     rails: dict[tuple[str, str], float] = {}
     for m in recordings:

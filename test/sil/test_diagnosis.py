@@ -759,7 +759,7 @@ def test_what_follows_late_is_an_echo(model, sound, lag):
     own = np.fft.rfft(e.y[:, [s.name for s in model.sensors].index("a_wheel")])
     push = np.fft.irfft(0.02 * M_W * (own * np.exp(-2j * np.pi * f * lag))[:, None] * response, len(e.time), axis=0)
     other = study.null_study(model, [replace(e, y=e.y + push)])
-    assert not echo.echo(one, one.null).heard and echo.echo(other, other.null).heard == (lag > 0.0)
+    assert not echo.echo(one, one.null).detected and echo.echo(other, other.null).detected == (lag > 0.0)
 
 
 @pytest.mark.parametrize("hiss, way", [(0.0, "cubic"), (2e-4, "linear")])

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 import penode_gen
 from penode_sil.errors import UserError
-from penode_sil.measured import load, told_of_rails
+from penode_sil.measured import load, with_shared_rails
 
 N = 8000
 T = np.round(np.arange(N) * 1e-3, 6)
@@ -170,7 +170,7 @@ def test_a_rail_is_known_in_all_recordings_of_a_sensor(record, oscillator):
     rarely[top] = 9.0
     recordings = [load([record(f"{name}.csv", z=z)], oscillator)[0] for name, z in (("long", np.minimum(Z, 9.0)), ("rarely", rarely), ("beyond", Z))]
     assert recordings[0].quality.channels["z"].high == pytest.approx(9e-3) and recordings[1].mask["z"].all()
-    long, short, beyond = told_of_rails(recordings)
+    long, short, beyond = with_shared_rails(recordings)
     assert np.array_equal(long.mask["z"], recordings[0].mask["z"]) and beyond.mask["z"].all()
     assert np.flatnonzero(~short.mask["z"]).tolist() == [top] and short.quality.channels["z"].saturated == 1
 

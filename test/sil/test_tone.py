@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from penode_sil.diagnosis.noise import HEARD, Experiment, Metric, Tone, tone
+from penode_sil.diagnosis.noise import DETECTED, Experiment, Metric, Tone, tone
 
 
 def recording(u: np.ndarray, y: np.ndarray, step: float) -> Experiment:
@@ -18,7 +18,7 @@ def recording(u: np.ndarray, y: np.ndarray, step: float) -> Experiment:
     return Experiment("", time, u[:, None], y, np.ones(y.shape, bool), u[:, None], u[:, None], nothing, nothing)
 
 
-def heard(u: np.ndarray, y: np.ndarray, step: float, power: np.ndarray | float = 1.0, model: np.ndarray | float = 0.0) -> Tone:
+def tone_in(u: np.ndarray, y: np.ndarray, step: float, power: np.ndarray | float = 1.0, model: np.ndarray | float = 0.0) -> Tone:
     """The tone of residuals y [n, n_z] beside motion of the model, where noise of the power [f] is expected."""
     sensors = y.shape[1]
     root = np.eye(sensors) / np.sqrt(np.broadcast_to(power, len(y) // 2 + 1))[:, None, None]
@@ -34,13 +34,13 @@ def road(draw: np.random.Generator, n: int) -> np.ndarray:
 @pytest.mark.parametrize("pole", [-0.5, 0.0, 0.9, 0.99])
 def test_noise_has_no_tone(rate, pole):
     """In 40 draws of each colour none is more likely a tone: the largest surprise is -4, and 0 if there is none above. By Markov's
-    bound one in exp(HEARD) is heard at the most."""
+    bound one in exp(DETECTED) is detected at the most."""
     draw = np.random.default_rng(rate)
     for _ in range(40):
         y = signal.lfilter([1.0], [1.0, -pole], draw.normal(size=(10 * rate, 2)), axis=0)
         if pole == 0.0:
             y = np.round(y)  # as coarse as the noise
-        assert heard(road(draw, len(y)), y, 1.0 / rate) == Tone()
+        assert tone_in(road(draw, len(y)), y, 1.0 / rate) == Tone()
 
 
 @pytest.mark.parametrize("swing, loud, seconds", [(0.0, 1.0, 12), (0.1, 1.0, 12), (0.1, 0.25, 30)])
@@ -49,15 +49,15 @@ def test_a_tone_is_found_though_its_frequency_wanders(swing, loud, seconds):
     draw, t = np.random.default_rng(3), np.arange(seconds * 1000) * 1e-3
     hum = loud * np.sin(2 * np.pi * 31.0 * t - 31.0 * swing / 0.07 * np.cos(2 * np.pi * 0.07 * t))
     y = draw.normal(size=(len(t), 2)) + np.column_stack([0.0 * t, hum])
-    found = heard(road(draw, len(t)), y, 1e-3)
-    assert found.heard and found.sensor == 1
+    found = tone_in(road(draw, len(t)), y, 1e-3)
+    assert found.detected and found.sensor == 1
     assert found.frequency == pytest.approx(31.0, rel=0.02 + swing)  # half a bin, and how far it wanders
 
 
 @pytest.mark.parametrize("step", [0.02, 0.2, 1.0, 10.0])
 def test_a_slow_raster_has_none(step):
     y = np.random.default_rng(5).normal(size=(2000, 1))
-    assert heard(y[:, 0], y, step) == Tone()
+    assert tone_in(y[:, 0], y, step) == Tone()
 
 
 @pytest.mark.parametrize("loud, seconds", [(0.35, 12), (0.15, 40)])
@@ -69,8 +69,8 @@ def test_a_faint_tone_that_stays_is_found(sweep, loud, seconds):
     y = draw.normal(size=(len(t), 2))
     y[:, 1] += loud * np.sin(2 * np.pi * 50.2 * t)
     y[:, 0] += sweep * (np.sin(3 * phase) + 0.3 * np.sin(5 * phase))
-    found = heard(np.sin(phase) if sweep else road(draw, len(t)), y, 1e-3)
-    assert found.heard and found.sensor == 1 and found.frequency == 50.0
+    found = tone_in(np.sin(phase) if sweep else road(draw, len(t)), y, 1e-3)
+    assert found.detected and found.sensor == 1 and found.frequency == 50.0
 
 
 @pytest.mark.parametrize("loud, alone", [(0.12, False), (0.2, True)])
@@ -78,9 +78,9 @@ def test_a_tone_that_three_sensors_have_is_found_sooner(loud, alone):
     """A part in 140 of the noise's power in each is too little for one sensor in 20 s, one in 50 is enough."""
     draw, t = np.random.default_rng(13), np.arange(20_000) * 1e-3
     y = draw.normal(size=(len(t), 3)) + loud * np.sin(2 * np.pi * 27.0 * t)[:, None]
-    assert heard(road(draw, len(t)), y[:, :1], 1e-3).heard == alone
-    found = heard(road(draw, len(t)), y, 1e-3)
-    assert found.heard and found.frequency == 27.0
+    assert tone_in(road(draw, len(t)), y[:, :1], 1e-3).detected == alone
+    found = tone_in(road(draw, len(t)), y, 1e-3)
+    assert found.detected and found.frequency == 27.0
 
 
 def test_noise_that_sensors_share_is_no_tone():
@@ -93,7 +93,7 @@ def test_noise_that_sensors_share_is_no_tone():
     power = np.abs(signal.freqz(b.ravel(), a, np.linspace(0.0, np.pi, len(t) // 2 + 1))[1]) ** 2
     root = np.linalg.inv(np.linalg.cholesky(power[:, None, None] + np.eye(2))).astype(complex)
     found = tone([recording(road(draw, len(t)), y, 1e-3)], [Metric(len(t), root)], [np.zeros_like(y)])
-    assert found.surprise < 0.6 * HEARD
+    assert found.surprise < 0.6 * DETECTED
 
 
 @pytest.mark.parametrize("damping, loud", [(0.08, 3.0), (0.04, 10.0)])
@@ -108,8 +108,8 @@ def test_a_resonance_is_none(known, damping, loud):
     y = draw.normal(size=(len(t), 1)) + shaken()
     response = signal.freqz(loud * mode[0].ravel(), mode[1], np.linspace(0.0, np.pi, len(t) // 2 + 1))[1]
     more = {"power": 1.0 + np.abs(response) ** 2} if known == "noise" else {"model": shaken()}
-    assert heard(road(draw, len(t)), y, 1e-3).heard, "what neither knows is a limit of it"
-    assert heard(road(draw, len(t)), y, 1e-3, **more).surprise < 0.6 * HEARD
+    assert tone_in(road(draw, len(t)), y, 1e-3).detected, "what neither knows is a limit of it"
+    assert tone_in(road(draw, len(t)), y, 1e-3, **more).surprise < 0.6 * DETECTED
 
 
 def test_a_blow_is_none():
@@ -117,11 +117,11 @@ def test_a_blow_is_none():
     draw, t = np.random.default_rng(9), np.arange(12_000) * 1e-3
     ring = np.where(t > 5.0, np.exp(-3.0 * (t - 5.0)) * np.sin(2 * np.pi * 31.0 * t), 0.0)
     y = draw.normal(size=(len(t), 1)) + 1e3 * ring[:, None]
-    assert not heard(road(draw, len(t)), y, 1e-3).heard
+    assert not tone_in(road(draw, len(t)), y, 1e-3).detected
 
 
 def test_under_a_sine_nothing_is_told():
     t = np.arange(12_000) * 1e-3
     u = np.sin(2 * np.pi * 3.0 * t)
     y = 0.1 * u[:, None] ** 3 + 0.01 * np.random.default_rng(4).normal(size=(len(t), 1))
-    assert heard(u, y, 1e-3) == Tone()
+    assert tone_in(u, y, 1e-3) == Tone()

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 CHANCE = 1e-3  # that a whole recording has one row of repeated samples as long
 EVEN = 1e-4  # of the square of a fall: falls that differ less are of the same share
 STEADY = 6  # falls in a row, of eight samples: of noise, fewer than one in a hundred is so even
-LESS = 0.5  # of the motion: a sensor that shows more of it is no silent one
+MAX_SILENT = 0.5  # of the motion: a sensor that shows more of it is no silent one
 LAST = 8  # samples: so far the end of a spline is felt
 
 
@@ -99,7 +99,7 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
             inside = far[a:b]
             y, model = e.y[a:b, j][inside], z[a:b, j][inside]
             sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2) | (np.abs(y) < 0.05 * np.max(np.abs(model)))
-            less = y @ model < LESS * (model @ model)  # a model that is a little wrong is followed, though by less
+            less = y @ model < MAX_SILENT * (model @ model)  # a model that is a little wrong is followed, though by less
             fades = _discharges(y)  # from where it was, which may be of the other sign
             deep = np.min(np.abs(y)) < 0.25 * np.max(np.abs(model))
             if a > int(0.1 / e.step) and b - a < longest and (fades or less and np.mean(sinks) > 0.95) and deep and np.count_nonzero(inside) > 4:

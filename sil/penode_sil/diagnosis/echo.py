@@ -34,7 +34,7 @@ class Echo:
     soon: float = 0.0
 
     @property
-    def heard(self) -> bool:
+    def detected(self) -> bool:
         return self.late > max(LOUD, CLEAR * self.early, APART * self.soon)
 
 

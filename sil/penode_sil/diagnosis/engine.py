@@ -18,7 +18,7 @@ import penode_gen
 from penode_gen.model import Model
 
 from ..errors import UserError
-from ..measured import Measured, told_of_rails
+from ..measured import Measured, with_shared_rails
 from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady, weighed
 from .answers import alternatives, by_innovations, recorded, write_extended
 from .broken import broken_sensors, still_wild
@@ -60,7 +60,7 @@ def diagnose(
     log = advancing(log, tell)
     tell(0.0, "fitting the model as it is")
     plain, model = model, with_tolerances(model)
-    both = told_of_rails([*train, *holdout])
+    both = with_shared_rails([*train, *holdout])
     train, holdout = both[: len(train)], both[len(train) :]
     experiments, unused, remarks = settled(model, train, holdout, set_name)
     if problems := plausible.misfits(model, [*experiments, *unused], set_name):
@@ -95,9 +95,9 @@ def diagnose(
     log(str(change))
     fades = best is not None and any(kind == "damper_fading" for kind, _ in best.groups)  # which changes by its nature
     changed = change.gain if change.surprise > -np.log(CHANGING) and not fades else 0.0
-    causes, verdict, explained, evidence = judge(study, explanations, faults, alike, shared, tone.heard, changed)
+    causes, verdict, explained, evidence = judge(study, explanations, faults, alike, shared, tone.detected, changed)
     doubt = plausible.doubt(study, best, verdict)
-    behind = not doubt and verdict != "unexplained" and best is not None and pitching(best) and echo.echo(study, best.fit).heard
+    behind = not doubt and verdict != "unexplained" and best is not None and pitching(best) and echo.echo(study, best.fit).detected
     if doubt or behind:
         causes, verdict = (Cause(OUTSIDE, "", {}, 0.5),), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
@@ -212,7 +212,7 @@ def hints(
     if verdict == "unexplained" and explanations:
         masses = [cause(study, explanations, g) for g in explanations[0].groups if g[0] == "hidden_resonance"]
         notes += damped([c for c in masses if worth(study, c)])
-    if tone.heard:
+    if tone.detected:
         own = study.model.sensors[tone.sensor].name
         notes.append(f"{own} has a tone of its own at {tone.frequency:.0f} Hz, or around it: an engine, a wheel, the mains?")
     if drift:

@@ -48,34 +48,31 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
     terms: list[Term] = []
     rounds: list[tuple[Trial, ...]] = []
     shares: list[float] = []
-    plain: Bench | None = None
-    named = 0
     first = 0.0
-    lengths = [len(r) // bench.update for r in bench.records]
-    blocks = Blocks.of(lengths)
+    blocks = Blocks.of([len(r) // bench.update for r in bench.records])
     bench, base = _based(bench, blocks)
+    benches = [bench]  # with as many terms as there were
     while len(terms) < MAX_CAUSES:
         trials, wide = propose(bench, terms, log)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (t.share < WORTH, -t.gain))
         trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
-        for t in trials:
-            log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, blocks {np.round(_better(t, base, bench), 1)}")
-        good = [t for t in trials if _accepted(t, _better(t, base, bench), first)]
+        better = [_better(t, base, bench) for t in trials]
+        for t, b in zip(trials, better):
+            log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, blocks {np.round(b, 1)}")
+        good = [t for t, b in zip(trials, better) if _accepted(t, b, first)]
         good = [t for t in good if t.share >= WORTH] or good
         rounds.append(tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks)))))
         if not good:
             break
         best = _simplest(rounds[-1], base)
-        if plain is None and best.share < WORTH:
-            plain, named = bench, len(terms)
         first = first or float(np.sum(_better(best, base, bench)))
         bench, term = adopt(bench, best)
         terms.append(term)
         shares.append(best.share)
         bench, base = _based(bench, blocks)
-    if plain is None:
-        plain, named = bench, len(terms)
-    return Found(bench, plain, named, tuple(terms), tuple(shares), tuple(rounds))
+        benches.append(bench)
+    named = next((k for k, s in enumerate(shares) if s < WORTH), len(shares))
+    return Found(bench, benches[named], named, tuple(terms), tuple(shares), tuple(rounds))
 
 
 def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:

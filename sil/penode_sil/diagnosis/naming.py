@@ -48,7 +48,7 @@ Array = NDArray[np.float64]
 Values = Mapping[object, float]
 
 
-def christened(terms: Sequence[Term], names: Sequence[str], fit: Fit, study: Study) -> tuple[Term, ...]:
+def with_kinds(terms: Sequence[Term], names: Sequence[str], fit: Fit, study: Study) -> tuple[Term, ...]:
     """The terms of friction, dampers and springs named by what their fitted curve does, not by the laws that it was put
     together from."""
     values = {f.target: f.value for f in fit.free}

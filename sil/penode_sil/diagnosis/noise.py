@@ -30,10 +30,10 @@ FINER = (1.2, 1.1, 1.05, 1.025)
 LOUD = 4.0  # times its noise and its mean power from which on an input is there for a while
 BINS = 16  # of a spectrum in which coherence is estimated
 HALF = 8  # bins to either side that say how loud it is around a tone
-HEARD = 12.0  # [nat] of surprise from which on a tone is one
+DETECTED = 12.0  # [nat] of surprise from which on a tone is one
 LEVELS = np.repeat([2.0, 4.0, 8.0], 2)[:, None]  # of tones, in the noise's power in a bin
 STAYS = np.tile([0.99, 0.5], 3)[:, None]  # chance that half a second later it is in the same bin
-MOST = 3.0  # [nat] that one second says: a blow is not a tone
+MAX_SURPRISE = 3.0  # [nat] that one second says: a blow is not a tone
 ORDERS = 8  # of a sweep that are not looked at
 TAIL = 10.0  # how fast what a bin has of its neighbours' median falls off in noise: as (1 + x / TAIL)^-TAIL, at the most
 PARTS = (0.1, 2.0, 6.0, 20.0)  # [Hz] from which to which coherence is added up
@@ -358,8 +358,8 @@ class Tone:
     sensor: int = 0
 
     @property
-    def heard(self) -> bool:
-        return self.surprise > HEARD
+    def detected(self) -> bool:
+        return self.surprise > DETECTED
 
 
 def tone(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> Tone:
@@ -455,7 +455,7 @@ def _says(pure: Array) -> Array:
     """The log likelihood ratio [seconds, models, bins] of a tone of random phase and strength against noise where bins stand out so far
     [seconds, bins]."""
     x = TAIL * np.log1p(np.nan_to_num(pure) / TAIL)  # exponential, though medians of a few bins scatter
-    says = np.minimum(LEVELS * x[:, None] / (1.0 + LEVELS) - np.log1p(LEVELS), MOST)
+    says = np.minimum(LEVELS * x[:, None] / (1.0 + LEVELS) - np.log1p(LEVELS), MAX_SURPRISE)
     return np.where(np.isnan(pure)[:, None], 0.0, says)
 
 

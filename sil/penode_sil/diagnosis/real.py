@@ -57,13 +57,13 @@ def answer(
     noise = sample_noise(records, np.array([s.noise for s in model.sensors]))
     bench = build(model, places, records, noise, fastest, set_name)
     log(f"corrected every {bench.update} samples; {bench.level.size:.3g} of what moves wanders, for {bench.level.tau:.3g} s")
-    still = Filter.none(*bench.fit.by.gain.shape)
-    alone = bench.problem().solve(bench.fit.free, still, FREE_RUN)
+    alone = bench.problem().solve(bench.fit.free, Filter.none(*bench.fit.by.gain.shape), FREE_RUN)
     found = innovate.search(bench, log)
     plain, after = found.plain, found.bench
     causes: list[Cause] = []
     notes = []
-    moved = motions(Probe.of(plain))
+    probe = Probe.of(plain)
+    moved = motions(probe)
     probabilities = [_weighed(r) for r in found.rounds]
     named = found.terms[: found.named]
     for k, term in enumerate(named):
@@ -76,7 +76,7 @@ def answer(
             notes.append(_small(term, size))
     notes += [_small(t, s) for t, s in zip(found.terms[found.named :], found.shares[found.named :])]
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
-    biased, remarks = _offsets(model, plain, Probe.of(plain))
+    biased, remarks = _offsets(model, plain, probe)
     notes += more + remarks
     run = after.problem().solve(after.fit.free, Filter.none(*after.fit.by.gain.shape), 20)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]

@@ -123,8 +123,8 @@ def likely(e: Experiment, levels: Array, g: Complex, acting: int, r: Complex) ->
     first, then errors of the inputs. These are their most likely values; the spectra of the forces are those that spectra r [f, n_z] of
     a residual suggest, smooth over half a hertz."""
     band = len(g)
-    heard = np.conj(np.swapaxes(g, 1, 2)) / levels[:, None, :]
-    curvature, slope = heard @ g, (heard @ r[:, :, None])[:, :, 0]
+    weighted = np.conj(np.swapaxes(g, 1, 2)) / levels[:, None, :]
+    curvature, slope = weighted @ g, (weighted @ r[:, :, None])[:, :, 0]
     prior = np.empty((band, g.shape[2]))
     prior[:, :acting] = 1.0 / np.median(np.einsum("fqq->fq", curvature).real[:, :acting], axis=0)
     prior[:, acting:] = np.maximum(e.unsure[:band], 1e-15) ** 2
@@ -138,7 +138,7 @@ def likely(e: Experiment, levels: Array, g: Complex, acting: int, r: Complex) ->
             power = np.abs(root * (inner @ (root * slope)[:, :, None])[:, :, 0]) ** 2 + np.maximum(left, 0.0)
             for q in range(acting):
                 prior[:, q] = np.maximum(np.convolve(power[:, q], kernel, "same") / weight, 1e-30)
-    return root[:, :, None] * inner * root[:, None, :] @ heard
+    return root[:, :, None] * inner * root[:, None, :] @ weighted
 
 
 @dataclass(frozen=True, eq=False)

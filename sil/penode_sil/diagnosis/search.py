@@ -19,10 +19,10 @@ from penode_gen.model import Model
 from .build import Extended, Term, all_free, extended
 from .fit import Fit, Problem
 from .hypotheses import BENDS, CLOCK, HALVES, KNEE, STRIBECK, VALUED, Basis, Fault
-from .naming import DAMPERS, FRICTION, christened, straight
+from .naming import DAMPERS, FRICTION, straight, with_kinds
 from .noise import ALIKE, correlation
 from .score import DAMPINGS, RESONANCES, Candidate, Regression, where
-from .study import Study, heard, loss, regression, requieted
+from .study import Study, loss, noise_of, regression, with_noise_of
 
 GRAVITY = 9.81  # [m/s^2]
 SHARP = 3.0  # of a sensor's limits, to begin with
@@ -47,19 +47,19 @@ SHAPED = {*FRICTION, *DAMPERS} - {"bouc_wen"}  # kinds whose names follow from t
 FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
 RIVAL = 0.8  # of a cause's worth: what another must explain of it to be tried in its place
 KEPT = 0.5  # of what a regression promises: a fit that keeps less than that of it began in the wrong place
-LESS = 0.3  # of all that was gained: an explanation that gains less by that is not gone on with
+MAX_LOSS = 0.3  # of all that was gained: an explanation that gains less by that is not gone on with
 SMALL = 0.03  # of all that was gained: a cause worth less than that may be a remainder of another
 PART = 0.1  # of the size a law has alone: left to it where its companions do the rest
 WHOLE = 0.97  # share that is a whole explanation
 NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
 REST = 0.5  # of the noise: a load at rest that leaves so much more than a start in motion is none
 CLOSE = 0.02  # of the gain: an exchanged cause that is nearly as good gets more laws
-MOST = 0.5  # of what is more than noise
+MIN_TAKEN = 0.5  # of what is more than noise
 DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a colour
 HOPELESS = 0.3  # of what is more than noise: causes that take less have no name, whatever is exchanged among them
 MENDS = 4  # laws, at most, that only mend the form of what is named
 STIFF = 1.5  # of the highest frequency of hidden masses: one that a fit has taken beyond it moves with its body
-SPRUNG = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
+MASS_FREQUENCIES = (8.0, 16.0, 30.0)  # [Hz] frequencies to begin with of a mass that may be on a spring
 WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
 HEAVY = 2e6  # steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause
 ROUGH = 5e5  # the same: where it takes more, fits begin with longer steps
@@ -229,7 +229,7 @@ def explain(
     found = fitted(terms, built, fit)
     if len(acting(found)) < len(found):
         return explain(study, acting(found), 2, fit, formulas)
-    return Explanation(christened(found, built.names, fit, study), built, problem, fit, gain, formulas)
+    return Explanation(with_kinds(found, built.names, fit, study), built, problem, fit, gain, formulas)
 
 
 def acting(terms: Sequence[Term]) -> list[Term]:
@@ -443,7 +443,7 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
         beam = [idle]  # the load was but a start in motion that is none
     if beam[0].score < max(NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW) or taken(rest, beam[0]) < HOPELESS:
         return rest, []
-    quiet = requieted(rest, beam[0].fit)
+    quiet = with_noise_of(rest, beam[0].fit)
     again = [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]]
     if told and set(beam[0].groups) == set(told[0].groups):  # which has been looked at from all sides, in motion
         found = ranked(quiet, settled(quiet, again[0]), again[1:], log)
@@ -530,10 +530,10 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
     them leaves. The first look is taken twice: the null fit may take a cause for slow noise."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
     study = replace(study, nothing=loss(study, study.null))
-    bare = requieted(study, study.null, coloured=False)
+    bare = with_noise_of(study, study.null, coloured=False)
     bare = replace(bare, nothing=min(study.nothing, loss(bare, bare.null)))
     first = singles(bare, regression(bare, bare.null, parameters), 2)
-    white = bool(first) and first[0].score > 0.0 and requieted(bare, first[0].fit) is bare
+    white = bool(first) and first[0].score > 0.0 and with_noise_of(bare, first[0].fit) is bare
     if bare.metrics is not study.metrics and not white and not any(only_noise(bare, e) for e in first):
         slow = replace(study, nothing=bare.nothing)
         first = sorted([*first, *singles(slow, regression(slow, slow.null, parameters), 1)], key=lambda e: -e.score)
@@ -541,7 +541,7 @@ def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation
         log(f"first {e.groups} {e.gain:.0f}")
     if not first or first[0].score <= 0.0 and not hopeful(bare, first[0]):
         return study, []
-    quiet = requieted(bare, first[0].fit)
+    quiet = with_noise_of(bare, first[0].fit)
     if quiet is bare:
         return grow(quiet, first, log)
     again = [*singles(quiet, regression(quiet, quiet.null, parameters)), explain(quiet, first[0].terms, start=first[0].fit)]
@@ -557,7 +557,7 @@ def hopeful(study: Study, e: Explanation) -> bool:
     """Does a cause take most of what is more than noise, though noise of another colour would do as well? Then another cause is left
     that was hidden in that noise, such as a bias, and both together may do better."""
     more = study.null.cost - rows(study)
-    return more > DOUBLE * rows(study) and study.null.cost - e.fit.cost > MOST * more
+    return more > DOUBLE * rows(study) and study.null.cost - e.fit.cost > MIN_TAKEN * more
 
 
 def distinct(found: Sequence[Explanation]) -> list[Explanation]:
@@ -578,7 +578,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
     share = 0.0
     for _ in (2, 3):
         grown: list[Explanation] = []
-        enough = beam[0].gain - LESS * abs(beam[0].gain)
+        enough = beam[0].gain - MAX_LOSS * abs(beam[0].gain)
         for e in beam[: 1 if heavy(beam[0]) else width]:
             alike = {curve(t.candidate) for t in e.terms} == {curve(t.candidate) for t in beam[0].terms}
             if e.gain < (max(enough, (1.0 - NEAR) * beam[0].gain) if alike else enough):
@@ -586,7 +586,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
             if any(len(e.terms) >= len(o.terms) and e.gain < o.gain - NEW for o in ended):
                 continue  # it would need more laws to become as good
             akin, _ = correlation(study.experiments, study.metrics, e.fit.simulated)
-            here = requieted(study, e.fit, coloured=akin < ALIKE)  # what sensors share is no noise
+            here = with_noise_of(study, e.fit, coloured=akin < ALIKE)  # what sensors share is no noise
             if here is not study:
                 e = explain(here, e.terms, 4, e.fit, e.formulas)
             e = e.whole()
@@ -624,7 +624,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
         beam = sorted(grown, key=lambda e: -e.score)
     done = sorted((e for e in spared(done) if e.score > 0.0), key=lambda e: -e.score)
     if done:
-        study = requieted(study, done[0].fit)
+        study = with_noise_of(study, done[0].fit)
     if done and len(done[0].groups) > 1 and share > HOPELESS:
         found = exchanged(study, done[0], parameters, log)
         if found and max(e.score for e in found) > done[0].score:
@@ -901,7 +901,7 @@ def formed(
         wider = called(explain(study, [*e.terms, new], start=e.fit, formulas=e.formulas), e)
         log(f"  mended {group}: {wider.gain:.0f} for {e.gain:.0f}")
         if set(wider.groups) == set(e.groups) and wider.gain > e.gain + 2.0 * cost(new.candidate):
-            levels, metrics = heard(study, wider.fit)  # what is mended had been taken for noise
+            levels, metrics = noise_of(study, wider.fit)  # what is mended had been taken for noise
             study = replace(study, levels=levels, metrics=metrics)
             e = settled(study, wider).whole()
             r = regression(study, e.fit, parameters, related(spare))
@@ -930,7 +930,7 @@ def exchanged(study: Study, e: Explanation, parameters: Sequence[str], log) -> l
         kept = [t for t in e.terms if t.group != group]
         if worth < SMALL * e.gain:  # it may have stood in for what another cause can do by itself
             alone = explain(study, kept, start=e.fit, formulas=e.formulas)
-            if alone.gain > (1.0 - LESS) * e.gain:
+            if alone.gain > (1.0 - MAX_LOSS) * e.gain:
                 alone = refined(study, alone, parameters)
             found.append(alone)
             log(f"  without {group}: {alone.gain:.0f} for {e.gain:.0f}, x{len(alone.terms)}")
@@ -961,7 +961,7 @@ def sprung(study: Study, e: Explanation, r: Regression, group: Group) -> list[li
     masses = [c for c in r.candidates if c.kind == "hidden_resonance" and c.where == body]
     if more <= 0.0 or not masses:
         return []
-    nearest = [min(masses, key=lambda c: abs(np.log(c.what[2] / f)) + abs(np.log(c.what[3] / DAMPINGS[1]))) for f in SPRUNG]
+    nearest = [min(masses, key=lambda c: abs(np.log(c.what[2] / f)) + abs(np.log(c.what[3] / DAMPINGS[1]))) for f in MASS_FREQUENCIES]
     return [[Term(c, more)] for c in nearest]
 
 

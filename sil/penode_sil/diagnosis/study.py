@@ -139,7 +139,7 @@ def fitted(model: Model, fit: Fit) -> Model:
     return replace(model, parameters={**model.parameters, **changed})
 
 
-def heard(study: Study, fit: Fit, coloured: bool = True, robust: bool = True) -> tuple[tuple[Array, ...], tuple[Metric, ...]]:
+def noise_of(study: Study, fit: Fit, coloured: bool = True, robust: bool = True) -> tuple[tuple[Array, ...], tuple[Metric, ...]]:
     """Noise levels and metrics as the residual of a fit shows them, see sensor_levels."""
     declared = np.array([s.noise for s in study.model.sensors])
     levels, metrics = [], []
@@ -152,7 +152,7 @@ def heard(study: Study, fit: Fit, coloured: bool = True, robust: bool = True) ->
 
 def loss(study: Study, fit: Fit) -> float:
     """-2 log likelihood of a fit with the noise that suits it best: what absorbs less into noise is worth more."""
-    _, metrics = heard(study, fit, robust=False)
+    _, metrics = noise_of(study, fit, robust=False)
     total = sum(f.offset**2 for f in fit.free)
     for e, m, z in zip(study.experiments, metrics, fit.simulated):
         r = m(np.where(e.good, e.y - z, 0.0))
@@ -161,9 +161,9 @@ def loss(study: Study, fit: Fit) -> float:
 
 
 @lru_cache(maxsize=FEW)
-def requieted(study: Study, fit: Fit, coloured: bool = True) -> Study:
+def with_noise_of(study: Study, fit: Fit, coloured: bool = True) -> Study:
     """The study with noise as a fit's residual shows it; itself if that is no other noise."""
-    levels, metrics = heard(study, fit, coloured)
+    levels, metrics = noise_of(study, fit, coloured)
     change = max(float(np.max(np.mean(np.abs(np.log(new / old)), axis=0))) for new, old in zip(levels, study.levels))
     if change < 0.05:
         return study

@@ -21,7 +21,7 @@ WORTH = 0.07  # of what acts: less is a small deviation. Any model is 2 to 5 % w
 BENT = 0.6  # of a friction or a cube along a Gaussian motion is beside a straight line, in rms: sqrt(1 - 2/pi), sqrt(1 - 9/15)
 SYSTEMATIC = 0.007  # of what acts: what mis-modelling of 3.5 % does to the size of a form, for it is like it to 0.2 in rms, one direction of 25
 LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of their parameter makes as large as they have to be
-STRAIGHT = LINEAR | {"expression": "s"}  # and those that are about straight
+ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
 
 def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]) -> float:
@@ -73,7 +73,7 @@ def shift(model: Model, bench: Bench, moved: Sequence[Motion], name: str) -> flo
 def _beside(bench: Bench, place: int, motion: Motion, force: Array) -> Array:
     """A force [n] without what the straight laws at its place could take over, or the mass of a body that it ties to ground."""
     names, ends = {n for n, _ in bench.places[place].elements}, bench.places[place].ends
-    lines = {STRAIGHT[e.law] for e in bench.model.elements if e.name in names and e.law in STRAIGHT}
+    lines = {ABOUT_LINEAR[e.law] for e in bench.model.elements if e.name in names and e.law in ABOUT_LINEAR}
     columns = [np.concatenate([getattr(p, q) for p in motion.parts]) for q in sorted(lines)]
     if names and GROUND in ends and any(b.name in ends and not bench.model.parameters[b.mass].exact for b in bench.model.bodies):
         columns.append(np.concatenate([np.gradient(p.v, p.step) for p in motion.parts]))

@@ -200,8 +200,8 @@ class Case:
         bench, drive = self.bench, self.bench.drives[-1]
         clean, (given, seen) = bench.observe(self.motions[-1], self.changes, len(bench.training)), self.measured[-1]
         error = np.fft.rfft(given - drive.at_signals[0][:: int(RATE / bench.rate)])  # of the input: a perfect model still hears it
-        heard = {s: np.fft.irfft(error * bench.transfer(len(given))[s], len(given)) for s in seen}
-        floor = {bench.plant.names[s]: float(np.sqrt(np.mean((seen[s] - clean[s] - heard[s]) ** 2))) for s in seen}
+        shaken = {s: np.fft.irfft(error * bench.transfer(len(given))[s], len(given)) for s in seen}
+        floor = {bench.plant.names[s]: float(np.sqrt(np.mean((seen[s] - clean[s] - shaken[s]) ** 2))) for s in seen}
         trained, held = reach(bench.plant, self.motions[:-1], bench.training), reach(bench.plant, self.motions[-1:], [drive])
         inside = all(np.abs(h).max() <= np.abs(t).max() for e in trained for h, t in zip(held[e], trained[e]))
         return {"holdout_inside": bool(inside), "noise_floor": floor,

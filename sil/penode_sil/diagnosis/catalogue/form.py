@@ -15,7 +15,7 @@ from penode_gen.model import Model
 from penode_gen.numeric import along
 
 from ..plant import Place
-from . import driven
+from . import memory
 
 Array = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ class Part:
             return self.force(m)
         known = laws.LAWS.get(self.law)
         if known and known.states:
-            return driven.force(self.law, {self.gain[0]: 1.0, **{k: v for k, (v, _) in self.shapes.items()}}, m.s, m.step)
+            return memory.force(self.law, {self.gain[0]: 1.0, **{k: v for k, (v, _) in self.shapes.items()}}, m.s, m.step)
         text = known.force if known else self.law
         values = {self.gain[0]: 1.0, **{k: v for k, (v, _) in self.shapes.items()}, "s": m.s, "v": m.v}
         return np.broadcast_to(along(text, tuple(values))(*values.values()), m.s.shape)

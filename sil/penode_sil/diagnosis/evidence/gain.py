@@ -30,7 +30,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """The linear `plant` of a augmented model with states `names`; `into`: states of the model that follows, of which others are not
+    """The linear `plant` of an augmented model with states `names`; `into`: states of the model that follows, of which others are not
     corrected. `input_noise` [n_u] and `noise` [n_z]: standard deviations of a sample of each input and sensor; `forces` [wandering]:
     what levels are relative to; `period` [s] between updates, and how many `samples` that are."""
 
@@ -109,6 +109,6 @@ def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
 
 
 def linear(model: Model, values: dict[str, float]) -> Linear:
-    """A augmented model with these parameters where it stands still."""
+    """An augmented model with these parameters where it stands still."""
     known = {n: replace(p, value=values.get(n, p.value)) for n, p in model.parameters.items()}
     return linearise(replace(model, parameters=known), (), np.zeros((1, len(model.states))), np.zeros((1, len(model.inputs))))

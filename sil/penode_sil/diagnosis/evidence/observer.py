@@ -87,7 +87,7 @@ def augmented(model: Model, places: Sequence[Place]) -> Model:
 
 
 def with_probes(model: Model, places: Sequence[Place]) -> Model:
-    """A augmented model with a force at_k as a further input at each place, and its deflection, its rate and what acts there already as
+    """An augmented model with a force at_k as a further input at each place, and its deflection, its rate and what acts there already as
     further sensors."""
     forces = [Element(f"probe{k}", p.ends, "expression", expression=f"at{k}") for k, p in enumerate(places)]
     wide = replace(model, inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(places))))
@@ -139,7 +139,7 @@ class Lanes:
 
 
 class Predictor:
-    """A augmented model that follows recordings, corrected every `update` samples."""
+    """An augmented model that follows recordings, corrected every `update` samples."""
 
     def __init__(self, model: Model, records: Sequence[Record], update: int, set_name: str = "default", fastest: float = 0.0):
         self.model, self.records, self.update, self.set_name = model, tuple(records), update, set_name

@@ -19,7 +19,7 @@ from ...batch import Batch
 
 Array = NDArray[np.float64]
 MODEL = """[model]
-name = "driven"
+name = "memory"
 sample_time = "{step!r} s"
 substeps = 4
 [parameters]
@@ -47,6 +47,6 @@ def _batch(law: str, step: float) -> Batch:
         parameters="\n".join(f'p_{a} = {{ value = 1, unit = "{u}" }}' for a, u in arguments.items()),
     )  # fmt: skip
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "driven.toml"
+        path = Path(folder) / "memory.toml"
         path.write_text(text)
         return Batch(replace(penode_gen.load(path), interpolation="cubic"), exact=False)

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What a term matters beside what is free anyway, and priors with tails: by values by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from penode_sil.diagnosis.evidence import prior
+from penode_sil.diagnosis.fit import Free
+from penode_sil.diagnosis.worth import own
+
+
+def fit(columns, free):
+    """A fit of one sensor with these columns [free, updates], whose innovations have the variance 4."""
+    slopes = np.array(columns, float).T[:, None, :]
+    return SimpleNamespace(free=tuple(free), slopes=slopes, variance=np.array([4.0]), used=np.ones(slopes.shape[:2], bool))
+
+
+LAW = Free("law", 3.0, 0.5, sigma=1.0)
+MODEL = SimpleNamespace(bodies=(SimpleNamespace(mass="m"),))
+
+
+@pytest.mark.parametrize("turn", (0.0, 0.3, np.pi / 2))
+def test_only_what_nothing_else_can_do_counts(turn):
+    """A column at an angle to the only other one: its sine is left."""
+    others = [[1.0, 0.0, 0.0, 0.0], [np.cos(turn), np.sin(turn), 0.0, 0.0]]
+    assert own(MODEL, fit(others, [Free("k", 1.0, 1.0), LAW]), ["law"]) == pytest.approx(np.sin(turn), abs=1e-12)
+
+
+def test_masses_do_not_take_a_law_over():
+    """All forces together with the masses are a scale that no sensor of motion shows: k and m together do just what the law does."""
+    law, k = np.array([1.0, 2.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0, 0.0])
+    free = [Free("m", 1.0, 1.0), Free("k", 1.0, 1.0), LAW]
+    found = own(MODEL, fit([-(law + k), k, law], free), ["law"])
+    assert found == pytest.approx(np.sqrt(2.0 / 6.0))  # but for k
+
+
+def test_terms_that_cancel_each_other_are_none():
+    """Two laws of one column and sizes that add up to nothing."""
+    column = [1.0, -1.0, 2.0, 0.5]
+    free = [LAW, Free("against", -3.0, 0.5, sigma=1.0)]
+    assert own(MODEL, fit([column, column], free), ["law", "against"]) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", (Free, prior.Stated))
+@pytest.mark.parametrize("log", (False, True))
+@pytest.mark.parametrize("value", (1.01, 1.3, 4.0))
+def test_slope_of_a_prior_is_that_of_its_cost(kind, log, value):
+    """Against central differences, whose error is h^2/6 of the third derivative, here below 1e-6 of a slope; and the parabola is nowhere
+    below the cost (weights of Gauss)."""
+    f = kind("p", value, 0.1, log=log, sigma=0.02, origin=1.0)
+    h = 1e-5
+    costs = [prior.cost(kind("p", float(f.at(x)), 0.1, log=log, sigma=0.02, origin=1.0)) for x in (-h, h)]
+    assert prior.slopes([f])[0] == pytest.approx((costs[1] - costs[0]) / (2.0 * h), rel=1e-5)
+    slope, curvature, x = prior.slopes([f])[0], prior.precisions([f])[0] ** 2, -0.3
+    there = kind("p", float(f.at(x)), 0.1, log=log, sigma=0.02, origin=1.0)
+    assert prior.cost(there) <= prior.cost(f) + slope * x + 0.5 * curvature * x**2 + 1e-9
+
+
+def test_what_a_file_states_costs_no_more_than_a_cause():
+    """Near the file as Gauss; eight deviations off 2.5 log(1 + 64/5), not 32; nothing without a prior."""
+    near, far = (prior.Stated("p", 1.0 + n * 0.02, 0.1, sigma=0.02, origin=1.0) for n in (0.1, 8.0))
+    assert prior.cost(near) == pytest.approx(0.005, rel=2e-3)
+    assert prior.cost(far) == pytest.approx(2.5 * np.log(13.8))
+    assert prior.cost(Free("p", 7.0, 0.1)) == 0.0
+    assert prior.stated([near, far, Free("q", 9.0, 1.0, sigma=0.1)]) == prior.cost(near) + prior.cost(far)
