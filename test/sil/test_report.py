@@ -17,7 +17,7 @@ from test_diagnosis import MODEL, SAMPLES, STEP, drive, record, road
 import penode_gen
 from penode_sil import targets
 from penode_sil.cli import cli
-from penode_sil.diagnosis import files, noise, report, report_figure as fig, residual, restoring, result
+from penode_sil.diagnosis import files, noise, report, report_figure as fig, report_price, residual, restoring, result
 from penode_sil.diagnosis.report_figure import Axis
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
@@ -283,7 +283,7 @@ def test_both_colour_schemes_can_be_read(page):
 
 
 def test_difference_shows_what_was_learnt(model, extended):
-    got = report.difference(model.path, extended)
+    got = report_price.difference(model.path, extended)
     assert ("-", 'd = { value = 1500.0, unit = "N*s/m", tolerance = 0.01 }') in got
     at = got.index(("+", 'd = { value = 1490.0, unit = "N*s/m", tolerance = 0.01 }'))
     assert got[at - 1][0] == "-" and got[at + 1] == ("+", 'f_c = { value = 61.3, unit = "N" }')
@@ -291,8 +291,8 @@ def test_difference_shows_what_was_learnt(model, extended):
 
 
 def test_price_is_left_out_without_a_compiler(model, found, monkeypatch, extended):
-    monkeypatch.setattr(report.shutil, "which", lambda name: None)
-    assert report.price(model, extended) == []
+    monkeypatch.setattr(report_price.shutil, "which", lambda name: None)
+    assert report_price.price(model, extended) == []
     assert "What it costs" not in report.render(model, found, extended)
 
 
@@ -371,13 +371,13 @@ def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path):
 
 
 def test_price_is_compiled_once(model, monkeypatch, extended):
-    first = report.price(model, extended)
+    first = report_price.price(model, extended)
 
     def refuse(*_):
         raise AssertionError("compiled again")
 
     monkeypatch.setattr(targets, "compile_program", refuse)
-    assert first and report.price(model, extended) == first
+    assert first and report_price.price(model, extended) == first
 
 
 def test_what_compilers_take_for_the_report_counts_as_well(model, found, monkeypatch, tmp_path):

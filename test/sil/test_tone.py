@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from penode_sil.diagnosis.noise import DETECTED, Experiment, Metric, Tone, tone
+from penode_sil.diagnosis.noise import Experiment, Metric
+from penode_sil.diagnosis.tones import DETECTED, Tone, tone
 
 
 def recording(u: np.ndarray, y: np.ndarray, step: float) -> Experiment:

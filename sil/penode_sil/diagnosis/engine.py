@@ -19,7 +19,7 @@ from penode_gen.model import Model
 
 from ..errors import UserError
 from ..measured import Measured, with_shared_rails
-from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady, weighed
+from . import absorb, dropouts, echo, extension, nameless, naming, noise, numerics, plant, plausible, residual, search, steady, tones, weighed
 from .answers import alternatives, by_innovations, recorded, write_extended
 from .broken import broken_sensors, still_wild
 from .driven import settled
@@ -89,7 +89,7 @@ def diagnose(
     left = best.fit if best else study.null
     alike, shared = noise.correlation(study.experiments, study.metrics, left.simulated)
     log(f"correlation {alike:.1f}, shared {shared:.0f}")
-    tone = noise.tone(study.experiments, study.metrics, left.simulated)
+    tone = tones.tone(study.experiments, study.metrics, left.simulated)
     log(str(tone))
     change = steady.change(study, left, study.seen)
     log(str(change))
@@ -200,7 +200,7 @@ def resting(
 
 
 def hints(
-    study: Study, explanations: Sequence[Explanation], verdict: str, behind: bool, change: steady.Change | None, tone: noise.Tone,
+    study: Study, explanations: Sequence[Explanation], verdict: str, behind: bool, change: steady.Change | None, tone: tones.Tone,
     drift: float,
 ) -> list[str]:  # fmt: skip
     """Notes on what is left: motion that comes late (`behind`), what changes with time, masses, a tone, a drift of clocks."""

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage, special
 
 from .fit import Fit
-from .noise import Experiment, Metric, swept
+from .noise import Experiment, Metric
 from .score import Seen
 from .study import Study, watch
+from .tones import swept
 
 Array = NDArray[np.float64]
 PIECES = 5  # hats over the time of a recording that a changing coefficient is made of
