@@ -50,7 +50,7 @@ def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array]
     times = np.arange(steps + 1) * fmu.step_size
     half = fmu.step_size / 2
     at = np.maximum(np.searchsorted(table["time"], times + half * 1e-3, side="right") - 1, 0) if table else None
-    inputs = np.array([table[name][at] if name in table else np.full(steps + 1, fmu.get(system.wires[name])) for name in system.inputs]).reshape(-1, steps + 1)
+    inputs = np.array([table[name][at] if name in table else np.full(steps + 1, _start(system, fmu, name)) for name in system.inputs]).reshape(-1, steps + 1)
     outputs = np.empty((steps + 1, len(system.outputs)))
     waiting = list(system.schedule)
     fmu.initialise({**system.start, **{system.wires[n]: (u[0],) for n, u in zip(system.inputs, inputs)}}, f"{path}: start")
@@ -64,6 +64,12 @@ def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array]
         fmu.set({system.wires[n]: (u[k],) for n, u in zip(system.inputs, inputs)}, f"{path}: inputs")
         fmu.step(k)
     return np.column_stack([inputs.T, outputs])
+
+
+def _start(system: ssp_file.System, fmu: _Fmu, name: str) -> float:
+    """Of an input of the system: what the SSP binds to it, or else the FMU's own."""
+    bound = system.start.get(system.wires[name])
+    return bound[0] if bound else fmu.get(system.wires[name])
 
 
 def _record(path: Path, known: tuple[str, ...]) -> dict[str, Array]:

@@ -161,6 +161,23 @@ def test_state_is_saved_restored_and_given_to_another_instance(unpacked: Unpacke
         other.from_bytes(data[:-1])
 
 
+def test_a_state_of_another_export_is_refused(tmp_path: Path) -> None:
+    """Two models that differ in a constant alone: sizes and layout of their states are the same."""
+    masters = []
+    for k in (3, 4):
+        path = tmp_path / f"{k}.toml"
+        path.write_text(f'[model]\nname = "lag"\nsample_time = "1 ms"\n[parameters]\nk = {{ value = {k}, unit = "1" }}\nT = {{ value = 1, unit = "s", tunable = true }}\n'
+                        '[inputs]\nu = { unit = "m" }\n[states]\nx = { unit = "m" }\n[equations]\nq = "der(x) = (k*u - x)/T"\n[outputs]\ny = { value = "x", unit = "m" }\n')  # fmt: skip
+        (tmp_path / str(k)).mkdir()
+        masters.append(Master(Unpacked(export(penode_gen.load(path), 3, tmp_path / str(k)), tmp_path / f"unpacked{k}")).initialise())
+    one, other = masters
+    data = one.to_bytes(one.save())
+    one.from_bytes(data)
+    with pytest.raises(FMICallException):
+        other.from_bytes(data)
+    assert other.log[-1] == (ERROR, "logStatusError", "this state was saved by another FMU")
+
+
 @pytest.fixture(scope="module")
 def double(nqvm: Any, tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
     folder = tmp_path_factory.mktemp("double")

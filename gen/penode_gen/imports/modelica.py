@@ -57,7 +57,8 @@ class _Reader:
         self.tokens.append((line, "end", ""))
 
     def error(self, what: str, remedy: str) -> ImportProblem:
-        return ImportProblem(f"{self.path}: line {self.tokens[min(self.at, len(self.tokens) - 1)][0]}: {what}; {remedy}")
+        # a string of the file may run over several lines
+        return ImportProblem(f"{self.path}: line {self.tokens[min(self.at, len(self.tokens) - 1)][0]}: {' '.join(what.split())}; {remedy}")
 
     @property
     def kind(self) -> str:
