@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""
-Networks from ONNX files, as training tools write them.
+"""Networks from ONNX files, as training tools write them.
 
 The graph must be one chain from its only input [batch, n] or [n] to its only output. Dense layers come as Gemm or as MatMul and Add,
 scaling as Sub, Div, Mul, Add, Neg with constants or as Scaler; operators that only rename, reshape or convert are checked and dropped;
