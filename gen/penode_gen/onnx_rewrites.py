@@ -88,7 +88,7 @@ class _Graph:
         """Length of the last axis of each tensor, where it follows from the file; ranks likewise."""
         try:
             whole = shape_inference.infer_shapes(self.model)
-        except Exception:  # noqa: BLE001 - the checker of the reader says what is wrong
+        except shape_inference.InferenceError:  # the checker of the reader says what is wrong; all else is caught where this is read
             return {}
         found = {}
         for info in (*whole.graph.value_info, *whole.graph.input, *whole.graph.output):
@@ -111,7 +111,7 @@ class _Graph:
         for node in list(self.model.graph.node):
             if node.op_type == "Constant" and node.attribute and node.attribute[0].name == "value":
                 self.constants[node.output[0]] = numpy_helper.to_array(node.attribute[0].t)
-            if node.op_type in BRANCHES and all(not n or n in self.constants for n in node.input):
+            if node.op_type in BRANCHES and not node.domain and all(not n or n in self.constants for n in node.input):
                 self.computed(node)
                 continue
             rule = rules.get(node.op_type)
@@ -141,7 +141,7 @@ class _Graph:
         factor = scale / np.sqrt(variance + _attribute(node, "epsilon", 1e-5))
         shift, kind = bias - mean * factor, self.constants[node.input[1]].dtype
         before = next((n for n in self.nodes if node.input[0] in n.output), None)
-        if before is not None and before.op_type == "Gemm" and self.users(node.input[0]) == 1 and all(n in self.constants for n in before.input[1:]):
+        if before is not None and self.folds(before):
             weights = self.constants[before.input[1]].astype(np.float64)
             turned = _attribute(before, "transB", 0)
             weights = _attribute(before, "alpha", 1.0) * (weights * factor[:, None] if turned else weights * factor)
@@ -156,32 +156,44 @@ class _Graph:
             helper.make_node("Add", [between, self.constant(shift.astype(kind))], [node.output[0]], node.name),
         ]
 
+    def folds(self, before: NodeProto) -> bool:
+        """Can a Gemm take what scales its result? A transposed signal is left to the reader, which refuses it."""
+        plain = before.op_type == "Gemm" and not before.domain and not _attribute(before, "transA", 0)
+        return plain and self.users(before.output[0]) == 1 and all(n in self.constants for n in before.input[1:])
+
+    def along(self, value: Values, source: str) -> Values | None:
+        """One value for each element of a signal, where that is what broadcasting makes of a constant."""
+        width, rank = self.widths.get(source), self.ranks.get(source, 0)
+        if width is None or value.ndim > rank or value.size not in (1, width) or value.size != (value.shape or (1,))[-1]:
+            return None
+        return np.broadcast_to(np.ravel(value), width).astype(np.float64)
+
     def users(self, name: str) -> int:
         """How many nodes of the file take a tensor."""
         return sum(list(n.input).count(name) for n in self.model.graph.node) + sum(o.name == name for o in self.model.graph.output)
 
     def leaky(self, node: NodeProto) -> list[NodeProto] | None:
         """relu(x) - a relu(-x)."""
-        width = self.widths.get(node.input[0])
         if node.op_type == "PRelu":
             slope = self.constants.get(node.input[1])
         else:
-            slope = np.float64(_attribute(node, "alpha", 0.01))
-        if width is None or slope is None or np.size(slope) not in (1, width):
+            slope = np.array(_attribute(node, "alpha", 0.01))
+        by = None if slope is None else self.along(slope, node.input[0])
+        if by is None:
             return None
-        by = np.broadcast_to(np.ravel(slope), width).astype(np.float64)
-        eye = np.eye(width)
-        return self.through(node, np.hstack([eye, -eye]), np.zeros(2 * width), np.vstack([eye, -np.diag(by)]), np.zeros(width))
+        eye, none = np.eye(len(by)), np.zeros(len(by))
+        return self.through(node, np.hstack([eye, -eye]), np.tile(none, 2), np.vstack([eye, -np.diag(by)]), none)
 
     def clip(self, node: NodeProto) -> list[NodeProto] | None:
         """ReLU as it is for limits 0 and none, else a + relu(x - a) - relu(x - b)."""
         limits: list[float | None] = []
         for position, name in ((1, "min"), (2, "max")):
             given = node.input[position] if len(node.input) > position else ""
-            if given and given not in self.constants:
+            if given and (given not in self.constants or self.constants[given].size != 1):
                 return None
-            value = float(np.ravel(self.constants[given])[0]) if given else _attribute(node, name, None)
-            limits.append(None if value is None or abs(value) >= FAR else float(value))
+            value = self.constants[given].item() if given else _attribute(node, name, None)
+            none = value is None or (value <= -FAR if name == "min" else value >= FAR)
+            limits.append(None if none else float(value))
         low, high = limits
         if high is None and low is not None:
             return self.above(node, node.input[0], np.array([low]))
@@ -202,25 +214,27 @@ class _Graph:
         if len(node.input) != 2 or len(signals) != 1:
             return None
         (other,) = (self.constants[n] for n in node.input if n in self.constants)
-        return (self.above if node.op_type == "Max" else self.below)(node, signals[0], np.ravel(other).astype(np.float64))
+        return (self.above if node.op_type == "Max" else self.below)(node, signals[0], other)
 
     def above(self, node: NodeProto, source: str, limit: Values) -> list[NodeProto] | None:
         """max(x, c)."""
-        if not limit.any():
+        if limit.size == 1 and limit.ndim <= 1 and limit.item() == 0.0:
             return [helper.make_node("Relu", [source], [node.output[0]], node.name)]
-        width = self.widths.get(source)
-        if width is None or limit.size not in (1, width):
+        at = self.along(limit, source)
+        if at is None:
             return None
-        at = np.broadcast_to(limit, width)
-        return self.through(node, np.eye(width), -at, np.eye(width), at, source)
+        if not at.any():
+            return [helper.make_node("Relu", [source], [node.output[0]], node.name)]
+        eye = np.eye(len(at))
+        return self.through(node, eye, -at, eye, at, source)
 
     def below(self, node: NodeProto, source: str, limit: Values) -> list[NodeProto] | None:
         """min(x, c)."""
-        width = self.widths.get(source)
-        if width is None or limit.size not in (1, width):
+        at = self.along(limit, source)
+        if at is None:
             return None
-        at = np.broadcast_to(limit, width)
-        return self.through(node, -np.eye(width), at, -np.eye(width), at, source)
+        eye = np.eye(len(at))
+        return self.through(node, -eye, at, -eye, at, source)
 
     def through(self, node: NodeProto, into: Values, bias: Values, out: Values, shift: Values, source: str = "") -> list[NodeProto]:
         """relu(x into + bias) out + shift."""

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""
-Networks from ONNX files, as training tools write them.
+"""Networks from ONNX files, as training tools write them.
 
-The graph must be one chain from its only input [batch, n] or [n] to its only output. Dense layers come as Gemm or as
-MatMul and Add, scaling as Sub, Div, Mul, Add, Neg with constants or as Scaler; operators that only rename, reshape or
-convert are checked and dropped; onnx_rewrites turns others into such. Two patterns that are no chain are known: the Softplus of PyTorch
-(Where(Greater(x, 20), x, Softplus(x))) and the unit step (a comparison, then Cast or Where(., 1, 0)).
-The layers follow from the operators alone, not from the numbers, so sets trained on one architecture stay exchangeable.
+The graph must be one chain from its only input [batch, n] or [n] to its only output. Dense layers come as Gemm or as MatMul and Add,
+scaling as Sub, Div, Mul, Add, Neg with constants or as Scaler; operators that only rename, reshape or convert are checked and dropped;
+onnx_rewrites turns others into such. Two patterns that are no chain are known: the Softplus of PyTorch (Where(Greater(x, 20), x,
+Softplus(x))) and the unit step (a comparison, then Cast or Where(., 1, 0)). The layers follow from the operators alone, not from the
+numbers, so sets trained on one architecture stay exchangeable.
 """
 
 from __future__ import annotations
@@ -25,6 +24,7 @@ from onnx import NodeProto, TensorProto, helper, numpy_helper
 
 from . import onnx_rewrites
 from .networks import Affine, Dense, Layer, Network, NetworkError, Vector
+
 Shape = tuple[int, ...]
 
 _ACTIVATIONS = {"Relu": "relu", "Tanh": "tanh", "Sigmoid": "sigmoid", "Softplus": "softplus"}

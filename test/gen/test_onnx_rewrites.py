@@ -96,11 +96,20 @@ def test_odd_by_subtraction(activation: str, tmp_path: Path) -> None:
     [
         ([IN, node("Clip", "h x", "a"), OUT], "operator is not supported"),
         ([IN, node("Elu", "h", "a"), OUT], "operator is not supported"),
-        ([*branch("x", "1"), node("Neg", "x", "m"), *branch("m", "2", "Relu"), node("Sub", "f1 f2", "y")], "not of one shape"),
+        ([*branch("x", "1"), node("Neg", "x", "minus"), *branch("minus", "2", "Relu"), node("Sub", "f1 f2", "y")], "not of one shape"),
+        # constants that broadcast along the batch, add an axis or widen the signal
+        ([IN, node("Max", "h column", "a"), OUT], "operator is not supported"),
+        ([IN, node("Min", "cube h", "a"), OUT], "operator is not supported"),
+        ([IN, node("PRelu", "h column", "a"), OUT], "operator is not supported"),
+        ([node("Gemm", "x narrow", "h"), node("Max", "h zeros", "a"), OUT], "operator is not supported"),
+        ([IN, node("Clip", "h c", "a"), OUT], "operator is not supported"),  # its limits are scalars
+        ([IN, node("Clip", "h far", "a"), OUT], "NaN or Inf"),  # beyond float, but below: not as if there were none
+        ([node("Gemm", "x w1 b1", "h", transA=1), node("BatchNormalization", "h g c m v", "a"), OUT], "not transposed"),
     ],
 )
 def test_refused_with_a_way_out(nodes: list[onnx.NodeProto], says: str, tmp_path: Path) -> None:
-    path = save(tmp_path, nodes, PLAIN)
+    constants = PLAIN | BN | {"column": RANDOM.normal(size=(5, 1)), "cube": np.ones((1, 1, 1)), "narrow": W1[:, :1], "zeros": np.zeros(5), "far": np.array(np.inf)}
+    path = save(tmp_path, nodes, {n: v for n, v in constants.items() if any(n in k.input for k in nodes)})
     with pytest.raises(NetworkError) as caught:
         read_network(path)
     assert str(caught.value).startswith(f"{path}: ") and says in str(caught.value) and "; " in str(caught.value)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from onnx import NodeProto, TensorProto, helper, numpy_helper
 
 import penode_gen
 from penode_gen.networks import Affine, Dense, Network
@@ -82,3 +83,21 @@ def test_bad_start_is_one_line(name: str, text: str, says: str, tmp_path: Path) 
     with pytest.raises((UserError, penode_gen.ModelError)) as caught:
         begin.read([tmp_path / name], penode_gen.load(QUARTER))
     assert any(says in p for p in caught.value.problems), caught.value.problems
+
+
+@pytest.mark.parametrize(
+    ("layer", "says"),
+    [
+        (helper.make_node("Mul", ["x", "k"], ["y"]), "no layer with weights"),
+        (helper.make_node("Gemm", ["x", "k"], ["y"]), "1 and 2, the model's 1 and 1"),
+    ],
+)
+def test_network_that_cannot_be_a_start_is_one_line(layer: NodeProto, says: str, tmp_path: Path) -> None:
+    width = 1 if layer.op_type == "Mul" else 2
+    ends = [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["batch", w]) for n, w in (("x", 1), ("y", width))]
+    graph = helper.make_graph([layer], "given", ends[:1], ends[1:], [numpy_helper.from_array(np.full((1, width), 3.0, np.float32), "k")])
+    path = tmp_path / "spring_net.onnx"
+    path.write_bytes(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8).SerializeToString())
+    with pytest.raises(UserError) as caught:
+        begin.read([path], penode_gen.load(QUARTER))
+    assert says in str(caught.value) and len(caught.value.problems) == 1

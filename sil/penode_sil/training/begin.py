@@ -60,8 +60,11 @@ def read(paths: Sequence[Path], model: Model) -> Start:
         else:
             raise UserError(f"--from {given}: neither a model file (.toml), nor a network (.onnx, .json), nor a diagnosis.json; give one of these")
     for name, network in networks.items():
-        if (network.n_inputs, network.n_outputs) != (len(model.networks[name].input_units), 1):
-            raise UserError(f"--from: network {name} has {network.n_inputs} inputs, the model's has {len(model.networks[name].input_units)}; give one of that shape")
+        inputs = len(model.networks[name].input_units)
+        if (network.n_inputs, network.n_outputs) != (inputs, 1):
+            raise UserError(f"--from: network {name} has inputs and outputs {network.n_inputs} and {network.n_outputs}, the model's {inputs} and 1; give one of that shape")
+        if all(isinstance(layer, Affine) for layer in network.layers):
+            raise UserError(f"--from: network {name} scales its input and has no layer with weights; give one that has, or leave it out")
     return Start(parameters, {n: v for n, v in networks.items() if not _silent(v)})
 
 
