@@ -28,10 +28,11 @@ def play(path: Path, record: Path | None, tell: Any = lambda line: None) -> list
     Time, inputs and outputs at each sample, as columns. Raises UserError.
 
     `record`: CSV with `time [s]` and inputs of the system; a value holds from its row to the next. Without it inputs keep their
-    start values until the stop time of the SSP. `tell` takes a line for each warning of the FMU.
+    start values until the stop time of the SSP. `tell` takes a line for each warning of the FMU, and for each exchange that is
+    scheduled too late.
     """
     if importlib.util.find_spec("fmpy") is None:
-        raise UserError("--ssp: it needs the Python package FMPy, which is not installed; pip install penode[fmi]")
+        raise UserError("--ssp: it needs the Python package FMPy, which is not installed; pip install penode[ssp]")
     system = ssp_file.read(path)
     table = _record(record, system.inputs) if record else {}
     stop = float(table["time"][-1]) if table else system.stop
@@ -63,6 +64,8 @@ def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array]
             fmu.set(exchange.values, f"{path}: {exchange.source} at {exchange.time:g} s")
         fmu.set({system.wires[n]: (u[k],) for n, u in zip(system.inputs, inputs)}, f"{path}: inputs")
         fmu.step(k)
+    for exchange in waiting:
+        fmu.tell(f"{exchange.source} at {exchange.time:g} s is never in force: the run ends at {times[-1]:g} s")
     return np.column_stack([inputs.T, outputs])
 
 

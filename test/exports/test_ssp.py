@@ -8,6 +8,7 @@ import importlib.util
 import io
 import random
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from conftest import chirp
 import penode_gen
 from penode_gen import exports, layout
 from penode_gen.exports.archive import zipped
-from penode_sil import ssp_file
+from penode_sil import ssp_file, ssp_player
 from penode_sil.cli import cli
 from penode_sil.errors import UserError
 from penode_sil.schedule import Call
@@ -222,6 +223,30 @@ def test_damaged_archives_are_refused_with_a_line(ssp: Path, tmp_path: Path) -> 
 @pytest.mark.long
 def test_1000_damaged_archives_are_refused_with_a_line(ssp: Path, tmp_path: Path) -> None:
     check_damaged(ssp, tmp_path / "damaged.ssp", range(1000, 2000))
+
+
+@needs("fmpy")
+def test_exchanges_after_the_end_are_told(ssp: Path, tmp_path: Path) -> None:
+    """The schedule has sets at 1 s and 1.5 s; the recording ends at 1.2 s."""
+    record = tmp_path / "road.csv"
+    record.write_text("time [s],z_road [m]\n0,0\n1.2,0.01\n")
+    told: list[str] = []
+    ssp_player.play(ssp, record, told.append)
+    assert [line for line in told if "never in force" in line] == [line for line in told if "at 1.5 s" in line] != []
+
+
+@needs("fmpy")
+def test_an_input_without_a_column_keeps_what_the_ssp_binds_to_it(ssp: Path, tmp_path: Path) -> None:
+    """A road of 0.01 m as a start value of the SSP, not the 0 of the FMU."""
+    system = ssp_file.read(ssp)
+    wire = system.wires["z_road"]
+    record = tmp_path / "time.csv"
+    record.write_text("time [s]\n0\n0.02\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ssp_file, "read", lambda path: replace(system, start={**system.start, wire: (0.01,)}))
+        columns = {c.name: c.values for c in ssp_player.play(ssp, record)}
+    assert (columns["z_road"] == 0.01).all()
+    assert columns["z_w"][-1] > 0.0, "the wheel follows it"
 
 
 def test_tables_and_options_that_do_not_fit_are_one_line(ssp: Path, tmp_path: Path) -> None:
