@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from exchanges import check_log, drive
+from exchanges import check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, link as links, measure, pages, stage, virtual
 from penode_sil.calibration.codes import Page, Slave
 from penode_sil.errors import UserError
@@ -119,24 +119,19 @@ def test_eight_signals_at_1_khz_without_loss(seconds: float) -> None:
 
 def test_every_entry_of_the_a2l_is_the_models_value() -> None:
     model = penode_gen.load(NQVM)
-    with reached("tcp", model, drive(model)) as (where, _), links.connected(where) as link:
-        a2l = link.a2l(None)  # GET_ID offers it
-        values = np.asarray(penode_gen.set_values(model, "default"))
-        first, size, kind = pages.segment(a2l)
-        seen = np.zeros(values.size, int)
-        for entry in a2l.characteristics.values():
-            at = (entry.address - first) // kind.itemsize
-            seen[at : at + entry.count] += 1
-            assert (link.values(entry) == values[at : at + entry.count]).all(), entry.name
-        assert (seen == 1).all() and size == values.nbytes
-        network = model.sets["default"].networks["damper_net"]
-        weights = [layer.weights for layer in network.layers if hasattr(layer, "weights")]
-        entry = a2l.characteristics["damper_net.weights_2"]
-        assert entry.sizes[:2] == weights[1].shape  # fastest: rows
-        assert (link.values(entry).reshape(weights[1].shape, order="F") == weights[1].astype(np.float32)).all()
-        for entry in a2l.measurements.values():
-            assert np.isfinite(link.values(entry)).all(), entry.name
-        assert link.number(a2l.measurements["set.layout"]) == penode_gen.set_head(model, "default")[0]
+    u = drive(model)
+    with reached("tcp", model, u) as (where, _):
+        with links.connected(where) as link:
+            a2l = link.a2l(None)  # GET_ID offers it
+            check_characteristics(model, link, a2l)
+            network = model.sets["default"].networks["damper_net"]
+            weights = [layer.weights for layer in network.layers if hasattr(layer, "weights")]
+            entry = a2l.characteristics["damper_net.weights_2"]
+            assert entry.sizes[:2] == weights[1].shape  # fastest: rows
+            assert (link.values(entry).reshape(weights[1].shape, order="F") == weights[1].astype(np.float32)).all()
+            assert link.number(a2l.measurements["set.layout"]) == penode_gen.set_head(model, "default")[0]  # by UPLOAD
+        log = measure.record(where, a2l, list(a2l.measurements), 0.3)
+    check_measurements(model, u, a2l, log)
 
 
 def test_refused_set_changes_nothing_and_says_why() -> None:

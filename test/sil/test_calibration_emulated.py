@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from exchanges import check_log, drive
+from exchanges import check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, emulated, link as links, measure, pages, stage
 
 NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm" / "nqvm.toml"
@@ -37,15 +37,10 @@ def running(request: pytest.FixtureRequest) -> Iterator[tuple[object, np.ndarray
 
 def test_every_entry_and_then_an_exchange(running: tuple) -> None:
     model, u, where, a2l = running
-    values = np.asarray(penode_gen.set_values(model, "default"))
     with links.connected(where) as link:
-        first, size, kind = pages.segment(a2l)
-        assert size == values.nbytes and link.text(links.Text.EPK) == a2l.epk[0]
-        for entry in a2l.characteristics.values():
-            at = (entry.address - first) // kind.itemsize
-            assert (link.values(entry) == values[at : at + entry.count]).all(), entry.name
-        for entry in a2l.measurements.values():
-            assert np.isfinite(link.values(entry)).all(), entry.name
+        assert link.text(links.Text.EPK) == a2l.epk[0]
+        check_characteristics(model, link, a2l)
+    check_measurements(model, u, a2l, measure.record(where, a2l, list(a2l.measurements), 0.3, 50))  # 180 bytes each 50 ms
     chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
     every = 10  # 23 bytes and a head each 10 ms of the emulated time
     log = measure.record(where, a2l, ["z_b", "z_w", "sample", "set_in_force", "adopted_at"], 0.3, every, lambda link: stage.stage_set(link, a2l, chosen))
