@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import socket
 import threading
@@ -11,6 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -98,7 +100,10 @@ def test_log_is_that_of_a_sil_run_with_the_exchange_where_it_shows_the_new_id(ki
             staged = stage.stage_set(link, a2l, chosen)
             assert (staged.bytes, staged.id) == (4 * 1198, Slave.FIRST_ID)
 
-        log = measure.record(where, a2l, SIGNALS, 0.3, every, exchange)
+        alias = dataclasses.replace(a2l.measurements["z_w"], name="alias")  # a second name of one place
+        named = dataclasses.replace(a2l, measurements=a2l.measurements | {"alias": alias})
+        log = measure.record(where, named, ["alias", *SIGNALS], 0.3, every, exchange)
+    assert (log.values["alias"] == log.values["z_w"]).all()
     check_log(model, u, log, every)
 
 
@@ -174,6 +179,43 @@ def test_nobody_answers_in_one_line() -> None:
         pass
     with pytest.raises(UserError, match="is no address"):
         address.parse("tcp:nowhere")
+    for kind in ("tcp", "udp"):
+        with pytest.raises(UserError, match="cannot be opened"), links.connected(address.parse(f"{kind}:nowhere.invalid:5555")):
+            pass
+
+
+class Timed:
+    """A link to a slave whose event comes each millisecond."""
+
+    master = SimpleNamespace(getDaqEventInfo=None)
+
+    def ask(self, what: str, *_: object) -> SimpleNamespace:
+        assert what == "GET_DAQ_EVENT_INFO"
+        return SimpleNamespace(eventChannelTimeUnit=6, eventChannelTimeCycle=1)
+
+
+def test_log_counts_what_is_missing_and_its_clock_goes_on_when_the_stamps_wrap() -> None:
+    kept = measure.Samples(names=["a"])
+    steps = [-3, -2, -1, 0, 1, 3, 4, 8]  # ms; the stamps wrap at 0; 2, 5, 6 and 7 never came
+    kept.stamps = [step * 1000 % (1 << 32) * 1000 for step in steps]  # ns, as pyxcp gives them
+    kept.rows = [[(1 << 60) + n] for n in range(len(steps))]
+    kept.stamps.append(0)  # of a sample whose values come after the look at them
+    entries = [a2l_read.Entry(name, "", 64, np.dtype("u8"), (), "") for name in ("a", "b")]  # two names of one place
+    log = measure._log(Timed(), entries, kept, 1)
+    assert log.lost == 4 and np.allclose(log.time, (np.array(steps) + 3) * 1e-3, rtol=0.0, atol=1e-15)  # rounding of seven sums below 16 ms
+    assert all(log.values[name].tolist() == [(1 << 60) + n for n in range(len(steps))] for name in ("a", "b"))
+
+
+def test_signals_of_one_place_are_measured_and_those_that_overlap_refused() -> None:
+    def entry(name: str, at: int, kind: str) -> a2l_read.Entry:
+        return a2l_read.Entry(name, "", at, np.dtype(kind), (), "")
+
+    entries = [entry("whole", 64, "u4"), entry("same", 64, "u4"), entry("next", 68, "f4"), entry("high", 66, "u2"), entry("low", 64, "u2")]
+    a2l = a2l_read.A2l("x", {}, {e.name: e for e in entries}, None, None)
+    assert [e.name for e in measure.choose(a2l, ["whole", "same", "next"])] == ["whole", "same", "next"]
+    for part in ("high", "low"):
+        with pytest.raises(UserError, match="lies in the bytes of"):
+            measure.choose(a2l, ["whole", part])
 
 
 def test_port_that_is_taken_is_one_line() -> None:
