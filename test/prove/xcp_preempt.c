@@ -3,8 +3,8 @@
 
 /*
  * xcp_preempt: packets to the XCP slave are pre-empted by a step with its DAQ sample, and such a step by a packet, once at each
- * boundary between two instructions, with and without a set that waits; for xcp_preempt_check.py. As preempt.c, an instruction
- * lasts 2^10 ns, more than 20 ticks of SysTick; the delay before the interrupt grows by 20 from run to run.
+ * boundary between two instructions, with and without a set that waits; for xcp_preempt_check.py. The delay before the
+ * interrupt grows by TICKS from run to run.
  */
 #include <stdbool.h>
 #include <stddef.h>
@@ -17,9 +17,6 @@
 #include "penode/pen_serial.h"
 #include "penode/pen_xcp_daq.h"
 
-#define TICKS    20U
-#define SCB_VTOR REGISTER(0xE000ED08U)
-#define SYST_ON  0x7U
 #define BYTES    (SMALL_SET_LENGTH * 4U)
 #define MAX_CTO  255U
 #define SLOTS    16U
@@ -41,9 +38,6 @@ static bool          step_interrupts;
 static volatile uint32_t pair[2]; /* steps so far, and its complement: written by the step */
 
 /* of one run */
-static volatile bool armed;
-static volatile bool inside;
-static volatile bool fired;
 static uint32_t kind;
 static uint32_t in_force;
 static uint32_t waiting; /* set, or SETS */
@@ -52,6 +46,8 @@ static bool     good_answer;
 static uint32_t drained; /* the pair that the last DAQ packet held */
 static uint32_t failures;
 static uint32_t runs;
+
+#include "interrupt.inc"
 
 static void expect(bool good, const char *what)
 {
@@ -183,18 +179,6 @@ __attribute__((noinline)) void the_step(void)
     pen_xcp_sample(&xcp, now);
 }
 
-static void from_start(void)
-{
-    static const small_x_t x = { (pen_real_t)0.75, (pen_real_t)0.25 };
-
-    (void)small_set_state(&model, &x);
-}
-
-static bool same(pen_real_t a, pen_real_t b)
-{
-    return *(const uint32_t *)(const void *)&a == *(const uint32_t *)(const void *)&b;
-}
-
 /* A step is that of one whole set: the one that waited, the one that the packet published, or the one before. */
 static void judge(bool must, bool may)
 {
@@ -213,52 +197,17 @@ static void judge(bool must, bool may)
 
 /* -- the interrupt -------------------------------------------------------------------------------------------------- */
 
-__attribute__((used)) static void on_tick(void)
+static void pre_empt(uint32_t at)
 {
-    SYST_CSR = 0U;
-    if (armed && inside) {
-        armed = false;
-        fired = true;
-        if (step_interrupts) {
-            const bool due = (waiting != SETS);
-            from_start();
-            the_step();
-            judge(due, due || (target != SETS));
-        } else {
-            the_packet();
-        }
+    (void)at;
+    if (step_interrupts) {
+        const bool due = (waiting != SETS);
+        from_start();
+        the_step();
+        judge(due, due || (target != SETS));
+    } else {
+        the_packet();
     }
-}
-
-static void take_vector(void)
-{
-    static uint32_t vectors[16] __attribute__((aligned(128)));
-    const uint32_t *const old = (const uint32_t *)SCB_VTOR;
-
-    for (size_t i = 0U; i < 16U; i++) {
-        vectors[i] = old[i];
-    }
-    vectors[15] = (uint32_t)(uintptr_t)on_tick;
-    SCB_VTOR = (uint32_t)(uintptr_t)vectors;
-    __asm__ volatile("dsb\n\tisb" : : : "memory");
-}
-
-static bool interrupt(void (*function)(void), uint32_t delay)
-{
-    bool early;
-
-    fired = false;
-    armed = true;
-    inside = true;
-    SYST_RVR = delay;
-    SYST_CVR = 0U;
-    SYST_CSR = SYST_ON;
-    function();
-    inside = false;
-    SYST_CSR = 0U;
-    early = armed;
-    armed = false;
-    return early;
 }
 
 /* -- one run -------------------------------------------------------------------------------------------------------- */
