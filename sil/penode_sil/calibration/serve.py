@@ -48,7 +48,9 @@ def serve(
     with emulated(loaded, machine or WITH_UART[0], host, port, u) if place == "pil" else served(loaded, kind, host, port, u, quiet) as found:
         if a2l is not None:
             a2l.write_text(found.a2l, encoding="utf-8")
-        if not found.a2l:
+        if place == "pil":
+            note(f"it offers no A2L: give penode measure, stage and compare --a2l {a2l}" if a2l else "it offers no A2L: write one by --a2l, for tools and for penode measure, stage and compare")
+        elif not found.a2l:
             note("it offers no A2L: that needs the Python package pyelftools; pip install penode[xcp]")
         click.echo(json.dumps({"address": found.address}) if as_json else f"{loaded.name} at {found.address}, a step each {loaded.sample_time * 1e3:g} ms; end with Ctrl-C")
         _wait(duration)
