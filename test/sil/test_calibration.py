@@ -21,7 +21,7 @@ import pytest
 import penode_gen
 from exchanges import check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, link as links, measure, pages, stage, virtual
-from penode_sil.calibration.codes import Page, Slave
+from penode_sil.calibration.codes import Page, Slave, Who
 from penode_sil.errors import UserError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -153,6 +153,38 @@ def test_refused_set_changes_nothing_and_says_why() -> None:
             foreign = pages.ChosenSet("foreign", bad.layout ^ 1, bad.values)
             with pytest.raises(UserError, match="set of another model"):
                 stage.stage_set(link, a2l, foreign)
+
+
+def test_quiet_commits_edits_of_the_working_page_while_that_runs() -> None:
+    model = penode_gen.load(NQVM)
+    chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
+    with virtual.served(model, "tcp", "127.0.0.1", 0, drive(model), quiet=200) as found, links.connected(address.parse(found.address)) as link:
+        a2l = a2l_read.parse(found.a2l, "served")
+        first, (running, status) = pages.segment(a2l)[0], (a2l.measurements[name] for name in ("set_in_force", "count.set_nonfinite"))
+
+        def in_force_after(data: bytes, seconds: float) -> tuple[float, float]:
+            old = link.number(running)
+            begin = time.monotonic()
+            link.write(first, data)
+            while link.number(running) == old and time.monotonic() - begin < seconds:
+                time.sleep(0.002)
+            return link.number(running) - old, time.monotonic() - begin
+
+        assert in_force_after(chosen.serial, 0.5)[0] == 0  # the reference runs
+        link.set_page(Who.ECU, Page.WORKING)
+        stage._await(link, a2l, 1)
+        more, seconds = in_force_after(np.float32(0.5).tobytes(), 5.0)
+        assert more == 1 and seconds > 0.2 - 0.011  # its clock ticks each 10 ms, and counts whole ms
+        assert in_force_after(np.float32(np.nan).tobytes(), 0.5)[0] == 0 and link.number(status) == 1
+
+
+def test_a2l_of_another_program_is_refused(tmp_path: Path) -> None:
+    model = penode_gen.load(NQVM)
+    other = tmp_path / "other.a2l"
+    with virtual.served(model, "tcp", "127.0.0.1", 0, drive(model)) as found, links.connected(address.parse(found.address)) as link:
+        other.write_text(found.a2l.replace('EPK "nqvm ', 'EPK "nqvm_old '))
+        with pytest.raises(UserError, match='is that of "nqvm_old .*the controller is "nqvm '):
+            link.a2l(other)
 
 
 def test_compare_names_sets_and_values() -> None:

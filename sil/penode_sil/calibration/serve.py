@@ -25,7 +25,7 @@ from .virtual import Served, inputs, served
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0: every one of this machine.")
 @click.option("--scenario", type=FILE, help="Scenario file whose inputs drive it, again and again; zeros if not given.")
 @click.option("--on", "target", default="sil", show_default=True, metavar="sil|pil[:machine]", help="On this machine, or on an emulated Cortex-M.")
-@click.option("--quiet", type=click.IntRange(0, 60000), default=0, show_default=True, help="Milliseconds after the last edit until it is in force; 0: by page switch only.")
+@click.option("--quiet", type=click.IntRange(0, 60000), default=0, show_default=True, help="Milliseconds after the last edit until it is in force, while the working page runs; 0: by page switch only.")
 @click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), help="Seconds; until Ctrl-C if not given.")
 @click.option("--a2l", type=FILE, help="File to write its A2L to, for tools that do not ask the controller.")
 @click.option("--json", "as_json", is_flag=True, help="Print the address and the end as JSON.")
