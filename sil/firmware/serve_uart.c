@@ -11,7 +11,7 @@
 #include "uart.h"
 #include "xcp_frame.h"
 
-#define STIMULI (0x100000U / sizeof(MODEL(u_t))) /* 1 MiB, as sil/penode_sil/calibration/emulated.py knows */
+#define STIMULI (0x100000U / sizeof(MODEL(u_t))) /* 1 MiB, as sil/penode_sil/calibration/codes.py knows */
 #define MAX_CTO 252U
 #define SLOTS   512U
 #define ROOM    (XCP_FRAME_HEAD + MAX_CTO + XCP_FRAME_TAIL)

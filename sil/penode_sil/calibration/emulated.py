@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from ..errors import UserError, hint
 from ..targets import FLAGS, MACHINES, PORT, ROOT, _files, _included, _kept, _version, generated, model_options
+from .codes import Slave
 from .virtual import Served, describe, free_port, identity
 
 WITH_UART = ("m4f", "m3", "m7")  # port/cortex-m/uart.c knows their serial line
 _EMULATOR = "qemu-system-arm"
-_ROOM = 1 << 20  # bytes of inputs that sil/firmware/serve_uart.c holds
 
 
 def build(model: Any, machine: str) -> Path:
@@ -49,8 +49,8 @@ def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[n
     if shutil.which(_EMULATOR) is None:
         raise UserError(f"{_EMULATOR}: the emulator is not installed; install it (make test does)")
     inputs = u.astype(np.float32).tobytes()
-    if len(inputs) > _ROOM:
-        most = _ROOM // (len(inputs) // len(u)) * model.sample_time
+    if len(inputs) > Slave.STIMULUS:
+        most = Slave.STIMULUS // (len(inputs) // len(u)) * model.sample_time
         raise UserError(f"--scenario: the emulated controller holds the inputs of {most:g} s, not of {len(u) * model.sample_time:g} s; shorten it, or use --on sil")
     program = build(model, machine)
     port = port if port is None else port or free_port(host, False)
