@@ -2,9 +2,9 @@
  * Copyright (c) 2026 the penode authors */
 
 /*
- * xcp_preempt: packets to the XCP slave are pre-empted by a step with its DAQ sample, and such a step by a packet, once at each
+ * xcp_preempt ALL FILE: packets to the XCP slave are pre-empted by a step with its DAQ sample, and such a step by a packet, once at each
  * boundary between two instructions, with and without a set that waits; for xcp_preempt_check.py. The delay before the
- * interrupt grows by TICKS from run to run.
+ * interrupt grows by TICKS from run to run. ALL and FILE: as of preempt.c.
  */
 #include <stdbool.h>
 #include <stddef.h>
@@ -197,9 +197,8 @@ static void judge(bool must, bool may)
 
 /* -- the interrupt -------------------------------------------------------------------------------------------------- */
 
-static void pre_empt(uint32_t at)
+static void pre_empt(void)
 {
-    (void)at;
     if (step_interrupts) {
         const bool due = (waiting != SETS);
         from_start();
@@ -281,20 +280,31 @@ static void end(bool samples_go_on)
     runs++;
 }
 
-static void sweep(bool pending)
+/* By other names, so that they are told from those that nothing interrupts. */
+__attribute__((noinline)) void the_call(void)
+{
+    the_packet();
+}
+
+__attribute__((noinline)) void the_sample(void)
+{
+    the_step();
+}
+
+static void sweep(bool pending, bool all)
 {
     const bool ends_list = (kind == CONNECT) || (kind == STOP) || (kind == FREE);
-    uint32_t delay = TICKS;
+    uint32_t delay = all ? TICKS : 0U;
     bool early = false;
 
     while (!early) {
         prepare(pending);
         good_answer = true;
         if (step_interrupts) {
-            early = interrupt(the_packet, delay);
+            early = interrupt(the_call, delay);
             judge_answer(pending);
         } else {
-            early = interrupt(the_step, delay);
+            early = interrupt(the_sample, delay);
             if (fired) {
                 judge_answer(pending);
             } else {
@@ -313,6 +323,10 @@ static void sweep(bool pending)
 
 int main(void)
 {
+    char text[128];
+    const bool all = board_argument(1U, text, sizeof(text)) && (text[0] == '1');
+    const int32_t file = board_argument(2U, text, sizeof(text)) ? board_open(text, true) : -1;
+
     take_vector();
     (void)small_init(&model, &small_set_default, &banks);
     (void)pen_xcp_daq_init(&daq, ring, SLOTS, MAX_CTO, 1U, 8U);
@@ -329,8 +343,8 @@ int main(void)
         step_interrupts = (way == 0U);
         runs = 0U;
         for (kind = DOWNLOAD; kind < KINDS; kind++) {
-            sweep(false);
-            sweep(true);
+            sweep(false, all);
+            sweep(true, all);
         }
         board_print(step_interrupts ? "packets interrupted " : "steps interrupted ");
         board_print_number(runs);
@@ -339,5 +353,6 @@ int main(void)
     board_print("failures ");
     board_print_number(failures);
     board_print("\n");
+    keep_met(file);
     return (failures == 0U) ? 0 : 1;
 }
