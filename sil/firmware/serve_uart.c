@@ -4,20 +4,20 @@
 /*
  * A controller on an emulated board: the timer interrupt steps, the main loop serves an XCP master over the serial line
  * (SxI: LEN and CTR of two bytes each, no checksum). Its argument names a file with the inputs of up to STIMULI samples,
- * pen_real_t[n][N_U], played again and again.
+ * pen_real_t[n][N_U], played again and again; it ends if there is none.
  */
 #include "board.h"
 #include "controller.h"
 #include "uart.h"
 #include "xcp_frame.h"
 
-#define STIMULI 4096U
+#define STIMULI (0x100000U / sizeof(MODEL(u_t))) /* 1 MiB, as sil/penode_sil/calibration/codes.py knows */
 #define MAX_CTO 252U
 #define SLOTS   512U
 #define ROOM    (XCP_FRAME_HEAD + MAX_CTO + XCP_FRAME_TAIL)
 
 static MODEL(u_t) stimulus[STIMULI];
-static uint32_t stimuli = 1U;
+static uint32_t stimuli;
 static uint32_t at;
 static uint8_t ring[SLOTS * (MAX_CTO + 1U)];
 static uint8_t frame[ROOM];
@@ -53,7 +53,7 @@ static void serve(void)
     }
 }
 
-static void read_stimulus(void)
+static bool read_stimulus(void)
 {
     char name[256];
     int32_t file = -1;
@@ -62,18 +62,17 @@ static void read_stimulus(void)
         file = board_open(name, false);
     }
     if (file >= 0) {
-        stimuli = board_read(file, stimulus, sizeof(stimulus)) / sizeof(stimulus[0]);
-        stimuli = (stimuli > 0U) ? stimuli : 1U;
+        stimuli = board_read(file, stimulus, sizeof(stimulus)) / (uint32_t)sizeof(stimulus[0]);
         board_close(file);
     }
+    return stimuli > 0U;
 }
 
 int main(void)
 {
     const controller_config_t config = { .max_cto = MAX_CTO, .ring = ring, .slots = SLOTS };
 
-    read_stimulus();
-    if (!controller_start(&config)) {
+    if (!read_stimulus() || !controller_start(&config)) {
         return 1;
     }
     uart_start();

@@ -7,6 +7,7 @@ from __future__ import annotations
 import importlib.util
 import re
 import shutil
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +18,7 @@ import pytest
 import penode_gen
 from models import RICH, network_file
 from penode_gen import exports, layout
+from penode_gen.exports import a2l, elf_types
 from penode_sil.calibration import a2l_read, virtual
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -149,6 +151,7 @@ def test_addresses_on_a_cortex_m_are_those_of_the_linker(tmp_path: Path) -> None
         ({"transport": "tcp:5555"}, "is none; use tcp:HOST:PORT"),
         ({"transport": "can:0x100:0x100"}, "is none; use tcp:HOST:PORT"),
         ({"epk": "nowhere"}, "has no variable nowhere"),
+        ({"epk": "controller"}, 'holds "", which'),  # no text
     ],
 )
 def test_what_is_wrong_is_one_line(rich: tuple[penode_gen.Model, dict], program: Path, options: dict, line: str) -> None:
@@ -169,3 +172,24 @@ def test_program_of_another_model_or_without_debug_information_is_refused(rich: 
     other.write_text(rich[0].path.read_text())
     with pytest.raises(exports.ExportError, match="generate the C of this model file again"):
         exports.export(penode_gen.load(other), "a2l", Path("x.a2l"), {"elf": program})
+
+
+@pytest.mark.parametrize("dwarf", [2, 3, 4, 5])
+def test_members_that_have_no_type_in_a2l_are_left_out_and_the_others_lie_where_they_are(tmp_path: Path, dwarf: int) -> None:
+    source, elf = tmp_path / "shown.c", tmp_path / "shown"
+    source.write_text("struct { unsigned a : 3, b : 5; float c; long double d; __int128 e; short f[2]; } shown = { .c = 1.5F, .f = { 7, -8 } };\nint main(void) { return 0; }\n")
+    subprocess.run(["gcc", f"-gdwarf-{dwarf}", "-gstrict-dwarf", "-no-pie", source, "-o", elf], check=True)
+    program = elf_types.read_program(elf)
+    found = {place.path: (place.kind, in_elf(elf, place.address, place.size)) for place in program.numbers(program.find("shown"))}
+    assert found == {"shown.c": ("float", struct.pack("<f", 1.5)), "shown.f[0]": ("signed", struct.pack("<h", 7)), "shown.f[1]": ("signed", struct.pack("<h", -8))}
+
+
+@pytest.mark.parametrize("text", ['a \\"b\\"', "a  b", "a\\\\b", ""])
+def test_epk_that_an_a2l_cannot_repeat_is_refused(tmp_path: Path, text: str) -> None:
+    source, elf = tmp_path / "epk.c", tmp_path / "epk"
+    source.write_text(f'const char penode_epk[] = "{text}", plain[] = "a b";\nint main(void) {{ return 0; }}\n')
+    subprocess.run(["gcc", "-g", "-no-pie", source, "-o", elf], check=True)
+    program = elf_types.read_program(elf)
+    with pytest.raises(exports.ExportError, match="which an A2L cannot repeat"):
+        a2l.epk(program, None)
+    assert a2l.epk(program, "plain") == ("a b", program.find("plain").address)

@@ -3,8 +3,8 @@
 
 /*
  * preempt ALL FILE: every tuning call of small.toml is pre-empted by a step, and every step by a tuning call, once at each
- * boundary between two instructions, with and without a set that waits; for preempt_check.py. An instruction lasts 2^10 ns,
- * more than 20 ticks of SysTick on every machine here; the delay before the interrupt grows by 20 from run to run.
+ * boundary between two instructions, with and without a set that waits; for preempt_check.py. The delay before the interrupt
+ * grows by TICKS from run to run.
  * ALL: 0: nothing is interrupted (to count what is executed); 1: all. FILE gets a bit for each halfword at which a call was
  * interrupted, then a step.
  */
@@ -15,12 +15,7 @@
 #include "cortex_m.h"
 #include "small.h"
 
-#define TICKS     20U
-#define CODE      0x10000U /* bytes of ROM that hold code, at most */
-#define SCB_VTOR  REGISTER(0xE000ED08U)
-#define FRAME_PC  6U
-#define SYST_ON   0x7U
-#define N         SMALL_SET_LENGTH
+#define N SMALL_SET_LENGTH
 
 enum { BEGIN, WRITE, COMMIT, ABORT, SELECT, ROLLBACK, HOLD, RUNNING, REPORT, WITHDRAW, VERIFY, EXCHANGE, KINDS };
 enum { SOFT, STIFF, KINKED, SETS }; /* runs first, is selected, is staged */
@@ -31,13 +26,9 @@ static const char *const name[KINDS] = { "begin", "write",   "commit", "abort", 
 static small_t       model;
 static small_banks_t banks;
 static pen_real_t    expected[SETS];
-static uint8_t       met[2][CODE / 16U];
 static bool          step_interrupts;
 
 /* of one run */
-static volatile bool armed;
-static volatile bool inside; /* between the two ends of a run */
-static volatile bool fired;
 static volatile pen_status_t result; /* of the tuning call */
 static uint32_t   kind;
 static uint32_t   in_force;  /* set */
@@ -49,6 +40,8 @@ static uint32_t   reported;  /* of those adopted */
 static pen_real_t last;
 static uint32_t   failures;
 static uint32_t   runs;
+
+#include "interrupt.inc"
 
 static void fail(const char *what)
 {
@@ -129,19 +122,7 @@ __attribute__((noinline)) void step(void)
     stepped = small_step(&model, &u, &y);
 }
 
-/* Take a step from the same state as ever and see that it is one whole set's, as its status says. */
-static void from_start(void)
-{
-    static const small_x_t x = { (pen_real_t)0.75, (pen_real_t)0.25 };
-
-    (void)small_set_state(&model, &x);
-}
-
-static bool same(pen_real_t a, pen_real_t b)
-{
-    return *(const uint32_t *)(const void *)&a == *(const uint32_t *)(const void *)&b;
-}
-
+/* A step is one whole set's, as its status says. */
 static void judge(bool must, bool may)
 {
     const bool adopts = (stepped & PEN_ADOPTED) != 0U;
@@ -170,62 +151,16 @@ static void judge(bool must, bool may)
 
 /* ---- the interrupt ---- */
 
-__attribute__((used)) static void on_tick(const uint32_t frame[])
+static void pre_empt(void)
 {
-    SYST_CSR = 0U;
-    if (armed && inside) {
-        armed = false;
-        fired = true;
-        const uint32_t at = (frame[FRAME_PC] & (CODE - 1U)) / 2U;
-        uint8_t *const bits = met[step_interrupts ? 0U : 1U];
-        bits[at / 8U] |= (uint8_t)(1U << (at % 8U));
-        if (step_interrupts) {
-            const bool due = (waiting != SETS);
-            from_start();
-            step();
-            judge(due, due || (target != SETS));
-        } else {
-            tune();
-        }
+    if (step_interrupts) {
+        const bool due = (waiting != SETS);
+        from_start();
+        step();
+        judge(due, due || (target != SETS));
+    } else {
+        tune();
     }
-}
-
-__attribute__((naked)) static void tick(void)
-{
-    __asm__ volatile("mrs r0, msp\n\t"
-                     "b on_tick");
-}
-
-static void take_vector(void)
-{
-    static uint32_t vectors[16] __attribute__((aligned(128)));
-    const uint32_t *const old = (const uint32_t *)SCB_VTOR;
-
-    for (size_t i = 0U; i < 16U; i++) {
-        vectors[i] = old[i];
-    }
-    vectors[15] = (uint32_t)(uintptr_t)tick;
-    SCB_VTOR = (uint32_t)(uintptr_t)vectors;
-    __asm__ volatile("dsb\n\tisb" : : : "memory");
-}
-
-/* Call one or the other, interrupted after a delay in ticks; true if it ended before that. */
-static bool interrupt(void (*function)(void), uint32_t delay)
-{
-    bool early;
-
-    fired = false;
-    armed = true;
-    inside = true;
-    SYST_RVR = delay;
-    SYST_CVR = 0U;
-    SYST_CSR = (delay > 0U) ? SYST_ON : 0U;
-    function();
-    inside = false;
-    SYST_CSR = 0U;
-    early = armed;
-    armed = false;
-    return early;
 }
 
 /* ---- one run ---- */
@@ -394,7 +329,6 @@ int main(void)
     board_print("failures ");
     board_print_number(failures);
     board_print("\n");
-    expect(board_write(file, met, sizeof(met)) == sizeof(met), "file");
-    board_close(file);
+    keep_met(file);
     return (failures == 0U) ? 0 : 1;
 }

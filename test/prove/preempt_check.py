@@ -4,19 +4,15 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import sys
 from pathlib import Path
 
-import numpy as np
-
 import gate
 
-sys.path.insert(0, str(gate.ROOT / "test" / "bench"))
-import cycles
 import penode_gen
+from interruption import executed, interrupted, never
 from penode_sil.targets import FLAGS, MACHINES, PORT, generated
 
 WORK = gate.BUILD / "preempt"
@@ -61,39 +57,18 @@ def program(machine: str, name: str, pen_set: Path, model: Path = gate.HERE / "s
     return elf
 
 
-def interrupted(machine: str, elf: Path) -> tuple[str, int, list[set[int]]]:
-    """What the program says, its exit code, and the addresses at which it interrupted calls and steps."""
-    bits = elf.with_suffix(".bits")
-    done = gate.run([PORT / "run", MACHINES[machine], elf, 1, bits.name], WORK, env=os.environ | {"SHIFT": "10", "LIMIT": "300"})
-    halves = np.unpackbits(np.fromfile(bits, np.uint8), bitorder="little").reshape(2, -1) if done.returncode in (0, 1) else np.zeros((2, 0))
-    return done.stdout + done.stderr, done.returncode, [{2 * int(k) for k in np.flatnonzero(half)} for half in halves]
-
-
-def executed(machine: str, elf: Path, function: str) -> set[int]:
-    """Addresses in the 64 kB of code that what a wrapper (one jump) calls executes when nothing interrupts it."""
-    with cycles.counting(elf, [function], modelled=False) as result:
-        done = gate.run([PORT / "run", MACHINES[machine], elf, 0, "quiet.bits"], WORK)
-        if done.returncode != 0:
-            raise SystemExit(f"FAIL  preempt: {elf.name} without interrupts: {done.stdout}{done.stderr}")
-        counted = result()
-    wrapper = cycles.symbols(elf)[function]
-    places = {counted.code[k].address for k in np.flatnonzero(counted.hits.sum(axis=1))} - {wrapper}
-    return {address & 0xFFFF for address in places}
-
-
 def main() -> int:
     good, figures = True, {}
     for machine in CORES:
         elf = program(machine, "right", SET)
-        said, code, met = interrupted(machine, elf)
+        said, code, met = interrupted(WORK, machine, elf)
         problems = [said] if code != 0 else []
         seen = dict(re.findall(r"^(calls|steps) interrupted (\d+)$", said, re.M))
         row: dict[str, object] = {"runs": {key: int(value) for key, value in seen.items()}, "failures": int(code != 0)}
         for what, function, pcs in (("calls", "the_call", met[0]), ("steps", "the_step", met[1])):
-            must = executed(machine, elf, function)
+            must = executed(WORK, machine, elf, function)
             row[f"addresses of {what}"] = {"executed": len(must), "interrupted": len(must & pcs)}
-            problems += [f"{what}: never interrupted at {address:#x}" for address in sorted(must - pcs)]
-            problems += [] if len(must) > 100 else [f"{what}: only {len(must)} addresses executed"]
+            problems += never(what, must, pcs)
         total = sum(row["runs"].values())
         good &= gate.report(f"preempt: {machine}: a step in a call, a call in a step, at each of {total} boundaries", problems)
         figures[machine] = row
@@ -101,7 +76,7 @@ def main() -> int:
     for k, (fault, change) in enumerate(FAULTS.items()):
         copy = WORK / f"fault{k}.c"
         copy.write_text(gate.faulty(SET.read_text(), change))
-        missed += [f"not found: {fault}"] if interrupted("m4f", program("m4f", f"fault{k}", copy, model))[1] == 0 else []
+        missed += [f"not found: {fault}"] if interrupted(WORK, "m4f", program("m4f", f"fault{k}", copy, model))[1] == 0 else []
     good &= gate.report(f"preempt: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults of the protocol found", missed)
     gate.keep("preempt", figures | {"faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
     return int(not good)

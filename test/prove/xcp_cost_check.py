@@ -38,7 +38,7 @@ def stated(text: str) -> dict[str, tuple[int, int]]:
 
 def problems(said: dict[str, tuple[int, int]], found: dict[str, tuple[int, int]]) -> list[str]:
     """Where the page is wrong by more than SHARE, or silent."""
-    wrong = [f"{name}: {found[name]}, the page says {said.get(name)}" for name in found if name not in said]
+    wrong = [f"{name}: {found.get(name)}, the page says {said.get(name)}" for name in sorted(found.keys() ^ said.keys())]
     return wrong + [
         f"{name}: {found[name]}, the page says {said[name]}"
         for name in found if name in said and any(abs(a - b) > SHARE * b for a, b in zip(found[name], said[name]))

@@ -2,9 +2,9 @@
  * Copyright (c) 2026 the penode authors */
 
 /*
- * xcp_preempt: packets to the XCP slave are pre-empted by a step with its DAQ sample, and such a step by a packet, once at each
- * boundary between two instructions, with and without a set that waits; for xcp_preempt_check.py. As preempt.c, an instruction
- * lasts 2^10 ns, more than 20 ticks of SysTick; the delay before the interrupt grows by 20 from run to run.
+ * xcp_preempt ALL FILE: packets to the XCP slave are pre-empted by a step with its DAQ sample, and such a step by a packet, once at each
+ * boundary between two instructions, with and without a set that waits; for xcp_preempt_check.py. The delay before the
+ * interrupt grows by TICKS from run to run. ALL and FILE: as of preempt.c.
  */
 #include <stdbool.h>
 #include <stddef.h>
@@ -17,9 +17,6 @@
 #include "penode/pen_serial.h"
 #include "penode/pen_xcp_daq.h"
 
-#define TICKS    20U
-#define SCB_VTOR REGISTER(0xE000ED08U)
-#define SYST_ON  0x7U
 #define BYTES    (SMALL_SET_LENGTH * 4U)
 #define MAX_CTO  255U
 #define SLOTS    16U
@@ -41,9 +38,6 @@ static bool          step_interrupts;
 static volatile uint32_t pair[2]; /* steps so far, and its complement: written by the step */
 
 /* of one run */
-static volatile bool armed;
-static volatile bool inside;
-static volatile bool fired;
 static uint32_t kind;
 static uint32_t in_force;
 static uint32_t waiting; /* set, or SETS */
@@ -52,6 +46,8 @@ static bool     good_answer;
 static uint32_t drained; /* the pair that the last DAQ packet held */
 static uint32_t failures;
 static uint32_t runs;
+
+#include "interrupt.inc"
 
 static void expect(bool good, const char *what)
 {
@@ -183,18 +179,6 @@ __attribute__((noinline)) void the_step(void)
     pen_xcp_sample(&xcp, now);
 }
 
-static void from_start(void)
-{
-    static const small_x_t x = { (pen_real_t)0.75, (pen_real_t)0.25 };
-
-    (void)small_set_state(&model, &x);
-}
-
-static bool same(pen_real_t a, pen_real_t b)
-{
-    return *(const uint32_t *)(const void *)&a == *(const uint32_t *)(const void *)&b;
-}
-
 /* A step is that of one whole set: the one that waited, the one that the packet published, or the one before. */
 static void judge(bool must, bool may)
 {
@@ -213,52 +197,16 @@ static void judge(bool must, bool may)
 
 /* -- the interrupt -------------------------------------------------------------------------------------------------- */
 
-__attribute__((used)) static void on_tick(void)
+static void pre_empt(void)
 {
-    SYST_CSR = 0U;
-    if (armed && inside) {
-        armed = false;
-        fired = true;
-        if (step_interrupts) {
-            const bool due = (waiting != SETS);
-            from_start();
-            the_step();
-            judge(due, due || (target != SETS));
-        } else {
-            the_packet();
-        }
+    if (step_interrupts) {
+        const bool due = (waiting != SETS);
+        from_start();
+        the_step();
+        judge(due, due || (target != SETS));
+    } else {
+        the_packet();
     }
-}
-
-static void take_vector(void)
-{
-    static uint32_t vectors[16] __attribute__((aligned(128)));
-    const uint32_t *const old = (const uint32_t *)SCB_VTOR;
-
-    for (size_t i = 0U; i < 16U; i++) {
-        vectors[i] = old[i];
-    }
-    vectors[15] = (uint32_t)(uintptr_t)on_tick;
-    SCB_VTOR = (uint32_t)(uintptr_t)vectors;
-    __asm__ volatile("dsb\n\tisb" : : : "memory");
-}
-
-static bool interrupt(void (*function)(void), uint32_t delay)
-{
-    bool early;
-
-    fired = false;
-    armed = true;
-    inside = true;
-    SYST_RVR = delay;
-    SYST_CVR = 0U;
-    SYST_CSR = SYST_ON;
-    function();
-    inside = false;
-    SYST_CSR = 0U;
-    early = armed;
-    armed = false;
-    return early;
 }
 
 /* -- one run -------------------------------------------------------------------------------------------------------- */
@@ -332,20 +280,31 @@ static void end(bool samples_go_on)
     runs++;
 }
 
-static void sweep(bool pending)
+/* By other names, so that they are told from those that nothing interrupts. */
+__attribute__((noinline)) void the_call(void)
+{
+    the_packet();
+}
+
+__attribute__((noinline)) void the_sample(void)
+{
+    the_step();
+}
+
+static void sweep(bool pending, bool all)
 {
     const bool ends_list = (kind == CONNECT) || (kind == STOP) || (kind == FREE);
-    uint32_t delay = TICKS;
+    uint32_t delay = all ? TICKS : 0U;
     bool early = false;
 
     while (!early) {
         prepare(pending);
         good_answer = true;
         if (step_interrupts) {
-            early = interrupt(the_packet, delay);
+            early = interrupt(the_call, delay);
             judge_answer(pending);
         } else {
-            early = interrupt(the_step, delay);
+            early = interrupt(the_sample, delay);
             if (fired) {
                 judge_answer(pending);
             } else {
@@ -364,6 +323,10 @@ static void sweep(bool pending)
 
 int main(void)
 {
+    char text[128];
+    const bool all = board_argument(1U, text, sizeof(text)) && (text[0] == '1');
+    const int32_t file = board_argument(2U, text, sizeof(text)) ? board_open(text, true) : -1;
+
     take_vector();
     (void)small_init(&model, &small_set_default, &banks);
     (void)pen_xcp_daq_init(&daq, ring, SLOTS, MAX_CTO, 1U, 8U);
@@ -380,8 +343,8 @@ int main(void)
         step_interrupts = (way == 0U);
         runs = 0U;
         for (kind = DOWNLOAD; kind < KINDS; kind++) {
-            sweep(false);
-            sweep(true);
+            sweep(false, all);
+            sweep(true, all);
         }
         board_print(step_interrupts ? "packets interrupted " : "steps interrupted ");
         board_print_number(runs);
@@ -390,5 +353,6 @@ int main(void)
     board_print("failures ");
     board_print_number(failures);
     board_print("\n");
+    keep_met(file);
     return (failures == 0U) ? 0 : 1;
 }

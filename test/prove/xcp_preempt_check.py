@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import gate
 
 import penode_gen
+from interruption import executed, interrupted, never
 from penode_sil.targets import FLAGS, MACHINES, PORT, generated
 
 WORK = gate.BUILD / "xcp-preempt"
@@ -26,36 +26,39 @@ FAULTS = {
 }  # fmt: skip
 
 
-def program(name: str, replaced: dict[str, Path]) -> Path:
-    """xcp_preempt.c with a model called small and the runtime; files by name from other places."""
+def program(name: str, replaced: dict[str, Path], *options: str) -> Path:
+    """xcp_preempt.c with a model called small and the runtime; files by name from other places; options of the compiler."""
     source = generated(penode_gen.load(gate.HERE / "small" / "small.toml"))
     elf = WORK / f"{name}.elf"
     elf.parent.mkdir(parents=True, exist_ok=True)
     runtime = [replaced.get(path.name, path) for path in sorted((gate.ROOT / "src").glob("*.c"))]
     gate.make(
-        [PORT / "cc", MACHINES[MACHINE], *FLAGS, "-O2", "-Wall", "-Wextra", "-fno-strict-aliasing", f"-I{source}", f"-I{PORT}",
+        [PORT / "cc", MACHINES[MACHINE], *FLAGS, "-O2", "-Wall", "-Wextra", "-fno-strict-aliasing", f"-I{source}", f"-I{PORT}", *options,
          "-o", elf, gate.HERE / "xcp_preempt.c", source / "small.c", source / "small_params.c", *runtime]
     )  # fmt: skip
     return elf
 
 
-def interrupted(elf: Path) -> tuple[str, int]:
-    """What the program says, and its exit code."""
-    done = gate.run([PORT / "run", MACHINES[MACHINE], elf], WORK, env=os.environ | {"SHIFT": "10", "LIMIT": "300"})
-    return done.stdout + done.stderr, done.returncode
-
-
 def main() -> int:
-    said, code = interrupted(program("right", {}))
+    right = program("right", {})
+    said, code, met = interrupted(WORK, MACHINE, right)
+    coarse = interrupted(WORK, MACHINE, program("coarse", {}, "-DTICKS=80U"))[2]  # every fourth instruction or so
+    addresses, problems, seeded = {}, [said] if code != 0 else [], []
+    for n, (what, function) in enumerate((("packets", "the_call"), ("steps", "the_sample"))):
+        must = executed(WORK, MACHINE, right, function)
+        addresses[what] = {"executed": len(must), "interrupted": len(must & met[n])}
+        problems += never(what, must, met[n])
+        seeded += [] if never(what, must, coarse[n]) else [f"{what}: boundaries that were left out are not noticed"]
     seen = {key: int(value) for key, value in re.findall(r"^(packets|steps) interrupted (\d+)$", said, re.M)}
-    good = gate.report(f"xcp-preempt: a step in a packet, a packet in a step, at each of {sum(seen.values())} boundaries", [said] if code != 0 else [])
+    good = gate.report(f"xcp-preempt: a step in a packet, a packet in a step, at each of {sum(seen.values())} boundaries", problems)
+    good &= gate.report("xcp-preempt: boundaries that are left out are found", seeded)
     missed = []
     for k, (fault, (file, change)) in enumerate(FAULTS.items()):
         copy = WORK / f"fault{k}-{file}"
         copy.write_text(gate.faulty((gate.ROOT / "src" / file).read_text(), change))
-        missed += [f"not found: {fault}"] if interrupted(program(f"fault{k}", {file: copy}))[1] == 0 else []
+        missed += [f"not found: {fault}"] if interrupted(WORK, MACHINE, program(f"fault{k}", {file: copy}))[1] == 0 else []
     good &= gate.report(f"xcp-preempt: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults of the slave found", missed)
-    gate.keep("xcp-preempt", {"runs": seen, "failures": int(code != 0), "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
+    gate.keep("xcp-preempt", {"runs": seen, "addresses": addresses, "failures": int(code != 0), "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
     return int(not good)
 
 

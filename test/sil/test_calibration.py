@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import socket
 import threading
@@ -11,15 +12,16 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import penode_gen
-from exchanges import check_log, drive
+from exchanges import check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, link as links, measure, pages, stage, virtual
-from penode_sil.calibration.codes import Page, Slave
+from penode_sil.calibration.codes import Page, Slave, Who
 from penode_sil.errors import UserError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -98,7 +100,10 @@ def test_log_is_that_of_a_sil_run_with_the_exchange_where_it_shows_the_new_id(ki
             staged = stage.stage_set(link, a2l, chosen)
             assert (staged.bytes, staged.id) == (4 * 1198, Slave.FIRST_ID)
 
-        log = measure.record(where, a2l, SIGNALS, 0.3, every, exchange)
+        alias = dataclasses.replace(a2l.measurements["z_w"], name="alias")  # a second name of one place
+        named = dataclasses.replace(a2l, measurements=a2l.measurements | {"alias": alias})
+        log = measure.record(where, named, ["alias", *SIGNALS], 0.3, every, exchange)
+    assert (log.values["alias"] == log.values["z_w"]).all()
     check_log(model, u, log, every)
 
 
@@ -119,24 +124,19 @@ def test_eight_signals_at_1_khz_without_loss(seconds: float) -> None:
 
 def test_every_entry_of_the_a2l_is_the_models_value() -> None:
     model = penode_gen.load(NQVM)
-    with reached("tcp", model, drive(model)) as (where, _), links.connected(where) as link:
-        a2l = link.a2l(None)  # GET_ID offers it
-        values = np.asarray(penode_gen.set_values(model, "default"))
-        first, size, kind = pages.segment(a2l)
-        seen = np.zeros(values.size, int)
-        for entry in a2l.characteristics.values():
-            at = (entry.address - first) // kind.itemsize
-            seen[at : at + entry.count] += 1
-            assert (link.values(entry) == values[at : at + entry.count]).all(), entry.name
-        assert (seen == 1).all() and size == values.nbytes
-        network = model.sets["default"].networks["damper_net"]
-        weights = [layer.weights for layer in network.layers if hasattr(layer, "weights")]
-        entry = a2l.characteristics["damper_net.weights_2"]
-        assert entry.sizes[:2] == weights[1].shape  # fastest: rows
-        assert (link.values(entry).reshape(weights[1].shape, order="F") == weights[1].astype(np.float32)).all()
-        for entry in a2l.measurements.values():
-            assert np.isfinite(link.values(entry)).all(), entry.name
-        assert link.number(a2l.measurements["set.layout"]) == penode_gen.set_head(model, "default")[0]
+    u = drive(model)
+    with reached("tcp", model, u) as (where, _):
+        with links.connected(where) as link:
+            a2l = link.a2l(None)  # GET_ID offers it
+            check_characteristics(model, link, a2l)
+            network = model.sets["default"].networks["damper_net"]
+            weights = [layer.weights for layer in network.layers if hasattr(layer, "weights")]
+            entry = a2l.characteristics["damper_net.weights_2"]
+            assert entry.sizes[:2] == weights[1].shape  # fastest: rows
+            assert (link.values(entry).reshape(weights[1].shape, order="F") == weights[1].astype(np.float32)).all()
+            assert link.number(a2l.measurements["set.layout"]) == penode_gen.set_head(model, "default")[0]  # by UPLOAD
+        log = measure.record(where, a2l, list(a2l.measurements), 0.3)
+    check_measurements(model, u, a2l, log)
 
 
 def test_refused_set_changes_nothing_and_says_why() -> None:
@@ -153,6 +153,38 @@ def test_refused_set_changes_nothing_and_says_why() -> None:
             foreign = pages.ChosenSet("foreign", bad.layout ^ 1, bad.values)
             with pytest.raises(UserError, match="set of another model"):
                 stage.stage_set(link, a2l, foreign)
+
+
+def test_quiet_commits_edits_of_the_working_page_while_that_runs() -> None:
+    model = penode_gen.load(NQVM)
+    chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
+    with virtual.served(model, "tcp", "127.0.0.1", 0, drive(model), quiet=200) as found, links.connected(address.parse(found.address)) as link:
+        a2l = a2l_read.parse(found.a2l, "served")
+        first, (running, status) = pages.segment(a2l)[0], (a2l.measurements[name] for name in ("set_in_force", "count.set_nonfinite"))
+
+        def in_force_after(data: bytes, seconds: float) -> tuple[float, float]:
+            old = link.number(running)
+            begin = time.monotonic()
+            link.write(first, data)
+            while link.number(running) == old and time.monotonic() - begin < seconds:
+                time.sleep(0.002)
+            return link.number(running) - old, time.monotonic() - begin
+
+        assert in_force_after(chosen.serial, 0.5)[0] == 0  # the reference runs
+        link.set_page(Who.ECU, Page.WORKING)
+        stage._await(link, a2l, 1)
+        more, seconds = in_force_after(np.float32(0.5).tobytes(), 5.0)
+        assert more == 1 and seconds > 0.2 - 0.011  # its clock ticks each 10 ms, and counts whole ms
+        assert in_force_after(np.float32(np.nan).tobytes(), 0.5)[0] == 0 and link.number(status) == 1
+
+
+def test_a2l_of_another_program_is_refused(tmp_path: Path) -> None:
+    model = penode_gen.load(NQVM)
+    other = tmp_path / "other.a2l"
+    with virtual.served(model, "tcp", "127.0.0.1", 0, drive(model)) as found, links.connected(address.parse(found.address)) as link:
+        other.write_text(found.a2l.replace('EPK "nqvm ', 'EPK "nqvm_old '))
+        with pytest.raises(UserError, match='is that of "nqvm_old .*the controller is "nqvm '):
+            link.a2l(other)
 
 
 def test_compare_names_sets_and_values() -> None:
@@ -179,6 +211,43 @@ def test_nobody_answers_in_one_line() -> None:
         pass
     with pytest.raises(UserError, match="is no address"):
         address.parse("tcp:nowhere")
+    for kind in ("tcp", "udp"):
+        with pytest.raises(UserError, match="cannot be opened"), links.connected(address.parse(f"{kind}:nowhere.invalid:5555")):
+            pass
+
+
+class Timed:
+    """A link to a slave whose event comes each millisecond."""
+
+    master = SimpleNamespace(getDaqEventInfo=None)
+
+    def ask(self, what: str, *_: object) -> SimpleNamespace:
+        assert what == "GET_DAQ_EVENT_INFO"
+        return SimpleNamespace(eventChannelTimeUnit=6, eventChannelTimeCycle=1)
+
+
+def test_log_counts_what_is_missing_and_its_clock_goes_on_when_the_stamps_wrap() -> None:
+    kept = measure.Samples(names=["a"])
+    steps = [-3, -2, -1, 0, 1, 3, 4, 8]  # ms; the stamps wrap at 0; 2, 5, 6 and 7 never came
+    kept.stamps = [step * 1000 % (1 << 32) * 1000 for step in steps]  # ns, as pyxcp gives them
+    kept.rows = [[(1 << 60) + n] for n in range(len(steps))]
+    kept.stamps.append(0)  # of a sample whose values come after the look at them
+    entries = [a2l_read.Entry(name, "", 64, np.dtype("u8"), (), "") for name in ("a", "b")]  # two names of one place
+    log = measure._log(Timed(), entries, kept, 1)
+    assert log.lost == 4 and np.allclose(log.time, (np.array(steps) + 3) * 1e-3, rtol=0.0, atol=1e-15)  # rounding of seven sums below 16 ms
+    assert all(log.values[name].tolist() == [(1 << 60) + n for n in range(len(steps))] for name in ("a", "b"))
+
+
+def test_signals_of_one_place_are_measured_and_those_that_overlap_refused() -> None:
+    def entry(name: str, at: int, kind: str) -> a2l_read.Entry:
+        return a2l_read.Entry(name, "", at, np.dtype(kind), (), "")
+
+    entries = [entry("whole", 64, "u4"), entry("same", 64, "u4"), entry("next", 68, "f4"), entry("high", 66, "u2"), entry("low", 64, "u2")]
+    a2l = a2l_read.A2l("x", {}, {e.name: e for e in entries}, None, None)
+    assert [e.name for e in measure.choose(a2l, ["whole", "same", "next"])] == ["whole", "same", "next"]
+    for part in ("high", "low"):
+        with pytest.raises(UserError, match="lies in the bytes of"):
+            measure.choose(a2l, ["whole", part])
 
 
 def test_port_that_is_taken_is_one_line() -> None:

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 import penode_gen
-from exchanges import check_log, drive
+from exchanges import check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, emulated, link as links, measure, pages, stage
+from penode_sil.errors import UserError
 
 NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm" / "nqvm.toml"
 
@@ -30,23 +31,25 @@ pytestmark = [
 def running(request: pytest.FixtureRequest) -> Iterator[tuple[object, np.ndarray, address.Address, a2l_read.A2l]]:
     """The emulated controller; its line is a TCP port, or a device."""
     model = penode_gen.load(NQVM)
-    u = drive(model)
+    u = drive(model, 20000)  # longer than the test: each sample has an input of its own
     with emulated.emulated(model, "m4f", "127.0.0.1", request.param, u) as found:
         yield model, u, address.parse(found.address), a2l_read.parse(found.a2l, "emulated")
 
 
 def test_every_entry_and_then_an_exchange(running: tuple) -> None:
     model, u, where, a2l = running
-    values = np.asarray(penode_gen.set_values(model, "default"))
     with links.connected(where) as link:
-        first, size, kind = pages.segment(a2l)
-        assert size == values.nbytes and link.text(links.Text.EPK) == a2l.epk[0]
-        for entry in a2l.characteristics.values():
-            at = (entry.address - first) // kind.itemsize
-            assert (link.values(entry) == values[at : at + entry.count]).all(), entry.name
-        for entry in a2l.measurements.values():
-            assert np.isfinite(link.values(entry)).all(), entry.name
+        assert link.text(links.Text.EPK) == a2l.epk[0]
+        check_characteristics(model, link, a2l)
+    log = measure.record(where, a2l, list(a2l.measurements), 0.3, 50)  # 180 bytes each 50 ms
+    check_measurements(model, u, a2l, log)
     chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
     every = 10  # 23 bytes and a head each 10 ms of the emulated time
     log = measure.record(where, a2l, ["z_b", "z_w", "sample", "set_in_force", "adopted_at"], 0.3, every, lambda link: stage.stage_set(link, a2l, chosen))
     check_log(model, u, log, every)
+
+
+def test_inputs_that_it_cannot_hold_are_refused() -> None:
+    model = penode_gen.load(NQVM)
+    with pytest.raises(UserError, match="holds the inputs of 262.144 s, not of 262.145 s"), emulated.emulated(model, "m4f", "127.0.0.1", 0, np.zeros((262145, 1), np.float32)):
+        pass

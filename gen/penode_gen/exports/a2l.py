@@ -42,13 +42,16 @@ def epk(program: Program, symbol: str | None) -> tuple[str, int] | None:
     name = symbol or "penode_epk"
     try:
         place = program.find(name)
-        return program.bytes_at(place.address, place.size).split(b"\0")[0].decode("ascii"), place.address
+        text = program.bytes_at(place.address, place.size).split(b"\0")[0].decode("ascii")
     except KeyError as exc:
         if symbol is None:
             return None
         raise ExportError(f"--epk: {program.path} has no variable {symbol}; name an array of characters") from exc
     except UnicodeDecodeError as exc:
         raise ExportError(f"--epk: {name} is no ASCII text; name an array of characters") from exc
+    if not text or quote(text) != f'"{text}"':  # a tool compares it with the memory, character by character
+        raise ExportError(f'--epk: {name} holds "{text}", which an A2L cannot repeat as it is; use a text without quotes, backslashes and double spaces')
+    return text, place.address
 
 
 def _measured(model: Model, program: Program, instance: str, named: str | None) -> Measurements:

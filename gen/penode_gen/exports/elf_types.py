@@ -17,7 +17,8 @@ from .interface import ExportError
 _QUALIFIERS = ("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type", "DW_TAG_atomic_type")
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
 _ENCODINGS = {2: "bool", 4: "float", 5: "signed", 6: "signed", 7: "unsigned", 8: "unsigned"}  # DW_ATE_...
-_OP_ADDR, _OP_ADDRX = 0x03, 0xA1
+_OP_ADDR, _OP_ADDRX, _OP_PLUS = 0x03, 0xA1, 0x23
+_SIZES = {"float": (4, 8)}  # bytes of numbers that A2L has a type for; of others 1, 2, 4, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +31,12 @@ class Place:
 
     @property
     def kind(self) -> str:
-        """float, signed, unsigned, bool; "" if it is no number."""
+        """float, signed, unsigned, bool; "" if it is no number, or one that A2L has no type for (long double, __int128)."""
         plain = bare(self.type)
         if plain.tag == "DW_TAG_enumeration_type":
             return "unsigned"
-        return _ENCODINGS.get(plain.attributes["DW_AT_encoding"].value, "") if plain.tag == "DW_TAG_base_type" else ""
+        kind = _ENCODINGS.get(plain.attributes["DW_AT_encoding"].value, "") if plain.tag == "DW_TAG_base_type" else ""
+        return kind if self.size in _SIZES.get(kind, (1, 2, 4, 8)) else ""
 
     @property
     def size(self) -> int:
@@ -146,7 +148,7 @@ class Program:
         return place
 
     def numbers(self, place: Place) -> Iterator[Place]:
-        """The numbers in a place: itself, or those of its members and elements; pointers are left out."""
+        """The numbers in a place: itself, or those of its members and elements; pointers and bit fields are left out."""
         plain = bare(place.type)
         if plain.tag == "DW_TAG_structure_type":
             for name in _members(plain):
@@ -187,7 +189,20 @@ def _uleb(code: bytes) -> int:
 
 
 def _members(structure: Any) -> dict[str, Any]:
-    return {child.attributes["DW_AT_name"].value.decode(): child for child in structure.iter_children() if child.tag == "DW_TAG_member" and "DW_AT_name" in child.attributes}
+    """Members by name, without bit fields, which have no address of their own."""
+    members = [child for child in structure.iter_children() if child.tag == "DW_TAG_member" and "DW_AT_name" in child.attributes]
+    return {m.attributes["DW_AT_name"].value.decode(): m for m in members if "DW_AT_bit_size" not in m.attributes}
+
+
+def _offset(member: Any) -> int:
+    """Bytes from the start of the structure: a number, in DWARF 2 an expression that adds it."""
+    value = member.attributes["DW_AT_data_member_location"].value
+    if isinstance(value, int):
+        return value
+    code = bytes(value)
+    if code[:1] != bytes([_OP_PLUS]):
+        raise KeyError(member.attributes["DW_AT_name"].value.decode())
+    return _uleb(code[1:])
 
 
 def _member(place: Place, name: str) -> Place:
@@ -195,8 +210,7 @@ def _member(place: Place, name: str) -> Place:
     member = _members(plain).get(name) if plain.tag == "DW_TAG_structure_type" else None
     if member is None:
         raise KeyError(f"{place.path}.{name}")
-    offset = member.attributes["DW_AT_data_member_location"].value
-    return Place(f"{place.path}.{name}", place.address + offset, member.get_DIE_from_attribute("DW_AT_type"))
+    return Place(f"{place.path}.{name}", place.address + _offset(member), member.get_DIE_from_attribute("DW_AT_type"))
 
 
 class _Shorter:

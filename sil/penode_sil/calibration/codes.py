@@ -27,8 +27,10 @@ class Text(IntEnum):
 
 
 class Slave(IntEnum):
-    """Of the virtual controller (sil/firmware/controller.c): its event, the id of the first set that a master opens, its longest packet [bytes]."""
+    """Of the virtual controller (sil/firmware/): its event, the id of the first set that a master opens, its longest packet and the inputs
+    that the emulated one holds [bytes]."""
 
     STEP = 0
     FIRST_ID = 1000
     MAX_CTO = 252
+    STIMULUS = 1 << 20

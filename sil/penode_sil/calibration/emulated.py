@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import UserError, hint
 from ..targets import FLAGS, MACHINES, PORT, ROOT, _files, _included, _kept, _version, generated, model_options
+from .codes import Slave
 from .virtual import Served, describe, free_port, identity
 
 WITH_UART = ("m4f", "m3", "m7")  # port/cortex-m/uart.c knows their serial line
@@ -47,13 +48,17 @@ def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[n
     """
     if shutil.which(_EMULATOR) is None:
         raise UserError(f"{_EMULATOR}: the emulator is not installed; install it (make test does)")
+    inputs = u.astype(np.float32).tobytes()
+    if len(inputs) > Slave.STIMULUS:
+        most = Slave.STIMULUS // (len(inputs) // len(u)) * model.sample_time
+        raise UserError(f"--scenario: the emulated controller holds the inputs of {most:g} s, not of {len(u) * model.sample_time:g} s; shorten it, or use --on sil")
     program = build(model, machine)
     port = port if port is None else port or free_port(host, False)
     line = "pty" if port is None else f"tcp:{host}:{port},server=on,wait=off"
     a2l = describe(model, program, "serial:115200" if port is None else f"tcp:{host}:{port}")
     with tempfile.TemporaryDirectory() as folder:
         stimulus = Path(folder, "inputs")
-        stimulus.write_bytes(u.astype(np.float32).tobytes())
+        stimulus.write_bytes(inputs)
         words = [
             _EMULATOR, "-machine", MACHINES[machine], "-display", "none", "-monitor", "none", "-serial", line,
             "-semihosting-config", f"enable=on,target=native,arg=program,arg={stimulus}", "-kernel", str(program),

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import importlib.util
 import logging
+import socket
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -157,6 +158,8 @@ def connected(address: Address, policy: Any = None, patience: float = 10.0) -> I
 
     arguments, sys.argv = sys.argv, sys.argv[:1]  # which pyxcp would read
     try:
+        if "Eth" in address.settings:  # pyxcp raises a bare Exception
+            socket.getaddrinfo(address.settings["Eth"]["host"], None, socket.AF_INET)
         application = create_application_from_config({"General": {"disable_error_handling": True}, "Transport": address.settings})
         set_application(application)
         _without_noise(application)
@@ -171,7 +174,7 @@ def connected(address: Address, policy: Any = None, patience: float = 10.0) -> I
     link = Link(master, spy, address)
     try:
         master.transport.connect()
-    except Exception as exc:  # pyxcp has one of its own for each transport
+    except OSError as exc:
         raise UserError(f"{address.text}: nothing answers there; start the controller (penode serve), or correct --to") from exc
     try:
         link.connect()

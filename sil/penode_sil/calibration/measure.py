@@ -67,7 +67,8 @@ def _policy(entries: list[Entry], every: int) -> tuple[Any, Samples]:
         def finalize(self) -> None:
             """Nothing to close."""
 
-    measured = [(entry.name, entry.address, 0, _TYPES[entry.type.str[1:]]) for entry in entries]
+    places = {entry.address: entry for entry in entries}.values()  # two names of one place are one column
+    measured = [(entry.name, entry.address, 0, _TYPES[entry.type.str[1:]]) for entry in places]
     lists = [DaqList(name="step", event_num=int(Slave.STEP), stim=False, enable_timestamps=True, measurements=measured, priority=0, prescaler=every)]
     policy = Collector(lists, logger=logging.getLogger("penode.measure"))  # else pyxcp reads the command line, which is ours
     policy.pid_off = False  # which it sets only then
@@ -83,6 +84,10 @@ def choose(a2l: A2l, names: list[str]) -> list[Entry]:
     several = [entry.name for entry in entries if entry.count != 1]
     if several:
         raise UserError(f"--signals: {several[0]} is an array; name single numbers")
+    places = sorted({(entry.address, entry.type.str): entry for entry in entries}.values(), key=lambda entry: entry.address)
+    for before, after in zip(places, places[1:]):
+        if after.address < before.address + before.size:  # pyxcp would leave out one of them
+            raise UserError(f"--signals: {after.name} lies in the bytes of {before.name}; measure one after the other")
     return entries
 
 
@@ -91,12 +96,14 @@ def _log(link: Link, entries: list[Entry], kept: Samples, every: int) -> Log:
     info = link.ask("GET_DAQ_EVENT_INFO", link.master.getDaqEventInfo, int(Slave.STEP))
     unit = int(info.eventChannelTimeUnit) if not isinstance(info.eventChannelTimeUnit, str) else 6
     period = float(info.eventChannelTimeCycle) * 10.0 ** (unit - 9) * every
-    stamps = np.array(kept.stamps, dtype=np.int64) // 1000  # us
+    rows = list(kept.rows)
+    stamps = np.array(kept.stamps[: len(rows)], dtype=np.int64) // 1000  # us
     steps = np.diff(stamps) % (1 << 32)  # they are of 32 bits
     time_ = np.concatenate([[0.0], np.cumsum(steps) * 1e-6]) if stamps.size else np.zeros(0)
     lost = int(np.maximum(np.rint(steps * 1e-6 / period) - 1, 0).sum()) if period > 0.0 else 0
-    columns = np.array(kept.rows, dtype=object).reshape(stamps.size, len(entries))
-    values = {entry.name: columns[:, kept.names.index(entry.name)].astype(np.float64).astype(entry.type) for entry in entries}
+    columns = np.array(rows, dtype=object).reshape(stamps.size, len(kept.names))
+    column = {entry.address: kept.names.index(entry.name) for entry in entries if entry.name in kept.names}
+    values = {entry.name: columns[:, column[entry.address]].astype(entry.type) for entry in entries}
     return Log(time_, values, lost, period)
 
 
