@@ -19,7 +19,7 @@ NQVM = ROOT / "gen" / "nqvm" / "nqvm.toml"
 sys.path.insert(0, str(Path(__file__).parent))
 
 if importlib.util.find_spec("fmpy") is None:
-    collect_ignore = ["test_fmu.py", "test_fmu_long.py"]
+    collect_ignore = ["test_fmu.py", "test_fmu_derivatives.py", "test_fmu_long.py"]
 
 
 def pytest_report_header() -> str:
@@ -38,6 +38,15 @@ def held(tmp_path_factory: pytest.TempPathFactory) -> Any:
     path = tmp_path_factory.mktemp("held") / "held.toml"
     path.write_text(f'[model]\nextends = "{NQVM}"\nname = "nqvm_held"\ninput = "held"\n')
     return penode_gen.load(path)
+
+
+@pytest.fixture(scope="session", params=[3, 2], ids=["FMI 3", "FMI 2"])
+def unpacked(request: pytest.FixtureRequest, nqvm: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Its FMU of either version, in a folder; tests leave it as it is."""
+    from master import Unpacked, export
+
+    folder = tmp_path_factory.mktemp("fmu")
+    return Unpacked(export(nqvm, request.param, folder), folder / "unpacked")
 
 
 def chirp(duration: float) -> np.ndarray:

@@ -13,7 +13,16 @@ import numpy as np
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 
+from penode_gen import exports
+
 WARNING, DISCARD, ERROR = 1, 2, 3
+
+
+def export(model: Any, version: int, folder: Path, **options: Any) -> Path:
+    """The FMU of a model, in a folder."""
+    path = folder / f"{model.name}{version}.fmu"
+    path.write_bytes(exports.export(model, f"fmu{version}", path, options))
+    return path
 
 
 class Unpacked:

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from conftest import chirp
 from fmpy.build import build_platform_binary
-from master import Master, Unpacked
-from test_fmu import SET, STEP, export, run, write_set
+from master import Master, Unpacked, export
+from test_fmu import SET, STEP, run, write_set
 
 import penode_gen
 from penode_sil.schedule import Call
