@@ -76,7 +76,7 @@ def diagnose(
     best = explanations[0] if explanations else None
     if weighed.misfit(study, best.fit if best else study.null, log):
         answer = by_innovations(replace(study, model=plain), best, unused, output, remarks, log, tell)
-        if answer.verdict != "partly_explained":  # what innovations explain but in part may still have no name at all
+        if answer.verdict != "partly_explained" or best and share(study, best) > ENOUGH:  # less, and it may have no name at all
             return replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started)
     if best is not None:  # bursts and spikes that a cause explains were none
         kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
@@ -271,33 +271,38 @@ def judge(
         return tuple(faults), verdict, 1.0, evidence
     best = explanations[0]
     left = max(best.fit.chi2 - rows, shared if alike > noise.ALIKE else 0.0, 0.0)  # in the noise that the best explanation leaves
-    gained = study.null.cost - best.fit.cost
-    share = gained / (gained + left) if gained + left > 0.0 else 1.0
-    if share < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > noise.ALIKE):
-        return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
-    shown = alike > noise.ALIKE or share < WHOLE and left > DOUBT * np.sqrt(2.0 * rows)
-    patched = len(best.groups) > 1 and share < PATCHED and shown  # several causes, and still no whole
-    twice = changed and alike > noise.ALIKE and share < PATCHED  # by two proofs something is left
+    gained, part = study.null.cost - best.fit.cost, share(study, best, left)
+    if part < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > noise.ALIKE):
+        return (Cause(OUTSIDE, "", {}, 1.0 - part),), "unexplained", part, evidence
+    shown = alike > noise.ALIKE or part < WHOLE and left > DOUBT * np.sqrt(2.0 * rows)
+    patched = len(best.groups) > 1 and part < PATCHED and shown  # several causes, and still no whole
+    twice = changed and alike > noise.ALIKE and part < PATCHED  # by two proofs something is left
     if patched or twice or changed > (1.0 - PATCHED) * gained:
-        return (Cause(OUTSIDE, "", {}, 1.0 - share),), "unexplained", share, evidence
+        return (Cause(OUTSIDE, "", {}, 1.0 - part),), "unexplained", part, evidence
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
     if len(masses) > 1 and len(best.groups) == 1 and search.explain(study, masses[:1]).gain < search.FILTER * best.gain:
-        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
+        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
     others = [t for t in best.terms if t.candidate.kind != CLOCK]
     if not others or len(others) < len(best.terms) and search.explain(study, others).gain < MAIN * best.gain:
-        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
+        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
     causes = [cause(study, explanations, group) for group in best.groups if group[0] != CLOCK]
     causes = [c for c in causes if worth(study, c)]
     if any(unsized(best, c) for c in causes):
-        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
+        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
     kinds = [c.kind for c in causes]  # several wrong parameters are another vehicle, several delays another clock
     several = max(kinds.count("wrong_parameter"), kinds.count("sensor_delay")) > 1
     if several or damped(causes):
-        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", share, evidence
+        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
     faulty = {(c.kind, c.where) for c in causes}
     causes += [f for f in faults if (f.kind, f.where) not in faulty]
-    whole = (share > search.WHOLE or left < 0.15 * rows) and not pure
-    return tuple(causes), ("explained" if whole else "partly_explained") if causes else "no_discrepancy", share, evidence
+    whole = (part > search.WHOLE or left < 0.15 * rows) and not pure
+    return tuple(causes), ("explained" if whole else "partly_explained") if causes else "no_discrepancy", part, evidence
+
+
+def share(study: Study, e: Explanation, left: float = 0.0) -> float:
+    """Of the avoidable residual that an explanation takes away, 0 to 1; `left`: chi2 at least of what it leaves."""
+    left, gained = max(e.fit.chi2 - search.rows(study), left), study.null.cost - e.fit.cost
+    return gained / (gained + left) if gained + left > 0.0 else 1.0
 
 
 def pitching(e: Explanation) -> bool:

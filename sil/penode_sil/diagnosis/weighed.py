@@ -26,7 +26,7 @@ from .worth import WORTH
 Array = NDArray[np.float64]
 WHOLE = 0.85  # share of the residual that causes take away where they explain it
 MIN_MISFIT = 20.0  # log likelihood that a wandering force gains beside the best explanation by sensor noise alone
-MIN_UNMODELLED = 0.02  # and its least size: coloured noise, and a curve that stands for another one, make up to 0.01; models that are wrong everywhere more
+MIN_UNMODELLED = 0.0055  # and its least size, of levels tried: 0.003 and less beside causes that are the truth, 0.01 and more where models are wrong everywhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,15 +88,15 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
-    verdict = _verdict(found, causes, share, left)
+    verdict = _verdict(found, causes, share, max(left, found.found.bench.level.size))
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
     return Weighed(causes, verdict, notes, explanations, text, extended, gain, held, fit, share)
 
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float) -> str:
-    """From what is named, the share of the residual that it takes in a free run, and the residual of the nominal model as a share of the
-    signal. Small deviations that have been found are what any model has."""
+    """From what is named, the share of the residual that it takes in a free run, and what is left: the residual of the nominal model as a
+    share of the signal, or what wanders as a share of what moves. Small deviations that have been found are what any model has."""
     if causes:
         return "explained" if share > WHOLE else "partly_explained"
     return "no_discrepancy" if not found.causes and left < WORTH and found.found.terms else "unexplained"
