@@ -19,10 +19,14 @@ from scipy.signal import lfilter, lsim
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import build, dropouts, echo, extension, hypotheses, naming, noise, plant, score, search, steady, study
+from penode_sil.diagnosis import (
+    build, dropouts, echo, effects, explaining, explanation, extension, hypotheses, measuring, noise, plant, pursuit, refining, score, sized, steady, study, textbook,
+)  # fmt: skip
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.driven import experiment
-from penode_sil.diagnosis.fit import Problem, delayed, longest, railed
+from penode_sil.diagnosis.compiling import longest
+from penode_sil.diagnosis.fit import Problem
+from penode_sil.diagnosis.faulty import delayed, railed
 from penode_sil.measured import load
 from penode_sil.targets import Sil
 
@@ -266,7 +270,7 @@ def test_what_ends_without_force_is_no_cause(tmp_path, model):
     r = study.regression(one, one.null, [])
     first = {c.kind: c for c in r.candidates[::-1]}
     terms = [Term(first["coulomb_friction"], 40.0), Term(first["bump_stop"], 1000.0)]
-    found = search.explain(one, terms)
+    found = explaining.explain(one, terms)
     assert [t.candidate.what.place for t in found.terms] == [terms[0].candidate.what.place] and found.groups[0][0] != "bump_stop"
     assert len(found.built.names) == 1 and not any("gap" in name for name in found.fit.model.parameters)
 
@@ -277,7 +281,7 @@ def test_a_fit_goes_on_with_the_derivatives_of_the_fit_that_it_starts_from(tmp_p
     path = record(tmp_path / "rubs.csv", z, drive(z, lambda s, v: 60.0 * np.tanh(v / 4e-3)), 15)
     one = studied(path, model)
     rubs = next(c for c in study.regression(one, one.null, []).candidates if c.kind == "coulomb_friction")
-    first = search.explain(one, [Term(rubs, 40.0)])
+    first = explaining.explain(one, [Term(rubs, 40.0)])
     whole = first.whole().fit
     other = replace(whole, metrics=list(whole.metrics))
     d = next(i for i, f in enumerate(one.null.free) if f.target == "d")
@@ -291,7 +295,7 @@ def test_a_fit_goes_on_with_the_derivatives_of_the_fit_that_it_starts_from(tmp_p
     monkeypatch.setattr(Problem, "solve", spied)
     for start, expected in ((whole, whole), (None, one.null), (replace(whole, whole=False), one.null), (other, one.null)):
         taken.clear()
-        search.explain(one, first.terms, 1, start)
+        explaining.explain(one, first.terms, 1, start)
         assert taken and all(np.array_equal(known[d], expected.jacobian[:, d]) for known in taken)
 
 
@@ -336,7 +340,7 @@ def test_some_kinds_have_the_rows_that_they_have_among_all(tmp_path, model):
         base, _ = study.begin(model, [replace(whole, good=good)])
         seen = study.look(base, base.null)
         parts = model, base.experiments, base.metrics, seen, base.places, list(NOISE), 0
-        (every, rows), (some, own_rows) = (score.collect(*parts, kinds) for kinds in ((), {"bump_stop", "sensor_scale"}))
+        (every, rows), (some, own_rows) = (effects.collect(*parts, kinds) for kinds in ((), {"bump_stop", "sensor_scale"}))
         own = [i for i, c in enumerate(every) if c.kind in ("bump_stop", "sensor_scale")]
         assert [(c.kind, c.where) for c in some] == [(every[i].kind, every[i].where) for i in own]
         assert np.array_equal(own_rows, rows[own])
@@ -353,13 +357,13 @@ def test_effects_are_weighed_as_least_squares_do(tmp_path, model):
     columns and rows; and again with fewer of them free, against another residual."""
     z = road(1)
     one, _ = study.begin(model, [experiment(m, model) for m in load([record(tmp_path / "r.csv", z, drive(z, lambda s, v: 9e3 * max(s - 0.006, 0.0)), 2)], model)])
-    candidates, effects = score.collect(model, one.experiments, one.metrics, study.look(one, one.null), one.places, list(NOISE), 1)
-    effects[5] *= 1e-25  # of which the square is none in single
-    double = effects.astype(float)
+    candidates, rows = effects.collect(model, one.experiments, one.metrics, study.look(one, one.null), one.places, list(NOISE), 1)
+    rows[5] *= 1e-25  # of which the square is none in single
+    double = rows.astype(float)
     fit = one.null
     index = {f.target: i for i, f in enumerate(fit.free)}
     double[-1] = fit.jacobian[:, index["c"]]
-    r = score.Regression(fit, candidates, effects, ["c"])
+    r = score.Regression(fit, candidates, rows, ["c"])
     fewer = [i for i, f in enumerate(fit.free) if f.target not in ("d", ("skew", 1))]
     moved = fit.residual + 2.0 * fit.jacobian[:, index["d"]]
     other = replace(fit, free=tuple(fit.free[i] for i in fewer), residual=moved, jacobian=fit.jacobian[:, fewer])
@@ -483,10 +487,10 @@ def test_laws_that_do_the_same_are_one(tmp_path, model):
     r = study.regression(one, one.null, [])
     stops = [c for c in r.candidates if c.kind == "bump_stop" and c.what.law == "bump_stop"]
     stops.sort(key=lambda c: abs(c.what.shapes["gap"][0] - 0.006))
-    both = search.explain(one, [Term(c, 5e3) for c in stops[:2]])
-    alone = search.leaner(one, both, lambda text: None)
+    both = explaining.explain(one, [Term(c, 5e3) for c in stops[:2]])
+    alone = textbook.leaner(one, both, lambda text: None)
     assert len(both.terms) == 2 and len(alone.terms) == 1 and alone.score > both.score
-    gap = naming.values(one, alone, alone.groups[0])["gap"]
+    gap = sized.values(one, alone, alone.groups[0])["gap"]
     assert gap.value == pytest.approx(0.006, rel=0.02) and gap.ci95[0] < 0.006 < gap.ci95[1] < 0.0062
 
 
@@ -500,10 +504,10 @@ def test_a_curve_has_the_parameter_of_its_element_in_it(tmp_path, model):
     kinks = [c for c in r.candidates if c.kind == "degressive_damper" and "min(v + knee" in c.what.law]
     kink = min(kinks, key=lambda c: abs(c.what.shapes["knee"][0] - 0.1))
     wrong = next(c for c in r.candidates if c.kind == "wrong_parameter" and c.where == "d")
-    two = search.explain(one, [Term(kink, 0.1 * D), Term(wrong, 0.0)])
-    curve = search.joined(one, two, lambda text: None)
+    two = explaining.explain(one, [Term(kink, 0.1 * D), Term(wrong, 0.0)])
+    curve = textbook.joined(one, two, lambda text: None)
     assert len(two.groups) == 2 and curve.groups == (("degressive_damper", "damper"),) and curve.gain > two.gain - 10.0
-    low, high = (naming.values(one, curve, curve.groups[0])[f"{rate}_rate_damping"] for rate in ("low", "high"))
+    low, high = (sized.values(one, curve, curve.groups[0])[f"{rate}_rate_damping"] for rate in ("low", "high"))
     assert low.value == pytest.approx(1.1 * D, rel=0.01) and high.value == pytest.approx(0.9 * D, rel=0.02)
 
 
@@ -514,8 +518,8 @@ def test_a_bushing_without_memory_is_a_spring(tmp_path, model):
     one = studied(path, model)
     laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == "hardening_bushing"]
     slow = replace(laws[0].what, shapes={"relaxation": (1000.0, "s")})
-    bushing = search.explain(one, [Term(replace(laws[0], companion=False, what=slow), 2e7)])
-    spring = search.unlagged(one, bushing, lambda text: None)
+    bushing = explaining.explain(one, [Term(replace(laws[0], companion=False, what=slow), 2e7)])
+    spring = textbook.unlagged(one, bushing, lambda text: None)
     assert bushing.groups == (("maxwell_bushing", "spring"),) and spring.groups == (("cubic_spring", "spring"),)
     assert spring.terms[0].gain == pytest.approx(2e7, rel=0.02)
 
@@ -537,12 +541,12 @@ def test_a_bushing_that_hardens_is_refined_by_one(tmp_path, model):
     one = studied(path, model)
     r = study.regression(one, one.null, [])
     kind = ("maxwell_bushing", "spring")
-    _, chosen = search.pursue(r, [k for k in search.pools(r)[kind] if search._law(r.candidates[k]) == "maxwell_bushing"], terms=1)
-    linear = search.explain(one, search.terms_of(r, chosen)).whole()
-    wider, _ = search.refine(one, linear, study.regression(one, linear.fit, []), [])
+    _, chosen = pursuit.pursue(r, [k for k in pursuit.pools(r)[kind] if explanation.law_of(r.candidates[k]) == "maxwell_bushing"], terms=1)
+    linear = explaining.explain(one, pursuit.terms_of(r, chosen)).whole()
+    wider, _ = refining.refine(one, linear, study.regression(one, linear.fit, []), [])
     assert wider.groups == linear.groups == (kind,)
-    assert "hardening_bushing" in {search._law(t.candidate) for t in wider.terms}
-    assert wider.score > linear.score + search.NEW
+    assert "hardening_bushing" in {explanation.law_of(t.candidate) for t in wider.terms}
+    assert wider.score > linear.score + explanation.NEW
 
 
 def test_friction_that_falls_for_nothing_is_coulomb(tmp_path, model):
@@ -551,10 +555,10 @@ def test_friction_that_falls_for_nothing_is_coulomb(tmp_path, model):
     path = record(tmp_path / "rubs.csv", z, drive(z, lambda s, v: 60.0 * v / np.hypot(v, 4e-3)), 15)
     one = studied(path, model)
     laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == hypotheses.STRIBECK]
-    falling = search.explain(one, [Term(laws[-1], 40.0)], iterations=0)
-    constant = search.plain(one, falling, [], lambda text: None)
+    falling = explaining.explain(one, [Term(laws[-1], 40.0)], iterations=0)
+    constant = textbook.plain(one, falling, [], lambda text: None)
     assert falling.groups == (("stribeck_friction", "damper"),) and constant.groups == (("coulomb_friction", "damper"),)
-    force = naming.values(one, constant, constant.groups[0])["force"]
+    force = sized.values(one, constant, constant.groups[0])["force"]
     assert force.value == pytest.approx(60.0, rel=0.02)
 
 
@@ -574,10 +578,10 @@ def test_friction_that_yields_a_little_is_coulomb(tmp_path, model):
     one = studied(path, model)
     laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == "falling_friction"]
     what = replace(laws[0].what, shapes={"presliding": (6e-5, "m"), "stribeck": (0.05, "m/s")})
-    falling = search.explain(one, [Term(replace(laws[0], what=what), 30.0)], iterations=0)
-    level = search.level_friction(one, falling, lambda text: None)
+    falling = explaining.explain(one, [Term(replace(laws[0], what=what), 30.0)], iterations=0)
+    level = textbook.level_friction(one, falling, lambda text: None)
     assert falling.groups == (("stribeck_friction", "damper"),) and level.groups == (("coulomb_friction", "damper"),)
-    assert naming.values(one, level, level.groups[0])["force"].value == pytest.approx(30.0, rel=0.02)
+    assert sized.values(one, level, level.groups[0])["force"].value == pytest.approx(30.0, rel=0.02)
 
 
 def test_a_loss_is_that_at_the_end_of_the_recording(tmp_path):
@@ -803,7 +807,7 @@ def test_two_bends_of_a_sensor_are_one_cube_in_the_file(model, sound):
     bends = [c for c in study.regression(base, base.null, []).candidates if getattr(c.what, "what", "") == "scale_bend"]
     rails, gain = (next(c for c in bends if (c.kind, c.where) == (kind, "deflection")) for kind in ("sensor_clipping", "sensor_scale"))
     gain = replace(gain, what=replace(gain.what, shape=2.0 * gain.what.shape))
-    e = search.explain(base, [Term(rails, -1e-3), Term(gain, -1e-3)], iterations=0)
+    e = explaining.explain(base, [Term(rails, -1e-3), Term(gain, -1e-3)], iterations=0)
     text, extended = extension.extend_file(base, e, ())
     assert text.count("curve_deflection = ") == 1
     y = 0.02
@@ -865,7 +869,7 @@ def test_rails_are_written_as_they_were_fitted(sharpness):
 def test_loads_that_cancel_each_other_count_in_full(model):
     """A start in motion of a quarter vehicle of 445 kg, told as loads of 191 kN and -229 kN."""
     terms = [SimpleNamespace(candidate=SimpleNamespace(kind="constant_force"), gain=g) for g in (-190.8e3, 228.8e3)]
-    assert search.loaded(SimpleNamespace(terms=terms)) == pytest.approx(419.6e3) and search.weight(model) == pytest.approx(9.81 * (M_B + M_W))
+    assert explanation.loaded(SimpleNamespace(terms=terms)) == pytest.approx(419.6e3) and explanation.weight(model) == pytest.approx(9.81 * (M_B + M_W))
 
 
 def test_a_delay_beyond_the_recording_leaves_its_start():
@@ -983,7 +987,7 @@ z = { value = "z", unit = "m" }
 ''')
     model = penode_gen.load(path)
     still = SimpleNamespace(u=np.zeros((1000, 1)), held=None)
-    z = extension.deployed(model, still, np.array([1.0, 0.0]), "default")[:, 0]
+    z = measuring.deployed(model, still, np.array([1.0, 0.0]), "default")[:, 0]
     assert np.max(np.abs(z - np.cos(30.0 * 2e-3 * np.arange(1000)))) < 1e-4
 
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import engine, noise
+from penode_sil.diagnosis import broken, judging, noise, resting
 from penode_sil.diagnosis.hypotheses import Basis
 from penode_sil.diagnosis.result import Cause, Value
 
@@ -39,16 +39,16 @@ def values(monkeypatch):
     """What parameters have been found: {kind: {name: (value, low, high)}}; a test may change it."""
     said: dict[str, dict[str, tuple[float, float, float]]] = {}
     made = lambda study, best, group: {k: Value(v, "1", (low, high)) for k, (v, low, high) in said.get(group[0], {}).items()}
-    monkeypatch.setattr(engine.naming, "values", made)
+    monkeypatch.setattr(judging.sized, "values", made)
     return said
 
 
 def judged(*explanations, study=STUDY, faults=(), alike=0.0, shared=0.0, pure=False, changed=0.0):
-    causes, verdict, _, _ = engine.judge(study, explanations, list(faults), alike, shared, pure, changed)
+    causes, verdict, _, _ = judging.judge(study, explanations, list(faults), alike, shared, pure, changed)
     return [c.kind for c in causes], verdict
 
 
-OUT = ([engine.OUTSIDE], "unexplained")
+OUT = ([judging.OUTSIDE], "unexplained")
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ OUT = ([engine.OUTSIDE], "unexplained")
     ],
 )
 def test_a_load_put_on_at_rest_is_no_start_in_motion(losses, costs, told, loads, so):
-    assert engine.rested(losses, costs, told, 8, loads) == so
+    assert resting.rested(losses, costs, told, 8, loads) == so
 
 
 def test_nothing_found(values):
@@ -156,16 +156,16 @@ def test_several_wrong_parameters_are_another_vehicle_and_delays_another_clock(v
 
 def test_a_resonance_needs_little_damping_and_one_mass(values, monkeypatch):
     mass = ("hidden_resonance", "body")
-    for ratio, answer in ((0.1, ([mass[0]], "explained")), (engine.DAMPED + 0.01, OUT)):
+    for ratio, answer in ((0.1, ([mass[0]], "explained")), (judging.DAMPED + 0.01, OUT)):
         values[mass[0]] = {"frequency": (8.0, 7.0, 9.0), "mass": (5.0, 4.0, 6.0), "damping_ratio": (ratio, 0.0, 1.0)}
         assert judged(found(mass)) == answer
-        lines = engine.damped([engine.cause(STUDY, [found(mass)], mass)])
+        lines = judging.damped([judging.cause(STUDY, [found(mass)], mass)])
         assert [("body" in line and "5 kg at 8 Hz" in line and "0.21" in line) for line in lines] == [True] * (answer == OUT)
     values[mass[0]]["damping_ratio"] = (0.1, 0.0, 1.0)
     two = found(mass)
     two.terms *= 2
     for share, answer in ((0.92, OUT), (0.94, ([mass[0]], "explained"))):
-        monkeypatch.setattr(engine.search, "explain", lambda study, terms: found(mass, gain=share * two.gain))
+        monkeypatch.setattr(judging.explaining, "explain", lambda study, terms: found(mass, gain=share * two.gain))
         assert judged(two) == answer
 
 
@@ -195,7 +195,7 @@ def test_alternatives_are_near_and_take_one_place(values):
     best = found(("bump_stop", "spring"), score=1000.0)
     near, far = found(("cubic_spring", "spring"), score=951.0), found(("backlash", "spring"), score=949.0)
     both = found(("asymmetric_spring", "spring"), ("sensor_scale", "a"), score=999.0)
-    (cause,), _, _, _ = engine.judge(STUDY, [best, near, far, both], [], 0.0, 0.0, False)
+    (cause,), _, _, _ = judging.judge(STUDY, [best, near, far, both], [], 0.0, 0.0, False)
     assert [o.kind for o in cause.alternatives] == ["cubic_spring"]
     assert 0.5 < cause.confidence < 0.99
 
@@ -218,7 +218,7 @@ def test_a_rail_may_be_met_once(high, model, kinds):
     sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
     simulated, burst = y.copy(), np.zeros((ROWS, 1), bool)
     simulated[at], burst[at] = model, True
-    found = engine.broken_sensors(sensors, [measured], study, [simulated[:, None]], [burst])
+    found = broken.broken_sensors(sensors, [measured], study, [simulated[:, None]], [burst])
     assert [c.kind for c in found] == kinds
     if kinds == ["sensor_clipping"]:
         assert found[0].parameters["high"].value == found[0].parameters["limit"].value == 2.5
@@ -237,19 +237,19 @@ def test_between_two_rails_a_sensor_goes_on(lost):
     simulated, burst = y.copy(), np.zeros((ROWS, 1), bool)
     simulated[5000:5020], burst[5000:5020] = np.linspace(-7.0, 7.0, 20), True
     simulated[7000 : 7000 + lost], burst[7000 : 7000 + lost] = np.linspace(-1.0, 1.0, lost + 1)[:lost], True
-    cause, *others = engine.broken_sensors(sensors, [measured], study, [simulated[:, None]], [burst])
+    cause, *others = broken.broken_sensors(sensors, [measured], study, [simulated[:, None]], [burst])
     assert cause.kind == "sensor_clipping" and {k: v.value for k, v in cause.parameters.items()} == {"limit": 2.5, "low": -2.5, "high": 2.5}
     assert [(c.kind, c.parameters["share"].value) for c in others] == [("sensor_dropout", lost / ROWS)] * bool(lost)
 
 
 def test_a_drift_of_clocks_has_no_name(values, monkeypatch):
     """Alone, or where others do less than half without it; beside one that does most, a note tells it."""
-    drift, stop = (engine.CLOCK, ""), ("bump_stop", "spring")
+    drift, stop = (judging.CLOCK, ""), ("bump_stop", "spring")
     assert judged(found(drift)) == OUT
     for share, answer in ((0.4, OUT), (0.6, (["bump_stop"], "explained"))):
-        monkeypatch.setattr(engine.search, "explain", lambda study, terms: found(stop, gain=share * 1000.0))
+        monkeypatch.setattr(judging.explaining, "explain", lambda study, terms: found(stop, gain=share * 1000.0))
         assert judged(found(stop, drift)) == answer
-    (cause,), _, _, _ = engine.judge(STUDY, [found(stop), found(drift, score=999.0)], [], 0.0, 0.0, False)
+    (cause,), _, _, _ = judging.judge(STUDY, [found(stop), found(drift, score=999.0)], [], 0.0, 0.0, False)
     assert cause.alternatives == () and cause.confidence < 0.7
 
 
@@ -269,7 +269,7 @@ def test_a_sensor_that_drops_out_does_so_near_its_value_too():
         simulated.append(model[:, None])
     study = SimpleNamespace(experiments=[SimpleNamespace(time=t)] * 2, levels=[np.full((1, 1), 1e-4)] * 2)
     sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
-    (cause,) = engine.broken_sensors(sensors, recordings, study, simulated, [np.zeros((ROWS, 1), bool)] * 2)
+    (cause,) = broken.broken_sensors(sensors, recordings, study, simulated, [np.zeros((ROWS, 1), bool)] * 2)
     share = cause.parameters["share"]
     assert share.value == pytest.approx((30 + 20 + 4) / (2 * ROWS))
     assert share.ci95[0] < share.value < share.ci95[1] < 1.15 * share.value
@@ -286,7 +286,7 @@ def test_few_samples_that_are_far_off_are_enough(held, away, quantum, told):
     measured = SimpleNamespace(z={"a": y}, mask={"a": mask}, shown={"a": np.ones(ROWS, bool)}, quality=SimpleNamespace(channels={"a": quality}))
     study = SimpleNamespace(experiments=[SimpleNamespace(time=np.arange(ROWS))], levels=[np.full((1, 1), 1e-4)])
     sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
-    found = engine.broken_sensors(sensors, [measured], study, [np.full((ROWS, 1), away)], [np.zeros((ROWS, 1), bool)])
+    found = broken.broken_sensors(sensors, [measured], study, [np.full((ROWS, 1), away)], [np.zeros((ROWS, 1), bool)])
     assert [c.kind for c in found] == ["sensor_dropout"] * told
 
 
@@ -294,5 +294,5 @@ def test_parameters_are_those_of_the_wider_explanation(values):
     """Of a cause that is in it; another keeps its own."""
     values["bump_stop"] = {"gap": (0.02, 0.019, 0.021)}
     known = Cause("bump_stop", "spring", {"gap": Value(0.03, "m", (0.01, 0.05))}, 0.9)
-    assert engine.resized(STUDY, found(("bump_stop", "spring")), known).parameters["gap"].value == 0.02
-    assert engine.resized(STUDY, found(("backlash", "spring")), known) == known
+    assert judging.resized(STUDY, found(("bump_stop", "spring")), known).parameters["gap"].value == 0.02
+    assert judging.resized(STUDY, found(("backlash", "spring")), known) == known

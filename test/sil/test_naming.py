@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import naming
+from penode_sil.diagnosis import naming, sized
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import STRIBECK, Basis, Motion
 from penode_sil.diagnosis.score import Candidate
@@ -74,7 +74,7 @@ def test_the_force_of_friction_is_where_its_line_begins(damping):
     values = {f"x{i}_{k}": x for i, (_, _, shapes) in enumerate(laws) for k, x in shapes.items()}
     study = SimpleNamespace(model=None, places=[None])
     e = SimpleNamespace(terms=terms, built=SimpleNamespace(names=["x0", "x1"]))
-    force = naming.functions(study, e, ("coulomb_friction", "spring"), REACH, SPEED)["force"][1]
+    force = sized.functions(study, e, ("coulomb_friction", "spring"), REACH, SPEED)["force"][1]
     assert force(values) == pytest.approx(20.0, rel=1e-9)
 
 
@@ -151,7 +151,7 @@ def test_damping_of_a_tyre_that_lags(relaxation):
     lagging = term("tyre_damping", "maxwell_bushing", "stiffness", {"relaxation": relaxation})
     study = SimpleNamespace(model=None, places=[None], seen=[SimpleNamespace(motions=[motion])])
     e = SimpleNamespace(terms=[lagging], built=SimpleNamespace(names=["x0"]))
-    unit, damping = naming.functions(study, e, lagging.group, REACH, SPEED)["damping"]
+    unit, damping = sized.functions(study, e, lagging.group, REACH, SPEED)["damping"]
     want = stiffness * relaxation / (1.0 + (omega * relaxation) ** 2)
     half = omega * step / 2.0 * omega * relaxation  # half a step of delay, as a part of what is in phase
     found = damping({"x0_stiffness": stiffness, "x0_relaxation": relaxation})
@@ -165,5 +165,5 @@ def test_what_relaxes_within_a_sample_is_no_part_of_a_bushings_stiffness(quick, 
     motion = Motion(np.zeros(9), np.zeros(9), np.arange(9.0))
     study = SimpleNamespace(model=SimpleNamespace(sample_time=1e-3), places=[None], seen=[SimpleNamespace(motions=[motion])])
     e = SimpleNamespace(terms=bushings, built=SimpleNamespace(names=["x0", "x1"]))
-    _, found = naming.functions(study, e, bushings[0].group, REACH, SPEED)["stiffness"]
+    _, found = sized.functions(study, e, bushings[0].group, REACH, SPEED)["stiffness"]
     assert found({"x0_stiffness": 1e3, "x0_relaxation": 0.1, "x1_stiffness": 5e4, "x1_relaxation": quick}) == stiffness

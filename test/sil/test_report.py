@@ -321,7 +321,7 @@ def test_summary_fits_one_screen(model, found, tmp_path):
 def test_gained_share_has_an_interval():
     """Errors of independent blocks: the deviation of an RMS of n is sigma/sqrt(2 n), of the share that over the
     room."""
-    from penode_sil.diagnosis.extension import achieved
+    from penode_sil.diagnosis.measuring import achieved
 
     rng = np.random.default_rng(3)
     n = 8000

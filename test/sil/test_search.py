@@ -13,10 +13,14 @@ import pytest
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import HALVES, Basis
 from penode_sil.diagnosis.score import Candidate, Regression
-from penode_sil.diagnosis.search import (
-    COST, NEW, PART, Explanation, acting, called, distinct, elsewhere, halved, heavy, hopeful, only_noise, pursue, rigid, spared, sprung, strongest, sufficient, terms_of,
-    weak, whole,
-)  # fmt: skip
+from penode_sil.diagnosis.exchange import sprung
+from penode_sil.diagnosis.explaining import acting, heavy
+from penode_sil.diagnosis.explanation import COST, NEW, Explanation, distinct, only_noise, spared
+from penode_sil.diagnosis.pursuit import PART, elsewhere, pursue, strongest, terms_of
+from penode_sil.diagnosis.refining import called
+from penode_sil.diagnosis.search import hopeful
+from penode_sil.diagnosis.singles import rigid, sufficient
+from penode_sil.diagnosis.textbook import halved, weak, whole
 
 LAW = SimpleNamespace(law="linear_damper", shapes={})
 

@@ -24,7 +24,7 @@ from penode_gen.networks import Affine, Dense, Network, layer_slope, layer_value
 
 from .hypotheses import Basis, size
 from .naming import Curve
-from .search import Explanation
+from .explanation import Explanation
 from .study import Study
 
 Array = NDArray[np.float64]

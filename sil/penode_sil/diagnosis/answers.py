@@ -14,10 +14,10 @@ import penode_gen
 from penode_gen.model import Model
 
 from ..measured import Measured
-from . import extension, numerics, plausible, residual, search, weighed
+from . import explanation, extension, numerics, plausible, residual, weighed
 from .noise import Experiment
 from .result import OUTSIDE, Cause, Diagnosis, Recorded, separating
-from .search import Explanation
+from .explanation import Explanation
 from .study import Study, look
 
 
@@ -61,7 +61,7 @@ def by_innovations(
     extended = w.model if output is None else write_extended(w.text, study.model, output)
     tell(0.9, "showing what is wrong")
     shown = residual.show(study, w.fit, extended, w.held, w.verdict == "unexplained")
-    rows = search.rows(study)
+    rows = explanation.rows(study)
     evidence = (study.null.cost - rows) / np.sqrt(2.0 * rows)
     numbers, _ = numerics.numerics(study)
     doubt = plausible.doubt(study, best, w.verdict) if w.verdict == "unexplained" else ""

@@ -15,7 +15,7 @@ from penode_gen.model import Model
 from ..measured import Measured
 from . import dropouts
 from .result import Cause, Value
-from .search import Explanation
+from .explanation import Explanation
 from .study import Study
 
 FEW = 5  # bad samples of a sensor that make a fault of it

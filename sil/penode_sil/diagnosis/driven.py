@@ -17,7 +17,7 @@ from penode_gen.model import Model
 
 from ..measured import Measured
 from . import noise
-from .fit import moving
+from .compiling import moving
 from .noise import Experiment
 from .study import Study, begin, loss, refit
 

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The model file with the causes in it, and what they gain on other data with the generated C."""
+"""The model file with the causes in it."""
 
 from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Collection, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
 from itertools import chain, count
 from pathlib import Path
 
@@ -18,20 +17,16 @@ from numpy.typing import NDArray
 import penode_gen
 from penode_gen import units
 from penode_gen.laws import LAWS
-from penode_gen.model import INTERPOLATIONS, Model, Signal
+from penode_gen.model import INTERPOLATIONS, Model
 
-from ..targets import Sil
-from . import stepped
-from .beginning import start_of
-from .build import SPREAD, Term
-from .dropouts import bursts
-from .fit import BLUNT, Free, Problem, moving
+from .build import Term
+from .explanation import Explanation
+from .faulty import BLUNT
 from .hypotheses import VALUED, Basis, Fault, size
-from .noise import Experiment, metric
-from .residual import Channel, channels, noise_floor, noise_rms, rms
-from .result import Cause, Gain
-from .search import Explanation
-from .study import Study, watched, widened
+from .measuring import deployed, started
+from .residual import rms
+from .result import Cause
+from .study import Study
 
 Array = NDArray[np.float64]
 
@@ -62,6 +57,22 @@ def extends(path: Path) -> str:
 
 def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> tuple[str, Model]:
     """Text of model_extended.toml, and the model that it describes."""
+    lines = _head(study, e, causes)
+    if e is None:
+        return joined(study, "\n".join(lines))
+    taken = {*study.model.parameters, *study.model.states, *(x.name for x in study.model.elements), *(s.name for s in study.model.sensors)}
+    written = _Written(study, e, causes, _renaming(e, taken), unlike("age", taken), unlike("recorded", taken))
+    for j in range(len(study.model.sensors)):
+        written.sensor(j)
+    written.clock()
+    for title, entries in written.sections():
+        if entries:
+            lines += [f"[{title}]", *entries, ""]
+    return joined(study, "\n".join(lines))
+
+
+def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[str]:
+    """Lines on what was learnt, and the section on the model with substeps that its fastest law asks for."""
     model = study.model
     learnt = ", ".join(f"{c.kind} at {c.where or '?'}" for c in causes)
     if e is not None and not e.terms and e.built.model.elements != model.elements:
@@ -80,94 +91,121 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
         substeps = max([substeps, *(int(np.ceil(_fastest(stiff, drag) * model.sample_time / d)) for d, (stiff, drag, _, _) in delays)])
         if substeps > model.substeps:
             lines.insert(-1, f"substeps = {substeps}")
-    if e is None:
-        return joined(study, "\n".join(lines))
-    values = {f.target: f.value for f in e.fit.free}
-    taken = {*model.parameters, *model.states, *(x.name for x in model.elements), *(s.name for s in model.sensors)}
-    rename = {}
+    return lines
+
+
+def _renaming(e: Explanation, taken: Collection[str]) -> dict[str, str]:
+    """Names of added elements by what they are for."""
+    rename: dict[str, str] = {}
     for term, name in zip(e.terms, e.built.names):
         stem = term.candidate.kind.replace("network_extrapolation", "beyond_range")  # network_ is the generator's own
         rename[name] = unlike(stem, {*taken, *rename.values()})
+    return rename
 
-    def named(text: str) -> str:
-        return re.sub(r"\b((?:[Fsv]_)?)(x\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
 
-    parameters = []
-    for p in e.built.model.parameters.values():
-        known = model.parameters.get(p.name)
-        value = values.get(p.name, p.value)
-        if known is None:
-            parameters.append(f"{named(p.name)} = {table({'value': value, 'unit': p.unit})}")
-        elif p.name in values and value != known.value:
-            more = {"tolerance": known.tolerance if np.isfinite(known.tolerance) else "unknown"} if known.tolerance else {}
-            more |= {"tunable": True} if known.tunable else {}
-            more |= {"description": known.description} if known.description else {}
-            parameters.append(f"{p.name} = {table({'value': value / units.factor(p.unit), 'unit': p.unit, **more})}")
-    elements = []
-    for x in e.built.model.elements[len(model.elements) :]:
-        entry: dict[str, object] = {"between": x.ends, "law": x.law}
-        if x.law == "expression":
-            entry["force"] = named(x.expression)
-        else:
-            entry |= {k: named(x.arguments[k]) for k in LAWS[x.law].arguments}
-        elements.append(f"{named(x.name)} = {table(entry)}")
-    sensors, states, equations = [], [], []
-    age, recorded = unlike("age", taken), unlike("recorded", taken)
-    changed: dict[Signal, str] = {}
-    for j, (s, old) in enumerate(zip(e.built.model.sensors, model.sensors)):
-        expression = named(s.expression)
-        unit = units.si(s.unit)
-        bent = _bent(e, values, j, f"({expression})", s.name, unit, f"min({age}/{recorded}, 1)", parameters)
+class _Written:
+    """Entries of the extended file, section by section: `rename` gives names of elements, `age` and `recorded` those of the time since the
+    start and of the longest recording."""
+
+    def __init__(self, study: Study, e: Explanation, causes: Sequence[Cause], rename: Mapping[str, str], age: str, recorded: str) -> None:
+        self.study, self.e, self.causes, self.rename, self.age, self.recorded = study, e, causes, rename, age, recorded
+        self.values = {f.target: f.value for f in e.fit.free}
+        self.parameters = self._parameters()
+        self.sensors: list[str] = []
+        self.states: list[str] = []
+        self.equations: list[str] = []
+        self.changed: dict[str, str] = {}  # expressions of sensors that are not what they were
+
+    def named(self, text: str) -> str:
+        """Text with the names that elements have in the file."""
+        return re.sub(r"\b((?:[Fsv]_)?)(x\d+)(?=_|\b)", lambda m: m[1] + self.rename.get(m[2], m[2]), text)
+
+    def _parameters(self) -> list[str]:
+        found = []
+        for p in self.e.built.model.parameters.values():
+            known = self.study.model.parameters.get(p.name)
+            value = self.values.get(p.name, p.value)
+            if known is None:
+                found.append(f"{self.named(p.name)} = {table({'value': value, 'unit': p.unit})}")
+            elif p.name in self.values and value != known.value:
+                more = {"tolerance": known.tolerance if np.isfinite(known.tolerance) else "unknown"} if known.tolerance else {}
+                more |= {"tunable": True} if known.tunable else {}
+                more |= {"description": known.description} if known.description else {}
+                found.append(f"{p.name} = {table({'value': value / units.factor(p.unit), 'unit': p.unit, **more})}")
+        return found
+
+    def _elements(self) -> list[str]:
+        found = []
+        for x in self.e.built.model.elements[len(self.study.model.elements) :]:
+            entry: dict[str, object] = {"between": x.ends, "law": x.law}
+            if x.law == "expression":
+                entry["force"] = self.named(x.expression)
+            else:
+                entry |= {k: self.named(x.arguments[k]) for k in LAWS[x.law].arguments}
+            found.append(f"{self.named(x.name)} = {table(entry)}")
+        return found
+
+    def sensor(self, j: int) -> None:
+        """What sensor j measures, with its faults."""
+        s, old, values = self.e.built.model.sensors[j], self.study.model.sensors[j], self.values
+        expression, unit, share = self.named(s.expression), units.si(s.unit), f"min({self.age}/{self.recorded}, 1)"
+        bent = _bent(self.e, values, j, f"({expression})", s.name, unit, share, self.parameters)
         if bent:
             expression = f"{expression} + {bent}"
-        if values.get(("delay", j), 0.0) > SHORT * model.sample_time:
-            delay, late, rate = (f"{what}_{s.name}" for what in ("delay", "late", "late_rate"))
-            parameters.append(f"{delay} = {table({'value': max(values[('delay', j)], 1e-9), 'unit': 's'})}")
-            stiff, drag, direct, own = _late(_rolled(values, j))
-            slope = rate if stiff else f"{expression} - {late}"
-            equations.append(f"{late} = {toml(f'der({late})*{delay} = {slope}')}")
-            if stiff:
-                equations.append(f"{rate} = {toml(f'der({rate})*{delay} = {stiff:.7g}*({expression} - {late}) - {drag:.7g}*{rate}')}")
-            states += [f"{name} = {table({'unit': unit})}" for name in ((late, rate) if stiff else (late,))]
-            if direct == 1.0:
-                expression = f"{expression} - {rate}"
-            else:
-                expression = f"{late} + {direct:.7g}*({expression} - {late}) - {own:.7g}*{rate}" if direct else late
+        if values.get(("delay", j), 0.0) > SHORT * self.study.model.sample_time:
+            expression = self._delayed(expression, j)
         if ("scale", j) in values:
-            parameters.append(f"gain_{s.name} = {table({'value': 1.0 + values[('scale', j)], 'unit': '1'})}")
+            self.parameters.append(f"gain_{s.name} = {table({'value': 1.0 + values[('scale', j)], 'unit': '1'})}")
             expression = f"gain_{s.name}*({expression})"
         if ("bias", j) in values:
-            parameters.append(f"bias_{s.name} = {table({'value': values[('bias', j)], 'unit': unit})}")
+            self.parameters.append(f"bias_{s.name} = {table({'value': values[('bias', j)], 'unit': unit})}")
             expression = f"{expression} + bias_{s.name}"
-        if drift := _drift(e, values, j, s.name, unit, f"min({age}/{recorded}, 1)", parameters):
+        if drift := _drift(self.e, values, j, s.name, unit, share, self.parameters):
             expression = f"{expression} + {drift}"
         if ("rail", j) in values:
-            expression = _railed(expression, values[("rail", j)], values[("sharpness", j)], s.name, unit, parameters)
-        rails = next((c.parameters for c in causes if (c.kind, c.where) == ("sensor_clipping", s.name)), {})
+            expression = _railed(expression, values[("rail", j)], values[("sharpness", j)], s.name, unit, self.parameters)
+        rails = next((c.parameters for c in self.causes if (c.kind, c.where) == ("sensor_clipping", s.name)), {})
         for side, cut in (("high", "min"), ("low", "max")):
             if side in rails:
-                parameters.append(f"{side}_{s.name} = {table({'value': rails[side].value, 'unit': unit})}")
+                self.parameters.append(f"{side}_{s.name} = {table({'value': rails[side].value, 'unit': unit})}")
                 expression = f"{cut}({expression}, {side}_{s.name})"
         if expression != old.expression:
-            changed[s] = expression
-            sensors.append(f"{s.name} = {table({'value': expression, 'unit': s.unit, 'noise': s.noise / units.factor(s.unit)})}")
-    if any(re.search(rf"\b{age}\b", expression) for expression in changed.values()):
-        last = max(float(x.time[-1] - x.time[0]) for x in study.experiments)
-        parameters.append(f"{recorded} = {table({'value': last, 'unit': 's', 'description': 'the longest recording of the training'})}")
-        states.append(f"{age} = {table({'unit': 's', 'description': 'since the start'})}")
-        equations.append(f"{age} = {toml(f'der({age}) = 1')}")
-    measured = {s.name: entry for s, entry in changed.items()}  # one name means one quantity
-    outputs = [
-        f"{s.name} = {table({'value': measured.get(s.name, named(s.expression)), 'unit': s.unit})}"
-        for s, old in zip(e.built.model.outputs, model.outputs) if s.expression != old.expression or s.name in measured
-    ]  # fmt: skip
-    for title, entries in (
-        ("parameters", parameters), ("elements", elements), ("states", states), ("equations", equations), ("outputs", outputs),
-        ("sensors", sensors),
-    ):  # fmt: skip
-        if entries:
-            lines += [f"[{title}]", *entries, ""]
-    return joined(study, "\n".join(lines))
+            self.changed[s.name] = expression
+            self.sensors.append(f"{s.name} = {table({'value': expression, 'unit': s.unit, 'noise': s.noise / units.factor(s.unit)})}")
+
+    def _delayed(self, expression: str, j: int) -> str:
+        """An expression as late as sensor j is."""
+        name, unit = self.e.built.model.sensors[j].name, units.si(self.e.built.model.sensors[j].unit)
+        delay, late, rate = (f"{what}_{name}" for what in ("delay", "late", "late_rate"))
+        self.parameters.append(f"{delay} = {table({'value': max(self.values[('delay', j)], 1e-9), 'unit': 's'})}")
+        stiff, drag, direct, own = _late(_rolled(self.values, j))
+        slope = rate if stiff else f"{expression} - {late}"
+        self.equations.append(f"{late} = {toml(f'der({late})*{delay} = {slope}')}")
+        if stiff:
+            self.equations.append(f"{rate} = {toml(f'der({rate})*{delay} = {stiff:.7g}*({expression} - {late}) - {drag:.7g}*{rate}')}")
+        self.states += [f"{state} = {table({'unit': unit})}" for state in ((late, rate) if stiff else (late,))]
+        if direct == 1.0:
+            return f"{expression} - {rate}"
+        return f"{late} + {direct:.7g}*({expression} - {late}) - {own:.7g}*{rate}" if direct else late
+
+    def clock(self) -> None:
+        """The time since the start, where a sensor asks for it."""
+        if any(re.search(rf"\b{self.age}\b", expression) for expression in self.changed.values()):
+            last = max(float(x.time[-1] - x.time[0]) for x in self.study.experiments)
+            self.parameters.append(f"{self.recorded} = {table({'value': last, 'unit': 's', 'description': 'the longest recording of the training'})}")
+            self.states.append(f"{self.age} = {table({'unit': 's', 'description': 'since the start'})}")
+            self.equations.append(f"{self.age} = {toml(f'der({self.age}) = 1')}")
+
+    def sections(self) -> tuple[tuple[str, list[str]], ...]:
+        """Titles and entries, in the order of the file."""
+        outputs = [
+            f"{s.name} = {table({'value': self.changed.get(s.name, self.named(s.expression)), 'unit': s.unit})}"  # one name means one quantity
+            for s, old in zip(self.e.built.model.outputs, self.study.model.outputs) if s.expression != old.expression or s.name in self.changed
+        ]  # fmt: skip
+        return (
+            ("parameters", self.parameters), ("elements", self._elements()), ("states", self.states), ("equations", self.equations),
+            ("outputs", outputs), ("sensors", self.sensors),
+        )  # fmt: skip
 
 
 SHORT = 0.02  # of a sample: a delay that is left out
@@ -295,91 +333,3 @@ def _load(text: str) -> Model:
         path = Path(folder) / "model_extended.toml"
         path.write_text(text)
         return penode_gen.load(path)
-
-
-def started(model: Model, e: Experiment, study: Study) -> tuple[Array, Array]:
-    """The start state with which a model fits a recording best, all else given, and the sensors [n, n_z] it then foretells."""
-    metrics = [metric(e, study.levels[0][:1].repeat(e.band, 0), np.zeros((e.band, len(model.sensors), len(model.inputs))))]
-    problem = Problem(model, [e], metrics, study.set_name, study.linear.fastest)
-    spread = [1.0] * (2 * len(model.bodies)) + [SPREAD.get(s.unit, 1.0) for s in model.extra_states]
-    free = tuple(Free(("start", 0, i), x, 1e-3, sigma=s) for i, (x, s) in enumerate(zip(model.start, spread)))
-    fit = problem.solve(free)
-    return np.array([f.value for f in fit.free]), fit.simulated[0]
-
-
-def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
-    """Sensors [n, n_z] of the generated C (float) driven by the recorded inputs from a start state."""
-    def simulate(one: Model) -> Array:
-        instance = Sil(one).instance(set_name)
-        if len(start):
-            instance.set_state(start)
-        return instance.run(e.u).z.astype(float)
-
-    z = stepped.run(model, e, simulate)
-    if moving(model):
-        z[0] = 2.0 * z[1] - z[2]  # the step knows no rate of an input at its first sample
-    return z
-
-
-def measure(
-    study: Study, extended: Model, holdout: Sequence[Experiment], lost: Collection[str] = (), set_name: str = ""
-) -> tuple[dict[str, Gain], list[str], list[Channel]]:
-    """Errors before and after on held-out recordings, with the generated C; how much of them lies outside of what was
-    seen in training, where a right name says nothing about size; and all of it sample by sample. Sensors `lost` drop out:
-    bursts of theirs do not count. `set_name`: parameter set of the extended model, if it is another one."""
-    model = study.model
-    shown: list[Channel] = []
-    floors = noise_floor(study, 0)
-    limits = [1.02 * x for k in range(len(study.places)) for x in size([m.motions[k] for m in study.seen])]
-    outside, notes = [], []
-    for e in holdout:
-        both = (study, replace(study, set_name=set_name or study.set_name))
-        starts = [start_of(m, e, study, s.set_name) for m, s in zip((model, extended), both)]
-        before, after = (deployed(m, e, x, s.set_name) for m, x, s in zip((model, extended), starts, both))
-        dropped = bursts([e], [after])[0] & [s.name in lost for s in model.sensors]
-        e = replace(e, good=e.good & ~dropped)
-        paths = followed(extended, e, starts[1], both[1])
-        beyond = np.any(np.abs(paths) > np.array(limits), axis=1)
-        outside.append(beyond)
-        if beyond.any():
-            share = f"{np.mean(beyond):.1%} of the samples move farther or faster than in training"
-            notes.append(f"{e.name}: {share}; there the gain is extrapolated")
-        shown += channels(e, model, before, after, floors, beyond)
-    noise = noise_rms(study)
-    gains = {}
-    for j, s in enumerate(model.sensors):
-        own = [c for c in shown if c.sensor == s.name]
-        if not own:
-            continue
-        floor = float(noise[j])
-        errors = [np.concatenate([r.values[c.good] for c, r in zip(own, each)]) for each in ([c.before for c in own], [c.after for c in own])]
-        share, ci95 = achieved(*errors, floor)
-        beyond = float(np.mean(np.concatenate(outside)))
-        gains[s.name] = Gain(rms(errors[0]), rms(errors[1]), floor, share, units.si(s.unit), beyond, ci95)
-    return gains, notes, shown
-
-
-BLOCKS = 40  # of the held-out samples, drawn anew together: errors near in time are alike
-DRAWS = 2000
-
-
-def achieved(before: Array, after: Array, floor: float) -> tuple[float | None, tuple[float, float] | None]:
-    """Share of the achievable gain in RMS [errors before and after, n each], and its 95 % interval by a block bootstrap; None
-    where there is next to nothing to gain."""
-    power = np.array([[np.mean(b**2) for b in np.array_split(x, min(BLOCKS, len(x)))] for x in (before, after)])
-    draws = np.random.default_rng(0).integers(power.shape[1], size=(DRAWS, power.shape[1]))
-    b, a = np.sqrt(power[:, draws].mean(axis=2))
-    room = rms(before) - floor
-    if not room > 0.05 * floor:
-        return None, None
-    shares = (b - a) / np.maximum(b - floor, 0.01 * floor)
-    low, high = np.quantile(shares, (0.025, 0.975))
-    return (rms(before) - rms(after)) / room, (float(low), float(high))
-
-
-def followed(model: Model, e: Experiment, start: Array, study: Study) -> Array:
-    """Deflection and rate [n, 2 places] of all places in a simulation."""
-    wide = widened(e, 2 * len(study.places))
-    problem = Problem(watched(model, study.places), [wide], study.metrics[:1], study.set_name, study.linear.fastest)
-    free = tuple(Free(("start", 0, i), x, 1.0) for i, x in enumerate(start))
-    return np.array(problem.simulate(0, free, np.zeros((1, len(free))))[0][0][:, -2 * len(study.places) :])

@@ -8,7 +8,6 @@ An iteration tries several steps at once, one in each lane (see batch), and so s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -17,21 +16,18 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.interpolate import CubicSpline
 
-from penode_gen import fold
-from penode_gen.causalise import Causal, causalise
 from penode_gen.model import Model
 
-from ..batch import Batch
+from .compiling import compiled, folded, longest, moving, ordered
+from .faulty import delayed, drifted, railed
 from .hypotheses import Fault
 from .noise import Experiment, Metric, Thinning, thinning
 from .plant import anonymous
 
 Array = NDArray[np.float64]
 CLOSE = 1e-3  # [s] of samples through which parabolas are the inputs in between, and cubics have their rates
-LONGEST = {"loose_damper": 2.5e-4, "presliding": 2.5e-4, "friction": 5e-4, "tanh(v/": 5e-4}  # [s] step of laws that follow short ways
 KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
-BLUNT = 0.3  # sharpness of a rail: with less it is about the same tanh, as a small difference of large numbers
 FAR = 1e20  # residual of a run that cannot be simulated, and the most that it shows
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
 PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, derivatives are about what they were
@@ -133,7 +129,7 @@ class Problem:
         least = max(longest(model), CLOSE if rough else 0.0)
         substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / least - 1e-6)), -(-model.substeps // self.fine))
         way = ("cubic" if self.moving else "parabola") if close else "linear"
-        exact = replace(_folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
+        exact = replace(folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
         self.batch = compiled(anonymous(exact), ordered(model)[0])
         self.inputs = [e.drive if close else _drive(e, self.fine) if model.inputs else np.zeros((self.fine * (len(e.time) - 1) + 1, 0)) for e in experiments]
 
@@ -345,11 +341,6 @@ class Problem:
         return np.concatenate(rows), jacobian, tuple(simulated)
 
 
-def longest(model: Model) -> float:
-    """The longest step [s] that its laws allow."""
-    return min([np.inf, *(LONGEST[k] for k in LONGEST for e in model.elements if k in e.law or k in e.arguments)])
-
-
 @lru_cache(maxsize=KEPT)
 def _halved(e: Experiment) -> Experiment:
     """Every second sample of an experiment, of its sensors after what they show above half of the frequencies is taken away; but not
@@ -365,49 +356,6 @@ def _halved(e: Experiment) -> Experiment:
 
 def _put(free: Sequence[Free], values: Array) -> tuple[Free, ...]:
     return tuple(replace(f, value=float(v)) for f, v in zip(free, values))
-
-
-def _folded(model: Model) -> Model:
-    """The model with its networks as straight pieces where all of them are: the same forces, far sooner.
-    Layer by layer where the float weights have more of them: neurons may switch between two neighbouring numbers."""
-    networks = [n for s in model.sets.values() for n in s.networks.values()]
-    if not networks or model.pieces or model.outside == "fade" or not all(map(fold.foldable, networks)):
-        return model
-    return replace(model, pieces=fold.room(max(fold.pieces(n, model.outside == "clamp") for n in networks)), more_pieces="layers")
-
-
-_BATCHES: dict[tuple[object, ...], Batch] = {}
-_ORDERED: dict[tuple[object, ...], tuple[Causal, bool]] = {}
-
-
-def _structure(model: Model) -> tuple[object, ...]:
-    """What models share that differ in values of parameters only."""
-    shapes = {name: n.architecture for s in list(model.sets.values())[:1] for name, n in s.networks.items()}
-    return repr(replace(model, parameters={}, sets={})), tuple(model.parameters), repr(shapes)
-
-
-def moving(model: Model) -> bool:
-    """Does anything in it depend on the rate of an input?"""
-    return ordered(model)[1]
-
-
-def ordered(model: Model) -> tuple[Causal, bool]:
-    """The equations of a model in order, which no method of integration changes, and whether anything depends on the rate of an input."""
-    key = _structure(model)
-    if key not in _ORDERED:
-        causal = causalise(replace(model, interpolation="cubic"))
-        _ORDERED[key] = causal, causal.uses([*causal.rates, *causal.outputs, *causal.sensors], causal.input_rates)
-    return _ORDERED[key]
-
-
-def compiled(model: Model, causal: Causal) -> Batch:
-    """The batch library of a model with the equations `causal`."""
-    key = _structure(model)
-    if key not in _BATCHES:
-        _BATCHES[key] = Batch(model, exact=False, causal=replace(causal, model=model))
-    found = copy(_BATCHES[key])
-    found.model = model
-    return found
 
 
 @lru_cache(maxsize=KEPT)
@@ -436,43 +384,3 @@ def _drive(e: Experiment, fine: int) -> Array:
         parts[:, 2] = u[1:] - h * e.rate[1:] / 3.0
         parts[:, 1] = 3.0 * whole - 0.5 * (u[:-1] + u[1:]) - parts[:, 2]
     return np.concatenate([e.stepped(parts).reshape(-1, u.shape[1]), u[-1:]])
-
-
-def drifted(signals: Array, drift: Array) -> Array:
-    """Signals [n, n_z, runs] by clocks that run fast by drifts [runs]: parabolas through the nearest three samples, of all runs the
-    same ones where these are near for all."""
-    n = len(signals)
-    at = np.arange(n)[:, None] * (1.0 + drift)
-    near = np.clip(np.rint(at).astype(int), 1, n - 2)
-    if np.all(np.abs(near - near[:, :1]) <= 1):
-        near = near[:, :1]
-        before, here, after = (signals[near[:, 0] + k] for k in (-1, 0, 1))
-    else:
-        before, here, after = (np.take_along_axis(signals, (near + k)[:, None], axis=0) for k in (-1, 0, 1))
-    part = (at - near)[:, None]
-    return here + 0.5 * part * (after - before + part * (after - 2.0 * here + before))
-
-
-def delayed(signals: Array, delay: Array, roll_off: Array, step: float) -> Array:
-    """Signals [n, runs] later by delays [runs] [s] and less of them where they are fast, by -roll_off [runs] [s^2] of the second
-    derivative. That is a dead time before two poles as evenly late as they can be: the poles alone from delay^2/6 on (Bessel's of
-    order 2) to delay^2/2 (one pole), the dead time alone without. Before its start a signal is what it was there, and all of that
-    with a delay that is as long as itself: a fit may try any."""
-    n = len(signals)
-    delay = np.minimum(delay, n * step)
-    lead = min(int(np.ceil(8.0 * np.max(delay) / step)), n) + 16
-    padded = np.concatenate([np.repeat(signals[:1], lead, 0), signals, np.repeat(signals[-1:], lead, 0)])
-    size = fft.next_fast_len(len(padded), real=True)
-    s = 2j * np.pi * fft.rfftfreq(size, step)[:, None]
-    lag = np.minimum(delay, np.sqrt(6.0 * roll_off))
-    poles = 1.0 + s * lag + s * s * (lag**2 / 2.0 - roll_off)
-    return fft.irfft(fft.rfft(padded, size, axis=0) * np.exp(-s * (delay - lag)) / poles, size, axis=0)[lead : lead + n]
-
-
-def railed(signals: Array, rail: Array, sharpness: Array) -> Array:
-    """Signals [n, runs] that a sensor shows less and less of towards its limits of 1/rail [runs]: by a tanh with no sharpness [runs],
-    all of them up to the limits with an endless one. In between, the slope is that of two logistic steps at the limits."""
-    sharpness, rail = np.maximum(sharpness, BLUNT), np.maximum(rail, 1e-12)
-    slope = np.tanh(0.5 * sharpness)
-    x = signals * rail * (sharpness / slope)
-    return signals / slope + (np.logaddexp(0.0, -x - sharpness) - np.logaddexp(0.0, x - sharpness)) / (sharpness * rail)

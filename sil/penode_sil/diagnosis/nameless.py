@@ -16,7 +16,7 @@ from .build import Extended
 from .fit import Fit, Free, Problem
 from .hypotheses import Basis
 from .plant import extend
-from .search import COST, Explanation
+from .explanation import COST, Explanation
 from .study import Study, loss
 
 HIDDEN = 8  # neurons, of deflection and rate: 32 weights

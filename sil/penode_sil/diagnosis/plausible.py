@@ -14,7 +14,7 @@ from penode_gen.model import Model
 
 from .fit import Free, Problem
 from .noise import Experiment
-from .search import COST, NEW, Explanation, cost
+from .explanation import COST, NEW, Explanation, cost
 from .study import VAGUE, Study
 
 Array = NDArray[np.float64]

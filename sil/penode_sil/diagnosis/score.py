@@ -10,33 +10,28 @@ frequency. So all of them are columns of one linear regression, in the metric of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from penode_gen.model import Model
 from scipy import fft, optimize
 
-from . import hypotheses as hy
 from .fit import Fit
 from .hypotheses import Basis, Fault, Motion
 from .noise import Experiment, Metric
-from penode_gen.model import GROUND, Model
-
-from .plant import Linear, Place, moving_ends
+from .plant import Linear, Place
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 Complex = NDArray[np.complex128] | NDArray[np.complex64]
 RESONANCES = np.geomspace(0.25, 40.0, 40)  # [Hz] of hidden masses that are tried
 DAMPINGS = (0.03, 0.1, 0.3)  # and their damping ratios
-COARSE = 0.002  # [s] step at which forces along a motion are looked at, if their recordings have a finer one
-TOGETHER = 8  # candidates whose effects are computed together: they stay in the cache
 BLOCK = 1024  # rows of which products are added up in single
 ROUND = 3e-6  # of the square of a column: less is rounding, or not as linear
-FEW = 200  # samples of a sensor that are taken out one by one, sooner than by a transform
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,109 +286,3 @@ def where(kind: str, place: Place, model: Model) -> str:
     laws = {e.name: e.law for e in model.elements}
     fitting = [name for name, _ in place.elements if ("damper" in laws[name] or "friction" in laws[name]) == damper]
     return fitting[0] if fitting else place.name
-
-
-def collect(
-    model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], seen: Sequence[Seen], found: Sequence[Place],
-    sensor_names: Sequence[str], parameters: int = 0, kinds: Collection[str] = (),
-) -> tuple[list[Candidate], Single]:  # fmt: skip
-    """All candidates, or those of some kinds, and their whitened effects [candidates, rows], with room for `parameters` more."""
-    rows = sum(2 * x.band * len(sensor_names) for x in experiments)
-    groups: list[tuple[list[Candidate], Callable[[int, Array], object]]] = []  # and what writes their effects in a recording
-    most = max(int(COARSE / experiments[0].step + 1e-6), 1)
-    every = max(q for q in range(1, most + 1) if all(len(x.time) % q == 0 for x in experiments))
-    step = every * experiments[0].step
-
-    holes = [np.flatnonzero(~x.good.all(axis=0)) for x in experiments]  # sensors that have any
-    metrics = [replace(m, root=m.root.astype(np.complex64)) for m in metrics]
-    plain = [s.single() for s in seen]
-    white = [s.white(m) for s, m in zip(plain, metrics)]
-
-    @cache
-    def turns(e: int, j: int) -> Single:
-        """By how much the samples of a sensor that do not count are turned at each frequency [samples, numbers]."""
-        good = experiments[e].good[:, j]
-        turn = np.exp(-2j * np.pi / len(good) * (np.outer(np.flatnonzero(~good), np.arange(experiments[e].band)) % len(good)))
-        return turn.astype(np.complex64).view(np.float32)
-
-    @cache
-    def shows(e: int, j: int) -> Single:
-        """Where the samples of a sensor count, as far as that is felt in the band: at few samples, and slowly."""
-        good, band = experiments[e].good[:, j], experiments[e].band
-        few = fft.next_fast_len(4 * band, real=True)
-        slow = fft.rfft(good.astype(float))[: 2 * band]
-        return (fft.irfft(slow, few) * few / len(good)).astype(np.float32)
-
-    def transformed(rows: Array, band: int) -> Complex:
-        """Spectra [k, f] of signals [k, n], in single but for their means."""
-        mean = np.mean(rows, axis=1, keepdims=True)
-        spectra = fft.rfft((rows - mean).astype(np.float32), axis=1)[:, :band]
-        spectra[:, :1] = rows.shape[1] * mean
-        return spectra
-
-    def masked(e: int, spectra: Complex) -> Complex:
-        """Spectra [k, f, sensors] of effects without the samples that do not count."""
-        good, band = experiments[e].good, experiments[e].band
-        for j in holes[e]:
-            if np.count_nonzero(~good[:, j]) <= FEW:
-                turn, whole = turns(e, j), np.ascontiguousarray(spectra[:, :, j])
-                lost = (2.0 * whole.view(np.float32) @ turn.T - whole[:, :1].real) / len(good)  # the mean counts once
-                spectra[:, :, j] -= (lost @ turn).view(np.complex64)
-            else:
-                shown = shows(e, j)
-                signals = fft.irfft(spectra[:, :, j], len(shown), axis=1)
-                signals *= shown
-                spectra[:, :, j] = fft.rfft(signals, axis=1)[:, :band]
-        return spectra
-
-    def answered(force: Complex, place: int, e: int, out: Array, settled: Sequence[bool] = ()) -> None:
-        if len(holes[e]):
-            metrics[e].white(masked(e, plain[e].answer(force, place, settled)), out)
-        else:
-            white[e].answer(force, place, settled, out)
-
-    def acted(place: int, laws: Sequence[Basis], e: int, out: Array) -> None:
-        rows = np.stack([b.series[e] for b in laws])
-        phi = np.float32(every) * transformed(rows, experiments[e].band)
-        answered(phi, place, e, out, [b.settled for b in laws])
-
-    def pulled(place: int, body: Sequence[Array], tried: Array, e: int, out: Array) -> None:
-        x = experiments[e].frequencies[: experiments[e].band] / tried[:, :1]
-        damped = 2j * tried[:, 1:] * x
-        answered(((1.0 + damped) / (1.0 - x**2 + damped) * body[e]).astype(np.complex64), place, e, out)
-
-    def faulty(sensor: int, faults: Sequence[Fault], e: int, out: Array) -> None:
-        x = experiments[e]
-        spectra = transformed(np.stack([f.series[e] for f in faults]) * x.good[:, sensor], x.band)
-        out = out.view(np.complex64).reshape(len(faults), len(sensor_names), x.band, copy=False)
-        np.multiply(spectra[:, None], metrics[e].triangle[:, sensor], out=out)
-
-    for k, place in enumerate(found):
-        motions = [Motion(m.s[::every], m.v[::every], m.t[::every]) for m in (s.motions[k] for s in seen)]
-        laws = list(hy.force_laws(k, place, motions, step, not moving_ends(model) & set(place.ends), kinds))
-        body = next((b.name for b in model.bodies if set(place.ends) == {b.name, GROUND}), None)
-        for i in range(0, len(laws), TOGETHER):
-            own = laws[i : i + TOGETHER]
-            groups.append(([Candidate(b.kind, where(b.kind, place, model), b.sign, b.companion, b) for b in own], partial(acted, k, own)))
-        if body is not None and (not kinds or "hidden_resonance" in kinds):
-            pull = [every * fft.rfft(np.gradient(m.v, step))[: x.band] for x, m in zip(experiments, motions)]
-            for f0 in RESONANCES:
-                own = [Candidate("hidden_resonance", body, 1, False, ("absorber", k, float(f0), zeta)) for zeta in DAMPINGS]
-                groups.append((own, partial(pulled, k, pull, np.array([(f0, zeta) for zeta in DAMPINGS]))))
-    for j, name in enumerate(sensor_names):
-        times = [s.motions[0].t if s.motions else e.time for e, s in zip(experiments, seen)]
-        faults = list(hy.sensor_faults(j, [s.sensors[:, j] for s in seen], times, step, kinds))
-        if faults:
-            groups.append(([Candidate(f.kind, name, f.sign, f.companion, f) for f in faults], partial(faulty, j, faults)))
-    if not kinds or hy.CLOCK in kinds:
-        drift = hy.clock([s.sensors for s in seen], [e.time - e.time[0] for e in experiments], experiments[0].step)
-        apart = Candidate(drift.kind, "", drift.sign, drift.companion, drift)
-        groups.append(([apart], lambda e, out: metrics[e].white(metrics[e].spectrum(drift.series[e] * experiments[e].good)[None], out)))
-    candidates = [c for own, _ in groups for c in own]
-    effects = np.empty((len(candidates) + parameters, rows), dtype=np.float32)
-    column = 0
-    for e, x in enumerate(experiments):
-        row, columns = 0, slice(column, column := column + 2 * x.band * len(sensor_names))
-        for own, write in groups:
-            write(e, effects[row : (row := row + len(own)), columns])
-    return candidates, effects

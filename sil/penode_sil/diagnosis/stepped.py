@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from penode_gen.model import Model
 
-from .fit import moving
+from .compiling import moving
 from .noise import Experiment
 
 Array = NDArray[np.float64]

@@ -17,7 +17,8 @@ from .fit import KEPT, Fit, Free, Problem
 from .hypotheses import size
 from .noise import Experiment, Metric, metric, sensor_levels
 from .plant import Linear, Place
-from .score import Regression, Seen, collect, smooth
+from .effects import collect
+from .score import Regression, Seen, smooth
 
 Array = NDArray[np.float64]
 SKEW = 0.001  # of a sample: channels are never sampled at quite the same time

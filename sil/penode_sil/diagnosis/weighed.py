@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from penode_gen.model import Model
 
-from . import applied, extension, real
+from . import applied, extension, measuring, real
 from .evidence.bench import build
 from .evidence.gain import Level
 from .evidence.observer import Record, bias, sample_noise
 from .fit import Fit, Problem
-from .innovate import Z_95
+from .innovate import MIN_GAIN, Z_95
 from .noise import Experiment
 from .residual import Channel, rms
 from .result import Cause, Gain
@@ -25,8 +25,8 @@ from .worth import WORTH
 
 Array = NDArray[np.float64]
 WHOLE = 0.85  # share of the residual that causes take away where they explain it
-MIN_MISFIT = 20.0  # log likelihood that a wandering force gains beside the best explanation by sensor noise alone
-MIN_UNMODELLED = 0.0055  # and its least size, of levels tried: 0.003 and less beside causes that are the truth, 0.01 and more where models are wrong everywhere
+MIN_UNMODELLED = 0.0055  # of what moves, and worth MIN_GAIN: less wanders beside causes that are the truth, 0.003 of the levels tried at most
+UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be that, or a curve that stands for another one
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +51,11 @@ def supports(model: Model) -> bool:
     return bool(model.bodies) and not model.networks
 
 
-def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> bool:
-    """Does more act than an explanation has, beyond the noise of sensors? Then innovations have to decide."""
+def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> float:
+    """How much more acts than an explanation has, beyond the noise of sensors, as a share of what moves; 0 if that may be chance. Beyond
+    UNMODELLED innovations have to decide; less than that, only a simpler answer of theirs counts."""
     if not supports(study.model):
-        return False
+        return 0.0
     values = {f.target: f.value for f in fit.free if isinstance(f.target, str)}
     known = {n: replace(p, value=values.get(n, p.value), exact=True) for n, p in fit.model.parameters.items()}
     model = replace(fit.model, parameters=known)
@@ -69,7 +70,7 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
     still = bench.problem().solve(bench.fit.free, bench.gains(bench.fit).at(Level(0.0, 1.0)), 12)
     gained = bench.fit.likelihood - still.likelihood
     log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats")
-    return gained > MIN_MISFIT and bench.level.size > MIN_UNMODELLED
+    return bench.level.size if gained > MIN_GAIN and bench.level.size > MIN_UNMODELLED else 0.0
 
 
 def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]) -> Weighed:
@@ -80,9 +81,9 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     offsets = {s.name for s in model.sensors if abs(bench.fit.value(bias(s.name))) > Z_95 * bench.fit.deviation(bias(s.name))}
     made = applied.apply(model, bench, found.run, found.found.terms, offsets)
     text, extended = extension.joined(study, made.text)
-    gain, more, held = extension.measure(study, extended, unused) if unused else ({}, [], [])
+    gain, more, held = measuring.measure(study, extended, unused) if unused else ({}, [], [])
     scale = np.array([s.noise or 1.0 for s in model.sensors])
-    after = tuple(extension.started(extended, e, study)[1] for e in study.experiments)
+    after = tuple(measuring.started(extended, e, study)[1] for e in study.experiments)
     fit = replace(study.null, simulated=after)
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, study.null.simulated))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter, Signal, State
 
 from ...batch import Observer
-from ..fit import Free, compiled, ordered
+from ..compiling import compiled, ordered
+from ..fit import Free
 from ..hypotheses import lag
 from ..noise import Experiment
 from ..plant import Place, anonymous, extend, rotational_unit

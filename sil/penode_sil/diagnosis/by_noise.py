@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The diagnosis of recordings in which sensor noise is what limits the fit: causes named by the search, weighed against numerics, tones
+and changes with time, written into the extended model and measured on the hold-out."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+import penode_gen
+from penode_gen.model import Model
+
+from ..measured import Measured
+from . import absorb, echo, explaining, extension, measuring, nameless, noise, numerics, plant, plausible, refining, residual, steady, tones
+from .answers import alternatives, write_extended
+from .broken import broken_sensors, still_wild
+from .explanation import Explanation
+from .hypotheses import CLOCK
+from .judging import cause, damped, judge, pitching, resized, worth
+from .noise import Experiment
+from .result import OUTSIDE, Cause, Diagnosis, Gain, separating
+from .study import Study, look
+
+CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
+UNSEEN = 1.5  # times the noise: a hold-out that is that far off, where training showed nothing, is of another vehicle
+FARTHER = 0.02  # share of samples outside of what was trained, from which a hold-out says little about a name
+SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
+SURELY_NOT = (Cause(OUTSIDE, "", {}, 0.5),)  # named by nothing on the list
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is diagnosed: the model as its file has it, recordings for training and hold-out, these as experiments (`unused`), what was
+    remarked on them, where files go, and who hears of progress: `log` what is tried, `tell` which share of the work is done."""
+
+    model: Model
+    train: Sequence[Measured]
+    holdout: Sequence[Measured]
+    unused: Sequence[Experiment]
+    remarks: Sequence[str]
+    output: Path | None
+    log: Callable[[str], None]
+    tell: Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What explanations amount to. `named`: the explanation that goes into the extended model, None if nothing does; `unnamed`: the same
+    where it is a network without a name; `doubt`: why all of it may be something else, empty if not."""
+
+    causes: tuple[Cause, ...]
+    verdict: str
+    explained: float
+    evidence: float
+    alike: float
+    doubt: str
+    drift: float
+    numbers: object
+    notes: tuple[str, ...]
+    named: Explanation | None = None
+    unnamed: Explanation | None = None
+
+    def nothing(self, note: str) -> Judged:
+        """Unexplained after all, for what the note says."""
+        return replace(self, causes=SURELY_NOT, verdict="unexplained", explained=0.0, named=None, unnamed=None, notes=(*self.notes, note))
+
+
+def by_noise(case: Case, study: Study, explanations: Sequence[Explanation], faults: list[Cause], bursts: Sequence[np.ndarray]) -> Diagnosis:
+    """The diagnosis, without recordings and time, which the caller has."""
+    best = explanations[0] if explanations else None
+    if best is not None:  # bursts and spikes that a cause explains were none
+        faults = _still_broken(case, study, best, faults, bursts)
+    case.tell(SEARCH[1], "weighing them against numerics")
+    study = replace(study, seen=look(study, best.fit if best else study.null))
+    judged = _sized(case, study, best, _weighed(case, study, explanations, faults))
+    study = replace(study, model=case.model)  # what the file does not state is not written down
+    judged, text, extended, gain, held = _measured(case, study, judged, faults)
+    if case.output is not None:
+        extended = write_extended(text, case.model, case.output)
+    absorbed: dict[str, object] = {}
+    if learnt := absorb.taught(study, judged.named) if judged.named is not None and judged.named.terms else []:
+        absorbed, more = absorbing(study, judged.named, learnt, case.unused, case.output)
+        judged = replace(judged, notes=(*judged.notes, *more))
+    case.tell(0.9, "showing what is wrong")
+    whole = judged.named is not None and (judged.named is judged.unnamed or best is not None and bool(judged.causes))
+    shown = residual.show(study, judged.named.fit if whole else None, extended if whole else None, held, judged.verdict == "unexplained")
+    causes = tuple(replace(c, separate=separating(c)) for c in judged.causes)
+    return Diagnosis(
+        judged.verdict, causes, gain, judged.numbers, judged.explained, judged.evidence, judged.alike,
+        tuple([judged.doubt] * bool(judged.doubt)) + judged.notes, residual=shown.numbers(), absorbed=absorbed,
+        explanations=alternatives(causes), shown=shown,
+    )  # fmt: skip
+
+
+def _still_broken(case: Case, study: Study, best: Explanation, faults: list[Cause], bursts: Sequence[np.ndarray]) -> list[Cause]:
+    kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
+    rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
+    again = broken_sensors(study.model, case.train, study, best.fit.simulated, kept)  # a cause may clip as well: then a rail looks like a drop-out
+    return [f for f in again if f.kind != "sensor_dropout" or f.where not in rails]
+
+
+def _weighed(case: Case, study: Study, explanations: Sequence[Explanation], faults: list[Cause]) -> Judged:
+    """Causes and verdict, against numerics, what sensors share, tones, and what changes with time."""
+    best = explanations[0] if explanations else None
+    left = best.fit if best else study.null
+    numbers, step = numerics.numerics(study)
+    alike, shared = noise.correlation(study.experiments, study.metrics, left.simulated)
+    case.log(f"correlation {alike:.1f}, shared {shared:.0f}")
+    tone = tones.tone(study.experiments, study.metrics, left.simulated)
+    case.log(str(tone))
+    change = steady.change(study, left, study.seen)
+    case.log(str(change))
+    fades = best is not None and any(kind == "damper_fading" for kind, _ in best.groups)  # which changes by its nature
+    changed = change.gain if change.surprise > -np.log(CHANGING) and not fades else 0.0
+    causes, verdict, explained, evidence = judge(study, explanations, faults, alike, shared, tone.detected, changed)
+    doubt = plausible.doubt(study, best, verdict)
+    behind = not doubt and verdict != "unexplained" and best is not None and pitching(best) and echo.echo(study, best.fit).detected
+    if doubt or behind:
+        causes, verdict = SURELY_NOT, "unexplained"
+    if step is not None and not any(c.kind == OUTSIDE for c in causes):
+        causes, verdict = (*causes, step), "explained"
+    drift = sum(t.gain for t in best.terms if t.candidate.kind == CLOCK) if best else 0.0
+    notes = [*case.remarks, *filter(None, [plant.placeless(study.places)])]
+    notes += hints(study, explanations, verdict, bool(behind), change if changed else None, tone, drift)
+    return Judged(causes, verdict, explained, evidence, alike, doubt, drift, numbers, tuple(notes))
+
+
+def _sized(case: Case, study: Study, best: Explanation | None, judged: Judged) -> Judged:
+    """With the sizes of named causes in an explanation of all there is, or with a network beside an element for what has no name."""
+    named = unnamed = None  # what has no name does not go into a model
+    causes, notes, explained = judged.causes, list(judged.notes), judged.explained
+    if not any(c.kind == OUTSIDE for c in causes):
+        idle = explaining.explain(study, []) if best is None or not causes else None
+        sized, named = refining.mended(study, best, case.log) if idle is None else (idle, idle)
+        causes = tuple(resized(study, sized, c) for c in causes)
+    if judged.verdict == "unexplained" and not judged.doubt and not judged.drift:
+        unnamed = nameless.fitted(study, best)
+    if unnamed is not None and case.unused:
+        case.tell(0.83, "fitting what has no name")
+        worse = measuring.measure(study, extension.extend_file(study, unnamed, causes)[1], case.unused)[0].values()
+        unnamed = None if any(g.after_rmse > 1.01 * g.before_rmse for g in worse) else unnamed
+    if unnamed is not None:
+        explained = nameless.share(study, unnamed.fit)
+        notes.append(f"a small network beside {nameless.beside(study, unnamed)} takes a part of it, and has no name")
+    elif judged.verdict == "unexplained":
+        explained = 0.0
+    return replace(judged, causes=causes, explained=explained, notes=tuple(notes), named=named or unnamed, unnamed=unnamed)
+
+
+def _measured(
+    case: Case, study: Study, judged: Judged, faults: Sequence[Cause]
+) -> tuple[Judged, str, Model, dict[str, Gain], list[residual.Channel]]:
+    """What the hold-out says: the judgement after it, text and model of the extended file, gain, and channels of the hold-out."""
+    text, extended = extension.extend_file(study, judged.named, judged.causes)
+    if not case.holdout:
+        return judged, text, extended, {}, []
+    case.tell(0.85, "measuring the gain")
+    lost = {c.where for c in judged.causes if c.kind == "sensor_dropout"}
+    gain, more, held = measuring.measure(study, extended, case.unused, lost)
+    worse = [s for s, g in gain.items() if g.after_rmse > 1.05 * g.before_rmse]
+    fitted = [c for c in judged.causes if c not in faults]  # the others are seen in the samples, not by a simulation
+    if fitted and any(gain[s].after_rmse > UNSEEN * gain[s].noise_floor and gain[s].outside < FARTHER for s in worse):
+        names = " and ".join(f"{c.kind} at {c.where}" for c in fitted)
+        judged = judged.nothing(f"{names} would explain the training, but makes {', '.join(worse)} of the hold-out worse: train with more excitations")
+    elif worse and not judged.causes:
+        note = f"parameters that fit the training within their tolerances make {', '.join(worse)} of the hold-out worse: left as they were"
+        judged = replace(judged, named=None, unnamed=None, notes=(*judged.notes, note))
+    else:
+        judged = replace(judged, notes=(*judged.notes, *(f"{s} gets worse by the extended model: do not use it" for s in worse)))
+    if worse and judged.named is None:
+        text, extended = extension.extend_file(study, None, judged.causes)
+        gain, more, held = measuring.measure(study, extended, case.unused)
+    judged = replace(judged, notes=(*judged.notes, *more))
+    unseen = [s for s, g in gain.items() if g.after_rmse > UNSEEN * g.noise_floor] if not judged.causes else []
+    if unseen:
+        note = f"{', '.join(unseen)}: the hold-out shows what the training does not: train with recordings like it"
+        judged = replace(judged, causes=SURELY_NOT, verdict="unexplained", explained=0.0, notes=(*judged.notes, note))
+    return judged, text, extended, gain, held
+
+
+def hints(
+    study: Study, explanations: Sequence[Explanation], verdict: str, behind: bool, change: steady.Change | None, tone: tones.Tone,
+    drift: float,
+) -> list[str]:  # fmt: skip
+    """Notes on what is left: motion that comes late (`behind`), what changes with time, masses, a tone, a drift of clocks."""
+    notes = []
+    if behind:
+        notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
+    if change is not None and verdict == "unexplained":
+        notes.append(f"{change.what} of {change.place} changes while it is measured: a controller, a leak?")
+    if verdict == "unexplained" and explanations:
+        masses = [cause(study, explanations, g) for g in explanations[0].groups if g[0] == "hidden_resonance"]
+        notes += damped([c for c in masses if worth(study, c)])
+    if tone.detected:
+        own = study.model.sensors[tone.sensor].name
+        notes.append(f"{own} has a tone of its own at {tone.frequency:.0f} Hz, or around it: an engine, a wheel, the mains?")
+    if drift:
+        notes.append(f"clocks of sensors and inputs drift apart by {1e6 * abs(drift):.3g} ppm: put both on one clock")
+    return notes
+
+
+def absorbing(
+    study: Study, e: Explanation, learnt: list[absorb.Taught], unused: Sequence[Experiment], output: Path | None
+) -> tuple[dict[str, object], list[str]]:
+    """The same effect as a parameter set: what goes into diagnosis.json, and a note."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = output or Path(folder)
+        beside = Path(os.path.relpath(study.model.path.resolve(), place.resolve()))
+        model = penode_gen.load(absorb.write(study, e, learnt, beside, place))
+        gain = measuring.measure(study, model, unused, (), absorb.SET)[0] if unused else {}
+    names = ", ".join(t.element for t in learnt)
+    said = {"file": absorb.FILE, "set": absorb.SET, "networks": {t.port: {"missing": t.missing} for t in learnt}, "gain": gain}
+    after = ", ".join(f"{k} {g.after_rmse:.3g} {g.unit}" for k, g in gain.items())
+    note = f"{names} can learn it: {absorb.FILE} has a set for the code that runs already"
+    return said, [note + f"; hold-out after: {after}" * bool(after)]
