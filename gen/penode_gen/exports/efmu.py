@@ -29,8 +29,8 @@ def algorithm_code(model: Model, dialect: str) -> tuple[efmu_code.Block, Represe
 def build(model: Model, options: Options) -> bytes:
     """The container, in the folder eFMU/ of a zip. Raises ExportError."""
     dialect = options["dialect"]
-    found = efmu_schemas.schemas(dialect, options["schemas"])
     _, algorithm = algorithm_code(model, dialect)
+    found = efmu_schemas.schemas(dialect, options["schemas"])
     parts = [algorithm]
     files: dict[str, bytes | str] = {f"eFMU/schemas/{path}": data for path, data in found.items()}
     for part in parts:

@@ -21,7 +21,7 @@ DIALECTS = {
     "dymola": {"efmiContainerManifest.xsd": "0.10.0", "AlgorithmCode/efmiAlgorithmCodeManifest.xsd": "0.13.0", "ProductionCode/efmiProductionCodeManifest.xsd": "0.17.0"},
 }
 _BEHAVIOUR = "BehavioralModel/efmiBehavioralModelManifest.xsd"
-_MARK = re.compile(rb"\n?schemas/((?:\w+/)?(?:\w+\.(?:xsd|txt|md)|LICENSE))")
+_MARK = re.compile(rb"schemas/((?:\w+/)?(?:\w+\.(?:xsd|txt|md)|LICENSE))")
 _END = b"</xs:schema>"
 _LARGEST = 1 << 20  # bytes of a schema
 
