@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""eFMU, the container of eFMI 1.0.0 Beta 1: Algorithm Code in GALEC that keeps the tensor flow."""
+"""eFMU, the container of eFMI 1.0.0 Beta 1: Algorithm Code in GALEC that keeps the tensor flow, Production Code in C."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from . import efmu_code, efmu_manifest, efmu_schemas
 from . import efmu_variables as ev
 from .archive import zipped
 from .efmu_manifest import Representation
+from .efmu_production import production_code
 from .interface import Exporter, Option, Options
 from .templating import render
 
@@ -29,9 +30,9 @@ def algorithm_code(model: Model, dialect: str) -> tuple[efmu_code.Block, Represe
 def build(model: Model, options: Options) -> bytes:
     """The container, in the folder eFMU/ of a zip. Raises ExportError."""
     dialect = options["dialect"]
-    _, algorithm = algorithm_code(model, dialect)
+    block, algorithm = algorithm_code(model, dialect)
     found = efmu_schemas.schemas(dialect, options["schemas"])
-    parts = [algorithm]
+    parts = [algorithm, *production_code(model, block, algorithm, dialect)]
     files: dict[str, bytes | str] = {f"eFMU/schemas/{path}": data for path, data in found.items()}
     for part in parts:
         files |= {f"eFMU/{part.folder}/{name}": text for name, text in part.files.items()}
@@ -41,7 +42,7 @@ def build(model: Model, options: Options) -> bytes:
 
 
 EXPORTER = Exporter(
-    "eFMU: the container of eFMI, with Algorithm Code", (".fmu", ".efmu"), build,
+    "eFMU: the container of eFMI, with Algorithm Code and Production Code", (".fmu", ".efmu"), build,
     options=(
         Option("dialect", "beta1: manifests of eFMI 1.0.0 Beta 1 (default); dymola: those of Dymola 2026x", choices=tuple(efmu_schemas.DIALECTS), default="beta1"),
         Option("schemas", "folder with the schemas of the dialect (default for beta1: those in the package rumoca)"),
