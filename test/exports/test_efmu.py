@@ -152,37 +152,30 @@ def test_what_is_no_galec_is_refused(text: str, old: str, new: str, line: str) -
 # -- the container ------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def files(nqvm: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    if importlib.util.find_spec("rumoca") is None:
-        pytest.skip("rumoca, which has the schemas, is not installed: pip install penode[efmu]")
-    return contents(export(nqvm, tmp_path_factory.mktemp("efmu")))
-
-
-def test_every_manifest_is_valid_and_names_what_is_there(files: dict[str, bytes], tmp_path: Path) -> None:
+def test_every_manifest_is_valid_and_names_what_is_there(efmu: dict[str, bytes], tmp_path: Path) -> None:
     """By the schemas of eFMI 1.0.0 Beta 1; and each fault is found."""
-    schemas = Schemas(files, tmp_path)
-    assert problems(files) == [] and schemas.errors_of_all(files) == []
-    assert b"Modelica Association" in files["schemas/LICENSE"]
-    manifest = files["AlgorithmCode/manifest.xml"]
+    schemas = Schemas(efmu, tmp_path)
+    assert problems(efmu) == [] and schemas.errors_of_all(efmu) == []
+    assert b"Modelica Association" in efmu["schemas/LICENSE"]
+    manifest = efmu["AlgorithmCode/manifest.xml"]
     for old, new in ((b'kind="DoStep"', b'kind="Step"'), (b'xsdVersion="0.14.0"', b'xsdVersion="0.13.0"'), (b"Units>", b"Unit>"), (b'number="1"', b'number="0"')):
         assert schemas.errors("AlgorithmCode", manifest.replace(old, new)), old
-    assert schemas.errors("", files["__content.xml"].replace(b"__content", b"").replace(b'id="{', b'id="'))
+    assert schemas.errors("", efmu["__content.xml"].replace(b"__content", b"").replace(b'id="{', b'id="'))
 
 
-def test_faults_between_the_files_are_found(files: dict[str, bytes]) -> None:
-    code, manifest = files["AlgorithmCode/block.alg"], files["AlgorithmCode/manifest.xml"]
+def test_faults_between_the_files_are_found(efmu: dict[str, bytes]) -> None:
+    code, manifest = efmu["AlgorithmCode/block.alg"], efmu["AlgorithmCode/manifest.xml"]
     for wrong in (
         {"AlgorithmCode/block.alg": code + b" "}, {"AlgorithmCode/manifest.xml": manifest + b" "}, {"AlgorithmCode/more.alg": b""},
         {"AlgorithmCode/manifest.xml": manifest.replace(b'variableRefId="', b'variableRefId="no')},
     ):  # fmt: skip
-        assert problems(files | wrong)
+        assert problems(efmu | wrong)
 
 
-def test_the_manifest_has_the_variables_of_the_block(nqvm: Any, files: dict[str, bytes]) -> None:
+def test_the_manifest_has_the_variables_of_the_block(nqvm: Any, efmu: dict[str, bytes]) -> None:
     """Name, causality, shape and start values; signals of the methods; the clock."""
-    root = ElementTree.fromstring(files["AlgorithmCode/manifest.xml"])
-    block = Block(files["AlgorithmCode/block.alg"].decode(), np.float64)
+    root = ElementTree.fromstring(efmu["AlgorithmCode/manifest.xml"])
+    block = Block(efmu["AlgorithmCode/block.alg"].decode(), np.float64)
     block.run("Startup")
     kinds = {"input": "input", "output": "output", "tunableParameter": "parameter", "constant": "constant", "state": ""}
     entries = {e.get("name"): e for e in root.find("Variables")}
@@ -213,14 +206,14 @@ def test_the_same_bytes_from_the_command_line(nqvm: Any, tmp_path: Path, monkeyp
         export(nqvm, tmp_path)
 
 
-def test_schemas_of_a_folder(nqvm: Any, files: dict[str, bytes], tmp_path: Path) -> None:
+def test_schemas_of_a_folder(nqvm: Any, efmu: dict[str, bytes], tmp_path: Path) -> None:
     """The same as those of the package; incomplete ones and those of another dialect are refused with a line."""
-    for name, data in files.items():
+    for name, data in efmu.items():
         if name.startswith("schemas/"):
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).write_bytes(data)
     given = str(tmp_path / "schemas")
-    assert contents(export(nqvm, tmp_path, schemas=given)) == files
+    assert contents(export(nqvm, tmp_path, schemas=given)) == efmu
     for dialect, path, data, line in (
         ("dymola", "", b"", "efmiContainerManifest.xsd is not version 0.10.0, which the dialect dymola has"), ("beta1", "efmiUnits.xsd", b"<a>", "efmiUnits.xsd is no XML"),
         ("beta1", "efmiUnits.xsd", None, "includes efmiUnits.xsd, which is missing"), ("beta1", "efmiContainerManifest.xsd", None, "it has no efmiContainerManifest.xsd"),

@@ -20,7 +20,7 @@ from .interface import ExportError
 from .templating import render
 
 # Nodes, weights and the divisor of the weights of methods in which every stage builds on the one before.
-_METHODS = {"euler": ((0.0,), (1.0,), 1.0), "heun": ((0.0, 1.0), (1.0, 1.0), 2.0), "rk4": ((0.0, 0.5, 0.5, 1.0), (1.0, 2.0, 2.0, 1.0), 6.0)}
+METHODS = {"euler": ((0.0,), (1.0,), 1.0), "heun": ((0.0, 1.0), (1.0, 1.0), 2.0), "rk4": ((0.0, 0.5, 0.5, 1.0), (1.0, 2.0, 2.0, 1.0), 6.0)}
 _LOCALS = ("refused", "bad", "x0", "x", "xs", "k", "total", "share", "node", "weight", "y", "i", "s")
 
 
@@ -46,10 +46,12 @@ def block(model: Model) -> Block:
 
 def _check(model: Model, causal: Causal) -> None:
     problems = []
-    if model.method not in _METHODS:
-        problems.append(f'method = "{model.method}": it has no form in Algorithm Code here; use one of {", ".join(_METHODS)}')
+    if model.method not in METHODS:
+        problems.append(f'method = "{model.method}": it has no form in Algorithm Code here; use one of {", ".join(METHODS)}')
     if model.interpolation not in ("held", "linear"):
         problems.append(f'input = "{model.interpolation}": it has no form in Algorithm Code here; use held or linear')
+    if model.guard.out_of_range != "report":
+        problems.append(f'out_of_range = "{model.guard.out_of_range}": it has no form in Algorithm Code here; use report')
     problems += [f"'{s.name}': an actuator that works on samples has no form in Algorithm Code here; leave it out or use a lag" for s in model.sampled]
     if model.interpolation == "held" and causal.uses([*causal.rates, *causal.outputs], causal.input_rates):
         problems.append('input = "held": the model reads the rate of an input, which then has no form in Algorithm Code here; use linear')
@@ -98,7 +100,7 @@ class _Writer:
         return Block(render("galec.alg.j2", **context), self.variables, signals)
 
     def _method(self) -> dict[str, Any]:
-        nodes, weights, divisor = _METHODS[self.model.method]
+        nodes, weights, divisor = METHODS[self.model.method]
         step = f"self.{text.name(ev.STEP_SIZE)}"
         substeps = text.real(float(self.model.substeps))
         return {
