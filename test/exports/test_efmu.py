@@ -195,25 +195,25 @@ def test_the_same_bytes_from_the_command_line(nqvm: Any, tmp_path: Path, monkeyp
     made = []
     for k in range(2):
         path = tmp_path / f"{k}.fmu"
-        assert CliRunner().invoke(cli, ["export", str(nqvm.path), "--format", "efmu", "-o", str(path)], catch_exceptions=False).exit_code == 0
+        assert CliRunner().invoke(cli, ["export", str(nqvm.path), "--format", "efmu", "--recalibration", "1:default", "-o", str(path)], catch_exceptions=False).exit_code == 0
         made.append(path.read_bytes())
         monkeypatch.chdir(tmp_path)
     assert made[0] == made[1]
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1767225600")
-    assert b'generationDateAndTime="2026-01-01T00:00:00Z"' in contents(export(nqvm, tmp_path))["__content.xml"]
+    assert b'generationDateAndTime="2026-01-01T00:00:00Z"' in contents(export(nqvm, tmp_path, recalibration="0.1:default"))["__content.xml"]
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "soon")
     with pytest.raises(exports.ExportError, match="SOURCE_DATE_EPOCH: 'soon' is no time in seconds"):
         export(nqvm, tmp_path)
 
 
-def test_schemas_of_a_folder(nqvm: Any, efmu: dict[str, bytes], tmp_path: Path) -> None:
+def test_schemas_of_a_folder(efmu: dict[str, bytes], tmp_path: Path) -> None:
     """The same as those of the package; incomplete ones and those of another dialect are refused with a line."""
     for name, data in efmu.items():
         if name.startswith("schemas/"):
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).write_bytes(data)
     given = str(tmp_path / "schemas")
-    assert contents(export(nqvm, tmp_path, schemas=given)) == efmu
+    assert efmu_schemas.schemas("beta1", given) == {n.removeprefix("schemas/"): data for n, data in efmu.items() if n.startswith("schemas/")}
     for dialect, path, data, line in (
         ("dymola", "", b"", "efmiContainerManifest.xsd is not version 0.10.0, which the dialect dymola has"), ("beta1", "efmiUnits.xsd", b"<a>", "efmiUnits.xsd is no XML"),
         ("beta1", "efmiUnits.xsd", None, "includes efmiUnits.xsd, which is missing"), ("beta1", "efmiContainerManifest.xsd", None, "it has no efmiContainerManifest.xsd"),

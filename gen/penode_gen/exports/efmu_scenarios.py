@@ -59,17 +59,31 @@ def columns(variable: Variable) -> list[str]:
 
 
 def scenarios(model: Model, variables: list[Variable], asked: str | None) -> list[Scenario]:
-    """A sweep, and the same with a recalibration: `asked` as `2:altered_friction`, "none", or None: at 2 s to the second set. Raises ExportError."""
-    found = [_scenario(model, variables, None)]
+    """
+    A sweep of the inputs, and the same with a recalibration, which the sweep ends before. Raises ExportError.
+
+    `asked`: as `2:altered_friction`, "none", or None: at 2 s to the second set, unless there is none or the table would be too large.
+    """
     exchange = _exchange(model, asked)
-    if exchange:
-        rows = round((exchange[0] + _AFTER) / model.sample_time) + 1
-        length = sum(v.count for v, _, _ in _changes(model, variables, exchange[1]))
-        if rows * length <= _MOST:
-            found.append(_scenario(model, variables, exchange))
-        elif asked:
+    changes = _changes(model, variables, exchange[1]) if exchange else []
+    length, rows = sum(v.count for v, _, _ in changes), _rows(model, exchange[0] + _AFTER if exchange else _LASTS)
+    if rows * length > _MOST:
+        if asked:
             raise ExportError(f"--recalibration: a table of {rows} samples with {length} numbers each is too large; choose an earlier time, or none")
+        exchange, rows = None, _rows(model, _LASTS)
+    t = np.arange(rows) * model.sample_time
+    u = np.array([_sweep(i.minimum, i.maximum, 1.0 + 0.1 * k, t) for k, i in enumerate(model.inputs)]).reshape(len(model.inputs), rows).T
+    at = round(exchange[0] / model.sample_time) if exchange else rows
+    y = _reference(model, u, ["default", exchange[1] if exchange else "default"], at)
+    found = [Scenario("sweep", "inputs from 1 Hz on, rising; set default", u[:at], y[:at], [])]
+    if exchange:
+        words = f"the same; recalibration at {exchange[0]:g} s to the set {exchange[1]}, in force at that sample; states stay"
+        found.append(Scenario("recalibration", words, u, y, changes, at))
     return found
+
+
+def _rows(model: Model, lasts: float) -> int:
+    return round(lasts / model.sample_time) + 1
 
 
 def _exchange(model: Model, asked: str | None) -> tuple[float, str] | None:
@@ -88,18 +102,6 @@ def _changes(model: Model, variables: list[Variable], name: str) -> list[tuple[V
     before, after = (sets.set_values(model, n, np.float64) for n in ("default", name))
     pairs = [(v, *(layout.gather(v.element, values).reshape(v.shape) for values in (before, after))) for v in variables if v.element]
     return [(v, a, b) for v, a, b in pairs if not np.array_equal(a, b)]
-
-
-def _scenario(model: Model, variables: list[Variable], exchange: tuple[float, str] | None) -> Scenario:
-    lasts = exchange[0] + _AFTER if exchange else _LASTS
-    t = np.arange(round(lasts / model.sample_time) + 1) * model.sample_time
-    u = np.array([_sweep(i.minimum, i.maximum, 1.0 + 0.1 * k, t) for k, i in enumerate(model.inputs)]).reshape(len(model.inputs), len(t)).T
-    at = round(exchange[0] / model.sample_time) if exchange else len(t)
-    y = _reference(model, u, ["default", exchange[1] if exchange else "default"], at)
-    if not exchange:
-        return Scenario("sweep", "inputs from 1 Hz on, rising; set default", u, y, [])
-    words = f"the same; recalibration at {exchange[0]:g} s to the set {exchange[1]}, in force at that sample; states stay"
-    return Scenario("recalibration", words, u, y, _changes(model, variables, exchange[1]), at)
 
 
 def _sweep(minimum: float | None, maximum: float | None, pace: float, t: Array) -> Array:
