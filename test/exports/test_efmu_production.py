@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from conftest import chirp
+from conftest import ROOT, chirp
 from efmu_container import problems, unmapped
 from efmu_instance import FOLDERS, Production
 
@@ -95,3 +98,13 @@ def test_everything_of_the_block_is_mapped_once(efmu: dict[str, bytes]) -> None:
         for old, new in ((b'foreignRefId="z_b"', b'foreignRefId="z_c"'), (b'origin="true"', b'origin="true" checksum2=""'), (b'typeDefRefId="bool"', b'typeDefRefId="boole"')):
             assert problems(efmu | {f"{folder}/manifest.xml": manifest.replace(old, new)})
     assert any("origin" in p for p in problems(efmu | {"AlgorithmCode/manifest.xml": efmu["AlgorithmCode/manifest.xml"] + b" "}))
+
+
+def test_the_how_to_of_the_documentation(production: Any, tmp_path: Path) -> None:
+    """The C of gen/EXPORTS.md, compiled against the container's, with a main around it."""
+    code = re.search(r"```c\n(static nqvm_efmu_t block;.*?)```", (ROOT / "gen" / "EXPORTS.md").read_text(), re.S)[1]
+    first, rest = code.split("\n", 1)
+    (tmp_path / "main.c").write_text(f'#include "nqvm_efmu.h"\n{first}\nint main(void)\n{{\n{rest}    return (block.sets == 1U) ? (int)block.error_signal_status : 1;\n}}\n')
+    library = production(np.float32).library
+    subprocess.run(["gcc", "-std=c99", "-Wall", "-Wextra", f"-I{library.parent}", "main.c", str(library), "-o", "main"], cwd=tmp_path, check=True)
+    assert subprocess.run([str(tmp_path / "main")]).returncode == 0

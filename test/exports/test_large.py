@@ -31,7 +31,7 @@ y = { value = "x", unit = "m" }
 [sets.default]
 n = "big.json"
 """
-FORMATS = {"fmu3": ("big.fmu",), "fmu2": ("big.fmu",), "modelica": ("big.mo",), "ssp": ("big.ssp",)}
+FORMATS = {"fmu3": ("big.fmu",), "fmu2": ("big.fmu",), "modelica": ("big.mo",), "ssp": ("big.ssp",), "efmu": ("big.fmu",)}
 
 
 def write_model(folder: Path) -> Path:

@@ -19,11 +19,11 @@ _RESERVED = frozenset(
     "elseif else for in loop and or not size self limit true false while do until break return enumeration String min max previous derivative "
     "INVALID_ARGUMENT OVERFLOW NAN SOLVE_LINEAR_EQUATIONS_FAILED NO_SOLUTION_FOUND UNSPECIFIED_ERROR".split()
 )
-# Functions of the language, and names that it keeps for such: none may be given to anything else.
-_BUILT_IN = frozenset(
-    "absolute sign sqrt exp ln lg log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh imin imax real integer roundDown roundUp "
-    "roundTowardsZero remainderDown isNaN hasNaN1D hasNaN2D isInfinite isFinite safe_sqrt safe_ln solveLinearEquations interpolation1D interpolation2D "
-    "firstTick div mod rem abs floor ceil pi posMax posMin epsilon NaN inf".split()
+# Functions of the language, also for arrays (tanh1D), and names that it keeps for such: none may be given to anything else.
+_BUILT_IN = re.compile(
+    r"(?:minInteger|maxInteger|minReal|maxReal|posMinReal|epsReal|nan|isNaN|minusInfinite|plusInfinite|isInfinite|isFinite|hasNaN|allNaN|real|integer|"
+    r"imin|imax|min|max|euler|pi|sign|absolute|abs|fractional|sqrt|exp|ln|lg|a?(?:sin|cos|tan)h?|atan2|safe_\w+|solveLinearEquations|luFactorize|luSolve|"
+    r"interpolation|firstTick|round[A-Z]\w*|division[A-Z]\w*|remainder\w*|realRemainder\w*)(?:[1-3]D)?"
 )
 _PART = r"[A-Za-z][A-Za-z0-9_]*"
 _QUOTED = re.compile(rf"(?:previous\({_PART}(?:\.{_PART})*\)|derivative\({_PART}(?:\.{_PART})*\)|{_PART}(?:\.{_PART})*)")
@@ -33,7 +33,7 @@ def name(text: str) -> str:
     """A name as the language writes it: quoted where it has dots, or means something else. Raises ExportError."""
     if not _QUOTED.fullmatch(text):
         raise ExportError(f"'{text}' cannot be a name in GALEC; start it with a letter of ASCII in the model file")
-    plain = re.fullmatch(_PART, text) and text not in _RESERVED and text not in _BUILT_IN
+    plain = re.fullmatch(_PART, text) and text not in _RESERVED and not _BUILT_IN.fullmatch(text)
     return text if plain else f"'{text}'"
 
 
