@@ -5,12 +5,17 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import zipfile
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import pytest
+
 from penode_gen import exports
+
+SCHEMAS = pytest.mark.skipif(importlib.util.find_spec("rumoca") is None, reason="rumoca, which has the schemas, is not installed: pip install penode[efmu]")
 
 
 def export(model: Any, folder: Path, **options: Any) -> Path:
@@ -94,8 +99,6 @@ class Schemas:
 
     def errors(self, kind: str, manifest: bytes) -> list[str]:
         """What is wrong with a manifest of a kind, "" for that of the container."""
-        import pytest
-
         xmlschema = pytest.importorskip("xmlschema")
 
         if kind not in self._read:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import sys
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from conftest import ROOT, chirp
-from efmu_container import Schemas, contents, export, problems
+from efmu_container import SCHEMAS, Schemas, contents, export, problems
 from galec import Block
 from galec_against_c import distances
 from galec_types import GalecError
@@ -27,8 +26,6 @@ from penode_sil.cli import cli
 
 sys.path.append(str(ROOT / "test" / "gen"))
 from models import BARE, network_file, rich  # needs the path above
-
-SCHEMAS = pytest.mark.skipif(importlib.util.find_spec("rumoca") is None, reason="rumoca, which has the schemas, is not installed: pip install penode[efmu]")
 
 
 @pytest.fixture(scope="module")

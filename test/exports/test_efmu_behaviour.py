@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from efmu_container import contents, export
+from efmu_container import SCHEMAS, contents, export
 from efmu_instance import PRECISIONS, Scenario, play, scenarios
 from galec import Block
 
@@ -96,6 +96,7 @@ def small(folder: Path, more: str = "") -> Any:
     return penode_gen.load(path)
 
 
+@SCHEMAS
 def test_other_times_sets_and_none(tmp_path: Path) -> None:
     """A scalar is tuned without an index; --recalibration names time and set; a model of one set has one scenario."""
     model = small(tmp_path)
@@ -108,6 +109,7 @@ def test_other_times_sets_and_none(tmp_path: Path) -> None:
     assert list(scenarios(contents(export(model, tmp_path, recalibration="none")), "64-bit")) == ["sweep"]
 
 
+@SCHEMAS
 @pytest.mark.parametrize(
     ("asked", "line"),
     [

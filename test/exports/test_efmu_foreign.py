@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from efmu_container import SCHEMAS as WITH_SCHEMAS
 from efmu_container import Schemas, contents, export, problems, unmapped
 from efmu_instance import FOLDERS
 
@@ -23,6 +24,7 @@ from penode_gen.exports.archive import zipped
 
 EFMI = Path(os.environ["EFMI_DIR"]) if os.environ.get("EFMI_DIR") else None
 SCHEMAS = next((p.parent for p in sorted(EFMI.rglob("efmiContainerManifest.xsd")) if 'fixed="0.10.0"' in p.read_text(encoding="utf-8-sig")), None) if EFMI else None
+pytestmark = WITH_SCHEMAS
 CHECKER = next((p.parent for p in sorted(EFMI.rglob("ComplianceChecker.py"))), None) if EFMI else None
 
 
