@@ -57,7 +57,10 @@ def check(files: dict[str, bytes], folder: Path) -> tuple[int, str]:
     return done.returncode, done.stdout + done.stderr
 
 
-RUNS = pytest.mark.skipif(CHECKER is None or not (EFMI / "venv" / "bin" / "python").exists(), reason="EFMI_DIR names no checkout of efmi-compliancechecker with a venv/ beside it")  # type: ignore[operator]
+RUNS = pytest.mark.skipif(
+    CHECKER is None or EFMI is None or not (EFMI / "venv" / "bin" / "python").exists(),
+    reason="EFMI_DIR names no checkout of efmi-compliancechecker with a venv/ beside it",
+)
 
 
 @RUNS

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from conftest import ROOT, chirp
-from efmu_container import problems, unmapped
+from efmu_container import SCHEMAS, contents, export, problems, unmapped
 from efmu_instance import FOLDERS, Production
 
 import penode_gen
@@ -108,3 +108,21 @@ def test_the_how_to_of_the_documentation(production: Any, tmp_path: Path) -> Non
     library = production(np.float32).library
     subprocess.run(["gcc", "-std=c99", "-Wall", "-Wextra", f"-I{library.parent}", "main.c", str(library), "-o", "main"], cwd=tmp_path, check=True)
     assert subprocess.run([str(tmp_path / "main")]).returncode == 0
+
+
+@SCHEMAS
+@pytest.mark.long
+def test_names_of_the_structure_itself(tmp_path: Path) -> None:
+    """A model without parameters to tune, whose names are those of the structure: it compiles without a warning, and runs as SiL."""
+    path = tmp_path / "m.toml"
+    path.write_text('[model]\nname = "m"\nsample_time = "1 ms"\nmethod = "heun"\n[inputs]\nsets = { unit = "m" }\nstaged = { unit = "m" }\n[parameters]\nbanks = { value = 1, unit = "s" }\n'
+                    '[states]\nx = { unit = "m", start = 0.5 }\n[equations]\nlag = "der(x)*banks = sets - staged - x"\n[outputs]\ninstance = { value = "x", unit = "m" }\n')  # fmt: skip
+    model = penode_gen.load(path)
+    block = Production(contents(export(model, tmp_path)), np.float32, tmp_path)
+    assert block.run("Startup") == 0 and block.run("Recalibrate") == 0
+    u, found = np.random.default_rng(1).uniform(-1, 1, (20, 2)).astype(np.float32), []
+    for row in u:
+        block["sets"], block["staged"] = row
+        assert block.run("DoStep") == 0
+        found.append(block["instance"])
+    assert np.array_equal(np.array(found, np.float32), Sil(model).run(u).y[:, 0])

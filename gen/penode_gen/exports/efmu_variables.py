@@ -20,6 +20,7 @@ from .fmu_variables import unit_definitions
 from .interface import ExportError
 
 STEP_SIZE, STARTED = "discrete.stepSize", "discrete.stepSize.active"  # what Dymola calls them
+_MEMBERS = frozenset({"error_signal_status", "staged", "sets", "banks", "instance"})  # the structure's own
 _KINDS = {"input": "input ", "output": "output ", "tunableParameter": "parameter ", "constant": "constant ", "state": ""}
 
 
@@ -47,10 +48,12 @@ class Variable:
 
     @property
     def shape(self) -> tuple[int, ...]:
+        """() of a scalar."""
         return self.start.shape
 
     @property
     def count(self) -> int:
+        """Of its elements."""
         return prod(self.shape)
 
     @property
@@ -60,6 +63,7 @@ class Variable:
 
     @property
     def declaration(self) -> str:
+        """In the Algorithm Code."""
         return f"{_KINDS[self.causality]}{'Boolean' if self.boolean else 'Real'} {self.name}{self.dimensions};"
 
     @property
@@ -74,8 +78,9 @@ class Variable:
 
     @property
     def member(self) -> str:
-        """Of the structure of the Production Code."""
-        return re.sub(r"\W+", "_", self.label).strip("_")
+        """Of the structure of the Production Code; no name of a model file ends in _."""
+        found = re.sub(r"\W+", "_", self.label).strip("_")
+        return f"{found}_" if found in _MEMBERS else found
 
 
 def unit_id(unit: str) -> str:
