@@ -49,6 +49,31 @@ def unpacked(request: pytest.FixtureRequest, nqvm: Any, tmp_path_factory: pytest
     return Unpacked(export(nqvm, request.param, folder), folder / "unpacked")
 
 
+@pytest.fixture(scope="session")
+def efmu(nqvm: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The files of its eFMU, without eFMU/."""
+    from efmu_container import contents, export
+
+    if importlib.util.find_spec("rumoca") is None:
+        pytest.skip("rumoca, which has the schemas, is not installed: pip install penode[efmu]")
+    return contents(export(nqvm, tmp_path_factory.mktemp("efmu")))
+
+
+@pytest.fixture(scope="session")
+def production(efmu: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Makes instances of its Production Code, in a number type; each is compiled once."""
+    from efmu_instance import Production
+
+    folders: dict[type, Path] = {}
+
+    def made(real: type) -> Any:
+        if real not in folders:
+            folders[real] = tmp_path_factory.mktemp("code")
+        return Production(efmu, real, folders[real])
+
+    return made
+
+
 def chirp(duration: float) -> np.ndarray:
     """The road of the case study's scenario, 0.15 m/s from 1 Hz on, faster by 0.25 Hz a second; sample by sample [n, 1], float."""
     t = np.arange(round(duration / 1e-3) + 1) * 1e-3

@@ -20,6 +20,7 @@ FORMATS: dict[str, str] = {
     "modelica": "modelica",
     "ssp": "ssp",
     "a2l": "a2l",
+    "efmu": "efmu",
 }
 
 

@@ -78,8 +78,8 @@ def _provided(fmi: int) -> set[str]:
     return set(re.findall(rf"^(?:[\w ]+[ *])(fmi{fmi}\w+)\(", text, re.M))
 
 
-def sources(model: Model, context: dict[str, Any], interface: tuple[str, ...]) -> dict[str, str]:
-    """Name -> text of all C, in one folder; `interface`: templates of this version of FMI."""
+def runtime(model: Model) -> dict[str, str]:
+    """Name -> text of the model's C and of the runtime that it needs, as they stand in the repository. Raises ExportError."""
     texts = {name: text for name, text in render(model, self_test=False).items() if name.endswith((".c", ".h"))}
     for folder, pattern in (("src", "*.c"), ("src", "*.h"), ("inc/penode", "*.h"), ("port/gnu", "*.h")):
         for path in sorted((ROOT / folder).glob(pattern)):
@@ -90,13 +90,19 @@ def sources(model: Model, context: dict[str, Any], interface: tuple[str, ...]) -
     for kept in ("pen_selftest.h", "pen_xcp.h", "pen_xcp_daq.h", "pen_xcp_parts.h"):
         if any(f"penode/{kept}" in text for text in texts.values()):
             texts[kept] = (ROOT / "inc/penode" / kept).read_text(encoding="utf-8")
+    return texts
+
+
+def sources(model: Model, context: dict[str, Any], interface: tuple[str, ...]) -> dict[str, str]:
+    """Name -> text of all C, in one folder; `interface`: templates of this version of FMI."""
+    texts = runtime(model)
     rates = "y_u_before[" in texts[f"{model.name}.h"]
     for name in ("fmu_core.h", "fmu_core.c", "fmu_sets.h", "fmu_sets.c", "fmu_model.c", *interface):
         texts[name] = template(f"{name}.j2", **context, uses_input_rate=rates)
-    return {name: _flat(text, context["real"]) for name, text in texts.items()}
+    return {name: flat(text, context["real"]) for name, text in texts.items()}
 
 
-def _flat(text: str, real: str) -> str:
+def flat(text: str, real: str) -> str:
     """All in one folder; the number type is fixed in the sources, since importers compile them with options of their own."""
     text = re.sub(r'#include "penode/', '#include "', text)
     if real == "double":

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The Behavioral Model of an eFMU: reference trajectories, also of a recalibration, with a column for each weight that changes."""
+
+from __future__ import annotations
+
+from ..model import Model
+from . import efmu_manifest
+from . import efmu_variables as ev
+from .efmu_code import Block
+from .efmu_manifest import Representation
+from .efmu_production import PRECISIONS
+from .efmu_scenarios import columns, scenarios
+from .templating import render
+
+FOLDER = "BehavioralModel"
+
+
+def behaviour(model: Model, block: Block, algorithm: Representation, dialect: str, recalibration: str | None) -> Representation:
+    """Manifest and tables. Raises ExportError."""
+    found = scenarios(model, block.variables, recalibration)
+    files = {f"{s.name}.csv": s.table(model) for s in found}
+    signals = block.of("input") + block.of("output")
+    tuned = [v for s in found for v, _, _ in s.tuned]
+    id = efmu_manifest.identifier(model, FOLDER, dialect, str(recalibration))
+    manifest = render(
+        "efmu_behaviour.xml.j2", **efmu_manifest.shared(model, dialect), id=id, algorithm=algorithm, files=efmu_manifest.listed(files, {"csv": "ReferenceData"}),
+        scenarios=found, signals=signals, outputs=block.of("output"), variables=[*signals, *tuned], columns=columns, pairs=zip, precisions=list(PRECISIONS),
+        units=ev.unit_list([*signals, *tuned]), second=ev.unit_id("s"), sample_time=repr(float(model.sample_time)),
+    )  # fmt: skip
+    return Representation(FOLDER, "BehavioralModel", id, manifest, files)
