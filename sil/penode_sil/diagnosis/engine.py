@@ -54,7 +54,7 @@ def diagnose(
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
     """By innovations where a guess is all that the file has of a parameter, or where more acts than the search by sensor noise explains;
     by that search else. What innovations explain but in part may have no name at all, if the search has none for it either; and what acts
-    beside that search's causes may be but the form of one, unless innovations have an answer with fewer."""
+    beside several causes of that search may be but the form of one, unless innovations have an answer with fewer."""
     if weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values()):
         return by_innovations(replace(study, model=case.model), None, case.unused, case.output, case.remarks, case.log, case.tell)
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
@@ -64,7 +64,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     if level := weighed.misfit(study, best.fit if best else study.null, case.log):
         answer = by_innovations(replace(study, model=case.model), best, case.unused, case.output, case.remarks, case.log, case.tell)
         whole = answer.verdict != "partly_explained" or best and share(study, best) > ENOUGH
-        simpler = best and answer.verdict == "explained" and len(answer.causes) <= len(best.groups)
+        simpler = best and answer.verdict != "unexplained" and max(len(answer.causes), 1) < len(best.groups)
         if whole and (level > weighed.UNMODELLED or simpler):
             return answer
     return by_noise(case, study, explanations, faults, bursts)
