@@ -218,3 +218,9 @@ def test_values_tell_late_stamps_from_late_samples():
     assert sampled_evenly(stamps, TIME, [moving(TIME)])
     assert not sampled_evenly(stamps, TIME, [moving(stamps)])
     assert not sampled_evenly(stamps, TIME, [np.random.default_rng(5).normal(size=N)])
+
+
+@pytest.mark.parametrize("rows", range(6))
+def test_few_rows_show_no_clock(rows):
+    """Of fewer than five, none has two on either side; found by a damaged file."""
+    assert not sampled_evenly(TIME[:rows] + 1e-4 * np.arange(rows) ** 2, TIME[:rows], [np.arange(rows, dtype=float)])
