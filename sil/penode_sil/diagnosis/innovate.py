@@ -17,7 +17,7 @@ from .evidence.fit import Problem
 from .evidence.prior import stated
 from .propose import PROMISE, adopt, propose
 from .terms import Term, Trial
-from .worth import WORTH
+from .worth import WORTH, Z_95, least
 
 Array = NDArray[np.float64]
 SCORED = 4  # of which so many have to predict blocks
@@ -27,7 +27,6 @@ MIN_FORM = 0.2  # of what a form gains, which one with more values gains beyond 
 MIN_BLOCKS = 3  # of the blocks in which it does
 LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
 MAX_CAUSES = 4  # at most
-Z_95 = 1.96  # standard deviations that hold 95 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +70,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         shares.append(best.share)
         bench, base = _based(bench, blocks)
         benches.append(bench)
-    named = next((k for k, s in enumerate(shares) if s < WORTH), len(shares))
+    named = next((k for k, s in enumerate(shares) if s < least(bench.level.size)), len(shares))
     return Found(bench, benches[named], named, tuple(terms), tuple(shares), tuple(rounds))
 
 

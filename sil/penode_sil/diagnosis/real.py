@@ -22,13 +22,13 @@ from .evidence.fit import Fit
 from .evidence.observer import Filter, Record, bias, sample_noise
 from .evidence.screening import Probe
 from .fit import Free
-from .innovate import Z_95, Found
+from .innovate import Found
 from .noise import Experiment
 from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
 from .result import Cause, Named, Value, place
 from .terms import Term, Trial
-from .worth import SYSTEMATIC, WORTH, share, shift
+from .worth import SYSTEMATIC, WORTH, Z_95, least, share, shift
 
 Array = NDArray[np.float64]
 INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
@@ -65,12 +65,12 @@ def answer(
     probe = Probe.of(plain)
     moved = motions(probe)
     probabilities = [_weighed(r) for r in found.rounds]
-    named = found.terms[: found.named]
+    named, enough = found.terms[: found.named], least(after.level.size)
     for k, term in enumerate(named):
         size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
         cause = _cause(model, plain, term, size, _rivals(probabilities[k], term), _sure(probabilities[k], term))
         log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")
-        if size >= WORTH:
+        if size >= enough:
             causes = _merged(causes, cause)
         else:
             notes.append(_small(term, size))

@@ -16,15 +16,15 @@ from .evidence.bench import build
 from .evidence.gain import Level
 from .evidence.observer import Record, bias, sample_noise
 from .fit import Fit, Problem
-from .innovate import MIN_GAIN, Z_95
+from .innovate import MIN_GAIN
+from .judging import ENOUGH
 from .noise import Experiment
 from .residual import Channel, rms
 from .result import Cause, Gain
 from .study import Study
-from .worth import WORTH
+from .worth import WORTH, Z_95
 
 Array = NDArray[np.float64]
-WHOLE = 0.85  # share of the residual that causes take away where they explain it
 MIN_UNMODELLED = 0.0055  # of what moves, and worth MIN_GAIN: less wanders beside causes that are the truth, 0.003 of the levels tried at most
 UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be that, or a curve that stands for another one
 
@@ -99,7 +99,7 @@ def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: 
     """From what is named, the share of the residual that it takes in a free run, and what is left: the residual of the nominal model as a
     share of the signal, or what wanders as a share of what moves. Small deviations that have been found are what any model has."""
     if causes:
-        return "explained" if share > WHOLE else "partly_explained"
+        return "explained" if share > ENOUGH else "partly_explained"
     return "no_discrepancy" if not found.causes and left < WORTH and found.found.terms else "unexplained"
 
 

@@ -19,9 +19,17 @@ from .terms import Term
 Array = NDArray[np.float64]
 WORTH = 0.07  # of what acts: less is a small deviation. Any model is 2 to 5 % wrong, a name is worth it from 10 % on; the middle
 BENT = 0.6  # of a friction or a cube along a Gaussian motion is beside a straight line, in rms: sqrt(1 - 2/pi), sqrt(1 - 9/15)
+Z_95 = 1.96  # standard deviations that hold 95 %
+RATIO = 3.0  # times what wanders beside all that was found: where that is little, a name is worth it from less on
 SYSTEMATIC = 0.007  # of what acts: what mis-modelling of 3.5 % does to the size of a form, for it is like it to 0.2 in rms, one direction of 25
 LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of their parameter makes as large as they have to be
 ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
+
+
+def least(level: float) -> float:
+    """Share of what acts from which on a term is worth a name, where `level` of what moves wanders beside all that was found: WORTH, or
+    less where the model is else nearly right; never less than what keeps zero out of its interval."""
+    return min(WORTH, max(RATIO * level, Z_95 * SYSTEMATIC))
 
 
 def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]) -> float:
