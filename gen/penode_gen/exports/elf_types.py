@@ -159,6 +159,22 @@ class Program:
         elif place.kind:
             yield place
 
+    def member(self, place: Place, name: str) -> Place:
+        """A member of a structure. Raises KeyError."""
+        return _member(place, name)
+
+    def number(self, place: Place) -> int:
+        """The whole number, or the address, that the program's file holds there. Raises KeyError."""
+        return int.from_bytes(self.bytes_at(place.address, place.size), "little" if self.little_endian else "big")
+
+    def pointed(self, place: Place, n: int = 0) -> Place | None:
+        """Element n of what a pointer of the program's file points to; None if it is NULL. Raises KeyError where it is no pointer to data."""
+        plain = bare(place.type)
+        if plain.tag != "DW_TAG_pointer_type" or "DW_AT_type" not in plain.attributes:
+            raise KeyError(place.path)
+        address, target = self.number(place), plain.get_DIE_from_attribute("DW_AT_type")
+        return Place(f"{place.path}[{n}]", address + n * size_of(target), target) if address else None
+
     def bytes_at(self, address: int, n: int) -> bytes:
         """What the program's file holds for an address; zeros where it holds nothing. Raises KeyError outside of it."""
         section = self._section(address)
