@@ -11,6 +11,7 @@ from typing import Any
 from ..emit_c import VERSION
 from ..model import Model
 from .a2l_entries import Characteristic, Measurement, Measurements, characteristics, instance_of, page
+from .a2l_lists import static_lists
 from .elf_types import Program, read_program
 from .interface import Exporter, ExportError, Option, Options
 from .templating import render
@@ -77,7 +78,7 @@ def _units(entries: Iterable[Characteristic | Measurement]) -> dict[str, str]:
     """Unit -> name of its COMPU_METHOD."""
     names: dict[str, str] = {}
     for unit in sorted({entry.unit for entry in entries}):
-        plain = "unit_" + (re.sub(r"\W+", "_", unit.replace("/", "_per_")).strip("_") or "none")
+        plain = "unit_" + (re.sub(r"\W+", "_", unit.replace("/", "_per_"), flags=re.ASCII).strip("_") or "none")
         names[unit] = plain if plain not in names.values() else f"{plain}_{len(names)}"
     return names
 
@@ -92,7 +93,8 @@ def _build(model: Model, options: Options) -> bytes:
     measured = _measured(model, program, instance, options["measure"])
     entries = characteristics(model, values, program.find(f"{values.path}[0]"))
     names = [entry.name for entry in entries] + list(measured.found)
-    highest = max(max(entry.address for entry in (*entries, *measured.found.values())), values.address + values.size)
+    shown = [*entries, *measured.found.values()]
+    highest = max(max(entry.address for entry in shown), values.address + values.size)
     if highest >= 1 << 32:
         raise ExportError(f"{program.path}: addresses of more than 32 bits; link the program with -no-pie")
     for name in names:
@@ -100,7 +102,7 @@ def _build(model: Model, options: Options) -> bytes:
             raise ExportError(f"{model.path.name}: {name}: A2L has no such names; use letters without accents, digits and underscores")
     text = render(
         "a2l.j2", version=VERSION, model=model, instance=instance, values=values, characteristics=entries, measurements=measured.found.values(),
-        groups=_groups(entries, measured), units=_units([*entries, *measured.found.values()]), wire=wire, epk=epk(program, options["epk"]),
+        groups=_groups(entries, measured), units=_units(shown), scale={entry.unit: 1.0 / entry.factor for entry in shown}, wire=wire, epk=epk(program, options["epk"]), lists=static_lists(program),
         max_cto=int(options["max_cto"] or _PACKET[wire["kind"]]), little=program.little_endian, cycle=_cycle(model.sample_time), quote=quote,
     )  # fmt: skip
     return text.encode()
