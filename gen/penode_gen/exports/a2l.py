@@ -12,7 +12,7 @@ from ..emit_c import VERSION
 from ..model import Model
 from .a2l_entries import Characteristic, Measurement, Measurements, characteristics, instance_of, page
 from .a2l_lists import static_lists
-from .elf_types import Program, read_program
+from .elf_types import Place, Program, read_program
 from .interface import Exporter, ExportError, Option, Options
 from .templating import render
 
@@ -91,6 +91,17 @@ def _build(model: Model, options: Options) -> bytes:
     values = page(model, program)
     instance = instance_of(model, program, options["instance"])
     measured = _measured(model, program, instance, options["measure"])
+    return describe(model, program, values, measured, wire, epk(program, options["epk"]), options["max_cto"]).encode()
+
+
+def describe(
+    model: Model, program: Program, values: Place, measured: Measurements, wire: dict[str, Any], identity: tuple[str, int] | None, max_cto: Any = None,
+    pages: bool = True, addresses: bool = True,
+) -> str:  # fmt: skip
+    """
+    The text of an A2L. `values`: the array of a set; `pages`: a slave of penode switches between two of them there; `addresses`: False for
+    zeros, where SYMBOL_LINKs are to be resolved. Raises ExportError.
+    """
     entries = characteristics(model, values, program.find(f"{values.path}[0]"))
     names = [entry.name for entry in entries] + list(measured.found)
     shown = [*entries, *measured.found.values()]
@@ -100,12 +111,12 @@ def _build(model: Model, options: Options) -> bytes:
     for name in names:
         if not _IDENTIFIER.fullmatch(name):
             raise ExportError(f"{model.path.name}: {name}: A2L has no such names; use letters without accents, digits and underscores")
-    text = render(
-        "a2l.j2", version=VERSION, model=model, instance=instance, values=values, characteristics=entries, measurements=measured.found.values(),
-        groups=_groups(entries, measured), units=_units(shown), scale={entry.unit: 1.0 / entry.factor for entry in shown}, wire=wire, epk=epk(program, options["epk"]), lists=static_lists(program),
-        max_cto=int(options["max_cto"] or _PACKET[wire["kind"]]), little=program.little_endian, cycle=_cycle(model.sample_time), quote=quote,
+    return render(
+        "a2l.j2", version=VERSION, model=model, values=values, characteristics=entries, measurements=measured.found.values(),
+        groups=_groups(entries, measured), units=_units(shown), scale={entry.unit: 1.0 / entry.factor for entry in shown}, wire=wire, epk=identity,
+        lists=static_lists(program), max_cto=int(max_cto or _PACKET[wire["kind"]]), little=program.little_endian, cycle=_cycle(model.sample_time),
+        quote=quote, pages=pages, addresses=addresses,
     )  # fmt: skip
-    return text.encode()
 
 
 def quote(text: str) -> str:

@@ -82,9 +82,12 @@ def type_name(die: Any) -> str:
 
 
 class Program:
-    """A linked program. Raises ExportError if a file is none, or has no debug information."""
+    """
+    A linked program, or, if `shared`, a shared library, whose addresses count from where it is loaded. Raises ExportError if a file is none,
+    or has no debug information.
+    """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, shared: bool = False):
         from elftools.common.exceptions import DWARFError, ELFError
         from elftools.elf.elffile import ELFFile
 
@@ -97,7 +100,7 @@ class Program:
             self._variables = dict(self._global_variables())
         except (ELFError, DWARFError, OSError) as exc:
             raise ExportError(f"{path}: it cannot be read as an ELF program ({exc}); name the linked program") from exc
-        if self._elf["e_type"] != "ET_EXEC":
+        if self._elf["e_type"] != ("ET_DYN" if shared else "ET_EXEC"):
             raise ExportError(f"{path}: its addresses are not fixed; link the program with -no-pie")
 
     @property
@@ -185,14 +188,14 @@ class Program:
 
 
 @lru_cache(maxsize=1)
-def _read(path: Path, changed: int) -> Program:
-    return Program(path)
+def _read(path: Path, changed: int, shared: bool) -> Program:
+    return Program(path, shared)
 
 
-def read_program(path: Path) -> Program:
-    """A linked program; the last one is kept: reading it takes a second. Raises ExportError."""
+def read_program(path: Path, shared: bool = False) -> Program:
+    """A linked program, or a shared library; the last one is kept: reading it takes a second. Raises ExportError."""
     try:
-        return _read(path, path.stat().st_mtime_ns)
+        return _read(path, path.stat().st_mtime_ns, shared)
     except OSError as exc:
         raise ExportError(f"{path}: it cannot be read as an ELF program ({exc.strerror}); name the linked program") from exc
 
