@@ -13,7 +13,7 @@
 #include "penode/pen_xcp_parts.h"
 
 #define XCP_STAMPED     5U /* bytes before the entries of a first ODT: number, time stamp */
-#define XCP_DYNAMIC     0x01U
+#define XCP_STATIC      0xfeU /* all properties but: dynamic */
 #define XCP_PREDEFINED  0x07U /* properties of a list: predefined, its event is fixed, DAQ */
 #define XCP_CONFIGURABLE 0x06U
 #define XCP_CODE_NONE   0xd0U /* a command that there is not */
@@ -228,7 +228,7 @@ uint32_t pen_xcp_static_receive(pen_xcp_t *xcp, const pen_xcp_statics_t *statics
     } else {
         answer = pen_xcp_receive(xcp, in, n, out);
         if ((answer > 0U) && (out[0] == 0xffU) && (code == XCP_CODE_PROCESSOR)) {
-            out[1] &= (uint8_t)~XCP_DYNAMIC;
+            out[1] &= XCP_STATIC;
             out[6] = (uint8_t)xcp_predefined(statics); /* MIN_DAQ */
         }
     }

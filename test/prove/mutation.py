@@ -133,15 +133,18 @@ def bench(name: str, flags: list[str], only: str = "*") -> Bench:
     return made
 
 
-def faults(source: Path) -> Iterator[tuple[Fault, Path]]:
-    """All mutants of a file that compile, differ from it in what they do, and from each other."""
+def faults(source: Path, share: int, must: set[Fault]) -> Iterator[tuple[Fault, Path]]:
+    """The mutants of a file that compile, differ from it in what they do, and from each other: each `share`-th, and those of `must`."""
     place = WORK / source.stem
     place.mkdir()
     gate.make([MUTATE, source, "c", "--noCheck", "--mutantDir", place])
     before = source.read_text().splitlines()
     seen = {compiled(source.read_text(), ["gcc", "-O1"])}
     texts = {preprocessed(source)}
-    for mutant in sorted(place.glob("*.c"), key=lambda path: int(re.findall(r"\d+", path.stem)[-1])):
+    for number, mutant in enumerate(sorted(place.glob("*.c"), key=lambda path: int(re.findall(r"\d+", path.stem)[-1]))):
+        found = fault(source.name, before, mutant.read_text().splitlines())
+        if number % share and found not in must:
+            continue
         text = preprocessed(mutant)
         if text is None or text in texts:  # in a comment, or in the double build
             continue
@@ -149,7 +152,7 @@ def faults(source: Path) -> Iterator[tuple[Fault, Path]]:
         made = compiled(mutant.read_text(), ["gcc", "-O1"])
         if made is not None and made not in seen:
             seen.add(made)
-            yield fault(source.name, before, mutant.read_text().splitlines()), mutant
+            yield found, mutant
 
 
 def preprocessed(source: Path) -> str | None:
@@ -210,9 +213,7 @@ def main() -> int:
             continue
         mine = {fault for fault in may_live if fault.file == source.name}
         alive, total, same, wrong = [], 0, 0, []
-        for number, (found, mutant) in enumerate(faults(source)):
-            if number % options.share and found not in mine:
-                continue
+        for found, mutant in faults(source, options.share, mine):
             total += 1
             if lives(mutant, source.name, benches):
                 if same_code(mutant, source):

@@ -36,6 +36,15 @@ class Block:
         at = self.words.index(keyword) + 1 if keyword in self.words else 0
         return self.words[at : at + n] if at else []
 
+    def sizes(self) -> tuple[int, ...]:
+        """MATRIX_DIM, of three numbers or, since ASAP2 1.70, of any."""
+        found = []
+        for word in self.after("MATRIX_DIM", len(self.words)):
+            if not word[0].isdecimal():
+                break
+            found.append(int(word, 0))
+        return tuple(found)
+
 
 @dataclass(frozen=True)
 class Method:
@@ -135,15 +144,14 @@ def _method(block: Block) -> Method:
 
 def _characteristic(block: Block, types: dict[str, str], methods: dict[str, Method]) -> Entry:
     name, text, _, address, record, _, method = block.words[:7]
-    sizes = [int(word, 0) for word in block.after("MATRIX_DIM", 3)] or [int(word, 0) for word in block.after("NUMBER", 1)]
-    return Entry(name, text, int(address, 0), np.dtype(_TYPES[types[record]]), tuple(sizes), methods.get(method, Method()))
+    sizes = block.sizes() or tuple(int(word, 0) for word in block.after("NUMBER", 1))
+    return Entry(name, text, int(address, 0), np.dtype(_TYPES[types[record]]), sizes, methods.get(method, Method()))
 
 
 def _measurement(block: Block, methods: dict[str, Method]) -> Entry:
     name, text, kind, method = block.words[:4]
     (address,) = block.after("ECU_ADDRESS", 1) or ["0"]
-    sizes = [int(word, 0) for word in block.after("MATRIX_DIM", 3)]
-    return Entry(name, text, int(address, 0), np.dtype(_TYPES[kind]), tuple(sizes), methods.get(method, Method()))
+    return Entry(name, text, int(address, 0), np.dtype(_TYPES[kind]), block.sizes(), methods.get(method, Method()))
 
 
 def parse(text: str, origin: str) -> A2l:

@@ -8,9 +8,11 @@
 
 static void unchanged(void)
 {
+    //@ loop unroll 4;
     for (size_t i = 0U; i < PEN_XCP_LISTS; i++) {
         /*@ assert daq.list[i].first + daq.list[i].odts <= PEN_XCP_ODTS; */
     }
+    //@ loop unroll 32;
     for (size_t i = 0U; i < PEN_XCP_ODTS; i++) {
         /*@ assert daq.odt[i].first + daq.odt[i].entries <= PEN_XCP_ENTRIES; */
     }
@@ -68,6 +70,7 @@ void xcp_pointer(void)
         for (uint32_t k = 0U; k <= (n + 1U); k++) {
             uint8_t *const in = arriving(8U, 0xe2U);
             slave();
+            //@ loop unroll 32;
             for (size_t i = 0U; i < PEN_XCP_ODTS; i++) {
                 daq.odt[i].first = (uint8_t)Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - n);
                 daq.odt[i].entries = (uint8_t)n;
@@ -95,6 +98,7 @@ void xcp_write_entry(void)
             number(&in[4], place(k));
             send(in, 8U);
             /*@ assert daq.at + daq.left <= PEN_XCP_ENTRIES; */
+            //@ loop unroll 64;
             for (size_t i = 0U; i < PEN_XCP_ENTRIES; i++) {
                 /*@ assert daq.entry[i].byte == \null || daq.entry[i].size <= ROOM - ((k <= ROOM) ? k : 0); */
                 /*@ assert daq.entry[i].byte == \null || (daq.entry[i].byte == region_byte + k && k <= ROOM); */
@@ -107,6 +111,7 @@ static void look(uint8_t code, uint32_t odts, uint32_t entries)
 {
     slave();
     lists(4U, odts, entries);
+    //@ loop unroll 64;
     for (size_t i = 0U; i < PEN_XCP_ENTRIES; i++) {
         daq.entry[i].byte = some() ? NULL : &region_byte[0];
         daq.entry[i].size = Frama_C_unsigned_int_interval(0U, ROOM);
@@ -144,16 +149,19 @@ static void sample(uint32_t odts, uint32_t entries, uint32_t size, uint8_t mode)
     xcp.sampling = 0U;
     lists(1U, odts, entries);
     daq.list[0].mode = mode;
+    //@ loop unroll 64;
     for (size_t i = 0U; i < PEN_XCP_ENTRIES; i++) {
         daq.entry[i].byte = &region_byte[Frama_C_unsigned_int_interval(0U, ROOM - size)];
         daq.entry[i].size = size;
     }
+    //@ loop unroll 6;
     for (size_t i = 0U; i < SLOTS; i++) {
         ring[i * (MAX_CTO + 1U)] = (uint8_t)Frama_C_unsigned_int_interval(0U, MAX_CTO);
     }
     send(in, 8U);
     pen_xcp_sample(&xcp, any);
     pen_xcp_sample(&xcp, any);
+    //@ loop unroll 6;
     for (size_t i = 0U; i < SLOTS; i++) {
         /*@ assert ring[i * (MAX_CTO + 1U)] <= MAX_CTO; */
     }
@@ -201,6 +209,7 @@ void xcp_static_lists(void)
         for (uint32_t i = 0U; i < sizeof code; i++) {
             uint8_t *const in = arriving((n > 0U) ? n : 1U, code[i]);
             slave();
+            //@ loop unroll 64;
             for (size_t k = 4U; k < PEN_XCP_ENTRIES; k++) {
                 daq.entry[k].size = Frama_C_unsigned_int_interval(0U, ROOM);
             }
