@@ -210,6 +210,25 @@ void test_overload_leaves_out_whole_samples(void)
     }
 }
 
+/* One slot more than is left is as bad as many. */
+void test_sample_of_two_packets_needs_two_slots(void)
+{
+    two_lists();
+    GOOD(2U, 0xde, 1, HALF(1U));
+    pen_xcp_sample(&xcp, 0U); /* one slot */
+    GOOD(2U, 0xde, 0, HALF(1U));
+    GOOD(2U, 0xde, 1, HALF(0U));
+    for (uint32_t k = 1U; k < 4U; k++) { /* two each: the third has none */
+        pen_xcp_sample(&xcp, k);
+    }
+    TEST_ASSERT_EQUAL_UINT32(2U, packet());
+    TEST_ASSERT_EQUAL_HEX8(0xfdU, out[0]);
+    expect_sample_of_list_1();
+    expect_sample_of_list_0(1U);
+    expect_sample_of_list_0(2U);
+    TEST_ASSERT_EQUAL_UINT32(0U, packet());
+}
+
 void test_ring_of_an_odd_number_of_slots(void)
 {
     two_lists();

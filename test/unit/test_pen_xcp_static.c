@@ -252,13 +252,13 @@ void test_lists_that_do_not_fit_are_refused(void)
     static const pen_xcp_entry_t eleven[2] = { { memory, 8U }, { text, 3U } };
     static const pen_xcp_entry_t twelve[2] = { { memory, 8U }, { text, 4U } };
     static const pen_xcp_entry_t later[4] = { { memory, 1U }, { text, 1U }, { memory, 8U }, { memory, 8U } };
-    static const pen_xcp_entry_t huge[1] = { { memory, 0xfffffff8U } };
+    static const pen_xcp_entry_t huge[2] = { { memory, 0xfffffff8U }, { memory, 1U } };
     static const pen_xcp_static_t many[5] = { { 1U, 1U, NULL }, { 1U, 1U, NULL }, { 1U, 1U, NULL }, { 1U, 1U, NULL }, { 1U, 1U, NULL } };
     static const pen_xcp_static_t odts[2] = { { 32U, 1U, NULL }, { 1U, 1U, NULL } };
     static const pen_xcp_static_t entries[2] = { { 32U, 2U, NULL }, { 1U, 65U, NULL } };
     static const pen_xcp_static_t none[2] = { { 0U, 1U, NULL }, { 1U, 0U, NULL } };
     static const pen_xcp_static_t order[2] = { { 1U, 1U, NULL }, { 1U, 2U, eleven } };
-    static const pen_xcp_static_t room[4] = { { 1U, 2U, eleven }, { 1U, 2U, twelve }, { 2U, 2U, later }, { 1U, 1U, huge } };
+    static const pen_xcp_static_t room[4] = { { 1U, 2U, eleven }, { 1U, 2U, twelve }, { 2U, 2U, later }, { 1U, 2U, huge } };
     const pen_xcp_statics_t fitting[4] = { { 1U, room }, { 4U, many }, { 1U, odts }, { 1U, entries } };
 
     begin();

@@ -23,7 +23,6 @@ from .virtual import Served, describe, free_port, identity, period
 
 WITH_UART = ("m4f", "m3", "m7")  # port/cortex-m/uart.c knows their serial line
 _EMULATOR = "qemu-system-arm"
-SECOND = 10**9  # ns
 
 
 def build(model: Any, machine: str) -> Path:
@@ -31,7 +30,7 @@ def build(model: Any, machine: str) -> Path:
     if machine not in WITH_UART:
         raise UserError(f'--on: there is no controller for "{machine}"; {hint(machine, WITH_UART)}')
     between = period(model)
-    if SECOND % between:
+    if 10**9 % between:  # ns
         raise UserError(f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; use --on sil")
     source, firmware = generated(model), ROOT / "sil" / "firmware"
     code = [source / f"{model.name}.c", source / f"{model.owner}_params.c", *_files(("src", "*.c"))]
