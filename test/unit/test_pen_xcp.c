@@ -323,6 +323,8 @@ void test_store_only_what_is_frozen(void)
     with_options();
     config.protect = 0U;
     start();
+    BAD(MODE_NOT_VALID, 0xe6, 2, 0);
+    BAD(MODE_NOT_VALID, 0xe6, 3, 0);
     GOOD(3U, 0xe9);
     TEST_ASSERT_EQUAL_UINT8(1U, out[2]);
     GOOD(1U, 0xf9, 1, 0, 0);

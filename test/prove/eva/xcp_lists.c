@@ -193,6 +193,29 @@ static const pen_xcp_static_t some_lists[3] = { { 2U, 2U, constant }, { 3U, 2U, 
 static const pen_xcp_static_t wrong[5] = { { 1U, 1U, NULL }, { 2U, 2U, constant }, { 1U, 1U, huge }, { 0U, 1U, NULL }, { 1U, 65U, NULL } };
 static const pen_xcp_statics_t statics[] = { { 3U, some_lists }, { 5U, wrong }, { 2U, wrong }, { 1U, &wrong[2] }, { 1U, &wrong[3] }, { 1U, &wrong[4] }, { 0U, wrong } };
 
+/* To a list that there is, or (3, 4) any other; entry 0, 1 or any other. */
+static void packet_of_static(uint32_t n, uint8_t code, uint32_t to, uint32_t entry)
+{
+    uint8_t *const in = arriving((n > 0U) ? n : 1U, code);
+
+    if (n >= 4U) {
+        in[2] = (uint8_t)((to < 3U) ? to : ((to == 3U) ? Frama_C_unsigned_int_interval(3U, 255U) : any));
+        in[3] = (uint8_t)((to < 3U) ? 0U : ((to == 3U) ? 0U : Frama_C_unsigned_int_interval(1U, 255U)));
+    }
+    if (n >= 6U) {
+        in[5] = (uint8_t)((entry < 2U) ? entry : Frama_C_unsigned_int_interval(2U, 255U));
+    }
+    slave();
+    //@ loop unroll 64;
+    for (size_t k = 4U; k < PEN_XCP_ENTRIES; k++) {
+        daq.entry[k].size = Frama_C_unsigned_int_interval(0U, ROOM);
+    }
+    daq.busy = any;
+    daq.left = 0U;
+    seen = pen_xcp_static_receive(&xcp, &statics[0], in, n, out);
+    unchanged();
+}
+
 void xcp_static_lists(void)
 {
     static const uint8_t code[] = { 0xd3U, 0xd6U, 0xd8U, 0xdaU, 0xe1U, 0xe2U, 0xe3U, 0xffU };
@@ -200,23 +223,18 @@ void xcp_static_lists(void)
     begin();
     //@ loop unroll 7;
     for (uint32_t i = 1U; i <= (sizeof statics / sizeof statics[0]); i++) {
-        const pen_status_t status = pen_xcp_static_init(&daq, &statics[i % (sizeof statics / sizeof statics[0])]);
-        seen = status;
+        seen = pen_xcp_static_init(&daq, &statics[i % (sizeof statics / sizeof statics[0])]); /* last: the one that is used */
     }
-    //@ loop unroll 10;
-    for (uint32_t n = 0U; n <= 9U; n++) {
+    //@ loop unroll 9;
+    for (uint32_t n = 0U; n <= 8U; n++) {
         //@ loop unroll 8;
         for (uint32_t i = 0U; i < sizeof code; i++) {
-            uint8_t *const in = arriving((n > 0U) ? n : 1U, code[i]);
-            slave();
-            //@ loop unroll 64;
-            for (size_t k = 4U; k < PEN_XCP_ENTRIES; k++) {
-                daq.entry[k].size = Frama_C_unsigned_int_interval(0U, ROOM);
+            //@ loop unroll 15;
+            for (uint32_t k = 0U; k < 15U; k++) {
+                if ((n >= 4U) || (k == 14U)) {
+                    packet_of_static(n, code[i], k % 5U, k / 5U);
+                }
             }
-            daq.busy = any;
-            daq.left = 0U;
-            seen = pen_xcp_static_receive(&xcp, &statics[0], in, n, out);
-            unchanged();
         }
     }
 }
