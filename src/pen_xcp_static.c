@@ -24,8 +24,6 @@
 #define XCP_CODE_POINTER 0xe2U
 #define XCP_CODE_CLEAR  0xe3U
 
-static const uint8_t xcp_nothing[1] = { 0U }; /* address of entries of size 0 */
-
 static uint32_t xcp_predefined(const pen_xcp_statics_t *statics)
 {
     uint32_t n = 0U;
@@ -75,7 +73,8 @@ static bool xcp_possible(const pen_xcp_daq_t *daq, const pen_xcp_statics_t *stat
 /* An entry of a list in the state that it has before a master writes it. */
 static pen_xcp_entry_t xcp_initial(const pen_xcp_static_t *list, uint32_t k)
 {
-    pen_xcp_entry_t entry = { xcp_nothing, 0U };
+    static const uint8_t nothing[1] = { 0U }; /* the address of entries of size 0 */
+    pen_xcp_entry_t entry = { nothing, 0U };
 
     if ((list->entry != NULL) && (list->entry[k].size > 0U)) {
         entry = list->entry[k];
@@ -104,11 +103,11 @@ static uint8_t xcp_used(const pen_xcp_daq_t *daq, const pen_xcp_static_t *list, 
 }
 
 /* Number of ODTs of each list: all of them, or those that are used. Only while nothing is sampled. */
-static void xcp_size_lists(pen_xcp_daq_t *daq, const pen_xcp_statics_t *statics, bool all)
+static void xcp_size_lists(pen_xcp_daq_t *daq, const pen_xcp_statics_t *statics, bool whole)
 {
     for (uint32_t i = 0U; i < statics->lists; i++) {
         pen_xcp_list_t *const list = &daq->list[i];
-        list->odts = all ? statics->list[i].odts : xcp_used(daq, &statics->list[i], daq->odt[list->first].first);
+        list->odts = whole ? statics->list[i].odts : xcp_used(daq, &statics->list[i], daq->odt[list->first].first);
     }
 }
 
@@ -117,7 +116,6 @@ static void xcp_lay_out(pen_xcp_daq_t *daq, const pen_xcp_static_t *from, pen_xc
     list->first = daq->odts;
     list->mode = 0U;
     list->prescaler = 1U;
-    list->wait = 0U;
     xcp_reset(daq, from, daq->entries);
     for (uint32_t k = 0U; k < from->odts; k++) {
         daq->odt[daq->odts].first = daq->entries;

@@ -19,7 +19,7 @@ WORDS = ["-Dvolatile="]
 _KEPT = "pen_tuning_write:40,pen_tuning_write_bytes:40,xcp_at:20,xcp_upload:20,xcp_build_checksum:40"
 _RELATED = "pen_tuning_write,pen_tuning_write_bytes,pen_serial_get_bytes,pen_serial_put_bytes,pen_xcp_download_command"
 OPTIONS = [
-    "-eva-precision", "0", "-eva-plevel", "200", "-eva-min-loop-unroll", "24", "-eva-slevel-function", _KEPT,
+    "-eva-precision", "0", "-eva-plevel", "199", "-eva-min-loop-unroll", "24", "-eva-slevel-function", _KEPT,
     "-eva-domains-function", ",".join(f"octagon:{name}" for name in _RELATED.split(",")),
 ]  # fmt: skip
 UNROLLED = {"xcp_sampling": "70", "xcp_static_lists": "70"}  # entries of an ODT, or of all lists

@@ -104,7 +104,7 @@ void test_other_commands_are_those_of_the_slave(void)
     BAD(UNKNOWN, 0xd2, 0);
     GOOD(6U, 0xfd);
     TEST_ASSERT_EQUAL_UINT32(0U, SEND(0U));
-    TEST_ASSERT_EQUAL_UINT32(0U, send(0U, out));
+    TEST_ASSERT_EQUAL_UINT32(0U, send(0U, NULL));
     BAD(SYNTAX, 0xe2, 0, 0);
     BAD(SYNTAX, 0xe3, 0, 0);
     BAD(SYNTAX, 0xe1, 0xff, 1, 0);
@@ -174,6 +174,7 @@ void test_configurable_list_sends_what_was_written(void)
     GOOD(1U, 0xe3, 0, HALF(1U));
     BAD(DAQ_CONFIG, 0xde, 1, HALF(1U));
     GOOD(1U, 0xe2, 0, HALF(1U), 0, 0);
+    BAD(RANGE, 0xe1, 0xff, 0, 0, 0, 0, 0, 0); /* of no size */
     write_entry(2U, REGION);
     GOOD(1U, 0xe2, 0, HALF(1U), 1, 1);
     write_entry(3U, REGION + 4U);
@@ -238,6 +239,42 @@ void test_lists_keep_their_size_while_a_sample_is_taken(void)
     TEST_ASSERT_EQUAL_UINT8(1U, daq.list[1].odts);
 }
 
+static void with(uint32_t lists, const pen_xcp_static_t list[])
+{
+    begin();
+    statics.lists = lists;
+    statics.list = list;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_xcp_static_init(&daq, &statics));
+}
+
+/* Each command means the list of its number. */
+void test_several_lists_of_a_kind(void)
+{
+    static const pen_xcp_static_t constants[3] = { { 1U, 1U, constant }, { 1U, 1U, constant }, { 1U, 1U, NULL } };
+    static const pen_xcp_static_t open[3] = { { 1U, 1U, constant }, { 1U, 1U, NULL }, { 1U, 1U, NULL } };
+
+    with(3U, constants);
+    GOOD(1U, 0xe0, 0x10, HALF(0U), HALF(0U), 3, 0);
+    GOOD(1U, 0xe0, 0x10, HALF(1U), HALF(0U), 3, 0);
+    GOOD(1U, 0xe3, 0, HALF(1U));
+    GOOD(8U, 0xdf, 0, HALF(1U));
+    TEST_ASSERT_EQUAL_UINT8(1U, out[6]);
+    GOOD(8U, 0xdf, 0, HALF(0U));
+    TEST_ASSERT_EQUAL_UINT8(3U, out[6]);
+    BAD(WRITE_PROTECTED, 0xe2, 0, HALF(1U), 0, 0);
+    GOOD(1U, 0xe2, 0, HALF(2U), 0, 0);
+    with(3U, open);
+    for (uint16_t k = 1U; k < 3U; k++) {
+        GOOD(1U, 0xe2, 0, HALF(k), 0, 0);
+        write_entry(1U, REGION + k);
+    }
+    GOOD(2U, 0xde, 1, HALF(2U));
+    pen_xcp_sample(&xcp, 0U);
+    TEST_ASSERT_EQUAL_UINT32(2U, packet());
+    TEST_ASSERT_EQUAL_UINT8(2U, out[0]);
+    TEST_ASSERT_EQUAL_UINT8(memory[2], out[1]);
+}
+
 static void refused(uint32_t lists, const pen_xcp_static_t list[])
 {
     const pen_xcp_statics_t wrong = { lists, list };
@@ -252,14 +289,17 @@ void test_lists_that_do_not_fit_are_refused(void)
     static const pen_xcp_entry_t eleven[2] = { { memory, 8U }, { text, 3U } };
     static const pen_xcp_entry_t twelve[2] = { { memory, 8U }, { text, 4U } };
     static const pen_xcp_entry_t later[4] = { { memory, 1U }, { text, 1U }, { memory, 8U }, { memory, 8U } };
-    static const pen_xcp_entry_t huge[2] = { { memory, 0xfffffff8U }, { memory, 1U } };
+    static const pen_xcp_entry_t huge[2] = { { memory, 0xfffffff8U }, { memory, 8U } }; /* their sum is 0 */
+    static const pen_xcp_entry_t edge[4] = { { memory, 8U }, { text, 3U }, { memory, 8U }, { memory, 7U } };
     static const pen_xcp_static_t many[5] = { { 1U, 1U, NULL }, { 1U, 1U, NULL }, { 1U, 1U, NULL }, { 1U, 1U, NULL }, { 1U, 1U, NULL } };
     static const pen_xcp_static_t odts[2] = { { 32U, 1U, NULL }, { 1U, 1U, NULL } };
     static const pen_xcp_static_t entries[2] = { { 32U, 2U, NULL }, { 1U, 65U, NULL } };
-    static const pen_xcp_static_t none[2] = { { 0U, 1U, NULL }, { 1U, 0U, NULL } };
+    static const pen_xcp_static_t sum[2] = { { 16U, 4U, NULL }, { 1U, 1U, NULL } };
+    static const pen_xcp_static_t none[3] = { { 0U, 1U, NULL }, { 1U, 0U, NULL }, { 0U, 1U, eleven } };
+    static const pen_xcp_static_t full[1] = { { 2U, 2U, edge } };
     static const pen_xcp_static_t order[2] = { { 1U, 1U, NULL }, { 1U, 2U, eleven } };
     static const pen_xcp_static_t room[4] = { { 1U, 2U, eleven }, { 1U, 2U, twelve }, { 2U, 2U, later }, { 1U, 2U, huge } };
-    const pen_xcp_statics_t fitting[4] = { { 1U, room }, { 4U, many }, { 1U, odts }, { 1U, entries } };
+    const pen_xcp_statics_t fitting[6] = { { 1U, room }, { 4U, many }, { 1U, odts }, { 1U, entries }, { 1U, sum }, { 1U, full } };
 
     begin();
     refused(5U, many);
@@ -267,11 +307,13 @@ void test_lists_that_do_not_fit_are_refused(void)
     refused(1U, &entries[1]);
     refused(1U, &none[0]);
     refused(1U, &none[1]);
+    refused(1U, &none[2]);
+    refused(2U, sum);
     refused(2U, order);
     refused(1U, &room[1]);
     refused(1U, &room[2]);
     refused(1U, &room[3]);
-    for (uint32_t i = 0U; i < 4U; i++) {
+    for (uint32_t i = 0U; i < 6U; i++) {
         TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_xcp_static_init(&daq, &fitting[i]));
         TEST_ASSERT_EQUAL_UINT8(fitting[i].lists, daq.lists);
     }

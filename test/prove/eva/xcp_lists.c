@@ -199,7 +199,7 @@ static void packet_of_static(uint32_t n, uint8_t code, uint32_t to, uint32_t ent
     uint8_t *const in = arriving((n > 0U) ? n : 1U, code);
 
     if (n >= 4U) {
-        in[2] = (uint8_t)((to < 3U) ? to : ((to == 3U) ? Frama_C_unsigned_int_interval(3U, 255U) : any));
+        in[2] = (uint8_t)((to < 3U) ? to : Frama_C_unsigned_int_interval((to == 3U) ? 3U : 0U, 255U));
         in[3] = (uint8_t)((to < 3U) ? 0U : ((to == 3U) ? 0U : Frama_C_unsigned_int_interval(1U, 255U)));
     }
     if (n >= 6U) {
@@ -211,6 +211,7 @@ static void packet_of_static(uint32_t n, uint8_t code, uint32_t to, uint32_t ent
         daq.entry[k].size = Frama_C_unsigned_int_interval(0U, ROOM);
     }
     daq.busy = any;
+    daq.at = 0U; /* of no entry: it says nothing */
     daq.left = 0U;
     seen = pen_xcp_static_receive(&xcp, &statics[0], in, n, out);
     unchanged();
