@@ -9,7 +9,7 @@ ENTRIES = {
     **dict.fromkeys(
         ("xcp_upload_page", "xcp_upload_region", "xcp_upload_text", "xcp_checksum", "xcp_download_command", "xcp_pages", "xcp_elapse", "xcp_keys", "xcp_dispatch"), "xcp.c"
     ),
-    **dict.fromkeys(("xcp_lists", "xcp_allocate", "xcp_pointer", "xcp_write_entry", "xcp_whole_lists", "xcp_sampling", "xcp_static_lists"), "xcp_lists.c"),
+    **dict.fromkeys(("xcp_lists", "xcp_allocate", "xcp_pointer", "xcp_write_entries", "xcp_whole_lists", "xcp_sampling", "xcp_static_lists"), "xcp_lists.c"),
 }  # fmt: skip
 FILES = "pen_xcp*.c"  # no other entry analyses them
 
@@ -34,7 +34,7 @@ SEEDS = [
     ("pen_xcp_lists.c", "} else if (count > (PEN_XCP_ODTS - daq->odts)) {", "} else if (false) {", "xcp_allocate"),
     ("pen_xcp_lists.c", "} else if (count > (PEN_XCP_ENTRIES - daq->entries)) {", "} else if (false) {", "xcp_allocate"),
     ("pen_xcp_lists.c", " && (in[5] < odt->entries)", "", "xcp_pointer"),
-    ("pen_xcp_lists.c", "if (daq->left == 0U) {", "if (false) {", "xcp_write_entry"),
+    ("pen_xcp_lists.c", "if (daq->left == 0U) {", "if (false) {", "xcp_write_entries"),
     ("pen_xcp_daq.c", "good = good && (n <= xcp->config->max_cto);", "", "xcp_sampling"),
     ("pen_xcp_static.c", " && (odts <= PEN_XCP_ODTS) && (entries <= PEN_XCP_ENTRIES)", "", "xcp_static_lists"),
 ]  # fmt: skip

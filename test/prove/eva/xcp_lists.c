@@ -83,7 +83,7 @@ void xcp_pointer(void)
 }
 
 /* Each place written while any number of entries is left. */
-void xcp_write_entry(void)
+void xcp_write_entries(void)
 {
     begin();
     //@ loop unroll 16;
