@@ -37,7 +37,7 @@ static uint32_t xcp_unlock(pen_xcp_t *xcp, const uint8_t in[], uint32_t n, uint8
     } else if ((n - 2U) < in[1]) {
         error = PEN_XCP_SYNTAX;
     } else if (xcp->config->options->unlock(asked, in[1], &in[2])) {
-        xcp->locked &= (uint8_t)~asked;
+        xcp->locked &= (uint8_t)(asked ^ 0xffU);
         out[1] = xcp->locked;
     } else {
         pen_xcp_disconnect(xcp); /* as the standard asks for */

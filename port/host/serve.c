@@ -9,6 +9,9 @@
  * PORT 0: any that is free. STIMULUS: a file with the inputs of all samples, pen_real_t[n][N_U], played again and again;
  * A2L: the file that GET_ID offers, or "-". `frames` is UDP with a CAN frame a datagram, without header. Prints its port; ends
  * with its standard input, and then prints the number of steps, and of late ones: more than a period after their time.
+ *
+ * TCP: a master that is gone without a word (its machine is off, its cable out) is noticed within GONE seconds, and the port
+ * is free again. UDP: answers go to the master that was the last to send CONNECT; packets of others are dropped.
  */
 #define _GNU_SOURCE
 
@@ -30,6 +33,8 @@
 #define SLOTS 8192U
 #define ROOM  (XCP_FRAME_HEAD + 255U + XCP_FRAME_TAIL)
 #define SECOND 1000000000LL
+#define GONE   10 /* s */
+#define CONNECT 0xffU
 
 enum { WORD_KIND = 1, WORD_HOST, WORD_PORT, WORD_CTO, WORD_QUIET, WORD_STIMULUS, WORD_A2L, WORDS };
 
@@ -44,8 +49,9 @@ static struct {
     int                socket;
     bool               datagrams;
     bool               frames; /* CAN */
-    bool               known;  /* a master has spoken */
-    struct sockaddr_in peer;
+    bool               known;  /* a master has connected */
+    struct sockaddr_in peer;   /* that master            */
+    struct sockaddr_in from;   /* sender of the datagram */
 } line = { .socket = -1 };
 
 /* -- stepping ------------------------------------------------------------------------------------------------------- */
@@ -60,7 +66,7 @@ static int64_t nanoseconds(void)
 
 static void *stepping(void *unused)
 {
-    const int64_t period = (int64_t)CONTROLLER_PERIOD * 1000;
+    const int64_t period = (int64_t)CONTROLLER_PERIOD; /* ns */
     int64_t due = nanoseconds();
 
     for (uint32_t k = 0U;; k++) {
@@ -104,11 +110,22 @@ static bool send_packet(uint8_t message[], uint32_t n)
     return good;
 }
 
+/* May its sender give commands? CONNECT makes it the master. */
+static bool from_master(const uint8_t packet[], uint32_t n)
+{
+    if (line.datagrams && (n >= 2U) && (packet[0] == CONNECT)) {
+        line.peer = line.from;
+        line.known = true;
+    }
+    return !line.datagrams ||
+           (line.known && (line.peer.sin_addr.s_addr == line.from.sin_addr.s_addr) && (line.peer.sin_port == line.from.sin_port));
+}
+
 static bool receive(const uint8_t packet[], uint32_t n)
 {
     uint8_t message[ROOM];
 
-    return send_packet(message, pen_xcp_receive(&controller_xcp, packet, n, &message[XCP_FRAME_HEAD]));
+    return !from_master(packet, n) || send_packet(message, pen_xcp_receive(&controller_xcp, packet, n, &message[XCP_FRAME_HEAD]));
 }
 
 static bool take(const uint8_t data[], size_t n)
@@ -163,6 +180,18 @@ static void hang_up(void)
     }
 }
 
+/* Probes once nothing has come for a while; and data that nobody acknowledges end the connection, too. */
+static void notice_silence(int socket)
+{
+    const int on = 1, idle = GONE / 2, between = 1, probes = GONE / 2, limit = GONE * 1000;
+
+    setsockopt(socket, IPPROTO_TCP, TCP_KEEPIDLE, &idle, sizeof(idle));
+    setsockopt(socket, IPPROTO_TCP, TCP_KEEPINTVL, &between, sizeof(between));
+    setsockopt(socket, IPPROTO_TCP, TCP_KEEPCNT, &probes, sizeof(probes));
+    setsockopt(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, &limit, sizeof(limit));
+    setsockopt(socket, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof(on));
+}
+
 static void answer_call(int listening)
 {
     const int on = 1;
@@ -171,20 +200,20 @@ static void answer_call(int listening)
     line.socket = accept(listening, NULL, NULL);
     setsockopt(line.socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
     setsockopt(line.socket, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
+    notice_silence(line.socket);
     xcp_stream_begin(&stream);
 }
 
 static bool listen_to_line(void)
 {
     uint8_t data[4096];
-    socklen_t size = sizeof(line.peer);
+    socklen_t size = sizeof(line.from);
     ssize_t n;
     bool good;
 
     if (line.datagrams) {
-        n = recvfrom(line.socket, data, sizeof(data), 0, (struct sockaddr *)&line.peer, &size);
+        n = recvfrom(line.socket, data, sizeof(data), 0, (struct sockaddr *)&line.from, &size);
         xcp_stream_begin(&stream);
-        line.known = true;
         good = take(data, (n > 0) ? (size_t)n : 0U);
     } else {
         n = recv(line.socket, data, sizeof(data), 0);

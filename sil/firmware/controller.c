@@ -89,17 +89,34 @@ static void declare_all(const controller_config_t *config)
     xcp_config.text[5] = &epk_region;
 }
 
-/* A time as XCP codes it: a count of up to 255, and 3 for 1 us, 4 for 10 us, ... */
+/* A period as XCP codes it: a count of up to 255, and 0 for 1 ns, 1 for 10 ns, ... 9 for 1 s; 0, not cyclic, if it is none. */
 static void start_lists(const controller_config_t *config)
 {
-    uint32_t cycle = CONTROLLER_PERIOD;
-    uint8_t unit = 3U;
+    const bool whole = (CONTROLLER_PERIOD % 1000U) == 0U; /* us */
+    uint32_t cycle = (uint32_t)(whole ? (CONTROLLER_PERIOD / 1000U) : CONTROLLER_PERIOD);
+    uint8_t unit = whole ? 3U : 0U;
 
-    while ((cycle > 255U) || (((cycle % 10U) == 0U) && (cycle > 9U))) {
+    while ((unit < 9U) && (cycle > 0U) && ((cycle % 10U) == 0U)) {
         cycle /= 10U;
         unit++;
     }
+    if ((cycle > 255U) || (!whole && (CONTROLLER_PERIOD > UINT32_MAX))) {
+        cycle = 0U;
+        unit = 0U;
+    }
     pen_xcp_daq_init(&daq, config->ring, config->slots, config->max_cto, (uint8_t)cycle, unit);
+}
+
+/* The model's time in microseconds: no error adds up. Wraps. */
+static uint32_t elapsed(void)
+{
+    static uint32_t time;
+    static uint32_t rest; /* ns */
+
+    rest += (uint32_t)(CONTROLLER_PERIOD % 1000U);
+    time += (uint32_t)(CONTROLLER_PERIOD / 1000U) + (rest / 1000U);
+    rest %= 1000U;
+    return time;
 }
 
 bool controller_start(const controller_config_t *config)
@@ -131,7 +148,7 @@ void controller_step(const MODEL(u_t) *u, bool late)
     shown.step_status = status;
     shown.late_steps += late ? 1U : 0U;
     pen_port_store(&shown.sample, now);
-    pen_xcp_sample(&controller_xcp, now * CONTROLLER_PERIOD); /* the model's time: wraps */
+    pen_xcp_sample(&controller_xcp, elapsed());
 }
 
 uint32_t controller_samples(void) { return pen_port_load(&shown.sample); }

@@ -17,7 +17,10 @@
 
 #include "penode/pen_xcp_daq.h"
 
-#define CONTROLLER_PERIOD ((uint32_t)((MODEL_SIZE(SAMPLE_TIME) * (pen_real_t)1e6) + (pen_real_t)0.5)) /* us */
+/* Between two steps, in ns. The compiler is told of it where a float does not hold it. */
+#ifndef CONTROLLER_PERIOD
+#define CONTROLLER_PERIOD (UINT64_C(1000) * (uint32_t)((MODEL_SIZE(SAMPLE_TIME) * (pen_real_t)1e6) + (pen_real_t)0.5))
+#endif
 
 /** How the slave is reached. */
 typedef struct {

@@ -76,7 +76,7 @@ int main(void)
         return 1;
     }
     uart_start();
-    board_timer_start(1000000U / CONTROLLER_PERIOD);
+    board_timer_start((uint32_t)(1000000000U / CONTROLLER_PERIOD));
     for (;;) {
         serve();
     }

@@ -112,15 +112,38 @@ def test_a2ltool_finds_the_same_addresses_in_the_elf(program: Path, text: str, t
         assert addresses[0] == addresses[1]
 
 
+@pytest.mark.skipif(not A2LTOOL.exists(), reason="a2ltool is not installed: pip install a2ltool")
+def test_a2ltool_makes_the_same_measurements_out_of_the_types_in_the_elf(program: Path, text: str, tmp_path: Path) -> None:
+    """The second way: types, sizes and addresses without us. It does not carry to the set, which is one array in C: one block without names."""
+    made = tmp_path / "made.a2l"
+    links = {name: re.search(rf'MEASUREMENT {re.escape(name)} .*?SYMBOL_LINK "(.*?)"', text, re.S)[1] for name in a2l_read.parse(text, "a2l").measurements}
+    words = [word for link in links.values() for word in ("--measurement", link)] + ["--characteristic", "rich_value_default"]
+    subprocess.run([A2LTOOL, "--create", "--elffile", program, *words, "-o", made], check=True, capture_output=True)
+    ours, theirs = a2l_read.parse(text, "ours"), a2l_read.parse(made.read_text(), "theirs")
+    assert {name: (e.address, e.type) for name, e in ours.measurements.items()} == {name: (theirs.measurements[link].address, theirs.measurements[link].type) for name, link in links.items()}
+    (whole,) = theirs.characteristics.values()
+    assert (whole.address, whole.size) == ours.segment
+
+
 @pytest.mark.skipif(shutil.which("pya2l") is None, reason="pya2l is not on the path: it needs an environment of its own")
 def test_pya2l_reads_it(text: str, tmp_path: Path) -> None:
+    """It remarks on each block in an IF_DATA, were it the only one in the file, and on nothing else."""
     path = tmp_path / "x.a2l"
-    path.write_text(text)
-    done = subprocess.run(["pya2l", path, "to_json", "-o", tmp_path / "x.json"], capture_output=True, text=True, check=True)
-    remarks = [line for line in (done.stdout + done.stderr).splitlines() if "may be used at most once here" not in line]  # about each block of an IF_DATA
-    assert not remarks
-    json = (tmp_path / "x.json").read_text()
-    assert all(f'"{name}"' in json for name in a2l_read.parse(text, "a2l").characteristics)
+
+    def remarks(text: str) -> list[str]:
+        path.write_text(text)
+        done = subprocess.run(["pya2l", path, "to_json", "-o", tmp_path / "x.json"], capture_output=True, text=True, check=True)
+        json = (tmp_path / "x.json").read_text()
+        assert all(f'"{name}"' in json for name in a2l_read.parse(text, "a2l").characteristics)
+        return (done.stdout + done.stderr).splitlines()
+
+    inside = [(text.count("\n", 0, m.start()) + 1, text.count("\n", 0, m.end()) + 1) for m in re.finditer(r"/begin IF_DATA.*?/end IF_DATA", text, re.S)]
+    for line in remarks(text):
+        at, what = re.fullmatch(r"(\d+):\d+ (.*)", line).groups()
+        assert "may be used at most once here" in what and any(first <= int(at) <= last for first, last in inside), line
+    assert remarks(re.sub(r"/begin IF_DATA.*?/end IF_DATA", "", text, flags=re.S)) == []
+    (only,) = remarks(re.sub(r"/begin IF_DATA.*?/end IF_DATA", "", text, flags=re.S).replace("/end MODULE", "/begin IF_DATA XCP /begin PAG 0x01 /end PAG /end IF_DATA /end MODULE"))
+    assert only.endswith("PAG may be used at most once here, only the last occurrence is kept")
 
 
 @pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="arm-none-eabi-gcc is not installed")

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import eva_xcp
 import gate
 
 WORK = gate.BUILD / "eva"
@@ -41,9 +42,8 @@ PROMISED = {
 }
 OWNED = ("nqvm_sets.h", "nqvm_params.c")  # the sets of all others
 PARTS = ("all_layers", "elements", "elementary", "networks_of_16", "systems", "folding", "sets", "serial", "selftest")
-LEFT_OUT = "pen_xcp*.c"  # README.md says why
 # Parts in a file of their own.
-OF_FILE = {"trial": "promise.c", "promises": "promise.c"}
+OF_FILE = {"trial": "promise.c", "promises": "promise.c"} | eva_xcp.ENTRIES
 
 OPTIONS = [
     *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write,octagon:pen_tuning_write_bytes,octagon:pen_serial_get_bytes,octagon:pen_serial_put_bytes,octagon:pen_fold", "-eva-octagon-through-calls"),
@@ -54,7 +54,7 @@ OPTIONS = [
 
 # Loops over layers and neurons, with states merged between: numbers of rows stay known, and no decision multiplies states.
 UNROLLED = ["-eva-precision", "0", "-eva-min-loop-unroll", "24"]
-OPTIONS_OF = {"promises": UNROLLED, "trial": UNROLLED}
+OPTIONS_OF = {"promises": UNROLLED, "trial": UNROLLED} | {entry: eva_xcp.options(entry) for entry in eva_xcp.ENTRIES}
 
 LIMIT = 1800  # seconds that an analysis may take
 
@@ -138,6 +138,7 @@ SEEDS = [
     Seed("pen_promise.c", "p = &p[layer->n_out * (layer->n_in + 1U)]", "p = &p[layer->n_out * (layer->n_in + 2U)]", PROMISE),
     Seed("pen_selftest.c", "pen_dense(WIDE, 2U, w, x, y)", "pen_dense(WIDE, 3U, w, x, y)", Run(None, "selftest")),
     Seed("pen_fold.h", "&at[n - 1U]; /* of the two", "&at[n]; /* of the two", Run(None, "folding")),
+    *(Seed(file, old, new, Run(None, entry)) for file, old, new, entry in eva_xcp.SEEDS),
 ]
 
 
@@ -183,7 +184,9 @@ def sources(seed: Seed | None = None) -> Path:
 def analyse(run: Run, place: Path) -> Seen:
     """Let Eva look at one run."""
     words = [f"-I{place}/inc", f"-I{place}/src", "-Iport/template", *(["-D__OPTIMIZE_SIZE__"] if run.size_build else [])]
-    files = sorted(set((place / "src").glob("pen_*.c")) - set((place / "src").glob(LEFT_OUT)))
+    of_xcp = run.entry in eva_xcp.ENTRIES
+    words += eva_xcp.WORDS if of_xcp else []
+    files = sorted(set((place / "src").glob("pen_*.c")) - (set() if of_xcp else set((place / "src").glob(eva_xcp.FILES))))
     if run.model:
         words += [f"'{word}'" for word in told(run.model)]
         files += [place / "src" / f"{run.model}.c", place / "src" / f"{owner(run.model)}_params.c", HARNESS / "model.c"]
@@ -222,7 +225,7 @@ def plain(name: str) -> str:
 
 def reached(seen: dict[Run, Seen]) -> tuple[int, list[str]]:
     """Number of statements in all functions, and what Eva has not reached in any run: of the runtime, or of a model."""
-    harness = {name for file in HARNESS.glob("*.c") for name in re.findall(r"^\w[\w *]*\b(\w+)\([^;]*\)$", file.read_text(), re.M)}
+    harness = {name for file in HARNESS.glob("*.[ci]*") for name in re.findall(r"^\w[\w *]*\b(\w+)\([^;]*\)$", file.read_text(), re.M)}
     runtime = frozenset().union(*(s.defined for run, s in seen.items() if not run.model)) - harness
     total, missing = 0, []
     for group in (None, *dict.fromkeys(run.model for run in seen if run.model)):
@@ -248,18 +251,19 @@ def nan() -> list[str]:
 def main(only: Sequence[str]) -> int:
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
-    models(WORK)
     runs = [Run(None, part) for part in (*PARTS, *OF_FILE)] + [Run(None, "networks_of_16", size_build=True), Run(None, "serial", big_endian=True)]
     runs += [ORDER, *(Run(model, "corrupted") for model in MODELS)]
+    runs = [run for run in runs if not only or str(run) in only]
+    if any(run.model for run in runs):
+        models(WORK)
     good = True
     place = sources()
     seen: dict[Run, Seen] = {}
-    for run in (run for run in runs if not only or str(run) in only):
+    for run in runs:
         seen[run] = analyse(run, place)
         good &= gate.report(f"eva: {run}", seen[run].alarms + seen[run].trouble)
     if only:
         return int(not good)
-    print(f"skip  eva: {LEFT_OUT}: left to xcp-fuzz")
     good &= gate.report("eva: every NaN through the elementary functions", nan())
     total, missing = reached(seen)
     good &= gate.report(f"eva: {total} statements reached", missing)

@@ -5,6 +5,7 @@
 mutation.py             every fault
 mutation.py --share N   every N-th fault, and all of the list
 mutation.py pen_set.c   those of one file
+mutation.py --tests 'test_pen_xcp*' pen_xcp.c ...   with these test programs only: for files that no other one calls
 
 mutation.toml says of each fault that lives why it may: one that changes nothing a caller could see ("equivalent: ...")
 counts as none; of the others at least 95 % have to be found. A fault in the list that is found is a failure, too.
@@ -24,6 +25,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import NamedTuple
 
@@ -91,8 +93,8 @@ def passes(bench: Bench, name: str) -> bool:
     return subprocess.run(command, preexec_fn=limit, check=False, **quiet).returncode == 0
 
 
-def bench(name: str, flags: list[str]) -> Bench:
-    """Test programs of test/unit, coverage_model.c of two models, and the comparison with wider arithmetic."""
+def bench(name: str, flags: list[str], only: str = "*") -> Bench:
+    """Test programs of test/unit, coverage_model.c of two models, and the comparison with wider arithmetic; of them those named `only`."""
     place = WORK / name
     place.mkdir()
     unity = coverage.UNITY
@@ -109,7 +111,7 @@ def bench(name: str, flags: list[str]) -> Bench:
     wanted = [(test, None) for test in sorted(coverage.UNIT.glob("test_*.c"))]
     wanted += [(test, model) for test in sorted(gate.HERE.glob("coverage_model*.c")) for model in ("nqvm_folded", "fading", "implicit")]
     wanted += [(gate.HERE / "coverage_promise.c", "promised")]
-    for test, model in wanted:
+    for test, model in (pair for pair in wanted if fnmatch(pair[0].stem, only)):
         files, told = coverage.of_model("float", test, model) if model else ([], [])
         needs = re.search(r"needs: (.*) \*/", test.read_text())
         files += [coverage.MODELS / Path(n).name for n in (needs[1].split() if needs else [])]
@@ -119,9 +121,10 @@ def bench(name: str, flags: list[str]) -> Bench:
         sources = [runner, test, *shared, *files]
         gate.make(["gcc", "-O1", *FLAGS, *words, *told, *flags, "-o", out, *sources, *linked])
         made.programs[out.name] = [out]
-    out = place / "accuracy"
-    gate.make(["gcc", "-O2", *FLAGS, *flags, "-pthread", "-o", out, "test/accuracy/pen_math_accuracy.c", *linked, "-lm"])
-    made.programs["accuracy"] = [out, 4099, 1]
+    if fnmatch("accuracy", only):
+        out = place / "accuracy"
+        gate.make(["gcc", "-O2", *FLAGS, *flags, "-pthread", "-o", out, "test/accuracy/pen_math_accuracy.c", *linked, "-lm"])
+        made.programs["accuracy"] = [out, 4099, 1]
     for program in made.programs:
         start = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         if not passes(made, program):
@@ -130,15 +133,18 @@ def bench(name: str, flags: list[str]) -> Bench:
     return made
 
 
-def faults(source: Path) -> Iterator[tuple[Fault, Path]]:
-    """All mutants of a file that compile, differ from it in what they do, and from each other."""
+def faults(source: Path, share: int, must: set[Fault]) -> Iterator[tuple[Fault, Path]]:
+    """The mutants of a file that compile, differ from it in what they do, and from each other: each `share`-th, and those of `must`."""
     place = WORK / source.stem
     place.mkdir()
     gate.make([MUTATE, source, "c", "--noCheck", "--mutantDir", place])
     before = source.read_text().splitlines()
     seen = {compiled(source.read_text(), ["gcc", "-O1"])}
     texts = {preprocessed(source)}
-    for mutant in sorted(place.glob("*.c"), key=lambda path: int(re.findall(r"\d+", path.stem)[-1])):
+    for number, mutant in enumerate(sorted(place.glob("*.c"), key=lambda path: int(re.findall(r"\d+", path.stem)[-1]))):
+        found = fault(source.name, before, mutant.read_text().splitlines())
+        if number % share and found not in must:
+            continue
         text = preprocessed(mutant)
         if text is None or text in texts:  # in a comment, or in the double build
             continue
@@ -146,7 +152,7 @@ def faults(source: Path) -> Iterator[tuple[Fault, Path]]:
         made = compiled(mutant.read_text(), ["gcc", "-O1"])
         if made is not None and made not in seen:
             seen.add(made)
-            yield fault(source.name, before, mutant.read_text().splitlines()), mutant
+            yield found, mutant
 
 
 def preprocessed(source: Path) -> str | None:
@@ -192,23 +198,22 @@ def listed() -> dict[Fault, str]:
 def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--share", type=int, default=1)
+    parser.add_argument("--tests", default="*")
     parser.add_argument("files", nargs="*")
     options = parser.parse_args()
-    whole = options.share == 1 and not options.files
+    whole = options.share == 1 and not options.files and options.tests == "*"
     for place in (WORK, coverage.MODELS):
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir(parents=True)
     eva.models(coverage.MODELS)
-    benches = [bench("plain", ["-O1"]), bench("checked", ["-O1", "-g", *SANITIZE])]
+    benches = [bench("plain", ["-O1"], options.tests), bench("checked", ["-O1", "-g", *SANITIZE], options.tests)]
     may_live, good, figures = listed(), True, {}
     for source in SOURCES:
         if options.files and source.name not in options.files:
             continue
         mine = {fault for fault in may_live if fault.file == source.name}
         alive, total, same, wrong = [], 0, 0, []
-        for number, (found, mutant) in enumerate(faults(source)):
-            if number % options.share and found not in mine:
-                continue
+        for found, mutant in faults(source, options.share, mine):
             total += 1
             if lives(mutant, source.name, benches):
                 if same_code(mutant, source):

@@ -232,7 +232,7 @@ def test_log_counts_what_is_missing_and_its_clock_goes_on_when_the_stamps_wrap()
     kept.stamps = [step * 1000 % (1 << 32) * 1000 for step in steps]  # ns, as pyxcp gives them
     kept.rows = [[(1 << 60) + n] for n in range(len(steps))]
     kept.stamps.append(0)  # of a sample whose values come after the look at them
-    entries = [a2l_read.Entry(name, "", 64, np.dtype("u8"), (), "") for name in ("a", "b")]  # two names of one place
+    entries = [a2l_read.Entry(name, "", 64, np.dtype("u8"), ()) for name in ("a", "b")]  # two names of one place
     log = measure._log(Timed(), entries, kept, 1)
     assert log.lost == 4 and np.allclose(log.time, (np.array(steps) + 3) * 1e-3, rtol=0.0, atol=1e-15)  # rounding of seven sums below 16 ms
     assert all(log.values[name].tolist() == [(1 << 60) + n for n in range(len(steps))] for name in ("a", "b"))
@@ -240,7 +240,7 @@ def test_log_counts_what_is_missing_and_its_clock_goes_on_when_the_stamps_wrap()
 
 def test_signals_of_one_place_are_measured_and_those_that_overlap_refused() -> None:
     def entry(name: str, at: int, kind: str) -> a2l_read.Entry:
-        return a2l_read.Entry(name, "", at, np.dtype(kind), (), "")
+        return a2l_read.Entry(name, "", at, np.dtype(kind), ())
 
     entries = [entry("whole", 64, "u4"), entry("same", 64, "u4"), entry("next", 68, "f4"), entry("high", 66, "u2"), entry("low", 64, "u2")]
     a2l = a2l_read.A2l("x", {}, {e.name: e for e in entries}, None, None)

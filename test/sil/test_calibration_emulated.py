@@ -41,7 +41,10 @@ def test_every_entry_and_then_an_exchange(running: tuple) -> None:
     with links.connected(where) as link:
         assert link.text(links.Text.EPK) == a2l.epk[0]
         check_characteristics(model, link, a2l)
-    log = measure.record(where, a2l, list(a2l.measurements), 0.3, 50)  # 180 bytes each 50 ms
+    for seconds in (0.3, 3.0, 20.0):  # the emulated clock is behind on a busy machine
+        log = measure.record(where, a2l, list(a2l.measurements), seconds, 50)  # 180 bytes each 50 ms
+        if log.time.size > 3:
+            break
     check_measurements(model, u, a2l, log)
     chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
     every = 10  # 23 bytes and a head each 10 ms of the emulated time

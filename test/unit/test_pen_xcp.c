@@ -25,6 +25,8 @@ void test_init_needs_an_initialised_instance_and_a_packet_size(void)
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_xcp_init(&xcp, &config));
     instance.ready = 0U;
     TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, pen_xcp_init(&xcp, &config));
+    instance.ready = LAYOUT + 1U; /* of another model */
+    TEST_ASSERT_EQUAL_HEX32(PEN_SET_BADARG, pen_xcp_init(&xcp, &config));
 }
 
 void test_connect_reports_resources_order_and_sizes(void)
@@ -112,10 +114,14 @@ void test_protected_resources_are_locked(void)
     BAD(ACCESS_LOCKED, 0xf0, 1, 0);
     BAD(ACCESS_LOCKED, 0xeb, 1, 0, 0);
     BAD(UNKNOWN, 0xd6);
+    BAD(UNKNOWN, 0xe3, 0, 0, 0);
+    BAD(ACCESS_LOCKED, 0xe4, 0, 1, 0, 0);
     at(REGION);
     config.protect = PEN_XCP_DAQ;
     start();
     BAD(ACCESS_LOCKED, 0xd6);
+    BAD(ACCESS_LOCKED, 0xe3, 0, 0, 0);
+    GOOD(1U, 0xe4, 0, 1, 0, 0);
     GOOD(4U, 0xea, 1, 0);
 }
 
@@ -298,11 +304,27 @@ void test_no_keys(void)
     BAD(UNKNOWN, 0xf8, 0, PEN_XCP_CAL);
 }
 
+void test_what_memory_holds_before_is_not_stored(void)
+{
+    memset(&xcp, 0x5a, sizeof(xcp));
+    config.options = &options;
+    config.options_command = pen_xcp_options_command;
+    config.protect = 0U;
+    start();
+    GOOD(3U, 0xe5, 0, 0);
+    TEST_ASSERT_EQUAL_UINT8(0U, out[2]);
+    GOOD(6U, 0xfd);
+    TEST_ASSERT_EQUAL_HEX8(0U, out[1]);
+    TEST_ASSERT_NULL(pen_xcp_to_store(&xcp));
+}
+
 void test_store_only_what_is_frozen(void)
 {
     with_options();
     config.protect = 0U;
     start();
+    BAD(MODE_NOT_VALID, 0xe6, 2, 0);
+    BAD(MODE_NOT_VALID, 0xe6, 3, 0);
     GOOD(3U, 0xe9);
     TEST_ASSERT_EQUAL_UINT8(1U, out[2]);
     GOOD(1U, 0xf9, 1, 0, 0);

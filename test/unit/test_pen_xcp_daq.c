@@ -210,6 +210,25 @@ void test_overload_leaves_out_whole_samples(void)
     }
 }
 
+/* One slot more than is left is as bad as many. */
+void test_sample_of_two_packets_needs_two_slots(void)
+{
+    two_lists();
+    GOOD(2U, 0xde, 1, HALF(1U));
+    pen_xcp_sample(&xcp, 0U); /* one slot */
+    GOOD(2U, 0xde, 0, HALF(1U));
+    GOOD(2U, 0xde, 1, HALF(0U));
+    for (uint32_t k = 1U; k < 4U; k++) { /* two each: the third has none */
+        pen_xcp_sample(&xcp, k);
+    }
+    TEST_ASSERT_EQUAL_UINT32(2U, packet());
+    TEST_ASSERT_EQUAL_HEX8(0xfdU, out[0]);
+    expect_sample_of_list_1();
+    expect_sample_of_list_0(1U);
+    expect_sample_of_list_0(2U);
+    TEST_ASSERT_EQUAL_UINT32(0U, packet());
+}
+
 void test_ring_of_an_odd_number_of_slots(void)
 {
     two_lists();
@@ -316,4 +335,42 @@ void test_incomplete_lists_do_not_start(void)
     GOOD(1U, 0xd6);
     GOOD(1U, 0xd5, 0, HALF(1U));
     BAD(DAQ_CONFIG, 0xde, 1, HALF(0U));
+}
+
+/* Lists that are allocated again know nothing of those before. */
+void test_lists_begin_anew(void)
+{
+    two_lists();
+    GOOD(1U, 0xd6);
+    GOOD(1U, 0xd5, 0, HALF(2U));
+    for (uint16_t k = 0U; k < 2U; k++) {
+        GOOD(8U, 0xdf, 0, HALF(k));
+        TEST_ASSERT_EQUAL_HEX8(0U, out[1]);
+        TEST_ASSERT_EQUAL_UINT8(1U, out[6]);
+    }
+    GOOD(1U, 0xd4, 0, HALF(0U), PEN_XCP_ODTS - 1U); /* all room is there */
+    GOOD(1U, 0xd4, 0, HALF(1U), 1);
+    BAD(RANGE, 0xd3, 0, HALF(1U), 2, 1);
+    GOOD(1U, 0xd3, 0, HALF(1U), 0, 2);
+    BAD(DAQ_CONFIG, 0xde, 1, HALF(1U));
+    pointer(1U, 0U, 0U);
+    write_entry(1U, REGION);
+    BAD(DAQ_CONFIG, 0xde, 1, HALF(1U)); /* the second has no address yet */
+    write_entry(1U, REGION);
+    GOOD(2U, 0xde, 1, HALF(1U));
+}
+
+void test_whole_entries_and_events_are_looked_at(void)
+{
+    uint8_t in[8] = { 0xe1U, 0xffU, 3U, 0U };
+    const uint32_t address = REGION + 6U;
+
+    two_lists();
+    pointer(0U, 0U, 0U);
+    memcpy(&in[4], &address, 4U);
+    TEST_ASSERT_EQUAL_UINT32(8U, send(8U, in)); /* one byte of it is behind the region */
+    TEST_ASSERT_EQUAL_HEX8(ACCESS_DENIED, out[1]);
+    in[2] = 2U;
+    TEST_ASSERT_EQUAL_UINT32(1U, send(8U, in));
+    BAD(RANGE, 0xe0, 0x10, HALF(0U), HALF(0x100U), 1, 0);
 }

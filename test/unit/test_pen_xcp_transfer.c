@@ -178,6 +178,29 @@ void test_quiet_commits_what_is_open(void)
     TEST_ASSERT_FALSE(pen_tuning_pending(&instance.tuning));
 }
 
+/* Counted from the last edit, to the millisecond; a copy of the reference is one. */
+void test_quiet_is_counted_from_the_last_edit(void)
+{
+    with_quiet();
+    for (uint32_t k = 0U; k < 3U; k++) {
+        const uint32_t before = step()->head.id;
+        write_value(0U, (pen_real_t)(50U + k));
+        TEST_ASSERT_EQUAL_UINT32(0U, pen_xcp_elapse(&xcp, 60U, out));
+        if (k == 0U) {
+            write_value(1U, (pen_real_t)60);
+        } else if (k == 1U) {
+            GOOD(1U, 0xe4, 0, 1, 0, 0);
+        } else {
+            TEST_ASSERT_EQUAL_UINT32(0U, pen_xcp_elapse(&xcp, 0U, out));
+            write_value(1U, (pen_real_t)61);
+        }
+        TEST_ASSERT_EQUAL_UINT32(0U, pen_xcp_elapse(&xcp, 99U, out));
+        TEST_ASSERT_EQUAL_UINT32(before, step()->head.id);
+        TEST_ASSERT_EQUAL_UINT32(0U, pen_xcp_elapse(&xcp, 1U, out));
+        TEST_ASSERT_TRUE(step()->head.id != before);
+    }
+}
+
 void test_quiet_refused_is_an_event_once(void)
 {
     with_quiet();

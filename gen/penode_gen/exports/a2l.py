@@ -11,7 +11,8 @@ from typing import Any
 from ..emit_c import VERSION
 from ..model import Model
 from .a2l_entries import Characteristic, Measurement, Measurements, characteristics, instance_of, page
-from .elf_types import Program, read_program
+from .a2l_lists import static_lists
+from .elf_types import Place, Program, read_program
 from .interface import Exporter, ExportError, Option, Options
 from .templating import render
 
@@ -77,7 +78,7 @@ def _units(entries: Iterable[Characteristic | Measurement]) -> dict[str, str]:
     """Unit -> name of its COMPU_METHOD."""
     names: dict[str, str] = {}
     for unit in sorted({entry.unit for entry in entries}):
-        plain = "unit_" + (re.sub(r"\W+", "_", unit.replace("/", "_per_")).strip("_") or "none")
+        plain = "unit_" + (re.sub(r"\W+", "_", unit.replace("/", "_per_"), flags=re.ASCII).strip("_") or "none")
         names[unit] = plain if plain not in names.values() else f"{plain}_{len(names)}"
     return names
 
@@ -90,20 +91,32 @@ def _build(model: Model, options: Options) -> bytes:
     values = page(model, program)
     instance = instance_of(model, program, options["instance"])
     measured = _measured(model, program, instance, options["measure"])
+    return describe(model, program, values, measured, wire, epk(program, options["epk"]), options["max_cto"]).encode()
+
+
+def describe(
+    model: Model, program: Program, values: Place, measured: Measurements, wire: dict[str, Any], identity: tuple[str, int] | None, max_cto: Any = None,
+    pages: bool = True, addresses: bool = True,
+) -> str:  # fmt: skip
+    """
+    The text of an A2L. `values`: the array of a set; `pages`: a slave of penode switches between two of them there; `addresses`: False for
+    zeros, where SYMBOL_LINKs are to be resolved. Raises ExportError.
+    """
     entries = characteristics(model, values, program.find(f"{values.path}[0]"))
     names = [entry.name for entry in entries] + list(measured.found)
-    highest = max(max(entry.address for entry in (*entries, *measured.found.values())), values.address + values.size)
+    shown = [*entries, *measured.found.values()]
+    highest = max(max(entry.address for entry in shown), values.address + values.size)
     if highest >= 1 << 32:
         raise ExportError(f"{program.path}: addresses of more than 32 bits; link the program with -no-pie")
     for name in names:
         if not _IDENTIFIER.fullmatch(name):
             raise ExportError(f"{model.path.name}: {name}: A2L has no such names; use letters without accents, digits and underscores")
-    text = render(
-        "a2l.j2", version=VERSION, model=model, instance=instance, values=values, characteristics=entries, measurements=measured.found.values(),
-        groups=_groups(entries, measured), units=_units([*entries, *measured.found.values()]), wire=wire, epk=epk(program, options["epk"]),
-        max_cto=int(options["max_cto"] or _PACKET[wire["kind"]]), little=program.little_endian, cycle=_cycle(model.sample_time), quote=quote,
+    return render(
+        "a2l.j2", version=VERSION, model=model, values=values, characteristics=entries, measurements=measured.found.values(),
+        groups=_groups(entries, measured), units=_units(shown), scale={entry.unit: 1.0 / entry.factor for entry in shown}, wire=wire, epk=identity,
+        lists=static_lists(program), max_cto=int(max_cto or _PACKET[wire["kind"]]), little=program.little_endian, cycle=_cycle(model.sample_time),
+        quote=quote, pages=pages, addresses=addresses,
     )  # fmt: skip
-    return text.encode()
 
 
 def quote(text: str) -> str:

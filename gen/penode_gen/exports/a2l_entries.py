@@ -21,7 +21,10 @@ _FLOATS = {4: np.float32, 8: np.float64}
 
 @dataclass(frozen=True)
 class Characteristic:
-    """Values of a set that belong together: `size` is (), or (fastest, slowest) index as they lie in memory."""
+    """
+    Values of a set that belong together: `size` is (), or (fastest, slowest) index as they lie in memory. `unit` is that of the model file,
+    the number in memory is `factor` times as large: SI. `low` and `high` are in that unit.
+    """
 
     name: str
     text: str
@@ -29,6 +32,7 @@ class Characteristic:
     size: tuple[int, ...]
     type: str
     unit: str
+    factor: float
     low: float
     high: float
     offset: int  # bytes from the start of the set
@@ -36,13 +40,14 @@ class Characteristic:
 
 @dataclass(frozen=True)
 class Measurement:
-    """A number that may be read: of a model's signal in SI units."""
+    """A number that may be read. `unit`, `factor`, `low` and `high` as in Characteristic."""
 
     name: str
     text: str
     address: int
     type: str
     unit: str
+    factor: float
     low: float
     high: float
     link: str  # path in the program
@@ -85,6 +90,7 @@ def characteristics(model: Model, values: Place, number: Place) -> list[Characte
     """One for each block of the layout table. `number` is the first value."""
     low, high = limits(number)
     about = {p.name: p.description for p in model.tunable}
+    written = {p.name: p.unit for p in model.tunable}  # networks take and give SI, whatever unit their ports are written in
     found = []
     for array in layout.arrays(model):
         columns = array.shape[1] if len(array.shape) > 1 else 1
@@ -94,12 +100,15 @@ def characteristics(model: Model, values: Place, number: Place) -> list[Characte
             text = about.get(array.name) or f"{array.text}{f', rows {b.first_row} to {b.first_row + b.rows - 1}' if several else ''}"
             size = (b.rows, columns) if array.shape else ()
             offset = b.at * number.size
-            found.append(Characteristic(name, text, values.address + offset, size, a2l_type(number), _si(array.unit), low, high, offset))
+            unit, factor = scaled(written.get(array.name) or (units.si(array.unit) if array.unit else ""))
+            found.append(Characteristic(name, text, values.address + offset, size, a2l_type(number), unit, factor, low / factor, high / factor, offset))
     return found
 
 
-def _si(unit: str) -> str:
-    return "" if not unit or units.si(unit) == "1" else units.si(unit)
+def scaled(unit: str) -> tuple[str, float]:
+    """A unit of the model file as a tool shows it, and how many SI units it is: the number in memory counts those."""
+    plain = "" if unit.strip() == "1" else unit.strip()
+    return plain, units.factor(plain)
 
 
 class Measurements:
@@ -113,10 +122,11 @@ class Measurements:
     def add(self, group: str, name: str, path: str, unit: str = "", text: str = "", low: float | None = None, high: float | None = None) -> None:
         """One number. Raises KeyError if the program has it not."""
         place = self.program.find(path)
-        lowest, highest = limits(place)
+        shown, factor = scaled(unit)
+        lowest, highest = (limit if told is None else told for limit, told in zip(limits(place), (low, high)))  # in SI
         name = name if name not in self.found else f"{group}.{name}"
         self.found[name] = Measurement(
-            name, text, place.address, a2l_type(place), _si(unit), lowest if low is None else low, highest if high is None else high, path
+            name, text, place.address, a2l_type(place), shown, factor, lowest / factor, highest / factor, path
         )
         self.groups.setdefault(group, []).append(name)
 

@@ -82,9 +82,12 @@ def type_name(die: Any) -> str:
 
 
 class Program:
-    """A linked program. Raises ExportError if a file is none, or has no debug information."""
+    """
+    A linked program, or, if `shared`, a shared library, whose addresses count from where it is loaded. Raises ExportError if a file is none,
+    or has no debug information.
+    """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, shared: bool = False):
         from elftools.common.exceptions import DWARFError, ELFError
         from elftools.elf.elffile import ELFFile
 
@@ -97,7 +100,7 @@ class Program:
             self._variables = dict(self._global_variables())
         except (ELFError, DWARFError, OSError) as exc:
             raise ExportError(f"{path}: it cannot be read as an ELF program ({exc}); name the linked program") from exc
-        if self._elf["e_type"] != "ET_EXEC":
+        if self._elf["e_type"] != ("ET_DYN" if shared else "ET_EXEC"):
             raise ExportError(f"{path}: its addresses are not fixed; link the program with -no-pie")
 
     @property
@@ -159,6 +162,22 @@ class Program:
         elif place.kind:
             yield place
 
+    def member(self, place: Place, name: str) -> Place:
+        """A member of a structure. Raises KeyError."""
+        return _member(place, name)
+
+    def number(self, place: Place) -> int:
+        """The whole number, or the address, that the program's file holds there. Raises KeyError."""
+        return int.from_bytes(self.bytes_at(place.address, place.size), "little" if self.little_endian else "big")
+
+    def pointed(self, place: Place, n: int = 0) -> Place | None:
+        """Element n of what a pointer of the program's file points to; None if it is NULL. Raises KeyError where it is no pointer to data."""
+        plain = bare(place.type)
+        if plain.tag != "DW_TAG_pointer_type" or "DW_AT_type" not in plain.attributes:
+            raise KeyError(place.path)
+        address, target = self.number(place), plain.get_DIE_from_attribute("DW_AT_type")
+        return Place(f"{place.path}[{n}]", address + n * size_of(target), target) if address else None
+
     def bytes_at(self, address: int, n: int) -> bytes:
         """What the program's file holds for an address; zeros where it holds nothing. Raises KeyError outside of it."""
         section = self._section(address)
@@ -169,14 +188,14 @@ class Program:
 
 
 @lru_cache(maxsize=1)
-def _read(path: Path, changed: int) -> Program:
-    return Program(path)
+def _read(path: Path, changed: int, shared: bool) -> Program:
+    return Program(path, shared)
 
 
-def read_program(path: Path) -> Program:
-    """A linked program; the last one is kept: reading it takes a second. Raises ExportError."""
+def read_program(path: Path, shared: bool = False) -> Program:
+    """A linked program, or a shared library; the last one is kept: reading it takes a second. Raises ExportError."""
     try:
-        return _read(path, path.stat().st_mtime_ns)
+        return _read(path, path.stat().st_mtime_ns, shared)
     except OSError as exc:
         raise ExportError(f"{path}: it cannot be read as an ELF program ({exc.strerror}); name the linked program") from exc
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ..model import Model
-from . import fmu_files
+from . import fmu_files, fmu_xcp
 from .archive import zipped
 from .interface import Exporter, Options
 from .templating import render
@@ -17,10 +17,15 @@ def build(model: Model, options: Options) -> bytes:
     """The FMU. Raises ExportError."""
     context = fmu_files.context(model, options, 2)
     texts = fmu_files.sources(model, context, ("fmi2_api.h", "fmi2.c"))
-    made = {} if options["source_only"] else fmu_files.binaries(texts, model.name, 2)
+    made = {} if options["source_only"] else fmu_files.binaries(texts, model.name, 2, options["xcp"])
     made = {target: data for target, data in made.items() if target in _FOLDERS}
+    if options["xcp"]:
+        made, described = fmu_xcp.described(model, texts, made, 2, _FOLDERS)
+    else:
+        described = {}
     files: dict[str, bytes | str] = {f"sources/{name}": text for name, text in texts.items()}
     files |= {f"binaries/{_FOLDERS[target]}/{model.name}{fmu_files.suffix(target)}": data for target, data in made.items()}
+    files |= described
     files |= fmu_files.documentation(context, sorted(made))
     files["modelDescription.xml"] = render("fmi2.xml.j2", **context, compiled=sorted(name for name in texts if name.endswith(".c")))
     return zipped(files)

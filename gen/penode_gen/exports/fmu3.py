@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ..model import Model
-from . import fmu_files
+from . import fmu_files, fmu_xcp
 from .archive import zipped
 from .interface import Exporter, Options
 from .templating import render
@@ -15,9 +15,14 @@ def build(model: Model, options: Options) -> bytes:
     """The FMU. Raises ExportError."""
     context = fmu_files.context(model, options, 3)
     texts = fmu_files.sources(model, context, ("fmi3_api.h", "fmi3.c"))
-    made = {} if options["source_only"] else fmu_files.binaries(texts, model.name, 3)
+    made = {} if options["source_only"] else fmu_files.binaries(texts, model.name, 3, options["xcp"])
+    if options["xcp"]:
+        made, described = fmu_xcp.described(model, texts, made, 3, {target: target for target in made})
+    else:
+        described = {}
     files: dict[str, bytes | str] = {f"sources/{name}": text for name, text in texts.items()}
     files |= {f"binaries/{target}/{model.name}{fmu_files.suffix(target)}": data for target, data in made.items()}
+    files |= described
     files |= fmu_files.documentation(context, sorted(made))
     files["sources/buildDescription.xml"] = render("fmi3_build.xml.j2", **context, compiled=sorted(name for name in texts if name.endswith(".c")))
     files["modelDescription.xml"] = render("fmi3.xml.j2", **context)

@@ -26,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[3]
 OPTIONS = (
     Option("real", "number type inside, float (default) or double", choices=("float", "double"), default="float"),
     Option("source_only", "leave the binaries out", "flag", default=False),
+    Option("xcp", "an A2L inside, for XCP through the importer (FMI-LS-XCP); one instance in a process", "flag", default=False),
 )
 # Parts of the runtime that no FMU needs.
 _LEFT_OUT = ("pen_xcp", "pen_selftest")
@@ -68,7 +69,7 @@ def context(model: Model, options: Options, fmi: int) -> dict[str, Any]:
         "inputs": model.inputs, "outputs": model.outputs, "sensors": model.sensors, "states": model.states, "start": model.start,
         "constants": [v.start[0] for v in found if v.key == "constant" and v.start], "sets": list(model.sets), "sampled": bool(model.sampled),
         "sample_time": repr(model.sample_time), "units": fv.unit_definitions(found), "functions": functions(fmi), "real": options["real"],
-        "provided": _provided(fmi),
+        "provided": _provided(fmi), "xcp": options["xcp"],
     }  # fmt: skip
 
 
@@ -110,8 +111,8 @@ def flat(text: str, real: str) -> str:
     return text
 
 
-def binaries(texts: dict[str, str], name: str, fmi: int) -> dict[str, bytes]:
-    """Platform of FMI 3 -> shared library, for each compiler that is installed here. Raises ExportError where one refuses."""
+def binaries(texts: dict[str, str], name: str, fmi: int, debug: bool = False) -> dict[str, bytes]:
+    """Platform of FMI 3 -> shared library, for each compiler that is installed here; `debug`: ELF files with DWARF. Raises ExportError where one refuses."""
     made: dict[str, bytes] = {}
     with tempfile.TemporaryDirectory() as folder:
         for file, text in texts.items():
@@ -121,7 +122,7 @@ def binaries(texts: dict[str, str], name: str, fmi: int) -> dict[str, bytes]:
                 continue
             output = f"{name}{suffix}"
             files = sorted(file for file in texts if file.endswith(".c"))
-            command = [compiler, *_FLAGS, *more, f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", *files, "-o", output]
+            command = [compiler, *_FLAGS, *more, *(["-g"] if debug and suffix == ".so" else []), f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", *files, "-o", output]
             done = subprocess.run(command, cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL)
             if done.returncode:
                 lines = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines() or ["?"]

@@ -78,7 +78,7 @@ def build(model: Model, options: Options) -> bytes:
     if options["set"] not in (*model.sets, ""):
         raise ExportError(f"--set: the model file has no set '{options['set']}'; use one of: {', '.join(model.sets)}")
     old = version == "1.0"
-    fmu = (fmu2 if old else fmu3).build(model, {key: options[key] for key in ("real", "source_only")})
+    fmu = (fmu2 if old else fmu3).build(model, {option.name: options[option.name] for option in fmu_files.OPTIONS})
     dtype = fmu_files.dtype(options)
     context = {
         "model": model, "name": fv.identifier(model), "generator": f"penode {VERSION}", "version": version, "old": old, "exchanges": exchanges,

@@ -36,17 +36,45 @@ class Block:
         at = self.words.index(keyword) + 1 if keyword in self.words else 0
         return self.words[at : at + n] if at else []
 
+    def sizes(self) -> tuple[int, ...]:
+        """MATRIX_DIM, of three numbers or, since ASAP2 1.70, of any."""
+        found = []
+        for word in self.after("MATRIX_DIM", len(self.words)):
+            if not word[0].isdecimal():
+                break
+            found.append(int(word, 0))
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A conversion: a tool shows scale * number in memory + offset, in `unit`."""
+
+    unit: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+
 
 @dataclass(frozen=True)
 class Entry:
-    """A characteristic or a measurement: numbers of `type` at an address."""
+    """A characteristic or a measurement: numbers of `type` at an address, which `method` turns into what a tool shows."""
 
     name: str
     text: str
     address: int
     type: np.dtype[Any]
     sizes: tuple[int, ...]  # the fastest index first; () of a number
-    unit: str
+    method: Method = Method()
+
+    @property
+    def unit(self) -> str:
+        """Of what a tool shows."""
+        return self.method.unit
+
+    def shown(self, numbers: Any) -> Any:
+        """What a tool shows: the numbers themselves where they are not scaled, else float64."""
+        plain = self.method.scale == 1.0 and self.method.offset == 0.0
+        return numbers if plain else np.asarray(numbers, dtype=np.float64) * self.method.scale + self.method.offset
 
     @property
     def count(self) -> int:
@@ -102,17 +130,28 @@ def _tree(text: str) -> Block:
     return top
 
 
-def _characteristic(block: Block, types: dict[str, str], units: dict[str, str]) -> Entry:
+def _method(block: Block) -> Method:
+    """Of one that is neither identical nor linear: the number in memory, without a unit."""
+    kind, unit = block.words[2], block.words[4]
+    if kind == "LINEAR":
+        scale, offset = (float(word) for word in block.after("COEFFS_LINEAR", 2))
+        return Method(unit, scale, offset)
+    if kind == "RAT_FUNC":  # number in memory = (a x^2 + b x + c) / (d x^2 + e x + f) of what is shown
+        a, b, c, d, e, f = (float(word) for word in block.after("COEFFS", 6))
+        return Method() if a or d or e or not b else Method(unit, f / b, -c / b)
+    return Method(unit if kind == "IDENTICAL" else "")
+
+
+def _characteristic(block: Block, types: dict[str, str], methods: dict[str, Method]) -> Entry:
     name, text, _, address, record, _, method = block.words[:7]
-    sizes = [int(word, 0) for word in block.after("MATRIX_DIM", 3)] or [int(word, 0) for word in block.after("NUMBER", 1)]
-    return Entry(name, text, int(address, 0), np.dtype(_TYPES[types[record]]), tuple(sizes), units.get(method, ""))
+    sizes = block.sizes() or tuple(int(word, 0) for word in block.after("NUMBER", 1))
+    return Entry(name, text, int(address, 0), np.dtype(_TYPES[types[record]]), sizes, methods.get(method, Method()))
 
 
-def _measurement(block: Block, units: dict[str, str]) -> Entry:
+def _measurement(block: Block, methods: dict[str, Method]) -> Entry:
     name, text, kind, method = block.words[:4]
     (address,) = block.after("ECU_ADDRESS", 1) or ["0"]
-    sizes = [int(word, 0) for word in block.after("MATRIX_DIM", 3)]
-    return Entry(name, text, int(address, 0), np.dtype(_TYPES[kind]), tuple(sizes), units.get(method, ""))
+    return Entry(name, text, int(address, 0), np.dtype(_TYPES[kind]), block.sizes(), methods.get(method, Method()))
 
 
 def parse(text: str, origin: str) -> A2l:
@@ -120,10 +159,10 @@ def parse(text: str, origin: str) -> A2l:
     try:
         top = _tree(text)
         module = top.all("MODULE")[0]
-        units = {b.words[0]: b.words[4] for b in module.all("COMPU_METHOD") if b.words[2] == "IDENTICAL"}
+        methods = {b.words[0]: _method(b) for b in module.all("COMPU_METHOD")}
         types = {b.words[0]: b.after("FNC_VALUES", 2)[1] for b in module.all("RECORD_LAYOUT") if b.after("FNC_VALUES", 2)}
-        characteristics = [_characteristic(b, types, units) for b in module.all("CHARACTERISTIC")]
-        measurements = [_measurement(b, units) for b in module.all("MEASUREMENT")]
+        characteristics = [_characteristic(b, types, methods) for b in module.all("CHARACTERISTIC")]
+        measurements = [_measurement(b, methods) for b in module.all("MEASUREMENT")]
         segments = [tuple(int(word, 0) for word in b.words[5:7]) for b in module.all("MEMORY_SEGMENT")]
         parts = module.all("MOD_PAR")
         epk = (parts[0].after("EPK", 1), parts[0].after("ADDR_EPK", 1)) if parts else ([], [])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import UserError, hint
 from ..targets import FLAGS, MACHINES, PORT, ROOT, _files, _included, _kept, _version, generated, model_options
 from .codes import Slave
-from .virtual import Served, describe, free_port, identity
+from .virtual import Served, describe, free_port, identity, period
 
 WITH_UART = ("m4f", "m3", "m7")  # port/cortex-m/uart.c knows their serial line
 _EMULATOR = "qemu-system-arm"
@@ -29,12 +29,15 @@ def build(model: Any, machine: str) -> Path:
     """The program for one of WITH_UART, with debug information. Raises UserError."""
     if machine not in WITH_UART:
         raise UserError(f'--on: there is no controller for "{machine}"; {hint(machine, WITH_UART)}')
+    between = period(model)
+    if 10**9 % between:  # ns
+        raise UserError(f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; use --on sil")
     source, firmware = generated(model), ROOT / "sil" / "firmware"
     code = [source / f"{model.name}.c", source / f"{model.owner}_params.c", *_files(("src", "*.c"))]
     own = [firmware / "serve_uart.c", firmware / "controller.c", PORT / "uart.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
     command = [
         str(PORT / "cc"), MACHINES[machine], *FLAGS, "-O2", "-g", f"-I{ROOT}/port/xcp", f"-I{PORT}", f"-I{source}", *model_options(model),
-        f'-DCONTROLLER_EPK="{identity(model)} {machine}"', *map(str, [*own, *code]),
+        f'-DCONTROLLER_EPK="{identity(model)} {machine}"', f"-DCONTROLLER_PERIOD={between}ULL", *map(str, [*own, *code]),
     ]  # fmt: skip
     headers = [*_files(("port/xcp", "*.h"), ("sil/firmware", "*.h")), source / f"{model.name}.h"]
     return _kept(f"{model.name}-uart-{machine}", ".elf", command, [_version("arm-none-eabi-gcc"), *_included(), *headers, *own, *code])

@@ -40,12 +40,15 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A measurement: time [s] from the first sample, [n]; values [n] of each signal; samples that the controller took, but that never came."""
+    """
+    A measurement: time [s] from the first sample, [n]; values [n] of each signal; samples that the controller took, but that never
+    came, None where it does not state the period of its event.
+    """
 
     time: NDArray[np.float64]
     values: dict[str, NDArray[Any]]
-    lost: int
-    period: float  # [s] between two samples
+    lost: int | None
+    period: float  # [s] between two samples; 0: not stated
 
 
 def _policy(entries: list[Entry], every: int) -> tuple[Any, Samples]:
@@ -94,13 +97,13 @@ def choose(a2l: A2l, names: list[str]) -> list[Entry]:
 def _log(link: Link, entries: list[Entry], kept: Samples, every: int) -> Log:
     """Unwrap the time stamps and count what is missing between them."""
     info = link.ask("GET_DAQ_EVENT_INFO", link.master.getDaqEventInfo, int(Slave.STEP))
-    unit = int(info.eventChannelTimeUnit) if not isinstance(info.eventChannelTimeUnit, str) else 6
-    period = float(info.eventChannelTimeCycle) * 10.0 ** (unit - 9) * every
+    unit = int(info.eventChannelTimeUnit)  # 0: 1 ns, ... 9: 1 s, 10: 1 ps, ...
+    period = float(info.eventChannelTimeCycle) * 10.0 ** (unit - (9 if unit < 10 else 22)) * every
     rows = list(kept.rows)
     stamps = np.array(kept.stamps[: len(rows)], dtype=np.int64) // 1000  # us
     steps = np.diff(stamps) % (1 << 32)  # they are of 32 bits
     time_ = np.concatenate([[0.0], np.cumsum(steps) * 1e-6]) if stamps.size else np.zeros(0)
-    lost = int(np.maximum(np.rint(steps * 1e-6 / period) - 1, 0).sum()) if period > 0.0 else 0
+    lost = int(np.maximum(np.rint(steps * 1e-6 / period) - 1, 0).sum()) if period > 0.0 else None
     columns = np.array(rows, dtype=object).reshape(stamps.size, len(kept.names))
     column = {entry.address: kept.names.index(entry.name) for entry in entries if entry.name in kept.names}
     values = {entry.name: columns[:, column[entry.address]].astype(entry.type) for entry in entries}
@@ -180,11 +183,15 @@ def measure(
     if not log.time.size:
         raise UserError(f"{to}: no sample has come; is the controller stepping?")
     write_mf4(output, columns(log, described), "penode measure")
-    click.echo(f"{to}: {log.time.size} samples in {log.time[-1]:.3f} s, {log.lost} lost -> {output}")
+    lost = "lost ones not counted" if log.lost is None else f"{log.lost} lost"
+    click.echo(f"{to}: {log.time.size} samples in {log.time[-1]:.3f} s, {lost} -> {output}")
+    if log.lost is None:
+        note("XCP has no code for the controller's period (1 to 255 times 1 ns, 10 ns, ... 1 s): measure a counter, such as sample, to see gaps")
     if log.lost:
         note("the line was too slow for some samples: measure fewer signals, or --every 2")
 
 
 def columns(log: Log, a2l: A2l) -> list[Column]:
     """A log as a table."""
-    return [Column("time", "s", log.time), *(Column(name, a2l.measurements[name].unit or "1", values) for name, values in log.values.items())]
+    entries = a2l.measurements
+    return [Column("time", "s", log.time), *(Column(name, entries[name].unit or "1", entries[name].shown(values)) for name, values in log.values.items())]

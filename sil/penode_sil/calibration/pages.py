@@ -91,7 +91,7 @@ class Pages:
             first = (entry.address - address) // kind.itemsize
             pair = [page[1][first : first + entry.count] for page in (self.running, self.reference)]
             for n in np.flatnonzero(pair[0].view(f"u{kind.itemsize}") != pair[1].view(f"u{kind.itemsize}")):
-                found.append((entry.element(int(n)), entry.unit, float(pair[0][n]), float(pair[1][n])))
+                found.append((entry.element(int(n)), entry.unit, float(entry.shown(pair[0][n])), float(entry.shown(pair[1][n]))))
         return found
 
 
@@ -99,7 +99,7 @@ def look(link: Link, a2l: A2l) -> Pages:
     """Both pages of a controller, whose tool page is the working page afterwards. A set that is open is not looked at: none is after CONNECT."""
     address, size, kind = segment(a2l)
     page = link.page(Who.ECU)
-    whole = Entry("segment", "", address, kind, (size // kind.itemsize,), "")
+    whole = Entry("segment", "", address, kind, (size // kind.itemsize,))
     found = {}
     for tool in {page, Page.REFERENCE}:
         link.set_page(Who.TOOL, tool)

@@ -35,8 +35,21 @@ def identity(model: Any) -> str:
     return f"{model.name} {penode_gen.VERSION} {model.digest[:12]}"
 
 
+def period(model: Any) -> int:
+    """Time between two steps [ns]. Raises UserError where that is no whole number: a controller that rounds it runs at another speed."""
+    exact = model.sample_time * 1e9
+    found = round(exact)
+    if found < 1000 or abs(found - exact) > 1e-12 * exact:  # 1e-12: a few roundings of float64, from "0.3 ms" to seconds
+        near = max(round(exact / 1000.0), 1)
+        raise UserError(
+            f"{model.path.name}: sample_time: {model.sample_time!r} s is no whole number of nanoseconds from 1000 on, which a controller needs; "
+            f'choose another, such as "{near} us"'
+        )
+    return int(found)
+
+
 def build(model: Any) -> Path:
-    """The virtual controller of a model."""
+    """The virtual controller of a model. Raises UserError."""
     source, firmware = generated(model), ROOT / "sil" / "firmware"
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], _files(("src", "*.c"))
     own = [ROOT / "port" / "host" / "serve.c", firmware / "controller.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
@@ -44,8 +57,8 @@ def build(model: Any) -> Path:
     options = ["gcc", "-O2", "-g", *FLAGS, "-fno-pie", *include]
     read = [_version("gcc"), *_files(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("sil/firmware", "*.h"))]
     same = _kept("runtime-serve", ".o", [*options[:-1], "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
-    epk = f'-DCONTROLLER_EPK="{identity(model)}"'
-    command = [*options, "-no-pie", "-pthread", *model_options(model), epk, *map(str, [*own, *code, same])]
+    told = [f'-DCONTROLLER_EPK="{identity(model)}"', f"-DCONTROLLER_PERIOD={period(model)}ULL"]
+    command = [*options, "-no-pie", "-pthread", *model_options(model), *told, *map(str, [*own, *code, same])]
     return _kept(f"{model.name}-serve", ".elf", command, [*read, *own, *code, source / f"{model.name}.h", same])
 
 
