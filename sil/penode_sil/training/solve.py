@@ -99,6 +99,18 @@ def solve(
     return Fit(point, state.cost, normal, state.damping, state.steps, state.poor >= patience)
 
 
+def _inside(curvature: Array, slope: Array, limits: Limits, point: Point) -> Array:
+    """The step within the limits, and within those of the parameters where it would pass one: a parameter keeps its sign."""
+    step = least(curvature, slope, limits, point.vector)
+    n = len(point.ratios)
+    if np.all(point.ratios + step[:n] >= SETTINGS.problem_least):
+        return step
+    rows = np.eye(n, len(step))
+    low = np.full(n, SETTINGS.problem_least * (1.0 + 1e-6))  # more than what the solution is off by
+    both = Limits(np.vstack([limits.rows, rows]), np.concatenate([limits.least, low])) if limits.some else Limits(rows, low)
+    return least(curvature, slope, both, point.vector)
+
+
 def _step(problem: Problem, point: Point, normal: Normal, state: State, limits: Limits) -> tuple[Point, float, float] | None:
     """The next point, its cost and the damping that led there; None where no damping gains."""
     precision, origin = problem.prior(point)
@@ -109,7 +121,7 @@ def _step(problem: Problem, point: Point, normal: Normal, state: State, limits: 
     full = ((0.0, 1.0), (0.0, 0.5)) if len(slope) <= SETTINGS.problem_wide else ()
     for d, share in (*full, *((by * state.damping, 1.0) for by in (0.1, 1.0, 10.0, 1e2, 1e3, 1e5))):
         try:
-            step = least(curvature + np.diag(d * extra), slope, limits, point.vector)
+            step = _inside(curvature + np.diag(d * extra), slope, limits, point)
         except (np.linalg.LinAlgError, RuntimeError):
             continue
         new = point.moved(share * step)

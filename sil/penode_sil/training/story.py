@@ -21,7 +21,7 @@ from penode_gen.networks import Network
 
 from ..errors import UserError
 from ..measured import Measured
-from . import apart, bands, begin, curves, data, dense, ends, judge, promised, unfold, unknown
+from . import apart, bands, begin, curves, data, dense, ends, heldout, judge, promised, unfold, unknown
 from .curve import Curve
 from .curves import Tell
 from .port import Port, inputs_of
@@ -86,13 +86,17 @@ def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin
 
 
 def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], curves.Limits]]) -> tuple[Problem, Fit]:
-    """The fit with the colour of what it leaves, for its estimate and its band."""
+    """The fit with the colour of what it leaves, for its estimate and its band. What is louder than noise is what the model lacks: there the
+    estimate stays that of least errors, and curves bend as held-out parts of the recordings allow."""
+    loud = heldout.loud(problem, fit.point)
+    if loud:
+        problem, fit = heldout.bent(problem, fit, curves.limits_of(problem, bounds))
     found = problem.residuals(fit.point)
     if found is None:
         return problem, fit
     noise = data.of_residuals(found[0], [r.good for r in problem.records], problem.noise, coloured=True)
     own = problem.with_(noise=noise)
-    if not any(len(c) for c in noise.colour):
+    if loud or not any(len(c) for c in noise.colour):
         return own, replace(fit, normal=own.normal(fit.point))
     return own, solve(own, fit.point, 6, 1.0, curves.limits_of(own, bounds), damping=1e-6)
 
