@@ -65,9 +65,13 @@ train: setup ## From a recording to a running controller: record, train, check o
 onnx-table: setup ## Which operators of ONNX are read, by the cases of its own project; why others are refused
 	$(Q)$(PYTHON) test/gen/onnx_table.py
 
-campaign-train: setup ## Train on recordings of plants that are known, five seeds each: the table of test/training/CAMPAIGN.md, half an hour
-	$(Q)$(PYTHON) test/training/campaign.py --page test/training/CAMPAIGN.md
-	$(Q)$(PYTHON) test/training/campaign_more.py --page test/training/CAMPAIGN.md
+campaign-train: setup ## Train on recordings of plants that are known, five seeds each, and on measured dampers: test/training/CAMPAIGN.md; goes on where it was stopped
+	$(Q)$(PYTHON) test/training/campaign.py
+	$(Q)$(PYTHON) test/training/campaign.py --only tanh --seeds 10
+	$(Q)$(PYTHON) test/training/campaign_more.py
+	$(Q)$(PYTHON) test/training/campaign_promises.py
+	$(Q)$(PYTHON) test/training/campaign_rigs.py --rigs $(RIGS_DIR)
+	$(Q)$(PYTHON) test/training/campaign_page.py
 
 hidden-mechanisms: setup ## Half-cars with pitch and two-mass drives with something hidden: places, missing forces, nulls; 20 cases of each, minutes
 	$(Q)$(PYTHON) test/diagnosis/mechanisms_campaign.py --cases 20

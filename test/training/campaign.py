@@ -10,6 +10,7 @@ their noise, inside the trained range. The band covers: share of places where tr
 from __future__ import annotations
 
 import argparse
+import json
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -114,7 +115,7 @@ def run(case: Case, seed: int, folder: Path) -> dict[str, object]:
         "case": case.name, "seed": seed, "seconds": t.seconds, "forces": {n: e for n, e, _ in found}, "covered": [c for *_, c in found if np.isfinite(c)],
         "ratios": 100.0 * (max(ratios) / min(ratios) - 1.0), "absolute": 100.0 * max(abs(r - 1.0) for r in ratios),
         "holdout": 100.0 * (max(e.inside / e.noise for e in t.holdout) - 1.0), "masked": 100.0 * t.masked, "outside": 100.0 * t.outside,
-        "converged": t.converged, "scale": any(u.kind == "scale" for u in t.unknown), "chi2": t.chi2,
+        "converged": bool(t.converged), "scale": any(u.kind == "scale" for u in t.unknown), "chi2": t.chi2,
     }  # fmt: skip
 
 
@@ -141,25 +142,30 @@ HEAD = (
 )
 
 
+def read(path: Path) -> list[dict[str, object]]:
+    """Trainings of a campaign so far; none where there is no such file."""
+    return [json.loads(text) for text in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
+
+
 def main() -> None:
-    """All cases, or those whose names hold a word."""
+    """All cases, or those whose names hold a word; a training that is among the rows already is not run again."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", default="")
     parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--page", type=Path)
+    parser.add_argument("--rows", type=Path, default=Path("build/campaign-train/rows.jsonl"), help="what was found, a training a line")
     given = parser.parse_args()
-    lines = [HEAD]
+    given.rows.parent.mkdir(parents=True, exist_ok=True)
     print(HEAD, flush=True)
     with tempfile.TemporaryDirectory() as folder:
         for case in (c for c in CASES if given.only in c.name):
-            rows = [run(case, seed, Path(folder)) for seed in range(1, given.seeds + 1)]
-            lines.append(line(rows))
-            print(lines[-1], flush=True)
+            rows = [r for r in read(given.rows) if r["case"] == case.name]
+            for seed in (k for k in range(1, given.seeds + 1) if k not in {r["seed"] for r in rows}):
+                rows.append(run(case, seed, Path(folder)))
+                with given.rows.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(rows[-1]) + "\n")
+            print(line(rows), flush=True)
             for r in (r for r in rows if "failed" in r):
                 print(f"  seed {r['seed']}: {r['failed']}", flush=True)
-    if given.page:
-        text = "# Trained networks against plants that are known\n\nWritten by `make campaign-train`. " + " ".join((__doc__ or "").split()) + "\n\n"
-        given.page.write_text(text + "\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -21,10 +21,11 @@ from ..console import FILE, Several, staged
 @click.option("--from", "start", type=FILE, multiple=True, help="Start there: a trained or extended model file, NETWORK.onnx, or diagnosis.json.")
 @click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
 @click.option("--seed", default=0, show_default=True, help="Of the weights that a network starts from; curves need none.")
+@click.option("--resume", is_flag=True, help="Go on with the training into DIR that was interrupted, to the same bits.")
 @click.option("--json", "as_json", is_flag=True, help="Print training.json.")
 def train(
     model: Path, data: tuple[Path, ...], holdout: tuple[Path, ...], output: Path, known: tuple[str, ...], start: tuple[Path, ...],
-    channel: tuple[str, ...], seed: int, as_json: bool,
+    channel: tuple[str, ...], seed: int, resume: bool, as_json: bool,
 ) -> None:
     """Fit the networks of the model file MODEL, and its parameters within their tolerances, to recordings.
 
@@ -36,5 +37,5 @@ def train(
 
     check_folder(output)
     with staged() as tell:
-        found = files.run(files.Job(model, data, holdout, output, channel, known, seed, start), tell)
+        found = files.run(files.Job(model, data, holdout, output, channel, known, seed, start, resume), tell)
     click.echo(json.dumps(found.as_json(), indent=2) if as_json else result.sentences(found, output))

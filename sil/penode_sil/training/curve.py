@@ -84,15 +84,19 @@ def three(reach: float, zero: bool) -> Curve:
 
 
 def spaced(low: float, high: float, count: int, power: float) -> Array:
-    """`count` knots from low to high, dense about 0 by a power; one of them is 0 exactly."""
+    """`count` knots from low to high, dense about 0 by a power; one of them is 0 exactly, and those on both sides of it mirror each other."""
     low, high = min(low, 0.0), max(high, 0.0)
     wide = high ** (1.0 / power) + (-low) ** (1.0 / power)
     left = int(round((count - 1) * (-low) ** (1.0 / power) / wide))
     left = min(max(left, 1 if low < 0.0 else 0), count - 1 - (1 if high > 0.0 else 0))
-    right = count - 1 - left
-    below = low * np.linspace(1.0, 0.0, left + 1)[:-1] ** power if left else np.zeros(0)
-    above = high * np.linspace(0.0, 1.0, right + 1)[1:] ** power if right else np.zeros(0)
-    return np.concatenate([below, [0.0], above])
+    unit = wide / (count - 1)
+
+    def side(n: int, end: float) -> Array:
+        """n knots on the way from 0 to an end: by the common unit, the last one at the end."""
+        own = min(unit, end ** (1.0 / power) / max(n - 0.5, 0.5))  # where rounding left too little room
+        return np.append((own * np.arange(1, n)) ** power, end) if n else np.zeros(0)
+
+    return np.concatenate([-side(left, -low)[::-1], [0.0], side(count - 1 - left, high)])
 
 
 def bent(knots: Array, values: Array, spread: Array, regular: NDArray[np.bool_]) -> bool:
@@ -113,13 +117,23 @@ def fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArr
 
     Of so many candidates noise makes some look wanted, and a curve whose knots noise has chosen is wrong by more than its covariance shows. So
     another knot than those of the `regular` grid must gain more than that by 2 ln(candidates) (risk inflation criterion; Foster and George,
-    Annals of Statistics 22, 1994). The outermost knots and that at 0 stay.
+    Annals of Statistics 22, 1994). The outermost knots and that at 0 stay. The first knots on both sides of 0 stay or go together: what straight
+    pieces miss of a force that turns there cancels, or else it moves the force on both sides by a constant.
     """
+    kept = _fewer(knots, values, spread, count, regular, np.arange(len(knots)) == zero)
+    if not 1 < zero < len(knots) - 2 or kept[zero - 1] == kept[zero + 1]:
+        return kept
+    fixed = np.abs(np.arange(len(knots)) - zero) <= 1
+    return _fewer(knots, values, spread, count, regular, fixed) if fixed.sum() + 2 <= count else kept
+
+
+def _fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArray[np.bool_], fixed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The same with knots that stay."""
     keep = np.ones(len(knots), dtype=bool)
     favour = 2.0 * np.log(len(knots))
     while keep.sum() > count:
         at = np.flatnonzero(keep)
-        inner = [k for k in range(1, len(at) - 1) if at[k] != zero]
+        inner = [k for k in range(1, len(at) - 1) if not fixed[at[k]]]
         if not inner:
             break
         k = np.array(inner)

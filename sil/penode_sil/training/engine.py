@@ -123,6 +123,11 @@ class Engine:
         return job, [*kept, nets, which, p, x, sensitivity, nodes, shares, scratch]
 
 
+def compiler() -> str:
+    """The version of the compiler that makes the library."""
+    return _version("gcc")
+
+
 def _compiled(text: str) -> Path:
     """The library of a source text, compiled once."""
     folder = build_directory()
@@ -132,4 +137,4 @@ def _compiled(text: str) -> Path:
     if not source.exists():
         with whole(source) as part:
             part.write_text(text, encoding="utf-8")
-    return _kept("train", ".so", ["gcc", *OPTIONS, "-fPIC", "-shared", str(source)], [_version("gcc"), text])
+    return _kept("train", ".so", ["gcc", *OPTIONS, "-fPIC", "-shared", str(source)], [compiler(), text])

@@ -20,9 +20,11 @@ from ..diagnosis.files import all_or_none
 from ..errors import UserError
 from ..measured import load
 from ..output import whole
-from . import begin, onnx_file, report, threads
+from . import begin, onnx_file, report, resume, threads
+from .engine import compiler
 from .result import Trained
-from .story import Options, check, train
+from .settings import SETTINGS
+from .story import Options, check, train, versions
 
 
 @dataclass(frozen=True)
@@ -37,20 +39,30 @@ class Job:
     known: tuple[str, ...] = ()
     seed: int = 0
     start: tuple[Path, ...] = ()
+    resume: bool = False  # from the checkpoint in the folder, if there is one
 
 
 def run(job: Job, tell: Callable[[float, str], None] = lambda share, doing: None) -> Trained:
     """Train and write into the job's folder. UserError for bad input."""
     model = penode_gen.load(job.model)
     check(model)
-    options = Options(tuple(_known(text, model) for text in job.known), job.seed, begin.read(job.start, model))
+    known, start = tuple(_known(text, model) for text in job.known), begin.read(job.start, model)
     measured, held = load(job.data, model, job.channels), load(job.holdout, model, job.channels)
-    with threads.one():
-        after, found = train(model, measured, held, options, tell)
-    with all_or_none(job.output):
-        job.output.mkdir(exist_ok=True)
-        _write(job, model, after, found)
+    with resume.journal(job.output, _identity(job, model, start), job.resume) as journal:
+        with threads.one():
+            after, found = train(model, measured, held, Options(known, job.seed, start, journal), tell)
+        with all_or_none(job.output):
+            job.output.mkdir(exist_ok=True)
+            _write(job, model, after, found)
     return found
+
+
+def _identity(job: Job, model: Model, start: begin.Start) -> dict[str, str]:
+    """All that the bits of a training follow from, in the words of its call."""
+    return resume.identity({
+        "model file": model.digest, "--data": job.data, "--holdout": job.holdout, "--channel": job.channels, "--known": job.known, "--seed": job.seed,
+        "--from": start, "versions of programs": (versions(), compiler(), SETTINGS),
+    })  # fmt: skip
 
 
 def _known(text: str, model: Model) -> tuple[str, float | None]:

@@ -18,6 +18,7 @@ from .curve import Curve
 from .data import Noise, Record
 from .dense import Dense
 from .engine import Engine, Shape
+from .resume import Journal
 from .settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -40,12 +41,16 @@ class Point:
 
     def moved(self, step: Array) -> Point:
         """The point a step away."""
+        return self.placed(self.vector + step)
+
+    def placed(self, vector: Array) -> Point:
+        """The point with other values of all unknowns."""
         n, m = len(self.ratios), self.starts.size
         at, shapes = n + m, []
         for s in self.shapes:
-            shapes.append(s.with_theta(s.theta + step[at : at + len(s.theta)]))
+            shapes.append(s.with_theta(vector[at : at + len(s.theta)]))
             at += len(s.theta)
-        return Point(self.ratios + step[:n], self.starts + step[n : n + m].reshape(self.starts.shape), tuple(shapes))
+        return Point(vector[:n], vector[n : n + m].reshape(self.starts.shape), tuple(shapes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +73,7 @@ class Problem:
     frozen: bool = False  # only start states move
     tied: Array | None = None  # [directions, free]: of the parameters, that no sensor sees; they stay where the model file has them
     apart: tuple[Apart, ...] = ()  # networks beside free parameters in the same place
+    journal: Journal = field(default_factory=Journal)  # of the training's fits
     model: Model = field(init=False)
 
     def __post_init__(self) -> None:
@@ -75,7 +81,7 @@ class Problem:
 
     def with_(self, **changes: object) -> Problem:
         """The same problem but for some of it."""
-        given = {k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied", "apart")}
+        given = {k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied", "apart", "journal")}
         return Problem(**(given | changes))  # type: ignore[arg-type]
 
     @property

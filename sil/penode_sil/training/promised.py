@@ -45,7 +45,7 @@ def bound(promises: Promises, margin: float = SETTINGS.promised_first, size: flo
         if promises.dissipative is not None:
             away = curve.knots != 0.0
             sign = np.sign(curve.knots[away])
-            gone = np.minimum(16.0 * force, np.abs(curve.knots[away]) * by) if promises.dissipative == 0.0 else 16.0 * force
+            gone = np.minimum(16.0 * force, np.abs(curve.knots[away]) * by)  # near 0, where the force is small, so is its rounding
             add(sign[:, None] * values[away], gone - promises.dissipative)
             add(slopes[[0, -1]], by)  # beyond the outermost knots it goes on
         return Limits(np.vstack(rows), np.concatenate(least)) if rows else NONE

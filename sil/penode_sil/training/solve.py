@@ -5,14 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
 
+from .curve import Curve
 from .problem import Normal, Point, Problem
+from .resume import State
 from .settings import SETTINGS
 
 Array = NDArray[np.float64]
@@ -76,37 +78,58 @@ def solve(
     damping: float = 1e-3, tell: Callable[[int], None] = lambda k: None, patience: int = 2,
 ) -> Fit:  # fmt: skip
     """From a point to the least cost. Two dampings are tried at once, then larger ones until one gains."""
-    cost = problem.cost(point)
-    if not np.isfinite(cost):
+    number, state = problem.journal.enter([point.vector, *(s.knots for s in point.shapes if isinstance(s, Curve)), np.array([iterations, close, damping, patience])])
+    if state is None:
+        state = State(point.vector, problem.cost(point), damping, 0, 0)
+    if not np.isfinite(state.cost):
         raise FloatingPointError("the simulation left all bounds")
-    poor, k = 0, 0
+    point = point.placed(state.vector)
     normal = problem.normal(point)
-    while k < iterations and poor < patience:
-        k += 1
-        tell(k)
-        precision, origin = problem.prior(point)
-        curvature, slope = normal.curvature + precision, normal.slope - precision @ (point.vector - origin)
-        diagonal = np.diag(curvature)
-        extra = np.maximum(diagonal, SETTINGS.solve_floor * float(diagonal.max()))
-        best, found, used = cost, None, 0.0
-        full = ((0.0, 1.0), (0.0, 0.5)) if len(slope) <= SETTINGS.problem_wide else ()
-        for d, share in (*full, *((by * damping, 1.0) for by in (0.1, 1.0, 10.0, 1e2, 1e3, 1e5))):
-            try:
-                step = least(curvature + np.diag(d * extra), slope, limits(point), point.vector)
-            except (np.linalg.LinAlgError, RuntimeError):
-                continue
-            new = point.moved(share * step)
-            value = problem.cost(new)
-            if value < best or (found is None and limits(point).some and k == 1 and np.isfinite(value)):
-                best, found, used = value, new, d
-                if share == 1.0 and d == 0.0 and k > 1:
-                    break
-            elif found is not None and d >= damping:
-                break
+    while state.steps < iterations and state.poor < patience:
+        tell(state.steps + 1)
+        found = _step(problem, point, normal, state, limits(point))
         if found is None:
-            poor = patience
+            state = replace(state, poor=patience, steps=state.steps + 1)
+        else:
+            new, cost, used = found
+            poor = state.poor + 1 if state.cost - cost < close else 0
+            point, state = new, State(new.vector, cost, max(used, 0.1 * state.damping, 1e-9), poor, state.steps + 1)
+            normal = problem.normal(point)
+        problem.journal.note(number, state)
+    return Fit(point, state.cost, normal, state.damping, state.steps, state.poor >= patience)
+
+
+def _inside(curvature: Array, slope: Array, limits: Limits, point: Point) -> Array:
+    """The step within the limits, and within those of the parameters where it would pass one: a parameter keeps its sign."""
+    step = least(curvature, slope, limits, point.vector)
+    n = len(point.ratios)
+    if np.all(point.ratios + step[:n] >= SETTINGS.problem_least):
+        return step
+    rows = np.eye(n, len(step))
+    low = np.full(n, SETTINGS.problem_least * (1.0 + 1e-6))  # more than what the solution is off by
+    both = Limits(np.vstack([limits.rows, rows]), np.concatenate([limits.least, low])) if limits.some else Limits(rows, low)
+    return least(curvature, slope, both, point.vector)
+
+
+def _step(problem: Problem, point: Point, normal: Normal, state: State, limits: Limits) -> tuple[Point, float, float] | None:
+    """The next point, its cost and the damping that led there; None where no damping gains."""
+    precision, origin = problem.prior(point)
+    curvature, slope = normal.curvature + precision, normal.slope - precision @ (point.vector - origin)
+    diagonal = np.diag(curvature)
+    extra = np.maximum(diagonal, SETTINGS.solve_floor * float(diagonal.max()))
+    best: tuple[Point, float, float] | None = None
+    full = ((0.0, 1.0), (0.0, 0.5)) if len(slope) <= SETTINGS.problem_wide else ()
+    for d, share in (*full, *((by * state.damping, 1.0) for by in (0.1, 1.0, 10.0, 1e2, 1e3, 1e5))):
+        try:
+            step = _inside(curvature + np.diag(d * extra), slope, limits, point)
+        except (np.linalg.LinAlgError, RuntimeError):
+            continue
+        new = point.moved(share * step)
+        value = problem.cost(new)
+        if value < (state.cost if best is None else best[1]) or (best is None and limits.some and state.steps == 0 and np.isfinite(value)):
+            best = new, value, d
+            if share == 1.0 and d == 0.0 and state.steps > 0:
+                break
+        elif best is not None and d >= state.damping:
             break
-        poor = poor + 1 if cost - best < close else 0
-        point, cost, damping = found, best, max(used, 0.1 * damping, 1e-9)
-        normal = problem.normal(point)
-    return Fit(point, cost, normal, damping, k, poor >= patience)
+    return best

@@ -21,7 +21,7 @@ from penode_gen.networks import Network
 
 from ..errors import UserError
 from ..measured import Measured
-from . import apart, bands, begin, curves, data, dense, ends, judge, promised, unfold, unknown
+from . import apart, bands, begin, curves, data, dense, ends, heldout, judge, promised, unfold, unknown
 from .curve import Curve
 from .curves import Tell
 from .port import Port, inputs_of
@@ -29,6 +29,7 @@ from .dense import Dense
 from .engine import Engine
 from .problem import Point, Problem
 from .result import Error, Force, Trained
+from .resume import Journal
 from .solve import Fit, solve
 from .settings import SETTINGS
 
@@ -42,6 +43,7 @@ class Options:
     known: tuple[tuple[str, float | None], ...] = ()
     seed: int = 0
     start: begin.Start = field(default_factory=begin.Start)
+    journal: Journal = field(default_factory=Journal)
 
 
 def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], options: Options, tell: Tell) -> tuple[Model, Trained]:
@@ -54,7 +56,7 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
     ports = ports_of(model, engine)
     templates = [model.sets["default"].networks[p.name] for p in ports]
     records = tuple(data.record(model, m, engine.signals) for m in train_)
-    problem = Problem(engine, records, data.at_first(model, records, engine.signals), np.ones(len(ports)), apart=apart.find(model, engine.free, engine.networks))
+    problem = Problem(engine, records, data.at_first(model, records, engine.signals), np.ones(len(ports)), apart=apart.find(model, engine.free, engine.networks), journal=options.journal)
     bounds = [promised.bound(model.networks[p.name].promises, size=1.0) for p in ports]
     try:
         if all(p.knots for p in ports):
@@ -70,7 +72,7 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
     visited = judge.visited(ports, seen)
     _check_excited(model, ports, visited)
     networks, fit = written(model, problem, fit, ports, templates, visited)
-    spent = time.process_time() - started - (compiled - started)
+    spent = time.process_time() - compiled + options.journal.before
     return _judged(model, problem, fit, ports, networks, visited, train_, held, (options, known, spent), tell)
 
 
@@ -84,13 +86,17 @@ def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin
 
 
 def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], curves.Limits]]) -> tuple[Problem, Fit]:
-    """The fit with the colour of what it leaves, for its estimate and its band."""
+    """The fit with the colour of what it leaves, for its estimate and its band. What is louder than noise is what the model lacks: there the
+    estimate stays that of least errors, and curves bend as held-out parts of the recordings allow."""
+    loud = heldout.loud(problem, fit.point)
+    if loud:
+        problem, fit = heldout.bent(problem, fit, curves.limits_of(problem, bounds))
     found = problem.residuals(fit.point)
     if found is None:
         return problem, fit
     noise = data.of_residuals(found[0], [r.good for r in problem.records], problem.noise, coloured=True)
     own = problem.with_(noise=noise)
-    if not any(len(c) for c in noise.colour):
+    if loud or not any(len(c) for c in noise.colour):
         return own, replace(fit, normal=own.normal(fit.point))
     return own, solve(own, fit.point, 6, 1.0, curves.limits_of(own, bounds), damping=1e-6)
 
@@ -218,7 +224,7 @@ def _judged(
     found = Trained(
         model.name, tuple(forces), parameters, known, tuple(unknown.find(problem, fit, ports, visited)), training, holdout, outside, masked,
         (fit.ended or _all_stated(model, training)) and not loud, tuple(notes), problem.chi2(fit.point) / max(problem.samples, 1), spent, options.seed,
-        {m.path.name: hashlib.sha256(m.path.read_bytes()).hexdigest() for m in (*train_, *held)} | {model.path.name: model.digest}, _versions(),
+        {m.path.name: hashlib.sha256(m.path.read_bytes()).hexdigest() for m in (*train_, *held)} | {model.path.name: model.digest}, versions(),
     )  # fmt: skip
     return after, found
 
@@ -229,7 +235,8 @@ def _all_stated(model: Model, training: Sequence[Error]) -> bool:
     return bool(training) and all(e.signal in stated for e in training)
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of the programs that the numbers of a training follow from."""
     return {"penode": penode_gen.VERSION, "python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
 
 

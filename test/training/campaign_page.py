@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The page of `make campaign-train`: what its parts measured, beside what is asked; a part that has not run is named.
+
+Parts write what they find into a folder: `rows.jsonl` (a training a line), and `damping.json`, `promises.json` and `rigs.json` (rows of text, and
+whether each is as it must be).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import campaign
+
+Row = dict[str, Any]
+FOLDER = Path("build/campaign-train")
+OPEN = "not measured"
+
+
+def of(rows: list[Row], *words: str) -> list[Row]:
+    """Trainings of the cases whose names hold a word."""
+    return [r for r in rows if any(w in r["case"] for w in words)]
+
+
+def most(rows: list[Row], value: Callable[[Row], float]) -> float:
+    """The largest value of those that did not fail."""
+    return max((value(r) for r in rows if "failed" not in r), default=float("nan"))
+
+
+def error(r: Row) -> float:
+    """The larger force error [%] of a training."""
+    return max(r["forces"].values())
+
+
+def asked(rows: list[Row]) -> list[tuple[str, str, str, bool | None]]:
+    """What is asked, the bar, what was found, and whether that is enough (None: not measured)."""
+    found: list[tuple[str, str, str, bool | None]] = []
+
+    def add(what: str, bar: str, some: list[Row], text: Callable[[], str], good: Callable[[], bool]) -> None:
+        sound = [r for r in some if "failed" not in r]
+        seeds = f"{len(some)} trainings: " if some else ""
+        found.append((what, bar, seeds + text() if sound else OPEN, bool(good()) and len(sound) == len(some) if sound else None))
+
+    for case in ("x1, 1-16-16-1", "x1, 1-16-16-16-1"):
+        own = [r for r in rows if r["case"] == case]
+        seconds, off = (lambda own=own: most(own, lambda r: r["seconds"])), (lambda own=own: most(own, error))
+        add(case, "5 s of processor time, force error 1 % of span", own, lambda: f"{seconds():.1f} s, {off():.2f} %", lambda: seconds() <= 5.0 and off() <= 1.0)
+    for case, bar, key in (("m_b weighed", "parameters within 1 %", "absolute"), ("nothing weighed", "ratios within 1 %, scale reported", "ratios")):
+        own = of(rows, case)
+        known = lambda own=own, key=key: all(r["scale"] for r in own if "failed" not in r) or key == "absolute"  # noqa: E731
+        add(f"x5, parameters off 10 %, {case}", f"10 s, 2.5 %, {bar}", own,
+            lambda own=own, key=key: f"{most(own, lambda r: r['seconds']):.1f} s, {most(own, error):.2f} %, {most(own, lambda r: r[key]):.2f} %",
+            lambda own=own, key=key, known=known: most(own, lambda r: r["seconds"]) <= 10.0 and most(own, error) <= 2.5 and most(own, lambda r: r[key]) <= 1.0 and known())
+    for noise, bar in (("x1", 2.0), ("x5", 4.0)):
+        own = of(rows, f"{noise}, tanh")
+        good = [r for r in own if r.get("converged")]
+        add(f"{noise}, tanh 2-16-16-1", f"60 s, {bar:g} %; 9 of 10 seeds converge, others say so", own,
+            lambda good=good, own=own: f"{len(good)} converged, these {most(good, lambda r: r['seconds']):.1f} s, {most(good, error):.2f} %; the others report that they did not",
+            lambda good=good, own=own, bar=bar: most(good, lambda r: r["seconds"]) <= 60.0 and most(good, error) <= bar and len(good) >= 0.9 * len(own))
+    for what, some, bar in (("curves", [r for r in rows if "tanh" not in r["case"]], 2.0), ("end to end", of(rows, "tanh"), 5.0)):
+        add(f"hold-out inside the trained range, {what}", f"within {bar:g} % of the noise; at most 10 % masked", some,
+            lambda some=some: f"{most(some, lambda r: r['holdout']):.2f} %, {most(some, lambda r: r['masked']):.1f} % masked",
+            lambda some=some, bar=bar: most(some, lambda r: r["holdout"]) <= bar and most(some, lambda r: r["masked"]) <= 10.0)
+    cover = [c for r in rows for c in r.get("covered", [])]
+    mean = sum(cover) / max(len(cover), 1)
+    add("bands of trained curves", "2 sigma cover 90 to 98 %", [r for r in rows if r.get("covered")], lambda: f"{len(cover)} curves, {mean:.1f} %", lambda: 90.0 <= mean <= 98.0)
+    return found
+
+
+def table(folder: Path, name: str) -> list[tuple[str, str, bool]]:
+    """Rows of another part; none where it has not run."""
+    path = folder / f"{name}.json"
+    return [tuple(r) for r in json.loads(path.read_text(encoding="utf-8"))] if path.exists() else []  # type: ignore[misc]
+
+
+def page(folder: Path) -> str:
+    """The whole page."""
+    rows = campaign.read(folder / "rows.jsonl")
+    marks = {True: "yes", False: "no", None: "open"}
+    lines = ["# Trained networks against plants that are known", "", "Written by `make campaign-train`. " + " ".join((campaign.__doc__ or "").split()), ""]
+    lines += ["## What is asked", "", "| what | asked | found | met |", "|---|---|---|---|"]
+    lines += [f"| {what} | {bar} | {text} | {marks[good]} |" for what, bar, text, good in asked(rows)]
+    parts = (("rigs", "networks beside the laws of the diagnosis, measured dampers"), ("promises", "promises by exact arithmetic"), ("damping", "damping beside a network"))
+    for name, title in parts:
+        found = table(folder, name)
+        lines += [f"| {title}: {label} | | {figure} | {marks[bool(good)]} |" for label, figure, good in found] or [f"| {title} | | {OPEN} | open |"]
+    lines += ["| trained set in the controller | hash of states of SiL and PiL equal; onnxruntime equal within rounding | not of this campaign: `test/training/test_deployed.py`, in `make test` | by test |"]
+    lines += [f"| plain Adam on whole trajectories, 1000 epochs | in this table | {OPEN}: no rival is part of this campaign | open |"]
+    lines += ["", "## By case", "", campaign.HEAD]
+    lines += [campaign.line(own) for case in campaign.CASES if (own := [r for r in rows if r["case"] == case.name])]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--folder", type=Path, default=FOLDER)
+    parser.add_argument("--page", type=Path, default=Path(__file__).with_name("CAMPAIGN.md"))
+    given = parser.parse_args()
+    given.page.write_text(page(given.folder), encoding="utf-8")
+    print(given.page)
+
+
+if __name__ == "__main__":
+    main()
