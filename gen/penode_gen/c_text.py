@@ -8,6 +8,7 @@ import textwrap
 from typing import Callable
 
 import numpy as np
+import numpy.typing as npt
 import sympy as sp
 
 from . import expressions as ex
@@ -27,6 +28,17 @@ def literal(value: float) -> str:
     if float(single) == value:
         return _decimal(np.format_float_scientific(single, unique=True, trim="-")) + "F"
     return f"(pen_real_t){_decimal(repr(value))}"
+
+
+def literals(values: npt.ArrayLike) -> list[str]:
+    """The `literal` of each number [n], some ten times as fast. Raises ValueError for NaN and Inf."""
+    doubles = np.asarray(values, float)
+    size = np.abs(doubles)
+    with np.errstate(over="ignore", invalid="ignore"):
+        singles = doubles.astype(np.float32)
+        exact, plain = singles == doubles, (doubles == 0.0) | ((size >= 1e-4) & (size < 1e6))  # there, NumPy and repr write no exponent
+    found = zip(doubles.tolist(), singles.astype(str).tolist(), exact.tolist(), plain.tolist())
+    return [(f"{text}F" if held else f"(pen_real_t){value!r}") if short else literal(value) for value, text, held, short in found]
 
 
 def real(value: float) -> str:

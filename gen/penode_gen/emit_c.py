@@ -10,7 +10,7 @@ import sympy as sp
 
 from . import expressions as ex
 from . import layout, promises, sampled, selftest, sets, units
-from .c_text import Printer, fold, literal, real
+from .c_text import Printer, fold, literal, literals, real
 from .causalise import Causal, Step, causalise
 from .emit_networks import NetworkCode, by_value, hidden16, network_code, network_lines, second_lines, slope_lines
 from .functions import CALLS
@@ -362,8 +362,8 @@ class _Emitter:
     def _set(self, name: str) -> dict[str, Any]:
         chosen = self.model.sets[name]
         pieces = [
-            {"comment": p.comment, "rows": [", ".join(literal(v) for v in p.values[i : i + p.columns]) for i in range(0, p.length, p.columns)]}
-            for p in sets.pieces(self.model, chosen)
+            {"comment": p.comment, "rows": [", ".join(texts[i : i + p.columns]) for i in range(0, p.length, p.columns)]}
+            for p, texts in ((p, literals(p.values)) for p in sets.pieces(self.model, chosen))
         ] or [{"comment": "this model has nothing to tune", "rows": ["0.0F"]}]
         return {
             "name": name, "id": chosen.id, "pieces": pieces,

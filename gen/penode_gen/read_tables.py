@@ -136,8 +136,14 @@ class Tables:
         """Report what cannot stand for a value in the generated C."""
         if not NAME.fullmatch(name) or name.endswith("_"):
             self.problem(where, f"{show(name)} cannot be a name", "use up to 40 letters, digits and _, with a letter in front and no _ at the end")
-        elif name in C_WORDS or name in RESERVED or C_PATTERN.fullmatch(name) or name.startswith(prefixes):
+        elif name in C_WORDS or name in RESERVED or C_PATTERN.fullmatch(name) or name.startswith(prefixes) or self._is_macro(name):
             self.problem(where, f"'{name}' has a meaning of its own in C or in model files", "choose another name")
+
+    def _is_macro(self, name: str) -> bool:
+        """Whether the generated C may define this name: its macros are the model's name, or that of the owner of its sets, in capitals, _ and capitals."""
+        head = self.data.get("model")
+        own = head.get("name") if isinstance(head, dict) else None
+        return name.isupper() and any(isinstance(o, str) and o and name.startswith(f"{o.upper()}_") for o in (own, self.set_owner))
 
     def label(self, where: tuple[str, ...], name: str) -> None:
         """Report what cannot be a part of a name."""

@@ -80,7 +80,7 @@ def _references(manifest: str, root: ElementTree.Element, files: dict[str, bytes
 def unmapped(files: dict[str, bytes], folder: str) -> list[str]:
     """What of the block a Production Code does not map once: variables, the error signals, methods."""
     block = ElementTree.fromstring(files["AlgorithmCode/manifest.xml"])
-    wanted = [str(v.get("id")) for v in block.findall("Variables/*")] + ["ErrorSignalStatus"] + [str(m.get("id")) for m in block.iter("BlockMethod")]
+    wanted = [str(v.get("id")) for v in block.findall("Variables/*")] + ["block:ErrorSignalStatus"] + [str(m.get("id")) for m in block.iter("BlockMethod")]
     logical = ElementTree.fromstring(files[f"{folder}/manifest.xml"]).find("CodeContainer/LogicalData")
     assert logical is not None
     mapped = [str(e.get("foreignRefId")) for e in logical.iter() if e.get("foreignRefId")]

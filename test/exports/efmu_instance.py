@@ -54,7 +54,7 @@ class Production:
         function = getattr(self._loaded, self.functions[f"{method}()"])
         function.restype = ctypes.c_bool
         failed = function(ctypes.byref(self.data))
-        signals = int(self["ErrorSignalStatus"])
+        signals = int(self["block:ErrorSignalStatus"])
         assert failed == (signals != 0)
         return signals
 

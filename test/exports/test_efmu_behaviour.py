@@ -116,6 +116,7 @@ def test_other_times_sets_and_none(tmp_path: Path) -> None:
         ("2", "--recalibration: '2' is no exchange; write a time in seconds, a colon and a set, such as 2.5:default"),
         ("2:fast", "--recalibration: the model file has no set 'fast'; use one of: default, slow"), ("0.505:slow", "--recalibration: 0.505 s is no multiple of the sample time"),
         ("1:slow, 2:default", "--recalibration: '1:slow, 2:default' is not one exchange; write a time in seconds, a colon and a set, or none"),
+        ("0:slow", "--recalibration: '0:slow' is at the start, before any sample; choose a later time"), ("", "--recalibration: '' is not one exchange"),
         ("50000:slow", "--recalibration: a table of 5000051 samples with 1 numbers each is too large; choose an earlier time, or none"),
     ],
 )  # fmt: skip

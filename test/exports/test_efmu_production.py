@@ -93,7 +93,7 @@ def test_everything_of_the_block_is_mapped_once(efmu: dict[str, bytes]) -> None:
     for folder in FOLDERS.values():
         assert unmapped(efmu, folder) == []
         manifest = efmu[f"{folder}/manifest.xml"]
-        for old, new in ((b'foreignRefId="z_b"', b'foreignRefId="z_w"'), (b'foreignRefId="DoStep()"', b'foreignRefId="Startup()"'), (b'foreignRefId="ErrorSignalStatus"', b'foreignRefId="c"')):
+        for old, new in ((b'foreignRefId="z_b"', b'foreignRefId="z_w"'), (b'foreignRefId="DoStep()"', b'foreignRefId="Startup()"'), (b'foreignRefId="block:ErrorSignalStatus"', b'foreignRefId="c"')):
             assert old in manifest and unmapped(efmu | {f"{folder}/manifest.xml": manifest.replace(old, new)}, folder)
         for old, new in ((b'foreignRefId="z_b"', b'foreignRefId="z_c"'), (b'origin="true"', b'origin="true" checksum2=""'), (b'typeDefRefId="bool"', b'typeDefRefId="boole"')):
             assert problems(efmu | {f"{folder}/manifest.xml": manifest.replace(old, new)})

@@ -90,6 +90,7 @@ def test_manifest_and_files_are_where_the_standard_has_them(opened: Unpacked) ->
     assert b".debug_info" not in binary and b"/tmp/" not in binary
 
 
+@pytest.mark.long
 def test_the_same_bytes_again_and_none_of_it_without_the_option(opened: Unpacked, nqvm: Any) -> None:
     assert exports.export(nqvm, f"fmu{opened.version}", opened.path, {"xcp": True}) == opened.path.read_bytes()
     plain = exports.export(nqvm, f"fmu{opened.version}", opened.path, {"source_only": True})

@@ -280,6 +280,21 @@ def test_literals_are_exact(value):
 def test_no_literal_for_what_is_no_number(value):
     with pytest.raises(ValueError, match="has no C literal"):
         c_text.literal(value)
+    with pytest.raises(ValueError, match="has no C literal"):
+        c_text.literals([0.5, value])
+
+
+def test_literals_of_an_array_are_those_of_its_numbers():
+    """Drawn bits of both types, with powers of ten (where the notation changes), zeros and their neighbours."""
+    rng = np.random.default_rng(1)
+    powers = np.array([0.0, *(10.0**k for k in range(-9, 10))])
+    singles = powers.astype(np.float32)
+    near = np.concatenate([f(p, edge).astype(float) for p in (powers, singles) for f, edge in ((np.nextafter, p.dtype.type(0)), (np.nextafter, p.dtype.type(np.inf)), (np.fmax, p))])
+    with np.errstate(invalid="ignore"):
+        bits = rng.integers(0, 2**32, 2000, np.uint32).view(np.float32).astype(float)
+    drawn = np.concatenate([bits, rng.integers(0, 2**63, 1000).view(float), rng.standard_normal(500)])
+    values = np.concatenate([near, -near, drawn[np.isfinite(drawn)]])
+    assert c_text.literals(values) == [c_text.literal(v) for v in values]
 
 
 def test_weights_arrive_in_c_as_they_were(tmp_path):

@@ -143,6 +143,7 @@ FAULTS = [
     ('g = { unit = "N" }', 'while = { unit = "N" }', "variables.while: .. meaning of its own"),
     ("F_lag = {", '"F lag" = {', "'F lag' cannot be a name"),
     ('load = { value = "F_foot"', 'pen_load = { value = "F_foot"', "sensors.pen_load: .. meaning of its own"),
+    ('load = { value = "F_foot"', 'GOOD_SET_LENGTH = { value = "F_foot"', "sensors.GOOD_SET_LENGTH: .. meaning of its own"),
     ('load = { value = "F_foot"', 'H = { value = "F_foot"', "sensors.H: .. meaning of its own"),
     ('load = { value = "F_foot"', 'load_ = { value = "F_foot"', "sensors.load_: .. cannot be a name"),
     ('load = { value = "F_foot"', 'INT8_MAX = { value = "F_foot"', "sensors.INT8_MAX: .. meaning of its own"),

@@ -97,6 +97,7 @@ def test_goes_on_rather_than_anew_and_may_stop_again(short: Path, whole: tuple[P
     assert results(tmp_path / "out") == results(ended)
 
 
+@pytest.mark.long
 def test_networks_of_any_shape_too(short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     model = tmp_path / "tanh.toml"
     model.write_text(MODEL.read_text().replace("{ layers = [16, 16, 16] }", '{ layers = [3], activation = "tanh" }'))

@@ -10,7 +10,7 @@ from . import efmu_variables as ev
 from .efmu_code import Block
 from .efmu_manifest import Representation
 from .efmu_production import PRECISIONS
-from .efmu_scenarios import columns, scenarios
+from .efmu_scenarios import columns, scenarios, time_column
 from .templating import render
 
 FOLDER = "BehavioralModel"
@@ -27,5 +27,6 @@ def behaviour(model: Model, block: Block, algorithm: Representation, dialect: st
         "efmu_behaviour.xml.j2", **efmu_manifest.shared(model, dialect), id=id, algorithm=algorithm, files=efmu_manifest.listed(files, {"csv": "ReferenceData"}),
         scenarios=found, signals=signals, outputs=block.of("output"), variables=[*signals, *tuned], columns=columns, pairs=zip, precisions=list(PRECISIONS),
         units=ev.unit_list([*signals, *tuned]), second=ev.unit_id("s"), sample_time=repr(float(model.sample_time)),
+        time_column=time_column([v.label for v in signals]),
     )  # fmt: skip
     return Representation(FOLDER, "BehavioralModel", id, manifest, files)

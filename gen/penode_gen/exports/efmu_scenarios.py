@@ -8,6 +8,7 @@ The reference is the model in float64 (penode_gen.numeric) with its own method; 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,7 @@ class Scenario:
     def table(self, model: Model) -> str:
         """The CSV: time, inputs, outputs, and a column for each element of what is tuned."""
         signals = [*(i.name for i in model.inputs), *(o.name for o in model.outputs)]
-        rows = [",".join(["time", *signals, *(c for v, _, _ in self.tuned for c in columns(v))])]
+        rows = [",".join([time_column(signals), *signals, *(c for v, _, _ in self.tuned for c in columns(v))])]
         tails = ["".join(f",{x!r}" for values in chosen for x in np.ravel(values).tolist()) for chosen in zip(*((a, b) for _, a, b in self.tuned))] or ["", ""]
         for k, numbers in enumerate(np.concatenate([self.u, self.y], axis=1).tolist()):
             rows.append(f"{k * model.sample_time:.9g}{''.join(f',{x!r}' for x in numbers)}{tails[k >= self.at]}")
@@ -51,6 +52,11 @@ class Scenario:
         """Of each output: a rounding of its largest value at every sample, in either direction, adds up to some sqrt(n) of them; four times that."""
         unit = 2.0**-24 if precision == "32-bit" else 2.0**-53
         return [max(4 * float(np.abs(column).max()) * len(self.y) ** 0.5 * unit, 1e-30) for column in self.y.T]
+
+
+def time_column(signals: Iterable[str]) -> str:
+    """Name of the column of the time, beside `signals`; no name of a model file ends in _."""
+    return "time_" if "time" in signals else "time"
 
 
 def columns(variable: Variable) -> list[str]:
@@ -90,11 +96,13 @@ def _exchange(model: Model, asked: str | None) -> tuple[float, str] | None:
     if asked == "none" or (asked is None and len(model.sets) < 2):
         return None
     try:
-        found = schedule(model, asked or f"{round(_LASTS / model.sample_time) * model.sample_time:.9g}:{list(model.sets)[1]}")
+        found = schedule(model, asked if asked is not None else f"{round(_LASTS / model.sample_time) * model.sample_time:.9g}:{list(model.sets)[1]}")
     except ExportError as error:
         raise ExportError(*(p.replace("--schedule", "--recalibration") for p in error.problems)) from error
     if len(found) != 1:
         raise ExportError(f"--recalibration: '{asked}' is not one exchange; write a time in seconds, a colon and a set, or none")
+    if found[0]["time"] < model.sample_time / 2:
+        raise ExportError(f"--recalibration: '{asked}' is at the start, before any sample; choose a later time")
     return found[0]["time"], found[0]["set"]
 
 
