@@ -46,10 +46,17 @@ def parts(folder: Path, names: list[str], out: Path, half: int, halves: bool) ->
     return made
 
 
+def moves(model: Path) -> bool:
+    """Whether a model file, or one that it extends, has bodies."""
+    text = tomllib.loads(model.read_text())
+    base = text.get("model", {}).get("extends")
+    return "bodies" in text or base is not None and moves(model.parent / base)
+
+
 def predicted(command: str, model: Path, recording: Path, rig: dict) -> float | None:
     """RMSE of a model file on a recording, started from its first 50 samples where it has states; None if it cannot be simulated."""
     call = [*shlex.split(command), "simulate", str(model), "--input", str(recording), "-o", str(model.with_name("prediction.csv")), "--json"]
-    call += ["--start", f"measured:{rigs_expert.FIRST}"] if "[bodies]" in model.read_text() else []
+    call += ["--start", f"measured:{rigs_expert.FIRST}"] if moves(model) else []
     call += [x for c in rig.get("channels", []) for x in ("--channel", c)]
     done = subprocess.run(call, capture_output=True, text=True, timeout=600)
     if done.returncode:
