@@ -1081,6 +1081,7 @@ def rig(tmp_path: Path, **values: object) -> penode_gen.Model:
     return penode_gen.load(path)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not MEASURED.exists(), reason="the measured data are not beside the checkout")
 def test_measured_friction_damper(tmp_path, show):
     """Hysteresis and backlash are named; trained at 0.5 Hz, at 1 Hz the error is below that of earlier fits by hand."""

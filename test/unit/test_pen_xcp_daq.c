@@ -9,15 +9,12 @@
 #include "unity.h"
 
 #include "xcp_fixture.inc"
+#include "xcp_daq_fixture.inc"
 
-#define SLOTS      6U
-#define MAX_CTO    16U
-#define ACTIVE     0x11
-#define DAQ_CONFIG 0x2a
-#define OVERFLOW   0x30
+#define SLOTS    6U
+#define OVERFLOW 0x30
 
-static pen_xcp_daq_t daq;
-static uint8_t       ring[(SLOTS * (MAX_CTO + 1U)) + 1U];
+static uint8_t ring[(SLOTS * (MAX_CTO + 1U)) + 1U];
 
 /* A connected slave with DAQ. */
 static void begin(void)
@@ -30,29 +27,9 @@ static void begin(void)
     start();
 }
 
-/* A number of 2 bytes in the core's order: its byte k. */
-static uint8_t half(uint16_t number, uint32_t k)
-{
-    uint8_t byte[2];
-
-    memcpy(byte, &number, 2U);
-    return byte[k];
-}
-
-#define HALF(number) half(number, 0U), half(number, 1U)
-
 static void pointer(uint8_t list, uint8_t odt, uint8_t entry)
 {
     GOOD(1U, 0xe2, 0, HALF(list), odt, entry);
-}
-
-static void write_entry(uint8_t size, uint32_t address)
-{
-    uint8_t in[8] = { 0xe1U, 0xffU, size, 0U };
-
-    memcpy(&in[4], &address, 4U);
-    TEST_ASSERT_EQUAL_UINT32(1U, send(8U, in));
-    TEST_ASSERT_EQUAL_HEX8(0xff, out[0]);
 }
 
 /* Two lists: 0 with ODTs of 1 and 2 entries, 1 with one of 1. */

@@ -11,14 +11,11 @@
 static uint32_t receive(pen_xcp_t *slave, const uint8_t in[], uint32_t n, uint8_t answer[]);
 #define RECEIVE receive
 #include "xcp_fixture.inc"
+#include "xcp_daq_fixture.inc"
 
-#define SLOTS      8U
-#define MAX_CTO    16U
-#define ACTIVE     0x11
-#define DAQ_CONFIG 0x2a
+#define SLOTS 8U
 
-static pen_xcp_daq_t daq;
-static uint8_t       ring[SLOTS * (MAX_CTO + 1U)];
+static uint8_t ring[SLOTS * (MAX_CTO + 1U)];
 
 /* 0: predefined, two ODTs, one entry of the second left out; 1: configurable, three ODTs of two entries. */
 static const pen_xcp_entry_t constant[4] = { { &memory[0], 4U }, { &memory[4], 1U }, { text, 5U }, { NULL, 0U } };
@@ -40,25 +37,6 @@ static void begin(void)
     config.daq = &daq;
     config.daq_command = pen_xcp_daq_command;
     start();
-}
-
-static uint8_t half(uint16_t number, uint32_t k)
-{
-    uint8_t byte[2];
-
-    memcpy(byte, &number, 2U);
-    return byte[k];
-}
-
-#define HALF(number) half(number, 0U), half(number, 1U)
-
-static void write_entry(uint8_t size, uint32_t address)
-{
-    uint8_t in[8] = { 0xe1U, 0xffU, size, 0U };
-
-    memcpy(&in[4], &address, 4U);
-    TEST_ASSERT_EQUAL_UINT32(1U, send(8U, in));
-    TEST_ASSERT_EQUAL_HEX8(0xff, out[0]);
 }
 
 static uint32_t packet(void)
