@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from penode_gen import units
 from penode_gen.model import Model
 
 from . import applied, extension, measuring, real
@@ -20,7 +21,7 @@ from .innovate import MIN_GAIN
 from .judging import ENOUGH
 from .noise import Experiment
 from .residual import Channel, rms
-from .result import Cause, Gain
+from .result import Cause, Gain, Named, Value
 from .study import Study
 from .worth import WORTH, Z_95
 
@@ -105,8 +106,28 @@ def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: 
 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:
     """Causes, none where several parameters have left tolerances that the file states: that is another plant, and what else was found is
-    of that; and a note on it."""
-    off = [c.where for c in causes if c.kind == "wrong_parameter" and 0.0 < model.parameters[c.where].tolerance <= 1.0]
+    of that; and a note on it. All by one factor, they are the gain of an input that the file does not have."""
+    off = [c for c in causes if c.kind == "wrong_parameter" and 0.0 < model.parameters[c.where].tolerance <= 1.0]
     if len(off) < 2:
         return causes, []
-    return (), [f"{', '.join(off)} would all have to be outside of their tolerances: another plant, or dynamics that the model does not have"]
+    names = ", ".join(c.where for c in off)
+    if gain := _gain(model, off):
+        return (gain, *(c for c in causes if c not in off)), [f"{names} by one factor do the same; model_extended.toml has it so"]
+    return (), [f"{names} would all have to be outside of their tolerances: another plant, or dynamics that the model does not have"]
+
+
+def _gain(model: Model, off: Sequence[Cause]) -> Cause | None:
+    """The gain of the only input, a force, that does what parameters do together: with all masses among them, by one factor, beside which
+    each is within its tolerance. A sensor of motion shows forces over masses only."""
+    forces = [i for i in model.inputs if units.si(i.unit) in ("N", "N*m")]
+    if len(model.inputs) != 1 or not forces or not {b.mass for b in model.bodies} <= {c.where for c in off}:
+        return None
+    values = [(c.parameters[c.where], model.parameters[c.where]) for c in off]
+    low, high = (np.array([v.ci95[k] / p.value for v, p in values]) for k in (0, 1))
+    weights = 1.0 / np.maximum(high - low, 1e-300) ** 2
+    factor = float(np.sum(weights * 0.5 * (low + high)) / np.sum(weights))
+    if factor <= 0.0 or any(abs(v.value / p.value / factor - 1.0) > p.tolerance for v, p in values):
+        return None
+    gain = Value(1.0 / factor, "1", (1.0 / float(np.max(high)), 1.0 / float(np.min(low))))  # what a model leaves out moves each another way
+    others = tuple(Named(c.kind, c.where) for c in off[:3])
+    return Cause("input_gain", forces[0].name, {"gain": gain}, min(c.confidence for c in off), others)
