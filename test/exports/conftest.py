@@ -54,8 +54,7 @@ def efmu(nqvm: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes
     """The files of its eFMU, without eFMU/."""
     from efmu_container import contents, export
 
-    if importlib.util.find_spec("rumoca") is None:
-        pytest.skip("rumoca, which has the schemas, is not installed: pip install penode[efmu]")
+    pytest.importorskip("rumoca", reason="rumoca, which has the schemas, is not installed: pip install penode[efmu]")
     return contents(export(nqvm, tmp_path_factory.mktemp("efmu")))
 
 

@@ -119,10 +119,10 @@ def test_the_table_says_the_same_in_all_its_forms(alone):
 
 
 def test_several_processes_find_the_same(alone, place, tmp_path):
-    heard = []
-    rows = folder.diagnose(job(place, tmp_path / "out"), 2, tell=lambda done, of: heard.append((done, of)))
+    reported = []
+    rows = folder.diagnose(job(place, tmp_path / "out"), 2, tell=lambda done, of: reported.append((done, of)))
     assert results(rows) == results(alone[0])
-    assert heard == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    assert reported == [(0, 3), (1, 3), (2, 3), (3, 3)]
 
 
 @pytest.fixture(scope="module")
@@ -168,9 +168,9 @@ def test_what_is_done_is_kept_and_what_changed_is_done_anew(place, tmp_path):
     paths = [record(data / f"{name}.csv", k, 0.0) for k, name in enumerate("ab")]
     first = folder.diagnose(job(place, tmp_path / "out", data=(data,)))
     record(paths[1], 7, 0.0)
-    heard = []
-    rows = folder.diagnose(job(place, tmp_path / "out", data=(data,)), resume=True, tell=lambda done, of: heard.append(done))
-    assert rows[0] == first[0] and rows[1].source != first[1].source and heard == [1, 2]
+    reported = []
+    rows = folder.diagnose(job(place, tmp_path / "out", data=(data,)), resume=True, tell=lambda done, of: reported.append(done))
+    assert rows[0] == first[0] and rows[1].source != first[1].source and reported == [1, 2]
     assert folder.diagnose(job(place, tmp_path / "out", data=(data,)), resume=True) == rows
     other = folder.plan(job(place, tmp_path / "out", data=(data,), channels=("force=f",)))
     assert not {row.source for row in rows} & {folder._source(one, folder.files.load_model(one)) for one in other}

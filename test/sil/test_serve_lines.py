@@ -8,6 +8,7 @@ import os
 import socket
 import subprocess
 import sys
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ def framed(packet: bytes, counter: int = 0) -> bytes:
     return len(packet).to_bytes(2, "little") + counter.to_bytes(2, "little") + packet
 
 
-def served(kind: str):  # noqa: ANN201
+def served(kind: str) -> AbstractContextManager[virtual.Served]:
     return virtual.served(penode_gen.load(NQVM), kind, "127.0.0.1", 0, np.zeros((1, 1), np.float32))
 
 
@@ -56,7 +57,7 @@ def test_answers_of_udp_go_to_the_last_that_sent_connect() -> None:
             assert other.ask(stranger, 0.2) == b""
         one.line.settimeout(0.2)
         with pytest.raises(TimeoutError):
-            one.line.recv(300)  # nor has the master heard of it
+            one.line.recv(300)  # nothing of it reaches the master
         assert one.ask(GET_STATUS)[:1] == b"\xff"
         assert other.ask(CONNECT)[:1] == b"\xff"
         assert one.ask(GET_STATUS, 0.2) == b"" and other.ask(GET_STATUS)[:1] == b"\xff"
@@ -106,7 +107,7 @@ with served("tcp") as found:
 
 
 @pytest.mark.long
-def test_port_is_free_again_when_a_master_is_gone_without_a_word() -> None:
+def test_port_is_free_again_when_a_master_vanishes() -> None:
     """In a network of its own, whose only cable is out for longer than the controller waits."""
     if os.geteuid() != 0 or subprocess.run(["unshare", "-n", "ip", "link", "set", "lo", "up"], capture_output=True).returncode:
         pytest.skip("a network of its own needs root, unshare and ip")

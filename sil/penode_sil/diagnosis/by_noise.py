@@ -36,8 +36,8 @@ SURELY_NOT = (Cause(OUTSIDE, "", {}, 0.5),)  # named by nothing on the list
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What is diagnosed: the model as its file has it, recordings for training and hold-out, these as experiments (`unused`), what was
-    remarked on them, where files go, and who hears of progress: `log` what is tried, `tell` which share of the work is done."""
+    """What is diagnosed: the model as its file has it, recordings for training and hold-out, these as experiments (`unused`), notes on
+    them, where files go; `log` gets what is tried, `tell` which share of the work is done."""
 
     model: Model
     train: Sequence[Measured]

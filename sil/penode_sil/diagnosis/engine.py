@@ -36,7 +36,7 @@ def diagnose(
     tell: Callable[[float, str], None] = lambda share, doing: None,
 ) -> Diagnosis:  # fmt: skip
     """Name what the model gets wrong in `train`, and measure on `holdout` what knowing it gains; with `output`, write
-    model_extended.toml there. `log` hears what is tried, `tell` which share of the work is done and what comes next."""
+    model_extended.toml there. `log` gets what is tried, `tell` which share of the work is done and what comes next."""
     started = time.perf_counter()
     log = advancing(log, tell)
     tell(0.0, "fitting the model as it is")
