@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import lru_cache, reduce
-from typing import Callable, Sequence
+from typing import Callable, Mapping, Sequence
 
 import numpy as np
 import sympy as sp
@@ -38,11 +39,16 @@ class Numeric:
         if chosen is None and set_name != "default":
             raise KeyError(f"{model.path.name} has no set '{set_name}'; it has {', '.join(model.sets)}")
         self._networks = chosen.networks if chosen else {}
-        values = {p.name: p.value for p in model.parameters.values()} | (chosen.parameters if chosen else {})
-        self._values = {ex.symbol(n): sp.Float(v, 17) for n, v in values.items()}
+        self._values = {p.name: p.value for p in model.parameters.values()} | (chosen.parameters if chosen else {})
         self._rates, self._outputs, self._sensors = map(
             self._function, (self._causal.rates, self._causal.outputs, self._causal.sensors)
         )
+
+    def with_parameters(self, values: Mapping[str, float]) -> Numeric:
+        """The same equations with other values of these parameters, at no cost: nothing is ordered or compiled again."""
+        other = copy(self)
+        other._values = {**self._values, **values}
+        return other
 
     def initial_state(self) -> np.ndarray:
         """Start values of all states, SI."""
@@ -50,19 +56,19 @@ class Numeric:
 
     def rates(self, x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
         """dx/dt [n_x]."""
-        return self._rates(x, u, udot)
+        return self._rates(x, u, udot, self._values)
 
     def outputs(self, x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
         """Outputs [n_y]."""
-        return self._outputs(x, u, udot)
+        return self._outputs(x, u, udot, self._values)
 
     def sensors(self, x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
         """Sensors [n_z], without noise."""
-        return self._sensors(x, u, udot)
+        return self._sensors(x, u, udot, self._values)
 
     def _function(self, results: tuple[sp.Expr, ...]) -> Callable[..., np.ndarray]:
         causal: Causal = self._causal
-        given = [*causal.states, *causal.inputs, *causal.input_rates]
+        given = [*causal.states, *causal.inputs, *causal.input_rates, *map(ex.symbol, self._values)]
         kinematics = {ex.derivative(q.name): v for q, v in causal.kinematics.items()}
         results = tuple(r.subs(kinematics) for r in results)
         known = list(given)
@@ -75,8 +81,8 @@ class Numeric:
         networks = {n: net.evaluate for n, net in self._networks.items()}
         whole = self._whole
 
-        def function(x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
-            values = [*x, *whole(u), *whole(udot)]
+        def function(x: np.ndarray, u: np.ndarray, udot: np.ndarray, parameters: Mapping[str, float]) -> np.ndarray:
+            values = [*x, *whole(u), *whole(udot), *parameters.values()]
             for expression, network in plan:
                 found = expression(*values)
                 values.append(float(networks[network](np.array(found, dtype=float))[0]) if network else found[0])
@@ -97,7 +103,7 @@ class Numeric:
     def _lambdify(self, known: list[sp.Symbol], parts: list[sp.Expr] | tuple[sp.Expr, ...]) -> Callable[..., list[float]]:
         names = [sp.Symbol(f"a{i}", real=True) for i in range(len(known))]
         swap = dict(zip(known, names))
-        return sp.lambdify(names, [p.xreplace(self._values).xreplace(swap) for p in parts], modules=_NUMPY, cse=True)
+        return sp.lambdify(names, [p.xreplace(swap) for p in parts], modules=_NUMPY, cse=True)
 
 
 def numeric(model: Model, set_name: str = "default") -> Numeric:

@@ -8,9 +8,11 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
+import penode_gen
 from penode_gen import fold
 from penode_gen.causalise import Causal, causalise
 from penode_gen.model import Model
+from penode_gen.numeric import Numeric
 
 from ..batch import Batch
 
@@ -33,6 +35,7 @@ def folded(model: Model) -> Model:
 
 _BATCHES: dict[tuple[object, ...], Batch] = {}
 _ORDERED: dict[tuple[object, ...], tuple[Causal, bool]] = {}
+_FUNCTIONS: dict[tuple[object, ...], Numeric] = {}
 
 
 def _structure(model: Model) -> tuple[object, ...]:
@@ -63,3 +66,14 @@ def compiled(model: Model, causal: Causal) -> Batch:
     found = copy(_BATCHES[key])
     found.model = model
     return found
+
+
+def functions(model: Model) -> Numeric:
+    """A model, with its default set, as functions."""
+    if model.networks:
+        return penode_gen.numeric(model)
+    key, chosen = _structure(model), model.sets.get("default")
+    if key not in _FUNCTIONS:
+        _FUNCTIONS[key] = penode_gen.numeric(model)
+    own = {p.name: p.value for p in model.parameters.values()}
+    return _FUNCTIONS[key].with_parameters({**own, **(chosen.parameters if chosen else {})})

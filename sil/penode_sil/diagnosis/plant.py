@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import penode_gen
 from penode_gen import fold, laws, mechanics
 from penode_gen.model import GROUND, Element, Input, Model, Parameter, Signal, State
+
+from .compiling import functions
 
 Array = NDArray[np.float64]
 KEPT = 8  # transfers that are kept: two or three for each recording
@@ -227,7 +228,7 @@ def linearise(model: Model, found: Sequence[Place], x: Array, u: Array) -> Linea
         probed, interpolation="linear", inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(found))),
         sensors=(*probed.sensors, *seen),
     )  # fmt: skip
-    system = penode_gen.numeric(probed)
+    system = functions(probed)
     n_x, n_w = len(probed.states), len(probed.inputs)
     step = np.concatenate(
         [1e-4 * np.maximum(np.ptp(x, axis=0), 1e-3), 1e-4 * np.maximum(np.ptp(u, axis=0), 1e-3), np.ones(len(found)), np.ones(n_w)]

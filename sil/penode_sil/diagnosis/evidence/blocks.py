@@ -43,12 +43,9 @@ class Blocks:
 
     def scores(self, problem: Problem, fit: Fit) -> Array:
         """Log predictive density [blocks] of each block by the fit of the others."""
-        found = []
-        for b in range(BLOCKS):
-            left = self.number == b
-            part = Problem(problem.predictor, problem.floor, left).solve(fit.free, fit.by, REFIT)
-            found.append(predictive(part, left, problem.floor))
-        return np.array(found)
+        lefts = [self.number == b for b in range(BLOCKS)]
+        parts = problem.without(fit, lefts, REFIT)
+        return np.array([predictive(part, left, problem.floor) for part, left in zip(parts, lefts)])
 
     def fit_level(self, bench: Bench, problem: Problem, fit: Fit, level: Level, sizes: Sequence[float]) -> tuple[Level, Fit, Array]:
         """The level with which left-out blocks are predicted best, that of a fit or one of other `sizes`, the fit with it, and its scores. The

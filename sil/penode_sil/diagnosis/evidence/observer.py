@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,20 +173,44 @@ class Predictor:
                 observer=Observer(self.update, np.concatenate([y, blank], axis=-1), wide),
             )  # fmt: skip
             z = run.z
-            sane &= (run.first_bad < 0) & np.isfinite(z).all(axis=(1, 2))
-            nus.append(self._means(y - np.where(np.abs(z[:, :, : self.n_z]) < MAX_INNOVATION, z[:, :, : self.n_z], MAX_INNOVATION)))
+            nu, finite = self._beyond(e, y, z[:, :, : self.n_z])
+            sane &= (run.first_bad < 0) & finite
+            nus.append(nu)
             seen.append(z[:, :, self.n_z : self.n_z + watched])
             moved.append(run.x)
         return Lanes(nus, sane), seen, moved
 
-    def _means(self, beyond: Array) -> Array:
-        """Means [runs, updates, n_z] of what was measured beyond the prediction."""
-        runs, n, n_z = beyond.shape
-        whole = beyond[:, : n // self.update * self.update].reshape(runs, -1, self.update, n_z)
+    def _beyond(self, e: int, y: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Means [runs, updates, n_z] of what was measured, y [n, n_z] or [runs, n, n_z], beyond what was predicted, z [runs, n, n_z]; and
+        which runs [runs] are finite throughout."""
+        if y.ndim == 2:
+            good, count, measured = self._measured[e]
+            sums = self._blocks(z.transpose(1, 2, 0))  # the order in which it lies in memory
+            total = sums.sum(axis=1) if good is None else np.where(good[..., None], sums, 0.0).sum(axis=1)
+            if np.abs(total).max(initial=0.0) < MAX_INNOVATION:  # false for NaN
+                return measured - (total / count[..., None]).transpose(2, 0, 1), np.ones(len(z), bool)
+        beyond = y - np.where(np.abs(z) < MAX_INNOVATION, z, MAX_INNOVATION)
+        whole = self._blocks(np.moveaxis(beyond, 0, -1))
         there = np.isfinite(whole)
-        count = np.sum(there, axis=2)
-        total = np.sum(np.where(there, whole, 0.0), axis=2)
-        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+        counts = np.sum(there, axis=1)
+        means = np.where(counts > 0, np.sum(np.where(there, whole, 0.0), axis=1) / np.maximum(counts, 1), np.nan)
+        return means.transpose(2, 0, 1), np.isfinite(z).all(axis=(1, 2))
+
+    def _blocks(self, x: Array) -> Array:
+        """The samples [n, ...] between updates [updates, update, ...]."""
+        return x[: len(x) // self.update * self.update].reshape(-1, self.update, *x.shape[1:])
+
+    @cached_property
+    def _measured(self) -> list[tuple[NDArray[np.bool_] | None, Array, Array]]:
+        """Of each recording: which samples [updates, update, n_z] were measured (None: all), how many [updates, n_z], and their means."""
+        found = []
+        for r in self.records:
+            y = self._blocks(r.y)
+            good = np.isfinite(y)
+            count = np.sum(good, axis=1)
+            means = np.where(count > 0, np.sum(np.where(good, y, 0.0), axis=1) / np.maximum(count, 1), np.nan)
+            found.append((None if good.all() else good, np.maximum(count, 1).astype(float), means))
+        return found
 
     def _given(self, e: int, free: Sequence[Free], shifts: Array) -> tuple[Array, dict[str, Array], Array, Array]:
         record, runs = self.records[e], len(shifts)
