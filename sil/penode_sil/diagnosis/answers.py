@@ -15,10 +15,8 @@ from penode_gen.model import Model
 
 from ..measured import Measured
 from . import explanation, extension, numerics, plausible, residual, weighed
-from .noise import Experiment
 from .result import OUTSIDE, Cause, Diagnosis, Recorded, separating
 from .explanation import Explanation
-from .study import Study, look
 
 
 def write_extended(text: str, model: Model, output: Path) -> Model:
@@ -50,14 +48,11 @@ def alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
 
 
 def by_innovations(
-    study: Study, best: Explanation | None, unused: Sequence[Experiment], output: Path | None, remarks: Sequence[str],
-    log: Callable[[str], None], tell: Callable[[float, str], None],
+    w: weighed.Weighed, best: Explanation | None, output: Path | None, remarks: Sequence[str], tell: Callable[[float, str], None],
 ) -> Diagnosis:  # fmt: skip
-    """The diagnosis of recordings that sensor noise alone cannot judge, and of which `best` is what it would say; without recordings
-    and time, which the caller has."""
-    tell(0.3, "weighing what is missed everywhere")
-    study = replace(study, seen=look(study, study.null))
-    w = weighed.weigh(study, unused, log)
+    """The diagnosis of recordings that sensor noise alone cannot judge, from what was weighed, and of which `best` is what sensor noise would
+    say; without recordings and time, which the caller has."""
+    study = w.study
     extended = w.model if output is None else write_extended(w.text, study.model, output)
     tell(0.9, "showing what is wrong")
     shown = residual.show(study, w.fit, extended, w.held, w.verdict == "unexplained")

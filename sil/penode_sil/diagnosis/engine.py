@@ -21,6 +21,7 @@ from .broken import broken_sensors
 from .by_noise import SEARCH, Case, by_noise
 from .driven import settled
 from .evidence.bench import with_tolerances
+from .explanation import Explanation
 from .judging import ENOUGH, share
 from .noise import Experiment
 from .resting import resting
@@ -54,20 +55,36 @@ def diagnose(
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
     """By innovations where a guess is all that the file has of a parameter, or where more acts than the search by sensor noise explains;
     by that search else. What innovations explain but in part may have no name at all, if the search has none for it either; and what acts
-    beside several causes of that search may be but the form of one, unless innovations have an answer with fewer."""
+    beside several causes of that search may be but the form of one, unless innovations have an answer with fewer. The search ends early
+    where more acts than any one cause explains, and than all that innovations found."""
     if weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values()):
-        return by_innovations(replace(study, model=case.model), None, case.unused, case.output, case.remarks, case.log, case.tell)
+        return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
     case.tell(SEARCH[0], "looking for causes")
-    study, explanations = resting(other, *search.search(study, case.log), case.log)
+    study, beam = search.first(study, case.log)
+    w = None
+    if beam and weighed.misfit(study, beam[0].fit, case.log) > weighed.UNMODELLED:
+        w = _weighed(case, study)
+        if w.verdict == "explained" and w.level > weighed.UNMODELLED:
+            return _by_innovations(case, beam[0], w)
+    study, explanations = resting(other, *search.grow(study, beam, case.log), case.log)
     best = explanations[0] if explanations else None
     if level := weighed.misfit(study, best.fit if best else study.null, case.log):
-        answer = by_innovations(replace(study, model=case.model), best, case.unused, case.output, case.remarks, case.log, case.tell)
-        whole = answer.verdict != "partly_explained" or best and share(study, best) > ENOUGH
-        simpler = best and answer.verdict != "unexplained" and max(len(answer.causes), 1) < len(best.groups)
+        w = w or _weighed(case, study)
+        whole = w.verdict != "partly_explained" or best and share(study, best) > ENOUGH
+        simpler = best and w.verdict != "unexplained" and max(len(w.causes), 1) < len(best.groups)
         if whole and (level > weighed.UNMODELLED or simpler):
-            return answer
+            return _by_innovations(case, best, w)
     return by_noise(case, study, explanations, faults, bursts)
+
+
+def _weighed(case: Case, study: Study) -> weighed.Weighed:
+    case.tell(0.3, "weighing what is missed everywhere")
+    return weighed.weigh(replace(study, model=case.model), case.unused, case.log)
+
+
+def _by_innovations(case: Case, best: Explanation | None, w: weighed.Weighed) -> Diagnosis:
+    return by_innovations(w, best, case.output, case.remarks, case.tell)
 
 
 def unburst(

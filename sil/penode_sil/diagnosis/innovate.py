@@ -43,7 +43,7 @@ class Found:
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
-    """Causes one by one, each the one that predicts best, until none predicts enough better."""
+    """Causes one by one, each the one that predicts best, until none predicts enough better, or the best is not worth a name."""
     terms: list[Term] = []
     rounds: list[tuple[Trial, ...]] = []
     shares: list[float] = []
@@ -70,6 +70,8 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         shares.append(best.share)
         bench, base = _based(bench, blocks)
         benches.append(bench)
+        if best.share < least(bench.level.size):
+            break  # what is left is small
     named = next((k for k, s in enumerate(shares) if s < least(bench.level.size)), len(shares))
     return Found(bench, benches[named], named, tuple(terms), tuple(shares), tuple(rounds))
 

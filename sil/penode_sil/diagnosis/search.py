@@ -25,27 +25,27 @@ DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a co
 HOPELESS = 0.3  # of what is more than noise: causes that take less have no name, whatever is exchanged among them
 
 
-def search(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation]]:
-    """Explanations from best to worst, empty if there is nothing to explain; and the study with the noise that the best of
+def first(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation]]:
+    """Explanations by one kind, from best to worst, empty if there is nothing to explain; and the study with the noise that the best of
     them leaves. The first look is taken twice: the null fit may take a cause for slow noise."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
     study = replace(study, nothing=loss(study, study.null))
     bare = with_noise_of(study, study.null, coloured=False)
     bare = replace(bare, nothing=min(study.nothing, loss(bare, bare.null)))
-    first = singles(bare, regression(bare, bare.null, parameters), 2)
-    white = bool(first) and first[0].score > 0.0 and with_noise_of(bare, first[0].fit) is bare
-    if bare.metrics is not study.metrics and not white and not any(only_noise(bare, e) for e in first):
+    found = singles(bare, regression(bare, bare.null, parameters), 2)
+    white = bool(found) and found[0].score > 0.0 and with_noise_of(bare, found[0].fit) is bare
+    if bare.metrics is not study.metrics and not white and not any(only_noise(bare, e) for e in found):
         slow = replace(study, nothing=bare.nothing)
-        first = sorted([*first, *singles(slow, regression(slow, slow.null, parameters), 1)], key=lambda e: -e.score)
-    for e in first:
+        found = sorted([*found, *singles(slow, regression(slow, slow.null, parameters), 1)], key=lambda e: -e.score)
+    for e in found:
         log(f"first {e.groups} {e.gain:.0f}")
-    if not first or first[0].score <= 0.0 and not hopeful(bare, first[0]):
+    if not found or found[0].score <= 0.0 and not hopeful(bare, found[0]):
         return study, []
-    quiet = with_noise_of(bare, first[0].fit)
+    quiet = with_noise_of(bare, found[0].fit)
     if quiet is bare:
-        return grow(quiet, first, log)
-    again = [*singles(quiet, regression(quiet, quiet.null, parameters)), explain(quiet, first[0].terms, start=first[0].fit)]
-    return grow(quiet, distinct(again), log)
+        return quiet, found
+    again = [*singles(quiet, regression(quiet, quiet.null, parameters)), explain(quiet, found[0].terms, start=found[0].fit)]
+    return quiet, distinct(again)
 
 
 def hopeful(study: Study, e: Explanation) -> bool:
@@ -78,7 +78,10 @@ def _refined(study: Study, e: Explanation, parameters: Sequence[str], log) -> tu
 
 
 def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tuple[Study, list[Explanation]]:
-    """Explanations by one kind, by two and by three, from best to worst; `width`: how many of each are given a further one."""
+    """Explanations by one kind, those of the `beam`, by two and by three, from best to worst; `width`: how many of each are given a
+    further one."""
+    if not beam:
+        return study, []
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
     for e in beam:
         log(f"{e.groups} {e.gain:.0f}")

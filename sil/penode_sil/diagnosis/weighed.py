@@ -22,7 +22,7 @@ from .judging import ENOUGH
 from .noise import Experiment
 from .residual import Channel, rms
 from .result import Cause, Gain, Named, Value
-from .study import Study
+from .study import Study, look
 from .worth import WORTH, Z_95
 
 Array = NDArray[np.float64]
@@ -32,9 +32,10 @@ UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """What a diagnosis needs of it: causes, verdict, notes, explanations, text and model of the extended file, gain, hold-out, and the
+    """What a diagnosis needs of it: the study with the motion that it has seen, causes, verdict, notes, explanations, text and model of the extended file, gain, hold-out, and the
     training as the extended model has it."""
 
+    study: Study
     causes: tuple[Cause, ...]
     verdict: str
     notes: tuple[str, ...]
@@ -45,6 +46,7 @@ class Weighed:
     held: list[Channel]
     fit: Fit
     explained: float  # share of the power that the nominal model leaves in training
+    level: float  # of what moves wanders beside all that was found
 
 
 def supports(model: Model) -> bool:
@@ -76,7 +78,7 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
 
 def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]) -> Weighed:
     """Causes by innovations, the model with them, and what it gains."""
-    model = study.model
+    model, study = study.model, replace(study, seen=look(study, study.null))
     found = real.answer(model, study.places, study.experiments, study.linear.fastest, study.set_name, log)
     bench = found.found.bench
     offsets = {s.name for s in model.sensors if abs(bench.fit.value(bias(s.name))) > Z_95 * bench.fit.deviation(bias(s.name))}
@@ -93,7 +95,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     verdict = _verdict(found, causes, share, max(left, found.found.bench.level.size))
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
-    return Weighed(causes, verdict, notes, explanations, text, extended, gain, held, fit, share)
+    return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size)
 
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float) -> str:
