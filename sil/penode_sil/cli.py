@@ -62,6 +62,7 @@ def generate(model: Path, output: Path) -> None:
 @click.option("--data", type=FILE, multiple=True, required=True, help="Recordings (CSV or MDF4), or folders of them.")
 @click.option("--each", is_flag=True, help="Diagnose each recording by itself, as in a folder.")
 @click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on; not learnt from.")
+@click.option("--still", type=FILE, multiple=True, help="Recordings at standstill: the noise of each channel, instead of the model file's.")
 @click.option("-o", "--output", type=FILE, required=True, help="Directory for what is found; created if need be.")
 @click.option("--set", "set_name", default="default", show_default=True, help="Parameter set to start from.")
 @click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
@@ -74,6 +75,7 @@ def diagnose(
     data: tuple[Path, ...],
     each: bool,
     holdout: tuple[Path, ...],
+    still: tuple[Path, ...],
     output: Path,
     set_name: str,
     channel: tuple[str, ...],
@@ -92,7 +94,7 @@ def diagnose(
 
     gc.freeze()  # what has been loaded stays to the end: not to be looked through for garbage again and again
     files.check_folder(output)
-    job = files.Job(model, data, holdout, output, set_name, channel)
+    job = files.Job(model, data, holdout, output, set_name, channel, still)
     if not each and not any(path.is_dir() for path in data):
         for given, name in ((jobs, "--jobs"), (scheduler, "--scheduler"), (resume, "--resume")):
             if given:

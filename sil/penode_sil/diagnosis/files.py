@@ -18,11 +18,12 @@ from ..measured import load
 from . import report
 from .engine import diagnose
 from .result import Diagnosis
+from .still import with_noise_at_rest
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is diagnosed, and the folder where the answer goes. `channels` are texts like `x=pos_mm`."""
+    """What is diagnosed, and the folder where the answer goes. `channels` are texts like `x=pos_mm`; `still`: recordings at standstill."""
 
     model: Path
     data: tuple[Path, ...]
@@ -30,6 +31,7 @@ class Job:
     output: Path
     set_name: str = "default"
     channels: tuple[str, ...] = ()
+    still: tuple[Path, ...] = ()
 
 
 def load_model(job: Job) -> penode_gen.Model:
@@ -49,6 +51,7 @@ def run(
     compiled = compilers()
     model = load_model(job)
     train, held = load(job.data, model, job.channels), load(job.holdout, model, job.channels)
+    model = with_noise_at_rest(model, job.still, job.channels, train)
     with all_or_none(job.output):
         found = diagnose(model, train, held, job.output, job.set_name, log, tell)
         report.write(job.output / "report.html", model, found, job.output / "model_extended.toml")

@@ -100,21 +100,22 @@ def plan(job: Job) -> list[Job]:
 
 def _absolute(job: Job) -> Job:
     """The same for a process that runs elsewhere."""
-    data, holdout = (tuple(path.absolute() for path in paths) for paths in (job.data, job.holdout))
-    return replace(job, model=job.model.absolute(), data=data, holdout=holdout, output=job.output.absolute())
+    data, holdout, still = (tuple(path.absolute() for path in paths) for paths in (job.data, job.holdout, job.still))
+    return replace(job, model=job.model.absolute(), data=data, holdout=holdout, still=still, output=job.output.absolute())
 
 
 def _source(job: Job, model: penode_gen.Model) -> str:
     """A name for all that an answer follows from."""
     parts = [penode_gen.VERSION, model.digest, job.set_name, *job.channels]
-    for path in (*job.data, *job.holdout):
+    parts += [str(len(job.holdout)), str(len(job.still))]
+    for path in (*job.data, *job.holdout, *job.still):
         parts.append(hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "")
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
 def attempt(job: Job) -> Answer:
     """One diagnosis; all that goes wrong becomes a line."""
-    unseen = next((path for path in (job.model, *job.data, *job.holdout) if not path.exists()), None)
+    unseen = next((path for path in (job.model, *job.data, *job.holdout, *job.still) if not path.exists()), None)
     if unseen is not None:
         return None, f"{unseen}: there is no such file where it is to be diagnosed; use a folder that all workers share"
     try:
