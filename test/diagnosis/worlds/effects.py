@@ -91,10 +91,11 @@ def held(y: Array, samples: int) -> Array:
     return y[(np.arange(len(y)) // samples) * samples]
 
 
-def input_changed(kind: str, u: Array, x: float, sign: float, rate: float) -> tuple[Array, dict[str, float]]:
-    """What acts where the recording says u [N] (at `rate` Hz); x as for forces."""
-    rms = float(np.sqrt(np.mean(u**2)))
-    omega = float(np.sqrt(np.mean(np.gradient(u, 1 / rate) ** 2))) / rms
+def input_changed(kind: str, u: Array, x: float, sign: float, rate: float, like: Array | None = None) -> tuple[Array, dict[str, float]]:
+    """What acts where the recording says u [N] (at `rate` Hz); x as for forces, along `like` (u itself if not given)."""
+    like = u if like is None else like
+    rms = float(np.sqrt(np.mean(like**2)))
+    omega = float(np.sqrt(np.mean(np.gradient(like, 1 / rate) ** 2))) / rms
     if kind == "input_gain":
         return u * (1 + 0.3 * sign * x), {"gain": 1 + 0.3 * sign * x}
     if kind == "input_offset":
@@ -107,15 +108,16 @@ def input_changed(kind: str, u: Array, x: float, sign: float, rate: float) -> tu
     return held(u, n), {"period": n / rate}
 
 
-def sensor_changed(kind: str, y: Array, x: float, sign: float, rate: float) -> tuple[Array, dict[str, float]]:
-    """What the sensor says of y [N]; x as for forces."""
-    rms = float(np.std(y))
+def sensor_changed(kind: str, y: Array, x: float, sign: float, rate: float, like: Array | None = None) -> tuple[Array, dict[str, float]]:
+    """What the sensor says of y [N]; x as for forces, along `like` (y itself if not given)."""
+    like = y if like is None else like
+    rms = float(np.std(like))
     if kind == "sensor_bias":
         return y + 0.3 * sign * x * rms, {"bias": 0.3 * sign * x * rms}
     if kind == "sensor_scale":
         return y * (1 + 0.3 * sign * x), {"scale": 1 + 0.3 * sign * x}
     if kind == "sensor_delay":
-        omega = float(np.std(np.gradient(y, 1 / rate))) / rms
+        omega = float(np.std(np.gradient(like, 1 / rate))) / rms
         return shifted(y, 0.3 * x / omega * rate), {"delay": 0.3 * x / omega}
     limit = 1.6 * rms / x
     return np.clip(y, -limit, limit), {"limit": limit}

@@ -195,7 +195,7 @@ class World:
         u = record.u.copy()
         for e in self.effects:
             if e.kind in effects.INPUT:
-                u[:, 0], e.parameters = effects.input_changed(e.kind, u[:, 0], e.x, e.sign, RATE)
+                u[:, 0], e.parameters = effects.input_changed(e.kind, u[:, 0], e.x, e.sign, RATE, self.records["train_1"].u[:, 0])
         ext = np.zeros((len(record.gust), len(self.plant.inertia)))
         for name, (site, _) in self.kind.sites.items():
             if site.road >= 0:
@@ -328,7 +328,7 @@ class World:
             y = self._clean(r, sensor)
             for e in self.effects:
                 if e.kind in effects.SENSOR and e.site == sensor:
-                    y, e.parameters = effects.sensor_changed(e.kind, y, e.x, e.sign, 1 / SAMPLE)
+                    y, e.parameters = effects.sensor_changed(e.kind, y, e.x, e.sign, 1 / SAMPLE, self._clean(self.runs["train_1"], sensor))
             columns.append(y + noise[sensor] * rng.standard_normal(len(y)))
             heads.append(f"{sensor} [{unit}]")
         out = np.column_stack(columns)[skip:]
