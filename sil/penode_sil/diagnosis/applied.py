@@ -114,14 +114,24 @@ def _driven(model: Model, fit: Fit, terms: Sequence[Term]) -> tuple[dict[str, li
             left.append(f"{t.form.how} of {name}: a recording has to be corrected, the model file has no law for it")
             continue
         acts = f"{name}_acts"
+        if t.form.series:
+            samples = max(round(t.form.series.period / model.sample_time), 1)
+            found["actuators"].append(f"{acts} = {table({'input': name, 'law': 'held', 'samples': samples})}")
+            _redirected(model, name, acts, found["elements"])
+            continue
         law = {"law": "gain", "gain": f"{name}_gain"} if t.form.how == "input_gain" else {"law": "lag", "time": f"{name}_lag"}
         size = {"value": 1.0 + value, "unit": "1"} if t.form.how == "input_gain" else {"value": value, "unit": "s"}
         found["parameters"].append(f"{list(law.values())[1]} = {table(size)}")
         found["actuators"].append(f"{acts} = {table({'input': name, **law})}")
-        for e in model.elements:
-            ends = tuple(acts if x == name else x for x in e.ends)
-            text = re.sub(rf"\b{name}\b", acts, e.expression)
-            if ends != e.ends or text != e.expression:
-                entry = _element(Element(e.name, ends, e.law, e.arguments, e.network, e.network_inputs, text), lambda x: x)
-                found["elements"].append(f"{e.name} = {table(entry)}")
+        _redirected(model, name, acts, found["elements"])
     return found, left
+
+
+def _redirected(model: Model, name: str, acts: str, elements: list[str]) -> None:
+    """Adds the elements on which an input acts, with what an actuator makes of it instead."""
+    for e in model.elements:
+        ends = tuple(acts if x == name else x for x in e.ends)
+        text = re.sub(rf"\b{name}\b", acts, e.expression)
+        if ends != e.ends or text != e.expression:
+            entry = _element(Element(e.name, ends, e.law, e.arguments, e.network, e.network_inputs, text), lambda x: x)
+            elements.append(f"{e.name} = {table(entry)}")

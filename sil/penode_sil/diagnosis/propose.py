@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from penode_gen.model import Model
 
-from . import catalogue
+from . import catalogue, holding
 from .catalogue import drives
 from .catalogue.form import Form, Motion, Moved
 from .evidence.bench import Bench, fit_level
@@ -60,6 +60,7 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     forms += drives.sensors(bench.model, len(bench.noise))
     forms = [f for f in forms if not _taken(f, terms)]
     ranked = _screened(bench, probe, forms, moved)
+    ranked = sorted([*ranked, *_holds(bench, ranked, terms)], key=lambda pair: -pair[0].gain)
     chosen: dict[tuple[str, str, str], tuple[Score, Form]] = {}
     for score, form in ranked:
         if score.gain > PROMISE and len(chosen) < TRIED:
@@ -88,6 +89,14 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
         else:
             hypotheses.append(_slope(bench, f)[:, :, None])
     return sorted(zip(scores(bench.fit, hypotheses), forms), key=lambda pair: -pair[0].gain)
+
+
+def _holds(bench: Bench, ranked: Sequence[tuple[Score, Form]], terms: Sequence[Term]) -> list[tuple[Score, Form]]:
+    """Holds of inputs that seem to act late."""
+    taken = [t.form.where for t in terms if t.form.kind == holding.KIND]
+    late = [(s, f) for s, f in ranked if f.how == "input_delay" and s.gain > PROMISE and s.sizes[0] > 0.0 and f.where not in taken]
+    found = [holding.propose(bench, f.index, float(s.sizes[0])) for s, f in late]
+    return [pair for pair in found if pair]
 
 
 def _slope(bench: Bench, form: Form) -> Array:

@@ -177,6 +177,9 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
     parameters = {}
     for key, (unit, value) in found.items():
         sd = wider * float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
+        if not slopes[key].any():  # looked for, not fitted: known as well as the size that goes with it
+            alone = term.free[0].target
+            sd = wider * abs(value) * bench.fit.deviation(alone) / max(abs(bench.fit.value(alone)), 1e-300)
         parameters[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
     return Cause(form.kind, form.where, parameters, min(max(sure, 0.0), 0.99), rivals)
 

@@ -58,6 +58,8 @@ def free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
             return (Free((form.how, form.index), 0.0, 0.01 * size, sigma=size),)
         case "input_delay" | "input_lag":
             return (Free((form.how, form.index), 0.2 * bench.step, 0.2 * step, sigma=2.0 * step, low=0.0),)
+        case "input_added":
+            return (Free((form.how, form.index, form.series), 0.0, 0.1, sigma=1.0, low=0.0, high=1.2),)
         case "scale":
             return (Free(scale(form.where), 1.0, 0.01, sigma=0.3, origin=1.0),)
         case "late":

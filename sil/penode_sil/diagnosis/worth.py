@@ -109,4 +109,7 @@ def _of_signal(bench: Bench, term: Term, fit: Fit) -> float:
             return abs(value - 1.0)
         case "input_gain":
             return abs(value)
+        case "input_added" if term.form.series:
+            signals = [np.concatenate(x) for x in (term.form.series.signals, [r.u[:, term.form.index] for r in bench.records])]
+            return abs(value) * _rms(signals[0]) / max(float(np.std(signals[1])), 1e-300)
     return abs(value) * turn

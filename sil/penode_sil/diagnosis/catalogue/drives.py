@@ -8,19 +8,20 @@ from penode_gen.model import Model
 
 from .form import Form, Sizes
 
-KINDS = ("input_gain", "input_offset", "input_delay", "input_lag", "sensor_scale", "sensor_delay")
+KINDS = ("input_gain", "input_offset", "input_delay", "input_lag", "input_hold", "sensor_scale", "sensor_delay")
 MEANING = {
     "input_gain": "The plant is driven by more, or less, than the recording of the input says.",
     "input_offset": "A constant acts on top of the recorded input.",
     "input_delay": "The input acts later than the recording says.",
     "input_lag": "The input acts with a lag: an actuator that the model does not have.",
+    "input_hold": "The input acts in steps: its controller is slower than the recorder, and holds it in between.",
     "sensor_scale": "The sensor's scale is off.",
     "sensor_delay": "The sensor is late.",
 }
 
 
 def inputs(model: Model, count: int) -> Iterable[Form]:
-    """Forms of the first `count` inputs."""
+    """Forms of the first `count` inputs. That of a hold is for `holding`, which has to look for its period."""
     for j, i in enumerate(model.inputs[:count]):
         for kind in KINDS[:4]:
             yield Form(kind, i.name, kind, j)
@@ -41,6 +42,8 @@ def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:
             return {"gain": ("1", 1.0 + v.alone)}
         case "input_offset":
             return {"offset": (unit, v.alone)}
+        case "input_added":
+            return {"period": ("s", form.series.period)} if form.series else {}
         case "scale":
             return {"scale": ("1", v.alone)}
     return {"lag" if form.how == "input_lag" else "delay": ("s", v.alone)}

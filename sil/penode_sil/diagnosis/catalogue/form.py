@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -88,9 +88,17 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
+class Series:
+    """What is added to an input: a signal [n] for each recording; of a hold also its period [s]."""
+
+    signals: Sequence[Array]
+    period: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class Form:
     """A form of a kind at a place of the model (its index), an input or a sensor (its index): `how` is "force", or what is wrong with the
-    input ("input_gain", ...) or sensor ("scale", "late"). Of one family, forms stand for the same name."""
+    input ("input_gain", ..., "input_added": a `series`) or sensor ("scale", "late"). Of one family, forms stand for the same name."""
 
     kind: str
     where: str
@@ -98,6 +106,7 @@ class Form:
     index: int
     parts: tuple[Part, ...] = ()
     note: str = ""
+    series: Series | None = None
 
 
 @dataclass(frozen=True, eq=False)

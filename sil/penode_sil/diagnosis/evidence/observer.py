@@ -227,6 +227,9 @@ class Predictor:
             elif f.target[0] == "late":
                 y = np.array(np.broadcast_to(y, (runs, *y.shape[-2:])))
                 y[:, :, f.target[1]] = earlier(record.y[:, f.target[1]], values / record.step)
+            elif f.target[0] == "input_added":
+                u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
+                u[:, :, f.target[1]] += values[:, None] * f.target[2].signals[e]
             else:
                 u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
                 u[:, :, f.target[1]] = driven(f.target[0], u[:, :, f.target[1]], values, record.step)

@@ -66,27 +66,51 @@ class Score:
     sizes: Array
 
 
-def scores(fit: Fit, hypotheses: Sequence[Array]) -> list[Score]:
-    """Scores of hypotheses [updates, n_z, sizes] each, linearised about a fit (Rao 1948), with the level of the innovations profiled out."""
-    white = 1.0 / np.sqrt(fit.variance)
-    used = fit.used
-    weights = precisions(fit.free)
-    own = np.vstack([(fit.slopes * white[None, :, None])[used], np.diag(weights)])
-    rest = np.concatenate([(fit.nu * white)[used], slopes(fit.free) / np.maximum(weights, 1e-300)])
-    size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
-    q = np.linalg.qr(own / size)[0] if own.shape[1] else np.zeros((len(own), 0))
-    rest = rest - q @ (q.T @ rest)
-    total = float(rest @ rest)
-    found = []
-    for h in hypotheses:
-        columns = np.vstack([(h * white[None, :, None])[used], np.zeros((len(weights), h.shape[2]))])
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """What a fit leaves, `rest` [rows], beside all that is free anyway, with the orthonormal columns `q` of that."""
+
+    fit: Fit
+    q: Array
+    rest: Array
+
+    @staticmethod
+    def of(fit: Fit) -> Beside:
+        white, weights = 1.0 / np.sqrt(fit.variance), precisions(fit.free)
+        own = np.vstack([(fit.slopes * white[None, :, None])[fit.used], np.diag(weights)])
+        rest = np.concatenate([(fit.nu * white)[fit.used], slopes(fit.free) / np.maximum(weights, 1e-300)])
+        size = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
+        q = np.linalg.qr(own / size)[0] if own.shape[1] else np.zeros((len(own), 0))
+        return Beside(fit, q, rest - q @ (q.T @ rest))
+
+    def columns(self, change: Array) -> tuple[Array, Array]:
+        """A change [updates, n_z, sizes] as columns [rows, sizes], and what is left of them beside what is free."""
+        white = 1.0 / np.sqrt(self.fit.variance)
+        columns = np.vstack([(change * white[None, :, None])[self.fit.used], np.zeros((len(self.fit.free), change.shape[2]))])
         columns[~np.isfinite(columns)] = 0.0
-        before = np.sum(columns**2, axis=0)
-        columns = columns - q @ (q.T @ columns)
+        return columns, columns - self.q @ (self.q.T @ columns)
+
+    def gain(self, left: float) -> float:
+        """Log likelihood gained where so much is left of the sum of squares, with the level of the innovations profiled out."""
+        return 0.5 * int(np.sum(self.fit.used)) * float(np.log(float(self.rest @ self.rest) / max(left, 1e-300)))
+
+
+def scores(fit: Fit, hypotheses: Sequence[Array]) -> list[Score]:
+    """Scores of hypotheses [updates, n_z, sizes] each, linearised about a fit (Rao 1948)."""
+    beside, found = Beside.of(fit), []
+    for h in hypotheses:
+        whole, columns = beside.columns(h)
+        before = np.sum(whole**2, axis=0)
         if np.any(np.sum(columns**2, axis=0) < NEARLY * before) or not before.all():
             found.append(Score(0.0, np.zeros(h.shape[2])))
             continue
-        theta = np.linalg.lstsq(columns, -rest, rcond=1e-9)[0]
-        left = float(np.sum((rest + columns @ theta) ** 2))
-        found.append(Score(0.5 * int(np.sum(used)) * float(np.log(total / max(left, 1e-300))), theta))
+        theta = np.linalg.lstsq(columns, -beside.rest, rcond=1e-9)[0]
+        found.append(Score(beside.gain(float(np.sum((beside.rest + columns @ theta) ** 2))), theta))
     return found
+
+
+def as_they_are(fit: Fit, changes: Sequence[Array]) -> list[Score]:
+    """Scores of changes [updates, n_z] each, of size 1."""
+    beside = Beside.of(fit)
+    left = [float(np.sum((beside.rest + beside.columns(c[:, :, None])[1][:, 0]) ** 2)) for c in changes]
+    return [Score(beside.gain(x), np.ones(1)) for x in left]

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""An input that acts in steps: a controller that runs slower than the recorder, and holds its output in between.
+
+A signal u held for a period P is u later by P/2 on average, and beside that its slope times a saw of that period: with edges at phase + k P
+the error of the model's input is, to first order in P,
+
+    held - u = -u' (P/2 + saw(t)),    saw(t) = ((t - phase) mod P) - P/2 = -(P/pi) (sin(w (t - phase)) + ...),    w = 2 pi/P.
+
+So a delay of P/2, and a sine and a cosine of 1/P times u' of the amplitude P/pi, find period and phases without a start: phases follow
+from sums of squares. What they find is then looked at more closely, with true steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .catalogue.form import Form, Series
+from .evidence.bench import Bench
+from .evidence.screening import AT_ONCE, Beside, Score, as_they_are
+from .fit import Free
+
+Array = NDArray[np.float64]
+SPREAD = 0.75, 1.35  # times twice the delay that a score promises: periods that are tried
+FINER = 2.0  # frequencies tried, of the widths of one, 1/(length of the recordings)
+MOST = 1200  # of them: the finest periods of long recordings are left out
+BEST = 6  # frequencies that get a second look
+CLOSER = np.linspace(-0.6, 0.6, 7)  # of a step of frequency, in that
+TURNS = np.linspace(-0.125, 0.125, 3)  # of a period: phases in that
+KIND = "input_hold"
+
+
+def held(u: Array, period: float, phase: float) -> Array:
+    """A signal [n] held for `period` samples from `phase` on: at each sample the mean of the steps half a sample about it, for a simulation
+    joins samples by lines."""
+    n = len(u)
+    at = np.arange(np.floor((-1.0 - phase) / period), np.ceil((n + 1.0 - phase) / period) + 1.0)
+    edges = phase + at * period
+    area = np.concatenate([[0.0], np.cumsum(np.interp(edges[:-1], np.arange(n), u)) * period])
+    return np.diff(np.interp(np.arange(n + 1) - 0.5, edges, area))
+
+
+def propose(bench: Bench, index: int, delay: float) -> tuple[Score, Form] | None:
+    """The hold of an input that promises most, where one of `delay` [s] does; None if it would be shorter than two samples."""
+    step, about = bench.step, 2.0 * delay / bench.step
+    if about * SPREAD[1] < 2.0:
+        return None
+    wide = 1.0 / (FINER * max(len(r) for r in bench.records))
+    frequencies = np.arange(1.0 / (SPREAD[1] * about), min(0.5, 1.0 / (SPREAD[0] * about)), wide)[:MOST]
+    slopes = [np.gradient(r.u[:, index]) for r in bench.records]
+    series = [Series([s * wave(2.0 * np.pi * f * np.arange(len(s))) for s in slopes]) for f in frequencies for wave in (np.sin, np.cos)]
+    late, *waves = changes(bench, index, [Series([-s / step for s in slopes]), *series])
+    beside, own = Beside.of(bench.fit), _of_recordings(bench)
+    pairs = [[[w * one[:, None] for w in pair] for one in own] for pair in zip(waves[::2], waves[1::2])]
+    looks = [_look(beside, 1.0 / f, step, late, pair) for f, pair in zip(frequencies, pairs)]
+    steps = []
+    for k in np.argsort([left for left, _ in looks])[:BEST]:
+        phases = looks[k][1]
+        steps += [_steps(bench, index, 1.0 / (frequencies[k] + x * wide), phases + y) for x in CLOSER for y in TURNS]
+    tried = as_they_are(bench.fit, list(changes(bench, index, steps)))
+    best = int(np.argmax([s.gain for s in tried]))
+    return tried[best], Form(KIND, bench.model.inputs[index].name, "input_added", index, series=steps[best])
+
+
+def _look(beside: Beside, period: float, step: float, late: Array, waves: Sequence[Sequence[Array]]) -> tuple[float, Array]:
+    """What a hold of so many samples leaves of the sum of squares, and its phases [periods], from the changes [updates, n_z] by a sine and a
+    cosine of each recording."""
+    rest = beside.rest + 0.5 * period * step * beside.columns(late[:, :, None])[1][:, 0]
+    phases = []
+    for pair in waves:
+        columns = beside.columns(np.stack(pair, axis=-1))[1]
+        a, b = np.linalg.lstsq(columns, -rest, rcond=1e-9)[0]
+        size = period / np.pi / max(float(np.hypot(a, b)), 1e-300)
+        rest = rest + columns @ (size * np.array([a, b]))
+        phases.append(np.arctan2(-b, a) / (2.0 * np.pi))
+    return float(rest @ rest), np.array(phases)
+
+
+def _of_recordings(bench: Bench) -> list[Array]:
+    """Which updates [updates] are of each recording, as 1.0 and 0.0."""
+    lengths = [len(r) // bench.update for r in bench.records]
+    ends = np.cumsum([0, *lengths])
+    return [((np.arange(ends[-1]) >= a) & (np.arange(ends[-1]) < b)).astype(float) for a, b in zip(ends, ends[1:])]
+
+
+def _steps(bench: Bench, index: int, period: float, phases: Array) -> Series:
+    """What a hold of so many samples adds to the input, with a phase [periods] for each recording."""
+    own = [held(r.u[:, index], period, p * period) - r.u[:, index] for r, p in zip(bench.records, phases)]
+    return Series(own, period * bench.step)
+
+
+def changes(bench: Bench, index: int, series: Sequence[Series]) -> Array:
+    """Changes [series, updates, n_z] of the innovations when series are added to an input."""
+    problem, free = bench.problem(), bench.fit.free
+    found = []
+    for first in range(0, len(series), AT_ONCE):
+        added = [Free(("input_added", index, s), 0.0, 1.0) for s in series[first : first + AT_ONCE]]
+        shifts = np.vstack([np.zeros(len(free) + len(added)), np.hstack([np.zeros((len(added), len(free))), 0.1 * np.eye(len(added))])])
+        nu = problem.nu((*free, *added), shifts, bench.fit.by)
+        found.append((nu[1:] - nu[0]) / 0.1)
+    return np.concatenate(found)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""An input that acts in steps of a slower controller: the steps as a simulation needs them, and the hold told from a delay."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import penode_gen
+import pytest
+from scipy.signal import StateSpace, lsim
+
+from penode_sil.diagnosis import driven, plant, real
+from penode_sil.diagnosis.holding import held
+from penode_sil.diagnosis.noise import Experiment
+from penode_sil.measured import load
+
+STEP, FINE, SAMPLES = 2e-3, 8, 4000  # [s] of the recording, steps of the plant in one, samples
+MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 6.0
+MODEL = f"""
+[model]
+name = "rig"
+sample_time = "2 ms"
+[parameters]
+m = {{ value = {MASS}, unit = "kg", tolerance = 0.02 }}
+k = {{ value = {STIFFNESS}, unit = "N/m", tolerance = 0.02 }}
+d = {{ value = {DAMPING}, unit = "N*s/m", tolerance = 0.02 }}
+[inputs]
+push = {{ unit = "N" }}
+[bodies]
+mass = {{ mass = "m", position = "x", velocity = "v" }}
+[elements]
+spring = {{ between = ["mass", "ground"], law = "linear_spring", stiffness = "k" }}
+damper = {{ between = ["mass", "ground"], law = "linear_damper", damping = "d" }}
+drive = {{ between = ["mass", "ground"], law = "expression", force = "-push" }}
+[outputs]
+x = {{ value = "x", unit = "m" }}
+[sensors]
+x_mass = {{ value = "x", unit = "m", noise = 1e-6 }}
+a_mass = {{ value = "der(v)", unit = "m/s^2", noise = 1e-3 }}
+"""
+
+
+def recording(path: Path, how: str, period: float, seed: int) -> Path:
+    """A rig under a random force that acts late, or in steps, of a period [s]; a sine in its spring and in its damper makes it a little
+    wrong everywhere. Simulated in steps of a quarter millisecond, written every 2 ms."""
+    rng = np.random.default_rng(seed)
+    step, n = STEP / FINE, SAMPLES * FINE
+    t = np.arange(n) * step
+    f = np.fft.rfftfreq(n, step)
+    shape = np.where((f > 0.2) & (f < 6.0), 1.0, 0.0)
+    u = np.fft.irfft(shape * np.exp(2j * np.pi * rng.random(f.size)), n)
+    u *= 10.0 / np.std(u)
+    late = round(period / step)
+    acts = {"delay": np.interp(t - 0.5 * period, t, u), "hold": u[np.arange(n) // late * late]}[how]
+    linear = StateSpace([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]], [[0.0], [1.0 / MASS]], [[1.0, 0.0], [0.0, 1.0]], [[0.0], [0.0]])
+    for _ in range(3):  # the waves act along the motion that they make: a fixed point
+        x, v = lsim(linear, acts if _ == 0 else acts + waves, t, interp=False)[1].T
+        waves = 0.03 * (STIFFNESS * np.std(x) * np.sin(3.0 * x / np.std(x)) + DAMPING * np.std(v) * np.sin(2.5 * v / np.std(v)))
+    a = (acts + waves - STIFFNESS * x - DAMPING * v) / MASS
+    noise = rng.standard_normal((2, n)) * [[1e-6], [1e-3]]
+    columns = np.column_stack([t, u, x + noise[0], a + noise[1]])[::FINE]
+    np.savetxt(path, columns, delimiter=",", header="time [s],push [N],x_mass [m],a_mass [m/s^2]", comments="", fmt="%.9g")
+    return path
+
+
+@pytest.fixture
+def answer(tmp_path: Path):
+    (tmp_path / "rig.toml").write_text(MODEL)
+    model = penode_gen.load(tmp_path / "rig.toml")
+
+    def search(how: str, period: float, seed: int) -> real.Answer:
+        (m,) = load([recording(tmp_path / "r.csv", how, period, seed)], model)
+        e: Experiment = driven.experiment(m, model)
+        places = plant.places(model)
+        fastest = plant.linearise(model, places, np.array([model.start]), e.u[:1]).fastest
+        return real.answer(model, places, [e], fastest, "default", lambda text: None)
+
+    return search
+
+
+def test_steps_have_the_mean_of_a_hold_about_each_sample():
+    u = np.sin(np.arange(40) / 5.0)
+    assert np.array_equal(held(u, 1e9, 0.0), np.zeros(40))  # held from the first sample on, which is 0
+    whole = held(u, 4.0, 2.0)
+    for k in range(4, 36):
+        about = [u[(k + x - 2) // 4 * 4 + 2] for x in (-1, 0)]  # what is held from half a sample before to half a sample after
+        assert whole[k] == pytest.approx(np.mean(about), abs=1e-12)
+    late = np.interp(np.arange(400) - 1.25, np.arange(400), np.arange(400.0))
+    assert np.mean((held(np.arange(400.0), 2.5, 0.3) - late)[10:-10]) == pytest.approx(0.0, abs=0.02)  # later by half a period
+
+
+def test_a_hold_is_named_with_its_period(answer):
+    found = answer("hold", 0.0235, 1)
+    (cause,) = found.causes
+    assert (cause.kind, cause.where) == ("input_hold", "push")
+    assert cause.parameters["period"].value == pytest.approx(0.0235, abs=1e-5)  # 8 s resolve 1/8 Hz of 43 Hz; looked at in twentieths: 3.5e-6 s
+    low, high = cause.parameters["period"].ci95
+    assert low < 0.0235 < high
+
+
+def test_a_delay_is_no_hold(answer):
+    (cause,) = answer("delay", 0.0235, 1).causes
+    assert (cause.kind, cause.where) == ("input_delay", "push")
+    assert abs(cause.parameters["delay"].value - 0.01175) < 0.03 / np.sqrt(STIFFNESS / MASS)  # what waves of 3 % do, where they go with the rate
