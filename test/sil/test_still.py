@@ -92,9 +92,9 @@ def test_noise_is_that_of_all_recordings_about_a_drift(rig):
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        (None, "x_mass varies by .* m, in the recordings of motion by .* m; --still takes a recording in which nothing moves"),
+        (None, "x_mass varies by .* m, in a recording of motion by .* m; --still takes a recording in which nothing moves"),
         ("time [s],speed [m/s]\n0,1\n1,1\n", "it holds no sensor or input of the model; record at least one of: push, x_mass"),
-        ("time [s],x_mass [mm]\n0,1\n1,2\n", "channel x_mass has 2 samples; a noise needs at least 50, record longer"),
+        ("time [s],x_mass [mm]\n0,1\n1,2\n", "channel x_mass has 2 samples; a noise needs at least 100, record longer"),
         ("time [s],x_mass [s]\n0,1\n1,2\n", "x_mass"),
     ],
 )

@@ -8,7 +8,7 @@ the error of the model's input is, to first order in P,
     held - u = -u' (P/2 + saw(t)),    saw(t) = ((t - phase) mod P) - P/2 = -(P/pi) (sin(w (t - phase)) + ...),    w = 2 pi/P.
 
 So a delay of P/2, and a sine and a cosine of 1/P times u' of the amplitude P/pi, find period and phases without a start: phases follow
-from sums of squares. What they find is then looked at more closely, with true steps.
+from sums of squares. The best of these are then compared as true steps.
 """
 
 from __future__ import annotations
@@ -25,11 +25,8 @@ from .fit import Free
 
 Array = NDArray[np.float64]
 SPREAD = 0.75, 1.35  # times twice the delay that a score promises: periods that are tried
-FINER = 2.0  # frequencies tried, of the widths of one, 1/(length of the recordings)
+FINER = 3.0  # frequencies tried, of the widths of one, 1/(length of the recordings)
 MOST = 1200  # of them: the finest periods of long recordings are left out
-BEST = 6  # frequencies that get a second look
-CLOSER = np.linspace(-0.6, 0.6, 7)  # of a step of frequency, in that
-TURNS = np.linspace(-0.125, 0.125, 3)  # of a period: phases in that
 KIND = "input_hold"
 
 
@@ -56,10 +53,7 @@ def propose(bench: Bench, index: int, delay: float) -> tuple[Score, Form] | None
     beside, own = Beside.of(bench.fit), _of_recordings(bench)
     pairs = [[[w * one[:, None] for w in pair] for one in own] for pair in zip(waves[::2], waves[1::2])]
     looks = [_look(beside, 1.0 / f, step, late, pair) for f, pair in zip(frequencies, pairs)]
-    steps = []
-    for k in np.argsort([left for left, _ in looks])[:BEST]:
-        phases = looks[k][1]
-        steps += [_steps(bench, index, 1.0 / (frequencies[k] + x * wide), phases + y) for x in CLOSER for y in TURNS]
+    steps = [_steps(bench, index, 1.0 / frequencies[k], looks[k][1]) for k in np.argsort([left for left, _ in looks])[:AT_ONCE]]
     tried = as_they_are(bench.fit, list(changes(bench, index, steps)))
     best = int(np.argmax([s.gain for s in tried]))
     return tried[best], Form(KIND, bench.model.inputs[index].name, "input_added", index, series=steps[best])

@@ -18,6 +18,7 @@ from .beginning import start_of
 from .build import SPREAD
 from .dropouts import bursts
 from .compiling import moving
+from .evidence.blocks import DRAWS
 from .fit import Free, Problem
 from .hypotheses import size
 from .noise import Experiment, metric
@@ -91,7 +92,6 @@ def measure(
 
 
 BLOCKS = 40  # of the held-out samples, drawn anew together: errors near in time are alike
-DRAWS = 2000
 
 
 def achieved(before: Array, after: Array, floor: float) -> tuple[float | None, tuple[float, float] | None]:

@@ -16,11 +16,10 @@ from penode_gen.model import Input, Model, Signal
 
 from ..errors import UserError
 from ..measured import Measured
+from ..raster import SHORTEST
 from ..recording import aliases, pick, read
 
 Array = NDArray[np.float64]
-MIN_SAMPLES = 50  # of a channel: its standard deviation is then known to 10 %
-MAX_MOTION = 0.5  # of a sensor's rms in training, about its mean: what varies by more at standstill is no noise that a motion stands out of
 Channel = TypeVar("Channel", Signal, Input)
 
 
@@ -57,13 +56,13 @@ def _of(path: Path, model: Model, pairs: dict[str, str], train: Sequence[Measure
     found = {}
     for s in held:
         x = pick(tables, s.name, s.unit).channel(s.name, s.unit)
-        if len(x) < MIN_SAMPLES:
-            raise UserError(f"{path}: channel {s.name} has {len(x)} samples; a noise needs at least {MIN_SAMPLES}, record longer")
+        if len(x) < SHORTEST:
+            raise UserError(f"{path}: channel {s.name} has {len(x)} samples; a noise needs at least {SHORTEST}, record longer")
         noise = deviation(x)
-        moving = [np.std(m.z[s.name][m.mask[s.name]]) for m in train if s.name in m.z and m.mask[s.name].any()]
-        if moving and noise > MAX_MOTION * max(moving):
+        moving = [deviation(m.z[s.name][m.mask[s.name]]) for m in train if s.name in m.z and m.mask[s.name].any()]
+        if moving and noise >= min(moving):
             raise UserError(
-                f"{path}: {s.name} varies by {noise:.3g} {units.si(s.unit)}, in the recordings of motion by {max(moving):.3g} {units.si(s.unit)}; "
+                f"{path}: {s.name} varies by {noise:.3g} {units.si(s.unit)}, in a recording of motion by {min(moving):.3g} {units.si(s.unit)}; "
                 "--still takes a recording in which nothing moves"
             )
         if noise > 0.0:

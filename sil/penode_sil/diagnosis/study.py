@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from penode_gen.model import Model, Parameter, Signal
 
 from . import plant
+from .evidence.prior import SHARE
 from .fit import KEPT, Fit, Free, Problem
 from .hypotheses import size
 from .noise import Experiment, Metric, metric, sensor_levels
@@ -25,7 +26,6 @@ SKEW = 0.001  # of a sample: channels are never sampled at quite the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
 VAGUE = 0.5  # a parameter known no better may itself make a plant of another kind
 FEW = 4  # studies with other noise that are kept: the next step of a search may ask for one again
-SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 
 
 @dataclass(frozen=True, eq=False)

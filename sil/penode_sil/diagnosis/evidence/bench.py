@@ -16,11 +16,10 @@ from ..plant import Place
 from .fit import Fit, Problem, likelihood
 from .gain import Gains, Level, linear
 from .observer import WANDER, Filter, Predictor, Record, bias, augmented
-from .prior import Stated
+from .prior import SHARE, Stated
 
 Array = NDArray[np.float64]
 UPDATES = 16  # a period of the motion
-SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 UNSTATED = 0.05  # tolerance of a parameter for which the file has none: one that is farther off is worth a name
 FAR = 1e3  # a parameter is at most so many times as large or small as the file has it
 SIZES = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3)  # of what wanders, relative to what moves: levels that are tried

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..fit import Free
 
 Array = NDArray[np.float64]
+SHARE = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
 TAIL = 2.5  # halves of (degrees of freedom + 1): far from the file a value costs 2.5 log(1 + x^2/5), 7 for 8 deviations, 12 for 20
 
 
