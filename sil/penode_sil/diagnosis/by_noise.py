@@ -23,12 +23,11 @@ from .broken import broken_sensors, still_wild
 from .explanation import Explanation
 from .hypotheses import CLOCK
 from .judging import cause, damped, judge, pitching, resized, worth
-from .noise import Experiment
+from .noise import UNSEEN, Experiment
 from .result import OUTSIDE, Cause, Diagnosis, Gain, separating
 from .study import Study, look
 
 CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
-UNSEEN = 1.5  # times the noise: a hold-out that is that far off, where training showed nothing, is of another vehicle
 FARTHER = 0.02  # share of samples outside of what was trained, from which a hold-out says little about a name
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 SURELY_NOT = (Cause(OUTSIDE, "", {}, 0.5),)  # named by nothing on the list

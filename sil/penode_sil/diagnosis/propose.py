@@ -125,7 +125,8 @@ def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
     same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
     level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
-    return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved))
+    taken = bench.fit.taken(best, problem.floor)
+    return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved), taken)
 
 
 def _sized(term: Term, sizes: Array) -> list[Free]:

@@ -35,8 +35,8 @@ class Term:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A form beside what was accepted already, fitted: `gain` of the criterion, its `share` of what acts (see `worth`), `blocks` [blocks] of
-    predictive density."""
+    """A form beside what was accepted already, fitted: `gain` of the criterion, its `share` of what acts (see `worth`), the share `taken` of
+    the power that innovations have beyond sensor noise, `blocks` [blocks] of predictive density."""
 
     form: Form
     term: Term
@@ -44,6 +44,7 @@ class Trial:
     gain: float
     level: Level
     share: float = 0.0
+    taken: float = 0.0
     blocks: Array | None = None
 
 

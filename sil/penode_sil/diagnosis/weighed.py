@@ -19,7 +19,7 @@ from .evidence.observer import Record, bias, sample_noise
 from .fit import Fit, Problem
 from .innovate import MIN_GAIN
 from .judging import ENOUGH
-from .noise import Experiment
+from .noise import UNSEEN, Experiment
 from .residual import Channel, rms
 from .result import Cause, Gain, Named, Value
 from .study import Study, look
@@ -57,7 +57,7 @@ def supports(model: Model) -> bool:
 def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> float:
     """How much more acts than an explanation has, beyond the noise of sensors, as a share of what moves; 0 if that may be chance. Beyond
     UNMODELLED innovations have to decide; less than that, only a simpler answer of theirs counts."""
-    if not supports(study.model):
+    if not supports(study.model) or _is_noise(study, fit):
         return 0.0
     values = {f.target: f.value for f in fit.free if isinstance(f.target, str)}
     known = {n: replace(p, value=values.get(n, p.value), exact=True) for n, p in fit.model.parameters.items()}
@@ -74,6 +74,15 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
     gained = bench.fit.likelihood - still.likelihood
     log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats")
     return bench.level.size if gained > MIN_GAIN and bench.level.size > MIN_UNMODELLED else 0.0
+
+
+def _is_noise(study: Study, fit: Fit) -> bool:
+    """Does an explanation leave of every sensor no more than the noise that the file states for it? Slow noise looks like what wanders."""
+    for j, s in enumerate(study.model.sensors):
+        left = np.concatenate([(e.y - z)[e.good[:, j], j] for e, z in zip(study.experiments, fit.simulated)])
+        if left.size and rms(left) > UNSEEN * s.noise:
+            return False
+    return True
 
 
 def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]) -> Weighed:

@@ -35,13 +35,14 @@ def least(level: float) -> float:
 def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]) -> float:
     """Rms of terms of one name as a share of what acts at their place, of their input, or of their sensor: as much of it as nothing else
     that is free could do as well, a parameter, an offset, a start: in forces, and in what sensors show. How much of a line is whose is a
-    matter of writing it down, so a force counts by what is left of it beside lines, over BENT."""
+    matter of writing it down, so a force counts by what is left of it beside lines, that of a bent curve over BENT."""
     form, targets = terms[0].form, [f.target for t in terms for f in t.free]
     if form.how == "force":
         motion = moved[form.index]
         force = np.sum([np.concatenate(_force(t, fit, motion)) for t in terms], axis=0)
         beside = _beside(bench, form.index, motion, force)
-        return min(_rms(beside), _rms(force) * own(bench.model, fit, targets)) / (BENT * motion.force)
+        bent = 1.0 if all(_linear(t, fit, motion) for t in terms) else BENT
+        return min(_rms(beside), _rms(force) * own(bench.model, fit, targets)) / (bent * motion.force)
     return max(_of_signal(bench, t, fit) for t in terms) * own(bench.model, fit, targets)
 
 
@@ -97,6 +98,13 @@ def _force(term: Term, fit: Fit, motion: Motion) -> list[Array]:
         now = replace(part, shapes={k: (values.get(f"{name}_{k}", v), u) for k, (v, u) in part.shapes.items()})
         total = [x + fit.value(f"{name}_{part.gain[0]}") * now.along(m) for x, m in zip(total, motion.parts)]
     return total
+
+
+def _linear(term: Term, fit: Fit, motion: Motion) -> bool:
+    """Is its force twice as large along a motion twice as large: a spring and a damper in series, a hidden mass?"""
+    twice = replace(motion, parts=tuple(replace(m, s=2.0 * m.s, v=2.0 * m.v) for m in motion.parts))
+    once, other = (np.concatenate(_force(term, fit, m)) for m in (motion, twice))
+    return bool(_rms(other - 2.0 * once) < SYSTEMATIC * _rms(other))
 
 
 def _of_signal(bench: Bench, term: Term, fit: Fit) -> float:
