@@ -27,6 +27,7 @@ from .noise import Experiment
 from .resting import resting
 from .result import Diagnosis
 from .study import VAGUE, Study, begin
+from .worth import WORTH
 
 AGAIN = 3  # times that bursts are looked for in what is left without them
 
@@ -56,7 +57,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     """By innovations where a guess is all that the file has of a parameter, or where more acts than the search by sensor noise explains;
     by that search else. What innovations explain but in part may have no name at all, if the search has none for it either; and what acts
     beside several causes of that search may be but the form of one, unless innovations have an answer with fewer. The search ends early
-    where more acts than any one cause explains, and than all that innovations found."""
+    where more acts than any one cause explains, and than all that innovations found, but not so much that more causes are to be expected."""
     if weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values()):
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
@@ -65,7 +66,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     w = None
     if beam and weighed.misfit(study, beam[0].fit, case.log) > weighed.UNMODELLED:
         w = _weighed(case, study)
-        if w.verdict == "explained" and w.level > weighed.UNMODELLED:
+        if w.verdict == "explained" and weighed.UNMODELLED < w.level < 2.0 * WORTH:
             return _by_innovations(case, beam[0], w)
     study, explanations = resting(other, *search.grow(study, beam, case.log), case.log)
     best = explanations[0] if explanations else None
