@@ -66,15 +66,15 @@ void xcp_pointer(void)
     lists(4U, 2U, 0U);
     //@ loop unroll 65;
     for (uint32_t n = 0U; n <= PEN_XCP_ENTRIES; n++) {
+        //@ loop unroll 32;
+        for (size_t i = 0U; i < PEN_XCP_ODTS; i++) { /* which SET_DAQ_PTR leaves alone */
+            daq.odt[i].first = (uint8_t)Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - n);
+            daq.odt[i].entries = (uint8_t)n;
+        }
         //@ loop unroll 66;
         for (uint32_t k = 0U; k <= (n + 1U); k++) {
             uint8_t *const in = arriving(8U, 0xe2U);
             slave();
-            //@ loop unroll 32;
-            for (size_t i = 0U; i < PEN_XCP_ODTS; i++) {
-                daq.odt[i].first = (uint8_t)Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - n);
-                daq.odt[i].entries = (uint8_t)n;
-            }
             in[5] = (uint8_t)((k <= n) ? k : Frama_C_unsigned_int_interval(n + 1U, 255U));
             send(in, 8U);
             /*@ assert daq.at + daq.left <= PEN_XCP_ENTRIES; */
