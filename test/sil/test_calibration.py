@@ -216,6 +216,18 @@ def test_nobody_answers_in_one_line() -> None:
             pass
 
 
+def test_what_cannot_be_meant_is_one_line() -> None:
+    kind = np.dtype("f4")
+    with pytest.raises(UserError, match=r"which of its sets\? Name it as .*nqvm\.toml:NAME, one of: default, altered_friction$"):
+        pages.choose(str(NQVM), kind)
+    with pytest.raises(UserError, match="a set begins with b'PENS'; name a set as"):
+        pages.choose(str(ROOT / "README.md"), kind)
+    with pytest.raises(UserError, match=r"cannot be read as A2L \(it has no MODULE\)"):
+        a2l_read.parse((ROOT / "README.md").read_text(encoding="utf-8"), "README.md")
+    with pytest.raises(UserError, match="--signals names none"):
+        measure.choose(a2l_read.A2l("x", {}, {}, None, None), [])
+
+
 class Timed:
     """A link to a slave whose event comes each millisecond."""
 
@@ -233,7 +245,7 @@ def test_log_counts_what_is_missing_and_its_clock_goes_on_when_the_stamps_wrap()
     kept.rows = [[(1 << 60) + n] for n in range(len(steps))]
     kept.stamps.append(0)  # of a sample whose values come after the look at them
     entries = [a2l_read.Entry(name, "", 64, np.dtype("u8"), ()) for name in ("a", "b")]  # two names of one place
-    log = measure._log(Timed(), entries, kept, 1)
+    log = measure._log(measure._period(Timed(), 1), entries, kept)
     assert log.lost == 4 and np.allclose(log.time, (np.array(steps) + 3) * 1e-3, rtol=0.0, atol=1e-15)  # rounding of seven sums below 16 ms
     assert all(log.values[name].tolist() == [(1 << 60) + n for n in range(len(steps))] for name in ("a", "b"))
 

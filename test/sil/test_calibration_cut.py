@@ -16,9 +16,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import penode_gen
-from penode_sil.calibration import a2l_read, address, link as links, pages, stage, virtual
+from penode_sil.calibration import a2l_read, address, link as links, measure, pages, stage, virtual
+from penode_sil.cli import cli
 from penode_sil.errors import UserError
 
 NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm" / "nqvm.toml"
@@ -33,15 +35,26 @@ pytestmark = pytest.mark.skipif(
 
 
 class Cable(threading.Thread):
-    """A connection to a port, that passes `sent` bytes of the master and `answered` of the controller, and is then cut, on both sides."""
+    """
+    Connections to a port, one after the other; the last of them passes `sent` bytes of the master and `answered` of the controller, and is
+    then cut, on both sides.
+    """
 
-    def __init__(self, port: int, sent: int = ALL, answered: int = ALL):
+    def __init__(self, port: int, sent: int = ALL, answered: int = ALL, connections: int = 1):
         super().__init__(daemon=True)
-        self.left, self.port = [sent, answered], port
+        self.limits = [[ALL, ALL]] * (connections - 1) + [[sent, answered]]
+        self.port = port
         self.passed = [bytearray(), bytearray()]
         self.listening = socket.create_server(("127.0.0.1", 0))
 
     def run(self) -> None:
+        for limits in self.limits:
+            self.left = list(limits)
+            self.connection()
+        self.listening.close()
+
+    def connection(self) -> None:
+        """From its beginning to its end."""
         master, _ = self.listening.accept()
         ends = [master, socket.create_connection(("127.0.0.1", self.port))]
         for end in ends:
@@ -56,7 +69,7 @@ class Cable(threading.Thread):
                     self.left[way] -= len(data)
                     self.passed[way] += data
                     ends[1 - way].sendall(data)
-        for end in (*ends, self.listening):
+        for end in ends:
             end.close()
 
     @property
@@ -166,3 +179,17 @@ def test_penode_stage_ends_with_one_line_wherever_the_answers_break_off(served: 
         report = through(Cable(port, answered=cut), a2l, chosen, 0.3)
         assert report and "\n" not in report and "no answer to" in report
         clean(port, a2l, chosen, default, False)
+
+
+def test_measurement_that_breaks_off_leaves_the_log_of_what_came(served: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from asammdf import MDF
+
+    monkeypatch.setattr(measure, "SILENCE", 0.5)
+    out = tmp_path / "log.mf4"
+    cable = Cable(served[0], answered=20_000, connections=2)  # the A2L comes over the first
+    cable.start()
+    done = CliRunner().invoke(cli, ["measure", "--signals", "z_b,sample", "--to", cable.address.text, "-o", str(out)], standalone_mode=False)
+    assert isinstance(done.exception, UserError) and "has fallen silent" in str(done.exception)
+    with MDF(out) as log:
+        sample = log.get("sample").samples.astype(int)
+    assert sample.size > 500 and (np.diff(sample) == 1).all() and f"{sample.size} samples in" in done.stdout
