@@ -184,7 +184,7 @@ def test_penode_stage_ends_with_one_line_wherever_the_answers_break_off(served: 
 def test_measurement_that_breaks_off_leaves_the_log_of_what_came(served: tuple, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from asammdf import MDF
 
-    monkeypatch.setattr(measure, "SILENCE", 0.5)
+    monkeypatch.setattr(measure._wait, "__defaults__", (0.5,))
     out = tmp_path / "log.mf4"
     cable = Cable(served[0], answered=20_000, connections=2)  # the A2L comes over the first
     cable.start()

@@ -29,9 +29,6 @@ from .stage import Staged, stage_set
 _TYPES = {"u1": "U8", "i1": "I8", "u2": "U16", "i2": "I16", "u4": "U32", "i4": "I32", "u8": "U64", "i8": "I64", "f4": "F32", "f8": "F64"}
 
 
-SILENCE = 10.0  # s: as long as an answer may take (connected); a sample comes at least each 255 steps
-
-
 @dataclass
 class Samples:
     """What has come: time stamps [ns of the controller], and a list of numbers each."""
@@ -153,8 +150,8 @@ def record(
         return _log(period, entries, kept, broken)
 
 
-def _wait(duration: float | None, kept: Samples) -> bool:
-    """Until the time is over; True if no sample comes for SILENCE after others have."""
+def _wait(duration: float | None, kept: Samples, silence: float = 10.0) -> bool:
+    """Until the time is over; True if no sample comes for `silence` [s] after others have: as long as an answer may take (connected)."""
     begin = latest = time.monotonic()
     seen = 0
     with progress("measuring", duration or 1.0) as tell:
@@ -163,7 +160,7 @@ def _wait(duration: float | None, kept: Samples) -> bool:
             tell(min(time.monotonic() - begin, duration or 0.0))
             if len(kept.rows) != seen:
                 seen, latest = len(kept.rows), time.monotonic()
-            elif seen and time.monotonic() - latest > SILENCE:
+            elif seen and time.monotonic() - latest > silence:
                 return True
     return False
 
