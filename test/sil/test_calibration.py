@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from exchanges import check_characteristics, check_log, check_measurements, drive
+from exchanges import EIGHT, check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, link as links, measure, pages, stage, virtual
 from penode_sil.calibration.codes import Page, Slave, Who
 from penode_sil.errors import UserError
@@ -105,9 +105,6 @@ def test_log_is_that_of_a_sil_run_with_the_exchange_where_it_shows_the_new_id(ki
         log = measure.record(where, named, ["alias", *SIGNALS], 0.3, every, exchange)
     assert (log.values["alias"] == log.values["z_w"]).all()
     check_log(model, u, log, every)
-
-
-EIGHT = ["z_b", "z_w", "v_b", "v_w", "z_road", "a_body", "a_wheel", "deflection"]
 
 
 @pytest.mark.parametrize("seconds", [2.0, pytest.param(60.0, marks=pytest.mark.long)])
