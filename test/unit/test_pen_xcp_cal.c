@@ -131,6 +131,19 @@ void test_pages_of_tool_and_ecu_switch_apart(void)
     TEST_ASSERT_TRUE(value_at(0U) == (pen_real_t)9);
 }
 
+void test_page_of_the_tool_does_not_move_that_of_the_ecu(void)
+{
+    write_value(0U, (pen_real_t)9);
+    set_page(TOOL, WORKING);
+    TEST_ASSERT_EQUAL_UINT32(REFERENCE, ecu_page());
+    expect_in_force(1U, 0U, (pen_real_t)1);
+    set_page(ECU, WORKING);
+    (void)step();
+    set_page(TOOL, REFERENCE);
+    TEST_ASSERT_EQUAL_UINT32(WORKING, ecu_page());
+    expect_in_force(FIRST, 0U, (pen_real_t)9);
+}
+
 void test_modes_pages_and_segments_that_are_not_there(void)
 {
     BAD(MODE_NOT_VALID, 0xeb, 0, 0, 0);

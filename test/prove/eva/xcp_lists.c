@@ -59,13 +59,14 @@ void xcp_allocate(void)
     }
 }
 
-/* The pointer to each entry of ODTs of each size. */
+/* The pointer to each entry of ODTs of each size, and to one behind them. A packet takes it there too. */
 void xcp_pointer(void)
 {
     begin();
     lists(4U, 2U, 0U);
     //@ loop unroll 65;
     for (uint32_t n = 0U; n <= PEN_XCP_ENTRIES; n++) {
+        uint8_t *const in = arriving(8U, 0xe2U);
         //@ loop unroll 32;
         for (size_t i = 0U; i < PEN_XCP_ODTS; i++) { /* which SET_DAQ_PTR leaves alone */
             daq.odt[i].first = (uint8_t)Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - n);
@@ -73,12 +74,16 @@ void xcp_pointer(void)
         }
         //@ loop unroll 66;
         for (uint32_t k = 0U; k <= (n + 1U); k++) {
-            uint8_t *const in = arriving(8U, 0xe2U);
-            slave();
+            daq.at = 0U; /* of no entry, it says nothing; it stays, and left becomes 0, where the pointer is refused */
             in[5] = (uint8_t)((k <= n) ? k : Frama_C_unsigned_int_interval(n + 1U, 255U));
-            send(in, 8U);
+            seen = pen_xcp_list_command(&xcp, in, Frama_C_unsigned_int_interval(0U, PEN_XCP_LISTS - 1U));
             /*@ assert daq.at + daq.left <= PEN_XCP_ENTRIES; */
         }
+        slave();
+        daq.at = 0U;
+        in[5] = 0U;
+        send(in, 8U);
+        /*@ assert daq.at + daq.left <= PEN_XCP_ENTRIES; */
     }
 }
 
