@@ -138,6 +138,9 @@ void test_upload_reads_regions_and_goes_on(void)
     BAD(ACCESS_DENIED, 0xf5, 2); /* from one region into the next */
     TEST_ASSERT_EQUAL_UINT32(3U, send_word(0xf4U, 2U, REGION + 8U));
     TEST_ASSERT_EQUAL_HEX8('n', out[1]);
+    at(REGION + 8U);
+    GOOD(3U, 0xf5, 2);
+    BAD(ACCESS_DENIED, 0xf5, 1); /* behind what has been read */
 }
 
 void test_upload_sizes(void)
@@ -164,6 +167,7 @@ void test_addresses_outside_are_denied(void)
 
 void test_texts_end_where_they_end(void)
 {
+    at(SEGMENT); /* which no longer counts */
     GOOD(8U, 0xfa, 1);
     TEST_ASSERT_EQUAL_UINT32(5U, number_of(4U, &out[4]));
     GOOD(3U, 0xf5, 2);
