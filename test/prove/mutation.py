@@ -3,7 +3,7 @@
 """Gate: small faults put into src/ (universalmutator, float build) are found by the unit tests; the rest stand in a list.
 
 mutation.py             every fault
-mutation.py --share N   every N-th fault, and all of the list
+mutation.py --share N   every N-th fault, and all of the list; --first K: others of them, beginning with number K, below N
 mutation.py pen_set.c   those of one file
 mutation.py --tests 'test_pen_xcp*' pen_xcp.c ...   with these test programs only: for files that no other one calls
 
@@ -133,8 +133,8 @@ def bench(name: str, flags: list[str], only: str = "*") -> Bench:
     return made
 
 
-def faults(source: Path, share: int, must: set[Fault]) -> Iterator[tuple[Fault, Path]]:
-    """The mutants of a file that compile, differ from it in what they do, and from each other: each `share`-th, and those of `must`."""
+def faults(source: Path, share: int, first: int, must: set[Fault]) -> Iterator[tuple[Fault, Path]]:
+    """The mutants of a file that compile, differ from it in what they do, and from each other: each `share`-th from `first` on, and those of `must`."""
     place = WORK / source.stem
     place.mkdir()
     gate.make([MUTATE, source, "c", "--noCheck", "--mutantDir", place])
@@ -143,7 +143,7 @@ def faults(source: Path, share: int, must: set[Fault]) -> Iterator[tuple[Fault, 
     texts = {preprocessed(source)}
     for number, mutant in enumerate(sorted(place.glob("*.c"), key=lambda path: int(re.findall(r"\d+", path.stem)[-1]))):
         found = fault(source.name, before, mutant.read_text().splitlines())
-        if number % share and found not in must:
+        if number % share != first and found not in must:
             continue
         text = preprocessed(mutant)
         if text is None or text in texts:  # in a comment, or in the double build
@@ -198,6 +198,7 @@ def listed() -> dict[Fault, str]:
 def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--share", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--tests", default="*")
     parser.add_argument("files", nargs="*")
     options = parser.parse_args()
@@ -213,7 +214,7 @@ def main() -> int:
             continue
         mine = {fault for fault in may_live if fault.file == source.name}
         alive, total, same, wrong = [], 0, 0, []
-        for found, mutant in faults(source, options.share, mine):
+        for found, mutant in faults(source, options.share, options.first, mine):
             total += 1
             if lives(mutant, source.name, benches):
                 if same_code(mutant, source):

@@ -40,6 +40,13 @@ static pen_xcp_t xcp;
 static pen_xcp_daq_t daq;
 static uint8_t *ring;
 static pen_status_t verdict;
+static unsigned long long packets; /* sent so far, in all sequences */
+
+/* For xcp_fuzz_check.py. */
+__attribute__((destructor)) static void count(void)
+{
+    fprintf(stderr, "packets: %llu\n", packets);
+}
 
 static const uint8_t *at;
 static size_t left;
@@ -123,6 +130,7 @@ static void send(const uint8_t packet[], uint32_t n)
     const bool sure = predict(packet, n);
     uint32_t answer;
 
+    packets++;
     memcpy(in, packet, n);
     answer = pen_xcp_receive(&xcp, in, n, out);
     if (getenv("SHOW") != NULL) {
@@ -276,7 +284,7 @@ static void list(void)
     const uint32_t steps = byte() % 12U;
     const uint32_t room = (SLOTS - 1U) / odts; /* samples */
     const uint32_t should = (steps > room) ? ((room * odts) + 1U) : (steps * odts); /* packets, and an event */
-    uint32_t packets = 0U;
+    uint32_t sent = 0U;
 
     send8(0xd6U, 0U, 0U, 0U, 0U);
     send8(0xd5U, 0U, 1U, 0U, 0U);
@@ -295,9 +303,9 @@ static void list(void)
         step();
     }
     while ((xcp.sampling != 0U) && drain()) {
-        packets++;
+        sent++;
     }
-    expect((xcp.sampling == 0U) || (packets == should), "packets", packets, should);
+    expect((xcp.sampling == 0U) || (sent == should), "packets", sent, should);
     if ((byte() % 2U) == 0U) {
         expect((xcp.sampling == 0U) || (daq.lists == 1U), "lists", daq.lists, 1U);
         send8(0xd3U, 0U, 0U, 0U, 0U);

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import gate
 
 WORK = gate.BUILD / "xcp_fuzz"
 FAULT_RUNS = 60_000
+PACKETS = 10_000_000  # at least, in a run whose figures are kept
 
 # File, and fault: see gate.faulty.
 FAULTS = {
@@ -67,10 +69,11 @@ def program(parts: dict[str, Path], fault: tuple[str, tuple[str, int, str]] | No
     return elf
 
 
-def fuzz(elf: Path, runs: int) -> str:
-    """What libFuzzer has found, its last lines; "" if nothing."""
+def fuzz(elf: Path, runs: int) -> tuple[str, int]:
+    """What libFuzzer has found, its last lines, "" if nothing; and the packets that were sent."""
     done = gate.run([elf, f"-runs={runs}", "-max_len=1500", "-len_control=0", "-seed=1", f"-artifact_prefix={elf}-"], cwd=WORK, limit=36000)
-    return "" if done.returncode == 0 else "\n".join(done.stderr.splitlines()[-30:])
+    sent = re.search(r"^packets: (\d+)$", done.stderr, re.M)
+    return "" if done.returncode == 0 else "\n".join(done.stderr.splitlines()[-30:]), int(sent[1]) if sent else 0
 
 
 def main() -> int:
@@ -80,15 +83,17 @@ def main() -> int:
     parser.add_argument("--keep", action="store_true", help="put the figures into figures.json")
     chosen = parser.parse_args()
     parts = objects()
-    found = fuzz(program(parts), chosen.runs)
-    good = gate.report(f"xcp fuzz: {chosen.runs} sequences of packets as the oracle says", [found] if found else [])
+    found, packets = fuzz(program(parts), chosen.runs)
+    wrong = [found] if found else []
+    wrong += [f"{packets} packets, not {PACKETS}"] if chosen.keep and packets < PACKETS else []
+    good = gate.report(f"xcp fuzz: {packets} packets in {chosen.runs} sequences, as the oracle says", wrong)
     missed = []
     for name, fault in FAULTS.items():
-        if not fuzz(program(parts, fault), FAULT_RUNS):
+        if not fuzz(program(parts, fault), FAULT_RUNS)[0]:
             missed.append(name)
         good &= gate.report(f"xcp fuzz: seeded fault: {name}", ["not found"] if name in missed else [])
     if chosen.keep:
-        gate.keep(chosen.key, {"sequences": chosen.runs, "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
+        gate.keep(chosen.key, {"sequences": chosen.runs, "packets": packets, "failures": int(bool(found)), "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
     return int(not good)
 
 

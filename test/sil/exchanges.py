@@ -18,6 +18,8 @@ from penode_sil.schedule import Call
 from penode_sil.status import BIT
 from penode_sil.targets import Sil
 
+EIGHT = ["z_b", "z_w", "v_b", "v_w", "z_road", "a_body", "a_wheel", "deflection"]
+
 
 def drive(model: Any, n: int = 2000) -> np.ndarray:
     """Inputs that never repeat within n samples: 30 mm, two incommensurate waves."""

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from exchanges import check_characteristics, check_log, check_measurements, drive
+from exchanges import EIGHT, check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, link as links, measure, pages, stage, virtual
 from penode_sil.calibration.codes import Page, Slave, Who
 from penode_sil.errors import UserError
@@ -105,9 +105,6 @@ def test_log_is_that_of_a_sil_run_with_the_exchange_where_it_shows_the_new_id(ki
         log = measure.record(where, named, ["alias", *SIGNALS], 0.3, every, exchange)
     assert (log.values["alias"] == log.values["z_w"]).all()
     check_log(model, u, log, every)
-
-
-EIGHT = ["z_b", "z_w", "v_b", "v_w", "z_road", "a_body", "a_wheel", "deflection"]
 
 
 @pytest.mark.parametrize("seconds", [2.0, pytest.param(60.0, marks=pytest.mark.long)])
@@ -216,6 +213,18 @@ def test_nobody_answers_in_one_line() -> None:
             pass
 
 
+def test_what_cannot_be_meant_is_one_line() -> None:
+    kind = np.dtype("f4")
+    with pytest.raises(UserError, match=r"which of its sets\? Name it as .*nqvm\.toml:NAME, one of: default, altered_friction$"):
+        pages.choose(str(NQVM), kind)
+    with pytest.raises(UserError, match="a set begins with b'PENS'; name a set as"):
+        pages.choose(str(ROOT / "README.md"), kind)
+    with pytest.raises(UserError, match=r"cannot be read as A2L \(it has no MODULE\)"):
+        a2l_read.parse((ROOT / "README.md").read_text(encoding="utf-8"), "README.md")
+    with pytest.raises(UserError, match="--signals names none"):
+        measure.choose(a2l_read.A2l("x", {}, {}, None, None), [])
+
+
 class Timed:
     """A link to a slave whose event comes each millisecond."""
 
@@ -233,7 +242,7 @@ def test_log_counts_what_is_missing_and_its_clock_goes_on_when_the_stamps_wrap()
     kept.rows = [[(1 << 60) + n] for n in range(len(steps))]
     kept.stamps.append(0)  # of a sample whose values come after the look at them
     entries = [a2l_read.Entry(name, "", 64, np.dtype("u8"), ()) for name in ("a", "b")]  # two names of one place
-    log = measure._log(Timed(), entries, kept, 1)
+    log = measure._log(measure._period(Timed(), 1), entries, kept)
     assert log.lost == 4 and np.allclose(log.time, (np.array(steps) + 3) * 1e-3, rtol=0.0, atol=1e-15)  # rounding of seven sums below 16 ms
     assert all(log.values[name].tolist() == [(1 << 60) + n for n in range(len(steps))] for name in ("a", "b"))
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from exchanges import check_characteristics, check_log, check_measurements, drive
+from exchanges import EIGHT, check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, emulated, link as links, measure, pages, stage
 from penode_sil.errors import UserError
 
@@ -50,6 +50,18 @@ def test_every_entry_and_then_an_exchange(running: tuple) -> None:
     every = 10  # 23 bytes and a head each 10 ms of the emulated time
     log = measure.record(where, a2l, ["z_b", "z_w", "sample", "set_in_force", "adopted_at"], 0.3, every, lambda link: stage.stage_set(link, a2l, chosen))
     check_log(model, u, log, every)
+
+
+def test_line_carries_eight_signals_each_step(running: tuple) -> None:
+    """45 bytes a step with stamp and head: 45 kB a second. At the divisor of port/cortex-m/uart.c, 25 MHz / 16, a line passes 156 kB; the emulator paces none."""
+    _, _, where, a2l = running
+    for seconds in (0.5, 4.0, 20.0):  # as above
+        log = measure.record(where, a2l, [*EIGHT, "sample"], seconds)
+        if log.time.size > 100:
+            break
+    assert log.time.size > 100 and log.lost == 0
+    assert (np.diff(log.values["sample"].astype(int)) == 1).all()
+    assert (np.rint(np.diff(log.time) * 1e6) == 1000).all()
 
 
 def test_inputs_that_it_cannot_hold_are_refused() -> None:

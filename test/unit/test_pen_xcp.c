@@ -138,6 +138,9 @@ void test_upload_reads_regions_and_goes_on(void)
     BAD(ACCESS_DENIED, 0xf5, 2); /* from one region into the next */
     TEST_ASSERT_EQUAL_UINT32(3U, send_word(0xf4U, 2U, REGION + 8U));
     TEST_ASSERT_EQUAL_HEX8('n', out[1]);
+    at(REGION + 8U);
+    GOOD(3U, 0xf5, 2);
+    BAD(ACCESS_DENIED, 0xf5, 1); /* behind what has been read */
 }
 
 void test_upload_sizes(void)
@@ -164,6 +167,7 @@ void test_addresses_outside_are_denied(void)
 
 void test_texts_end_where_they_end(void)
 {
+    at(SEGMENT); /* which no longer counts */
     GOOD(8U, 0xfa, 1);
     TEST_ASSERT_EQUAL_UINT32(5U, number_of(4U, &out[4]));
     GOOD(3U, 0xf5, 2);
@@ -204,8 +208,8 @@ void test_checksum_is_that_of_the_serial_form(void)
     at(SEGMENT + (uint32_t)sizeof(pen_real_t));
     TEST_ASSERT_EQUAL_UINT32(8U, send_word(0xf3U, 0U, 2U * (uint32_t)sizeof(pen_real_t)));
     TEST_ASSERT_EQUAL_HEX32(pen_set_checksum(&first_value[1], 2U), number_of(4U, &out[4]));
-    GOOD(2U, 0xf5, 1); /* behind what was checked */
-    TEST_ASSERT_EQUAL_MEMORY(&first_value[3], &out[1], 1U);
+    GOOD(1U + (uint32_t)sizeof(pen_real_t), 0xf5, (uint8_t)sizeof(pen_real_t)); /* behind what was checked */
+    TEST_ASSERT_EQUAL_MEMORY(&first_value[3], &out[1], sizeof(pen_real_t));
 }
 
 void test_checksum_of_a_region_and_of_nothing(void)
@@ -282,7 +286,7 @@ void test_seed_and_key(void)
     BAD(SYNTAX, 0xf7, 2, 0x54);
     BAD(SEQUENCE, 0xf7, 1, 0x54); /* a seed is good for one key */
     GOOD(4U, 0xf8, 0, PEN_XCP_CAL);
-    GOOD(2U, 0xf7, 1, 0x54);
+    GOOD(2U, 0xf7, 1, 0x54, 0, 0, 0, 0, 0); /* fill behind the key */
     TEST_ASSERT_EQUAL_HEX8(PEN_XCP_DAQ, out[1]);
     GOOD(2U, 0xf8, 0, PEN_XCP_CAL); /* open already */
     TEST_ASSERT_EQUAL_HEX8(0U, out[1]);

@@ -131,6 +131,19 @@ void test_pages_of_tool_and_ecu_switch_apart(void)
     TEST_ASSERT_TRUE(value_at(0U) == (pen_real_t)9);
 }
 
+void test_page_of_the_tool_does_not_move_that_of_the_ecu(void)
+{
+    write_value(0U, (pen_real_t)9);
+    set_page(TOOL, WORKING);
+    TEST_ASSERT_EQUAL_UINT32(REFERENCE, ecu_page());
+    expect_in_force(1U, 0U, (pen_real_t)1);
+    set_page(ECU, WORKING);
+    (void)step();
+    set_page(TOOL, REFERENCE);
+    TEST_ASSERT_EQUAL_UINT32(WORKING, ecu_page());
+    expect_in_force(FIRST, 0U, (pen_real_t)9);
+}
+
 void test_modes_pages_and_segments_that_are_not_there(void)
 {
     BAD(MODE_NOT_VALID, 0xeb, 0, 0, 0);
@@ -246,6 +259,22 @@ void test_set_of_the_application(void)
     write_value(0U, (pen_real_t)1);
     set_page(ECU, WORKING);
     expect_in_force(FIRST, 1U, (pen_real_t)8);
+}
+
+/* A slave that starts while a set of the application waits shows the reference until the step adopts that set. */
+void test_set_that_waits_at_the_start(void)
+{
+    static const pen_real_t other_value[N] = { 9, 8, 7, 6, 5 };
+    const pen_set_t other = { { LAYOUT, N, 77U, pen_set_checksum(other_value, N) }, other_value };
+
+    memset(&xcp, 0x5a, sizeof(xcp));
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, choose(&other));
+    start();
+    TEST_ASSERT_EQUAL_UINT32(REFERENCE, ecu_page());
+    TEST_ASSERT_TRUE(value_at(1U) == (pen_real_t)2);
+    expect_in_force(77U, 1U, (pen_real_t)8);
+    TEST_ASSERT_EQUAL_UINT32(WORKING, ecu_page());
+    TEST_ASSERT_TRUE(value_at(1U) == (pen_real_t)8);
 }
 
 /* A bank whose address is damaged is not written to. */

@@ -267,6 +267,7 @@ void test_entries_are_written_within_their_odt(void)
     BAD(DAQ_CONFIG, 0xe1, 0xff, 1, 0, 0, 0, 0, 0); /* past the last entry */
     BAD(RANGE, 0xe2, 0, HALF(0U), 2, 0);
     BAD(RANGE, 0xe2, 0, HALF(0U), 1, 2);
+    BAD(RANGE, 0xe2, 0, HALF(0U), 1, 3);
     BAD(RANGE, 0xe2, 0, HALF(2U), 0, 0);
     pointer(0U, 1U, 1U);
     write_entry(2U, REGION);

@@ -157,8 +157,10 @@ def _measurement(block: Block, methods: dict[str, Method]) -> Entry:
 def parse(text: str, origin: str) -> A2l:
     """Raises UserError if it is no A2L, or uses what is not known here."""
     try:
-        top = _tree(text)
-        module = top.all("MODULE")[0]
+        modules = _tree(text).all("MODULE")
+        if not modules:
+            raise ValueError("it has no MODULE")
+        module = modules[0]
         methods = {b.words[0]: _method(b) for b in module.all("COMPU_METHOD")}
         types = {b.words[0]: b.after("FNC_VALUES", 2)[1] for b in module.all("RECORD_LAYOUT") if b.after("FNC_VALUES", 2)}
         characteristics = [_characteristic(b, types, methods) for b in module.all("CHARACTERISTIC")]

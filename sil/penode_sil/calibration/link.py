@@ -98,6 +98,10 @@ class Link:
         except (types.XcpTimeoutError, OSError, SystemExit) as exc:
             raise UserError(f"{self.address.text}: no answer to {what}; is the controller running, and no other tool connected?") from exc
 
+    def give_up(self) -> None:
+        """No answer is expected any more: what is still asked for waits 0.1 s."""
+        self.master.transport.timeout = 100_000_000  # ns
+
     def read(self, address: int, n: int) -> bytes:
         """n bytes of memory."""
         self.ask("SET_MTA", self.master.setMta, address)

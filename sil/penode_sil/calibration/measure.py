@@ -42,13 +42,14 @@ class Samples:
 class Log:
     """
     A measurement: time [s] from the first sample, [n]; values [n] of each signal; samples that the controller took, but that never
-    came, None where it does not state the period of its event.
+    came, None where it does not state the period of its event; whether it fell silent before the measurement was over.
     """
 
     time: NDArray[np.float64]
     values: dict[str, NDArray[Any]]
     lost: int | None
     period: float  # [s] between two samples; 0: not stated
+    broken: bool = False
 
 
 def _policy(entries: list[Entry], every: int) -> tuple[Any, Samples]:
@@ -80,6 +81,8 @@ def _policy(entries: list[Entry], every: int) -> tuple[Any, Samples]:
 
 def choose(a2l: A2l, names: list[str]) -> list[Entry]:
     """The measurements of that name. Raises UserError."""
+    if not names:
+        raise UserError(f"--signals names none; name some of {a2l.name}, with commas between")
     problems = [f'--signals: {a2l.name} has no "{name}"; {hint(name, a2l.measurements)}' for name in names if name not in a2l.measurements]
     if problems:
         raise UserError(*problems)
@@ -94,11 +97,15 @@ def choose(a2l: A2l, names: list[str]) -> list[Entry]:
     return entries
 
 
-def _log(link: Link, entries: list[Entry], kept: Samples, every: int) -> Log:
-    """Unwrap the time stamps and count what is missing between them."""
+def _period(link: Link, every: int) -> float:
+    """[s] between two samples; 0 if the controller does not state it."""
     info = link.ask("GET_DAQ_EVENT_INFO", link.master.getDaqEventInfo, int(Slave.STEP))
     unit = int(info.eventChannelTimeUnit)  # 0: 1 ns, ... 9: 1 s, 10: 1 ps, ...
-    period = float(info.eventChannelTimeCycle) * 10.0 ** (unit - (9 if unit < 10 else 22)) * every
+    return float(info.eventChannelTimeCycle) * 10.0 ** (unit - (9 if unit < 10 else 22)) * every
+
+
+def _log(period: float, entries: list[Entry], kept: Samples, broken: bool = False) -> Log:
+    """Unwrap the time stamps and count what is missing between them."""
     rows = list(kept.rows)
     stamps = np.array(kept.stamps[: len(rows)], dtype=np.int64) // 1000  # us
     steps = np.diff(stamps) % (1 << 32)  # they are of 32 bits
@@ -107,35 +114,55 @@ def _log(link: Link, entries: list[Entry], kept: Samples, every: int) -> Log:
     columns = np.array(rows, dtype=object).reshape(stamps.size, len(kept.names))
     column = {entry.address: kept.names.index(entry.name) for entry in entries if entry.name in kept.names}
     values = {entry.name: columns[:, column[entry.address]].astype(entry.type) for entry in entries}
-    return Log(time_, values, lost, period)
+    return Log(time_, values, lost, period, broken)
 
 
 def record(
     address: addresses.Address, a2l: A2l, names: list[str], duration: float | None, every: int = 1, during: Callable[[Link], object] = lambda link: None
 ) -> Log:
-    """Measure while `during(link)` runs, and then for `duration` seconds, or until an interrupt. Raises UserError."""
+    """
+    Measure while `during(link)` runs, and then for `duration` seconds, until an interrupt, or until the controller falls silent: what has
+    come until then is in the log. Raises UserError.
+    """
     entries = choose(a2l, names)
     policy, kept = _policy(entries, every)
     with connected(address, policy) as link:
+        period = _period(link, every)
         link.ask("the DAQ commands", policy.setup)
         kept.names = [header[0] for header in policy.daq_lists[0].headers]
         link.ask("START_STOP_SYNCH", policy.start)
+        broken = False
         try:
             during(link)
-            _wait(duration)
+            broken = _wait(duration, kept)
         except KeyboardInterrupt:
             pass
-        link.ask("START_STOP_SYNCH", policy.stop)
+        if broken:
+            link.give_up()
+        try:
+            link.ask("START_STOP_SYNCH", policy.stop)
+        except UserError:
+            if not kept.rows:
+                raise
+            broken = True
+            link.give_up()
         time.sleep(0.2)  # what is still on its way
-        return _log(link, entries, kept, every)
+        return _log(period, entries, kept, broken)
 
 
-def _wait(duration: float | None) -> None:
-    begin = time.monotonic()
+def _wait(duration: float | None, kept: Samples, silence: float = 10.0) -> bool:
+    """Until the time is over; True if no sample comes for `silence` [s] after others have: as long as an answer may take (connected)."""
+    begin = latest = time.monotonic()
+    seen = 0
     with progress("measuring", duration or 1.0) as tell:
         while duration is None or time.monotonic() - begin < duration:
             time.sleep(min(0.1, (duration or 1.0)))
             tell(min(time.monotonic() - begin, duration or 0.0))
+            if len(kept.rows) != seen:
+                seen, latest = len(kept.rows), time.monotonic()
+            elif seen and time.monotonic() - latest > silence:
+                return True
+    return False
 
 
 def _seconds(option: str, text: str) -> float:
@@ -187,6 +214,8 @@ def measure(
     click.echo(f"{to}: {log.time.size} samples in {log.time[-1]:.3f} s, {lost} -> {output}")
     if log.lost is None:
         note("XCP has no code for the controller's period (1 to 255 times 1 ns, 10 ns, ... 1 s): measure a counter, such as sample, to see gaps")
+    if log.broken:
+        raise UserError(f"{to}: the controller has fallen silent, or the line is broken; what came until then is in {output}")
     if log.lost:
         note("the line was too slow for some samples: measure fewer signals, or --every 2")
 

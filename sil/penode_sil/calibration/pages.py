@@ -64,12 +64,14 @@ def choose(text: str, kind: np.dtype[Any]) -> ChosenSet:
             raise UserError(f'{path}: it has no set "{name}"; {hint(name, model.sets)}')
         layout = penode_gen.set_head(model, name, kind.type)[0]
         return ChosenSet(f"{name} (set {model.sets[name].id})", int(layout), np.asarray(penode_gen.set_values(model, name, kind.type)))
+    if text.endswith(".toml") and Path(text).is_file():
+        raise UserError(f"{text}: which of its sets? Name it as {text}:NAME, one of: {', '.join(penode_gen.load(text).sets)}")
     if not Path(text).is_file():
         raise UserError(f"{text}: there is no such file; name a set as MODEL.toml:NAME, or a file in serial form")
     try:
         found = penode_gen.read_serial(Path(text).read_bytes())
     except ValueError as exc:
-        raise UserError(f"{text}: {exc}") from exc
+        raise UserError(f"{text}: {exc}; name a set as MODEL.toml:NAME, or a file in serial form") from exc
     if found.values.dtype != kind:
         raise UserError(f"{text}: its values have {found.values.dtype.itemsize} bytes, those of the controller {kind.itemsize}; write the set in that form")
     return ChosenSet(f"{Path(text).name} (set {found.id})", found.layout, found.values)

@@ -37,7 +37,7 @@ class Staged:
     def sentence(self) -> str:
         """For people."""
         within = "" if self.id is None else f", as set {self.id} of the controller"
-        return f"{self.bytes} bytes written in {self.seconds:.2f} s, proven (CRC-32 0x{self.checksum:08x}), read back\nin force: {self.set}{within}"
+        return f"{self.bytes} bytes written in {self.seconds:.3f} s, proven (CRC-32 0x{self.checksum:08x}), read back\nin force: {self.set}{within}"
 
 
 def _running_id(link: Link, a2l: A2l) -> int | None:

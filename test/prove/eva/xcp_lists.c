@@ -59,51 +59,92 @@ void xcp_allocate(void)
     }
 }
 
-/* The pointer to each entry of ODTs of each size. */
+/* The pointer to each entry of ODTs of each size, and to one behind them. A packet takes it there too. */
 void xcp_pointer(void)
 {
     begin();
     lists(4U, 2U, 0U);
     //@ loop unroll 65;
     for (uint32_t n = 0U; n <= PEN_XCP_ENTRIES; n++) {
+        uint8_t *const in = arriving(8U, 0xe2U);
+        //@ loop unroll 32;
+        for (size_t i = 0U; i < PEN_XCP_ODTS; i++) { /* which SET_DAQ_PTR leaves alone */
+            daq.odt[i].first = (uint8_t)Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - n);
+            daq.odt[i].entries = (uint8_t)n;
+        }
         //@ loop unroll 66;
         for (uint32_t k = 0U; k <= (n + 1U); k++) {
-            uint8_t *const in = arriving(8U, 0xe2U);
-            slave();
-            //@ loop unroll 32;
-            for (size_t i = 0U; i < PEN_XCP_ODTS; i++) {
-                daq.odt[i].first = (uint8_t)Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - n);
-                daq.odt[i].entries = (uint8_t)n;
-            }
+            daq.at = 0U; /* of no entry, it says nothing; it stays, and left becomes 0, where the pointer is refused */
             in[5] = (uint8_t)((k <= n) ? k : Frama_C_unsigned_int_interval(n + 1U, 255U));
-            send(in, 8U);
+            seen = pen_xcp_list_command(&xcp, in, Frama_C_unsigned_int_interval(0U, PEN_XCP_LISTS - 1U));
             /*@ assert daq.at + daq.left <= PEN_XCP_ENTRIES; */
         }
+        slave();
+        daq.at = 0U;
+        in[5] = 0U;
+        send(in, 8U);
+        /*@ assert daq.at + daq.left <= PEN_XCP_ENTRIES; */
     }
 }
 
-/* Each place written while any number of entries is left. */
+/* At which entry, and how many are left, decides nothing about what is written. */
+static void write_entry(uint32_t at, uint32_t left, uint32_t address, uint32_t size)
+{
+    uint8_t *const in = arriving(8U, 0xe1U);
+
+    slave();
+    lists(1U, 0U, 0U);
+    daq.left = (uint8_t)left;
+    daq.at = (uint8_t)at;
+    in[2] = (uint8_t)size;
+    number(&in[4], address);
+    send(in, 8U);
+}
+
+/* While n entries are left: a packet that writes one, or one that does not; either alone keeps what is asserted, both in one state would not. */
+static void entries_left(uint32_t n, bool taken)
+{
+    uint8_t *const in = arriving(8U, 0xe1U);
+
+    slave();
+    lists(1U, 0U, 0U);
+    daq.left = (uint8_t)n;
+    daq.at = (uint8_t)Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - n);
+    number(&in[4], REGION);
+    in[1] = (uint8_t)(taken ? 0xffU : Frama_C_unsigned_int_interval(0U, 0xfeU));
+    if (taken) {
+        xcp.connected = true;
+        xcp.locked = 0U;
+        xcp.sampling = 0U;
+        daq.busy = 0U;
+        in[2] = 1U;
+        in[3] = 0U;
+    }
+    send(in, 8U);
+    /*@ assert daq.at + daq.left <= PEN_XCP_ENTRIES; */
+}
+
+/* Each place with each size, at any entry; then each number of entries that are left. */
 void xcp_write_entries(void)
 {
     begin();
     //@ loop unroll 16;
     for (uint32_t k = 0U; k <= (ROOM + ELSEWHERE); k++) {
-        //@ loop unroll 65;
-        for (uint32_t n = 0U; n <= PEN_XCP_ENTRIES; n++) {
-            uint8_t *const in = arriving(8U, 0xe1U);
-            slave();
-            lists(1U, 0U, 0U);
-            daq.left = (uint8_t)n;
-            daq.at = (uint8_t)Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - n);
-            number(&in[4], place(k));
-            send(in, 8U);
-            /*@ assert daq.at + daq.left <= PEN_XCP_ENTRIES; */
+        //@ loop unroll 10;
+        for (uint32_t n = 0U; n <= (ROOM + 1U); n++) {
+            const uint32_t size = (n <= ROOM) ? n : Frama_C_unsigned_int_interval(ROOM + 1U, 255U);
+            write_entry(Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - 1U), Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES), place(k), size);
             //@ loop unroll 64;
             for (size_t i = 0U; i < PEN_XCP_ENTRIES; i++) {
                 /*@ assert daq.entry[i].byte == \null || daq.entry[i].size <= ROOM - ((k <= ROOM) ? k : 0); */
                 /*@ assert daq.entry[i].byte == \null || (daq.entry[i].byte == region_byte + k && k <= ROOM); */
             }
         }
+    }
+    //@ loop unroll 65;
+    for (uint32_t n = 0U; n <= PEN_XCP_ENTRIES; n++) {
+        entries_left(n, true);
+        entries_left(n, false);
     }
 }
 
