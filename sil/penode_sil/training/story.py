@@ -216,7 +216,7 @@ def _judged(
     ]
     loud = [e.signal for e in training if any(s.name == e.signal and s.noise > 0.0 and e.after > SETTINGS.story_loud * s.noise for s in (*model.sensors, *model.outputs))]
     notes = [f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"] if loud else []
-    notes += [f"{p}" for m in train_ for p in m.quality.problems]
+    notes += dict.fromkeys(f"{p}" for m in train_ for p in m.quality.problems)  # parts of a file have them in common
     notes += [f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, the network takes the rest" for a in problem.apart if ports[a.shape].knots]
     if held and not holdout:
         titles = ", ".join(m.title for m in held)
