@@ -21,6 +21,8 @@ class Settings:
     ends_tries: int = 3
     ends_close: float = 3.0  # gain in chi2 that counts: weights of a network go on gaining little for long
     engine_room: int = 4_000_000  # doubles of derivatives that are held at a time
+    kinks_sure: float = 5.0  # standard deviations of a change of slope that is one
+    kinks_sharp: float = 3.0  # times the curvature beside it: it happens at once
     judge_after: float = 0.5  # [s] after a sample outside of the trained range that are left out: what happened there dies away
     problem_limit: float = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
     problem_vague: float = 10.0  # standard deviation of a parameter that is unknown, over its nominal value

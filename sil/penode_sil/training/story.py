@@ -21,7 +21,7 @@ from penode_gen.networks import Network
 
 from ..errors import UserError
 from ..measured import Measured
-from . import apart, bands, begin, curves, data, dense, ends, held_starts, heldout, judge, promised, unfold, unknown
+from . import apart, bands, begin, curves, data, dense, ends, held_starts, heldout, judge, kinks, promised, unfold, unknown
 from .curve import Curve
 from .curves import Tell
 from .port import Port, inputs_of
@@ -218,6 +218,7 @@ def _judged(
     notes = [f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"] if loud else []
     notes += dict.fromkeys(f"{p}" for m in train_ for p in m.quality.problems)  # parts of a file have them in common
     notes += [f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, the network takes the rest" for a in problem.apart if ports[a.shape].knots]
+    notes += kinks.notes(problem, fit, ports)
     if held and not holdout:
         titles = ", ".join(m.title for m in held)
         notes.append(f"{titles}: the trained model leaves all bounds there, so there is no error on held-out data; a recording that goes further must be among --data")
