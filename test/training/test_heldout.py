@@ -78,3 +78,22 @@ def test_a_grid_mirrors_itself_about_zero() -> None:
     found = curve.spaced(-1.19, 1.11, 41, 2.0)
     zero = int(np.flatnonzero(found == 0.0)[0])
     assert np.array_equal(found[zero + 1 : zero + 18], -found[zero - 17 : zero][::-1])
+
+
+def test_on_the_way_a_constant_costs_and_a_step_does_not() -> None:
+    """A force that is 0 at 0 alone and a constant elsewhere moves where another network's 0 is: on the way to a fit it costs, by (100 range / cells)^2 what
+    it costs at the end; a step of friction costs the same."""
+    model = penode_gen.load(HERE / "quarter.toml")
+    engine = Engine(model, [])
+    knots = np.array([-1.0, -0.5, -0.01, 0.0, 0.01, 0.5, 1.0])
+    problem = Problem(engine, (), data.Noise(np.ones(0), (), np.ones(0)), np.full(2, 10.0))
+
+    def costs(values: np.ndarray) -> tuple[float, float]:
+        shape = curve.Curve(knots, values, 3)
+        both = (p._of_shape(shape, 10.0) for p in (problem, problem.with_(plain=True)))
+        return tuple(float(shape.theta @ m @ shape.theta) for m in both)
+
+    end, way = costs(np.where(knots == 0.0, 0.0, 2.0))
+    assert way - end > 0.9 * (100.0 * 2.0 / 0.02) ** 2 * (2.0 / 3.0) ** 2  # of 0.3 times the span
+    end, way = costs(2.0 * np.sign(knots))
+    assert abs(way - end) < 1e-9 * end

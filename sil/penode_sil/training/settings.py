@@ -28,6 +28,7 @@ class Settings:
     problem_vague: float = 10.0  # standard deviation of a parameter that is unknown, over its nominal value
     problem_least: float = 0.02  # of its nominal value, that a parameter keeps
     problem_bent: float = 0.3  # of a curve's span: standard deviation of a knot from the line between its neighbours
+    problem_plain: float = 100.0  # by so much straighter at 0 than elsewhere, and by the range over the cells beside 0, on the way to a fit
     problem_large: float = 30.0  # of the force scale: standard deviation of a value, so that what nothing shows stays finite
     problem_decay: float = 3.0  # standard deviation of a weight of a network that is not a curve
     problem_wide: int = 300  # columns from which on curvature is taken from every SPARSE-th sample
