@@ -10,6 +10,7 @@ of the parameters' errors against each other; hold-out is the larger of both sen
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import tempfile
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ import generator
 import numpy as np
 
 import penode_gen
+import penode_sil.training
 from penode_gen.model import Model
 from penode_gen.untrained import untrained
 from penode_sil.errors import UserError
@@ -110,11 +112,11 @@ def run(case: Case, seed: int, folder: Path) -> dict[str, object]:
         with threads.one():
             _, t = train(noisy, data, holdout, Options((("m_b", None),) if case.weighed else (), seed), lambda share, doing: None)
     except UserError as exc:
-        return {"case": case.name, "seed": seed, "failed": exc.problems[0]}
+        return {"case": case.name, "seed": seed, "code": code(), "failed": exc.problems[0]}
     found = list(judged(case, made, t))
     ratios = [v / generator.PLAIN[n] for n, (v, *_) in t.parameters.items()] or [1.0]
     return {
-        "case": case.name, "seed": seed, "seconds": t.seconds, "loop": 0.5 * (loop + clock.loop()),
+        "case": case.name, "seed": seed, "code": code(), "seconds": t.seconds, "loop": 0.5 * (loop + clock.loop()),
         "forces": {n: e for n, e, _ in found}, "covered": [c for *_, c in found if np.isfinite(c)],
         "ratios": 100.0 * (max(ratios) / min(ratios) - 1.0), "absolute": 100.0 * max(abs(r - 1.0) for r in ratios),
         "holdout": 100.0 * (max(e.inside / e.noise for e in t.holdout) - 1.0), "masked": 100.0 * t.masked, "outside": 100.0 * t.outside,
@@ -144,6 +146,12 @@ HEAD = (
     "| case | converged | processor s | over the fixed loop | force error, % of span | ratios off, % | parameters off, % | hold-out over noise, % | masked, % | covered by 2 sigma, % | scale reported |\n"
     "|---|---|---|---|---|---|---|---|---|---|---|"
 )
+
+
+def code() -> str:
+    """Which trainer it is: a digest of its sources, for a page whose rows are of several days."""
+    sources = sorted(Path(penode_sil.training.__file__).parent.rglob("*.[pch]*"))
+    return hashlib.sha256(b"".join(p.read_bytes() for p in sources if p.suffix in (".py", ".c", ".h"))).hexdigest()[:8]
 
 
 def read(path: Path) -> list[dict[str, object]]:

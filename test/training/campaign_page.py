@@ -2,7 +2,7 @@
 # Copyright (c) 2026 the penode authors
 """The page of `make campaign-train`: what its parts measured, beside what is asked; a part that has not run is named.
 
-Parts write what they find into a folder: `rows.jsonl` (a training a line), and `damping.json`, `promises.json` and `rigs.json` (rows of text, and
+Parts write what they find into a folder: `rows.jsonl` (a training a line), and `damping.json`, `promises.json`, `rigs.json` and `adam.json` (rows of text, and
 whether each is as it must be).
 """
 
@@ -84,14 +84,18 @@ def page(folder: Path) -> str:
     lines = ["# Trained networks against plants that are known", "", "Written by `make campaign-train`. " + " ".join((campaign.__doc__ or "").split()), ""]
     lines += ["## What is asked", "", "| what | asked | found | met |", "|---|---|---|---|"]
     lines += [f"| {what} | {bar} | {text} | {marks[good]} |" for what, bar, text, good in asked(rows)]
-    parts = (("rigs", "networks beside the laws of the diagnosis, measured dampers"), ("promises", "promises by exact arithmetic"), ("damping", "damping beside a network"))
+    parts = (("rigs", "networks beside the laws of the diagnosis, measured dampers"), ("promises", "promises by exact arithmetic"), ("damping", "damping beside a network"), ("adam", "plain Adam on whole trajectories"))
     for name, title in parts:
         found = table(folder, name)
         lines += [f"| {title}: {label} | | {figure} | {marks[bool(good)]} |" for label, figure, good in found] or [f"| {title} | | {OPEN} | open |"]
     lines += ["| trained set in the controller | hash of states of SiL and PiL equal; onnxruntime equal within rounding | not of this campaign: `test/training/test_deployed.py`, in `make test` | by test |"]
-    lines += [f"| plain Adam on whole trajectories, 1000 epochs | in this table | {OPEN}: no rival is part of this campaign | open |"]
     lines += ["", "## By case", "", campaign.HEAD]
     lines += [campaign.line(own) for case in campaign.CASES if (own := [r for r in rows if r["case"] == case.name])]
+    versions = {c: sum(r.get("code") == c for r in rows) for c in dict.fromkeys(r.get("code") for r in rows)}
+    lines += ["", "Trainings by digest of the trainer's sources: " + ", ".join(f"{n} by {c}" for c, n in versions.items()) + f"; it is {campaign.code()} now."]
+    for case in campaign.CASES:
+        own = {r.get("code") for r in rows if r["case"] == case.name}
+        lines += [f"Not of now: {case.name}."] if own and own != {campaign.code()} else []
     return "\n".join(lines) + "\n"
 
 
