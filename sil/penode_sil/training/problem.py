@@ -210,7 +210,7 @@ class Problem:
             return np.diag(np.full(len(shape.theta), SETTINGS.problem_decay**-2.0))
         rows = shape.bends() / (SETTINGS.problem_bent * size)
         if self.plain and 0 < shape.zero < len(shape.knots) - 1:  # a constant of one network would move where 0 of another one is
-            rows[shape.zero - 1] *= SETTINGS.problem_plain * float(np.ptp(shape.knots)) / float(shape.knots[shape.zero + 1] - shape.knots[shape.zero - 1])
+            rows[shape.zero - 1] /= SETTINGS.problem_tied
         return rows.T @ rows + np.eye(len(shape.theta)) * (SETTINGS.problem_large * size) ** -2.0
 
 

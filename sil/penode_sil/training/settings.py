@@ -21,14 +21,11 @@ class Settings:
     ends_tries: int = 3
     ends_close: float = 3.0  # gain in chi2 that counts: weights of a network go on gaining little for long
     engine_room: int = 4_000_000  # doubles of derivatives that are held at a time
-    kinks_sure: float = 5.0  # standard deviations of a change of slope that is one
-    kinks_sharp: float = 3.0  # times the curvature beside it: it happens at once
     judge_after: float = 0.5  # [s] after a sample outside of the trained range that are left out: what happened there dies away
     problem_limit: float = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
     problem_vague: float = 10.0  # standard deviation of a parameter that is unknown, over its nominal value
     problem_least: float = 0.02  # of its nominal value, that a parameter keeps
     problem_bent: float = 0.3  # of a curve's span: standard deviation of a knot from the line between its neighbours
-    problem_plain: float = 100.0  # by so much straighter at 0 than elsewhere, and by the range over the cells beside 0, on the way to a fit
     problem_large: float = 30.0  # of the force scale: standard deviation of a value, so that what nothing shows stays finite
     problem_decay: float = 3.0  # standard deviation of a weight of a network that is not a curve
     problem_wide: int = 300  # columns from which on curvature is taken from every SPARSE-th sample
