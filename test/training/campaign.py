@@ -120,7 +120,7 @@ def run(case: Case, seed: int, folder: Path) -> dict[str, object]:
         "forces": {n: e for n, e, _ in found}, "covered": [c for *_, c in found if np.isfinite(c)],
         "ratios": 100.0 * (max(ratios) / min(ratios) - 1.0), "absolute": 100.0 * max(abs(r - 1.0) for r in ratios),
         "holdout": 100.0 * (max(e.inside / e.noise for e in t.holdout) - 1.0), "masked": 100.0 * t.masked, "outside": 100.0 * t.outside,
-        "converged": bool(t.converged), "scale": any(u.kind == "scale" for u in t.unknown), "chi2": t.chi2,
+        "converged": bool(t.converged), "scale": any(u.kind == "scale" for u in t.unknown), "turns": any("turns at once" in n for n in t.notes), "chi2": t.chi2,
     }  # fmt: skip
 
 
