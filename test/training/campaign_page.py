@@ -19,6 +19,12 @@ import campaign
 Row = dict[str, Any]
 FOLDER = Path("build/campaign-train")
 OPEN = "not measured"
+STOPS = (
+    "A stop of `x1, stops and degressive damper` turns within a cell of the spring's knots. Moved along its input until the turns meet knots, by half a cell to some millimetres, "
+    "the curve leaves less than in its place, where straight pieces miss the turn; only samples at which the damper's rate passes 0 speak against it (1 N there is 0.1 mm). The first curves are "
+    "straight at 0, which helps the worst of five (9.2 to 5.9 %), and a turn that is seen is reported. Knots that follow the turn by Gauss-Newton come nearer, by a tenth of what is left in each "
+    "step of half a second, and end a third of the way short: tried, not kept."
+)
 
 
 def of(rows: list[Row], *words: str) -> list[Row]:
@@ -75,7 +81,8 @@ def asked(rows: list[Row]) -> list[tuple[str, str, str, bool | None]]:
     add("bands of trained curves", "2 sigma cover 90 to 98 %", curves, lambda: f"{2 * len(curves)} curves, {covered(curves):.1f} %", lambda: 90.0 <= covered(curves) <= 98.0)
     turns = [r for r in rows if r.get("covered") and r.get("turns")]
     if turns:
-        add("bands beside a turn between two knots, which is reported", "none", turns, lambda: f"{2 * len(turns)} curves, {covered(turns):.1f} %", lambda: True)
+        add("the same, beside a turn between two knots, which is reported", "2 sigma cover 90 to 98 %", turns,
+            lambda: f"{2 * len(turns)} curves, {covered(turns):.1f} %", lambda: 90.0 <= covered(turns) <= 98.0)
     return found
 
 
@@ -97,13 +104,13 @@ def page(folder: Path) -> str:
         found = table(folder, name)
         lines += [f"| {title}: {label} | | {figure} | {marks[bool(good)]} |" for label, figure, good in found] or [f"| {title} | | {OPEN} | open |"]
     lines += ["| trained set in the controller | hash of states of SiL and PiL equal; onnxruntime equal within rounding | not of this campaign: `test/training/test_deployed.py`, in `make test` | by test |"]
+    lines += ["", STOPS] if of(rows, "stops") else []
     lines += ["", "## By case", "", campaign.HEAD]
     lines += [campaign.line(own) for case in campaign.CASES if (own := [r for r in rows if r["case"] == case.name])]
     versions = {c: sum(r.get("code") == c for r in rows) for c in dict.fromkeys(r.get("code") for r in rows)}
     lines += ["", "Trainings by digest of the trainer's sources: " + ", ".join(f"{n} by {c}" for c, n in versions.items()) + f"; it is {campaign.code()} now."]
-    for case in campaign.CASES:
-        own = {r.get("code") for r in rows if r["case"] == case.name}
-        lines += [f"Not of now: {case.name}."] if own and own != {campaign.code()} else []
+    earlier = [c.name for c in campaign.CASES if any(r["case"] == c.name and r.get("code") != campaign.code() for r in rows)]
+    lines += [f"With trainings by an earlier one: {'; '.join(earlier)}."] if earlier else []
     return "\n".join(lines) + "\n"
 
 
