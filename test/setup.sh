@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 #
-# setup.sh tools|python|unity|cmock|packages|proof|rivals: one part of the set-up each; the Makefile calls it, once. All goes into build/
+# setup.sh tools|python|unity|cmock|packages|proof|rivals|rival_training: one part of the set-up each; the Makefile calls it, once. All goes into build/
 # but the Debian packages of `tools` and `proof`. Quiet where there is nothing to do; one line that names the remedy where it cannot.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -117,6 +117,15 @@ rivals() # of the diagnosis, for `make campaign` only
     python3 -m venv build/rivals
     build/rivals/bin/python -m pip install --quiet --disable-pip-version-check -r test/diagnosis/rivals/requirements.txt \
         >build/setup/rivals.log 2>&1 || give_up "pip failed, see build/setup/rivals.log; is the package index reachable?"
+}
+
+rival_training() # plain Adam in JAX, for `make campaign-train` only
+{
+    echo "setup: JAX and diffrax into build/rival-training"
+    rm -rf build/rival-training
+    python3 -m venv build/rival-training
+    build/rival-training/bin/python -m pip install --quiet --disable-pip-version-check -r test/training/rivals/requirements.txt \
+        >build/setup/rival_training.log 2>&1 || give_up "pip failed, see build/setup/rival_training.log; is the package index reachable?"
 }
 
 # Print the Debian archive's own entries (not those of third parties) as entries for source packages.

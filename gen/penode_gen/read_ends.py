@@ -206,13 +206,13 @@ class EndTables(NetworkTables):
         if inputs is None:  # the units say which is meant
             inputs = [next((k for k, u in kinds.items() if same(u, unit)), "") for unit in takes]
             for unit in (unit for unit, kind in zip(takes, inputs) if not kind):
-                self.problem(where, f"network '{network}' takes {unit}, an element has a deflection in {length} and a rate in {length}/s", "mend the unit in [networks]")
+                self.problem(where, f"network '{network}' takes {unit or 'a number without unit'}, an element has a deflection in {length} and a rate in {length}/s", "mend the unit in [networks]")
         else:
             for kind, unit in zip(inputs, takes):
                 if kind not in list(kinds):
                     self.problem((*where, "inputs"), f"{show(kind)} is neither deflection nor rate", 'write inputs = ["deflection"]')
                 elif not same(kinds[kind], unit):
-                    self.problem((*where, "inputs"), f"the network takes {unit}, but {kind} is in {kinds[kind]}", "mend the unit in [networks]")
+                    self.problem((*where, "inputs"), f"the network takes {unit or 'a number without unit'}, but {kind} is in {kinds[kind]}", "mend the unit in [networks]")
             if takes and len(inputs) != len(takes):
                 self.problem((*where, "inputs"), f"{len(inputs)} inputs for a network of {len(takes)}", "give one for each")
         if not same(port.output_unit, force):

@@ -193,7 +193,7 @@ def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
     count = max(0, int(min((last - first) / step + 1e-3, 1e12)) + 1)
     if count < SHORTEST:
         raise UserError(
-            f"{path}: its {count} samples of {step * 1e3:g} ms are too few for a diagnosis; record at least {SHORTEST}"
+            f"{path}: its {count} samples of {step * 1e3:g} ms are too few; record at least {SHORTEST}"
         )
     if count > 20 * sum(c.time.size * max(1.0, c.interval / step) for c in clocks):
         raise UserError(f"{path}: it has far longer gaps than samples; split the recording there")

@@ -142,12 +142,12 @@ def test_what_cannot_be_a_recording_of_the_model_is_refused(diagnose, tmp_path):
     (line,) = diagnose(without(columns, *NOISE))
     assert "it holds no sensor of the model; record at least one of: z_b, a_body, a_wheel, deflection" in line
     (line,) = diagnose({name: values[:10] for name, values in columns.items()})
-    assert "its 10 samples of 2 ms are too few for a diagnosis; record at least 100" in line
+    assert "its 10 samples of 2 ms are too few; record at least 100" in line
     lines = diagnose(columns | dict.fromkeys(NOISE, np.ones(SAMPLES)))
     assert "no sensor has 100 sound samples" in lines[0] and sum("does not change" in line for line in lines) == 3
     short = write(tmp_path / "h.csv", {name: values[:50] for name, values in columns.items()})
     (line,) = diagnose(columns, "--holdout", short)
-    assert "h.csv: its 50 samples of 2 ms are too few for a diagnosis; record at least 100" in line
+    assert "h.csv: its 50 samples of 2 ms are too few; record at least 100" in line
     broken = tmp_path / "b.csv"
     broken.write_text("time [s],z_road [m]\n0,nothing\n")
     line, rows = diagnose(broken)

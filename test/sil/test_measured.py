@@ -205,7 +205,7 @@ def test_what_cannot_be_used_is_refused(record, oscillator):
     (line,) = problems(record(a=None, z=None), oscillator)
     assert "it holds no sensor of the model; record at least one of: z, a" in line
     (line,) = problems(record(rows=slice(10)), oscillator)
-    assert "its 10 samples of 1 ms are too few for a diagnosis; record at least 100" in line
+    assert "its 10 samples of 1 ms are too few; record at least 100" in line
     (line,) = problems(record(foot=1000.0 * FOOT), oscillator)
     assert "reaches -10000 mm, the model's range ends at -20 mm; its numbers look like thousandths (mm for m)" in line
     for end in (1e9, 1e308):

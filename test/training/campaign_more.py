@@ -12,6 +12,7 @@ from pathlib import Path
 
 import generator
 import numpy as np
+from kept import kept
 
 import penode_gen
 from penode_sil.measured import load
@@ -42,7 +43,10 @@ def main() -> None:
     found: list[tuple[str, str, bool]] = []
     with tempfile.TemporaryDirectory() as folder:
         for noise in (1.0, 5.0):
-            rows = [damping(generator.make(generator.Truth(), seed, noise), noise, Path(folder)) for seed in range(1, given.seeds + 1)]
+            rows = [
+                kept(given.out.with_suffix(".jsonl"), [noise, seed], lambda n=noise, k=seed: damping(generator.make(generator.Truth(), k, n), n, Path(folder)))
+                for seed in range(1, given.seeds + 1)
+            ]
             held = sum(abs(v - t) < 2.0 * s for v, s, t in rows)
             text = f"{held} of {len(rows)}, sigma {np.mean([s for _, s, _ in rows]):.2f} of {rows[0][2]:.0f} N s/m"
             found.append((f"x{noise:g}, 2 sigma hold the truth in 9 of 10", text, held >= 0.9 * len(rows)))

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import generator
 import numpy as np
+import kept as parts
 
 import penode_gen
 from penode_gen import promises
@@ -44,6 +45,7 @@ GIVEN = (
     Promises(increasing=True, dissipative=1.0, zero_at_zero=True),
 )
 PLANTS = (generator.Truth(), generator.STOPS, generator.Truth(spring_by=(-500.0, 0.05, 0.0, 0.0), damper_by=(90.0, 20.0, 0.05, -40.0)))
+CHUNK, FEW = 200, 25  # random curves, and trainings, of a part
 WINDOW = 500  # samples of a recording that a curve is trained on
 
 
@@ -228,21 +230,34 @@ def seen(name: str, count: int) -> int:
 # -- the page
 
 
+def random_curves(seed: int, count: int) -> list[int]:
+    """Of so many: broken before training's limits, after them, refused."""
+    random = np.random.default_rng([1, seed])
+    return [sum(values) for values in zip(*(kept(GIVEN[k % len(GIVEN)], random, [8, 8]) for k in range(count)))]
+
+
+def trained_curves(seed: int, count: int, folder: Path, promising: bool = True) -> list[int]:
+    """Of so many trainings, two networks each: networks that are broken, and that are refused."""
+    with threads.one():
+        pairs = list(trained(count, seed, folder, promising))
+    return [sum(breaks(g, n) for g, n in pairs if n is not None), sum(n is None for _, n in pairs)]
+
+
 def rows(given: argparse.Namespace) -> Iterator[tuple[str, str, bool]]:
     """Rows of the page, and whether each is as it must be."""
-    random = np.random.default_rng(1)
-    found = [kept(GIVEN[k % len(GIVEN)], random, [8, 8]) for k in range(given.curves)]
-    before, after, refused = (sum(values) for values in zip(*found))
-    yield "random curves, broken before and after training's limits, refused", f"{before}, {after} and {refused} of {len(found)}", after == 0
-    with tempfile.TemporaryDirectory() as folder, threads.one():
-        pairs = list(trained(given.trained // 2, 1, Path(folder)))
-        free = [p for p in trained(max(given.trained // 100, 2), 2, Path(folder), promising=False) if p[1] is not None]
-    made = [p for p in pairs if p[1] is not None]
-    wrong, wild = (sum(breaks(g, n) for g, n in some if n is not None) for some in (made, free))
-    yield "trained curves, broken, refused", f"{wrong} and {len(pairs) - len(made)} of {len(pairs)}", wrong == 0 and len(made) > len(pairs) // 2
-    yield "the same trained freely, broken", f"{wild} of {len(free)}", wild > 0
+    done = given.out.with_suffix(".jsonl")
+    some = [parts.kept(done, ["random", k], lambda k=k: random_curves(k, CHUNK)) for k in range(given.curves // CHUNK)]
+    before, after, refused = (sum(values) for values in zip(*some))
+    yield "random curves, broken before and after training's limits, refused", f"{before}, {after} and {refused} of {len(some) * CHUNK}", after == 0
+    with tempfile.TemporaryDirectory() as folder:
+        pairs = [parts.kept(done, ["trained", k], lambda k=k: trained_curves(k, FEW, Path(folder))) for k in range(given.trained // (2 * FEW))]
+        wild = parts.kept(done, ["free"], lambda: trained_curves(0, FEW, Path(folder), promising=False))
+    wrong, none = (sum(values) for values in zip(*pairs))
+    every = 2 * FEW * len(pairs)
+    yield "trained curves, broken, refused", f"{wrong} and {none} of {every}", wrong == 0 and none < every // 2
+    yield "the same trained freely, broken", f"{wild[0]} of {2 * FEW - wild[1]}", wild[0] > 0
     for name in FAULTS:
-        number = seen(name, 40)
+        number = parts.kept(done, ["fault", name], lambda name=name: seen(name, 40))
         yield f"fault in the limits: {name}", f"found in {number} of 40 curves", number > 0
 
 

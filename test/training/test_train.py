@@ -94,6 +94,7 @@ def test_one_weighed_mass_settles_the_scale(recordings: tuple[Path, Path], tmp_p
         (lambda t: t, ["--known", "m_b=3 m"], "measured in kg"),
         (lambda t: t.replace("layers = [16, 16, 16]", "layers = [16, 16], activation = 'step'", 1), [], "cannot be trained"),
         (lambda t: t.replace('spring_net = { inputs = ["m"], output', 'spring_net = { inputs = [], output'), [], "unit of each input"),
+        (lambda t: t.replace('spring_net = { inputs = ["m"], output', 'spring_net = { inputs = [""], output'), [], "takes a number without unit, an element has a deflection in m"),
         (lambda t: t.replace("value = 300000", "value = -300000"), [], "left all bounds"),
     ],
 )

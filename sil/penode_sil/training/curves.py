@@ -88,6 +88,7 @@ def train(
     tell(0.05, "straight lines")
     problem, point = lines(problem, [three(1.0, p.zero) for p in ports], limits)
     point = start(problem, point)
+    problem = problem.with_(plain=True)
     for share, count, iterations in ((0.15, SETTINGS.curves_coarse, 8), (0.35, SETTINGS.curves_coarse, 4)):
         tell(share, f"curves of {count} knots")
         seen = seen_by(problem, point)
@@ -100,6 +101,7 @@ def train(
         problem = renoised(problem, point)
     tell(0.55, "where knots are wanted")
     problem, point = chosen(problem, point, ports, limits)
+    problem = problem.with_(plain=False)
     tell(0.75, "the curves")
     fit = solve(problem, point, 10, 1.0, limits, damping=1e-6)
     problem = renoised(problem, fit.point)

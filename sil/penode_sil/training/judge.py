@@ -16,20 +16,12 @@ from penode_gen.model import Model
 from ..batch import Batch
 from ..measured import Measured
 from .port import Port, inputs_of
-from .data import Noise, Record
+from .data import Noise
 from .problem import Point, Problem
 from .result import Error
-from .solve import solve
 from .settings import SETTINGS
 
 Array = NDArray[np.float64]
-
-
-def fitted_starts(problem: Problem, records: tuple[Record, ...], point: Point) -> tuple[Problem, Point]:
-    """Start states of other recordings, all else as trained."""
-    own = problem.with_(records=records, frozen=True)
-    begin = replace(own.begin(point.shapes), ratios=point.ratios)
-    return own, solve(own, begin, 8, 0.1, damping=1e-6).point
 
 
 def errors(

@@ -72,6 +72,7 @@ class Problem:
     held: frozenset[str] = frozenset()
     frozen: bool = False  # only start states move
     tied: Array | None = None  # [directions, free]: of the parameters, that no sensor sees; they stay where the model file has them
+    plain: bool = False  # curves have no spike at 0: for the way to a fit, not for its end
     apart: tuple[Apart, ...] = ()  # networks beside free parameters in the same place
     journal: Journal = field(default_factory=Journal)  # of the training's fits
     model: Model = field(init=False)
@@ -81,7 +82,7 @@ class Problem:
 
     def with_(self, **changes: object) -> Problem:
         """The same problem but for some of it."""
-        given = {k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied", "apart", "journal")}
+        given = {k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied", "plain", "apart", "journal")}
         return Problem(**(given | changes))  # type: ignore[arg-type]
 
     @property
@@ -208,6 +209,8 @@ class Problem:
         if not isinstance(shape, Curve):
             return np.diag(np.full(len(shape.theta), SETTINGS.problem_decay**-2.0))
         rows = shape.bends() / (SETTINGS.problem_bent * size)
+        if self.plain and 0 < shape.zero < len(shape.knots) - 1:  # a constant of one network would move where 0 of another one is
+            rows[shape.zero - 1] /= SETTINGS.problem_tied
         return rows.T @ rows + np.eye(len(shape.theta)) * (SETTINGS.problem_large * size) ** -2.0
 
 

@@ -21,7 +21,7 @@ from penode_gen.networks import Network
 
 from ..errors import UserError
 from ..measured import Measured
-from . import apart, bands, begin, curves, data, dense, ends, heldout, judge, promised, unfold, unknown
+from . import apart, bands, begin, curves, data, dense, ends, held_starts, heldout, judge, kinks, promised, unfold, unknown
 from .curve import Curve
 from .curves import Tell
 from .port import Port, inputs_of
@@ -207,16 +207,21 @@ def _judged(
     holdout, outside, masked = (), 0.0, 0.0
     if held:
         records = tuple(data.record(model, m, problem.engine.signals) for m in held)
-        other, there = judge.fitted_starts(problem, records, fit.point)
-        holdout, outside, masked = judge.errors(other, there, held, model, after, ports, ranges, problem.noise)
+        there = held_starts.fitted(problem, records, fit.point, ports, curves.seen_by(problem, fit.point))
+        if there is not None:
+            holdout, outside, masked = judge.errors(*there, held, model, after, ports, ranges, problem.noise)
     forces = [
         _force(model, port, shape, network, x, band.deviation(k))
         for k, (port, shape, network, x) in enumerate(zip(ports, fit.point.shapes, networks, visited))
     ]
     loud = [e.signal for e in training if any(s.name == e.signal and s.noise > 0.0 and e.after > SETTINGS.story_loud * s.noise for s in (*model.sensors, *model.outputs))]
     notes = [f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"] if loud else []
-    notes += [f"{p}" for m in train_ for p in m.quality.problems]
+    notes += dict.fromkeys(f"{p}" for m in train_ for p in m.quality.problems)  # parts of a file have them in common
     notes += [f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, the network takes the rest" for a in problem.apart if ports[a.shape].knots]
+    notes += kinks.notes(problem, fit, ports)
+    if held and not holdout:
+        titles = ", ".join(m.title for m in held)
+        notes.append(f"{titles}: the trained model leaves all bounds there, so there is no error on held-out data; a recording that goes further must be among --data")
     if model.method not in ("euler", "heun", "rk4"):
         notes.append(f"the deployed method is {model.method}; networks were trained through rk4 with the same steps")
     sigma = {n: float(band.deviations[i]) * abs(model.parameters[n].value) for i, n in enumerate(problem.engine.free)}
