@@ -95,6 +95,14 @@ def test_what_is_not_read_is_a_line(text: str, tmp_path: Path) -> None:
     assert not output.exists() and sorted(tmp_path.iterdir()) == [path]
 
 
+def test_files_beside_it_do_not_count(tmp_path: Path) -> None:
+    """A second model of the same name in the folder, which the compiler alone would read as well."""
+    text = f"{HEAD}  1.0*der(v) = -k*x/2;\nend M;\n".replace('"N/m"', '"1/s2"').replace("1.0*", "")
+    for name in ("M.mo", "copy of M.mo"):
+        (tmp_path / name).write_text(text)
+    assert "der(v) = -k*x/2" in model_file(text, tmp_path / "M.mo")
+
+
 def test_other_lines(tmp_path: Path) -> None:
     path = tmp_path / "M.mo"
     for text, line in {

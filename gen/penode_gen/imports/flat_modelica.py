@@ -13,6 +13,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -69,11 +70,14 @@ def flat(path: Path, text: str, model: str) -> Flat:
         raise ImportProblem(f"{path}: more than {_LARGEST} characters; name the file of the model alone, libraries in MODELICA_LIBS")
     roots = [root for root in os.environ.get("MODELICA_LIBS", "").split(os.pathsep) if root]
     try:
-        done = subprocess.run([sys.executable, "-c", _COMPILE, str(path), model, *roots], capture_output=True, text=True, timeout=LIMIT, stdin=subprocess.DEVNULL, errors="replace")
+        with tempfile.TemporaryDirectory() as alone:  # rumoca reads the files beside it as well
+            copy = Path(alone, "model.mo")
+            copy.write_text(text, encoding="utf-8")
+            done = subprocess.run([sys.executable, "-c", _COMPILE, str(copy), model, *roots], capture_output=True, text=True, timeout=LIMIT, stdin=subprocess.DEVNULL, errors="replace")
     except subprocess.TimeoutExpired:
         raise ImportProblem(f"{path}: rumoca has not compiled {model} within {LIMIT} s; import a smaller model") from None
     if done.returncode != 0:
-        said = (done.stderr.strip().splitlines() or [f"it ended with code {done.returncode}"])[-1]
+        said = (done.stderr.replace(alone, "").strip().splitlines() or [f"it ended with code {done.returncode}"])[-1]
         if "unsupported-feature:events" in said:
             raise ImportProblem(f"{path}: {model} has events (when, reinit, or if without noEvent), which are not read; use the elements of a model file for stops and friction")
         raise ImportProblem(f"{path}: rumoca cannot compile {model}: {said[:300]}; mend the model, or name its libraries in MODELICA_LIBS")
