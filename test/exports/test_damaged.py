@@ -24,7 +24,7 @@ import damaged_files as df  # needs fork
 
 @pytest.mark.skipif(any(importlib.util.find_spec(p) is None for p in ("fmpy", "rumoca")), reason="FMPy or rumoca is not installed: pip install penode[ssp,modelica]")
 def test_damaged_files_are_taken_or_refused_with_a_line_each() -> None:
-    for importer in df.check(range(6)):
+    for importer in df.check(range(4)):
         assert importer.problems == [] and importer.refused > 0, importer.name
 
 

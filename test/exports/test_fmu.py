@@ -305,18 +305,6 @@ def test_models_without_inputs_states_sensors_or_sets(tmp_path: Path) -> None:
                 assert master.get("set_id") == 1000
 
 
-def test_the_lines_of_the_manual(nqvm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """What gen/EXPORTS.md shows for FMPy, as it stands there."""
-    text = (Path(__file__).parents[2] / "gen" / "EXPORTS.md").read_text()
-    lines = text.split("```python\n")[1].split("```")[0]
-    export(nqvm, 3, tmp_path).rename(tmp_path / "nqvm.fmu")
-    monkeypatch.chdir(tmp_path)
-    space: dict[str, Any] = {}
-    exec(lines, space)  # noqa: S102 - our own page
-    assert space["result"]["set_id"][-1] == penode_gen.set_head(nqvm, SET)[2] and "body height" in capsys.readouterr().out
-    assert space["result"]["z_b"][0] == np.float32(0.02) and len(space["result"]) > 100
-
-
 def test_all_functions_of_the_standard_are_there(unpacked: Unpacked) -> None:
     """Importers that look for each of them find it."""
     from penode_gen.exports.fmi_functions import functions

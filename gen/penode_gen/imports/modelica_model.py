@@ -161,7 +161,7 @@ def _units(found: Flat, where: str) -> dict[str, str]:
                 if len(missing) == 1 and part and part[missing[0]] == 1:
                     unit = whole / _unit_of(part, known, missing[0])
                     known[_bare(missing[0])] = unit * _SECOND if missing[0].startswith("der(") else unit
-    return {name: f"{unit:~C}".replace("**", "^") or "1" for name, unit in known.items()}
+    return {name: found.variables[name].unit or f"{unit:~C}".replace("**", "^") or "1" for name, unit in known.items()}
 
 
 def _bare(name: str) -> str:
