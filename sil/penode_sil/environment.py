@@ -12,9 +12,10 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
+from datetime import MAXYEAR, UTC, datetime
 from pathlib import Path
 
-LAST = 253402300799  # [s] the end of the year 9999
+LAST = int(datetime(MAXYEAR, 12, 31, 23, 59, 59, tzinfo=UTC).timestamp())  # [s] the last that a date can be written for
 
 
 def problems(environment: Mapping[str, str]) -> list[str]:
