@@ -26,7 +26,12 @@ from .output import check_writable, whole
 @click.option("--model", help="Which Modelica model, if the file has several; for a .toml only.")
 def import_(file: Path, output: Path, network: str | None, activation: str, model: str | None) -> None:
     """Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits; or a Modelica model of masses, springs and dampers, as a model file."""
-    if output.suffix.lower() == ".toml":
+    whole_model = output.suffix.lower() == ".toml"
+    foreign = [f"--{name}" for name in (("network", "activation") if whole_model else ("model",)) if _given(name)]
+    if foreign:
+        kind = "a model, which it writes as .toml" if not whole_model else "a network, which it writes as .json"
+        raise UserError(*(f"{name}: it is for {kind}; leave it out" for name in foreign))
+    if whole_model:
         _model(file, output, model)
         return
     if output.suffix.lower() != ".json":
@@ -42,6 +47,11 @@ def import_(file: Path, output: Path, network: str | None, activation: str, mode
     with whole(output) as part:
         part.write_text(text, encoding="utf-8")
     click.echo(str(output))
+
+
+def _given(name: str) -> bool:
+    """Is an option on the command line, rather than left at its default?"""
+    return click.get_current_context().get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
 
 
 def _model(file: Path, output: Path, model: str | None) -> None:

@@ -311,3 +311,16 @@ def test_all_functions_of_the_standard_are_there(unpacked: Unpacked) -> None:
 
     library = ctypes.CDLL(str(next(unpacked.folder.rglob("*.so"))))
     assert all(hasattr(library, f.name) for f in functions(unpacked.version)) and len(functions(unpacked.version)) == {3: 75, 2: 44}[unpacked.version]
+
+
+def test_a_binary_that_is_missing_is_a_note(nqvm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """With no compiler at all the FMU has its sources, and a line for each platform says why there is no more."""
+    from penode_sil.cli import cli
+
+    monkeypatch.setenv("PATH", str(tmp_path))
+    cli(args=["export", str(nqvm.path), "--format", "fmu3", "-o", str(tmp_path / "bare.fmu")], standalone_mode=False)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2 and all(line.startswith("note: no binary for x86_64-") and line.endswith(" is not installed") for line in lines), lines
+    assert not any(name.startswith("binaries/") for name in zipfile.ZipFile(tmp_path / "bare.fmu").namelist())
+    cli(args=["export", str(nqvm.path), "--format", "fmu3", "--source-only", "-o", str(tmp_path / "bare.fmu")], standalone_mode=False)
+    assert capsys.readouterr().err == ""

@@ -119,6 +119,12 @@ def test_files_beside_it_do_not_count(tmp_path: Path) -> None:
     assert "der(v) = -k*x/2" in model_file(text, tmp_path / "M.mo")
 
 
+def test_options_of_the_other_kind(tmp_path: Path) -> None:
+    for words, line in ((["-o", "m.toml", "--activation", "relu"], "--activation: it is for a network"), (["-o", "m.json", "--model", "M"], "--model: it is for a model")):
+        done = CliRunner().invoke(cli, ["import", str(LIBRARY), *words], standalone_mode=False)
+        assert done.exception is not None and line in done.exception.problems[0]
+
+
 def test_other_lines(tmp_path: Path) -> None:
     path = tmp_path / "M.mo"
     for text, line in {

@@ -131,6 +131,13 @@ def binaries(texts: dict[str, str], name: str, fmi: int, debug: bool = False) ->
     return made
 
 
+def notes(options: Options) -> list[str]:
+    """The binaries that are missing for want of a compiler, a line each; none where they are not wanted."""
+    if options.get("source_only"):
+        return []
+    return [f"no binary for {target} inside: {compiler} is not installed" for target, (compiler, _, _) in _COMPILERS.items() if shutil.which(compiler) is None]
+
+
 def documentation(context: dict[str, Any], platforms: list[str]) -> dict[str, str]:
     """Page and licence, by path in the FMU."""
     return {
