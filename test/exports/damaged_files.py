@@ -3,7 +3,8 @@
 """
 Campaign: damaged and foreign files given to every command that imports; make imports.
 
-Each call is a process of its own (a fork of this one), so a crash is seen as one. A file is taken, with code 0 and a whole result, or
+Calls are made in forks of this process, many in each; where one crashes or takes too long, its file is the culprit, and the next fork goes
+on behind it. A file is taken, with code 0 and a whole result, or
 refused, with code 2, a line each that begins with `penode: `, and nothing written: the file that stood there keeps its bytes, no other
 file appears. Files are good ones changed at random, in archives also inside of one of their files, and files of quite other kinds.
 Random numbers are seeded.
@@ -13,9 +14,9 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import gc
 import gzip
 import io
+import json
 import os
 import random
 import signal
@@ -41,6 +42,7 @@ from penode_sil.errors import UserError
 from penode_sil.guard import guarded
 
 LIMIT = 60  # [s] of wall-clock time for one file
+FORK = 50  # files for a process
 KEPT = b"this file stood here before"
 SMALL = """[model]
 name = "lag"
@@ -118,29 +120,15 @@ def inside(*suffixes: str, deep: str = "") -> Callable[[bytes, random.Random], b
 
 
 def called(words: list[str], command: Any, folder: Path) -> tuple[int, str]:
-    """Code and stderr of a command, run in a fork; the code is minus the signal for a crash."""
-    report = folder / "stderr"
-    child = os.fork()
-    if child == 0:
-        code = 77
+    """Code and stderr of a command, run in this process."""
+    said = io.StringIO()
+    os.chdir(folder)
+    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
         try:
-            signal.alarm(LIMIT)
-            os.chdir(folder)
-            for stream in (1, 2):
-                os.dup2(os.open(report if stream == 2 else os.devnull, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), stream)
-            sys.stderr = open(2, "w", closefd=False)
-            sys.stdout = open(1, "w", closefd=False)
             guarded(lambda: command(args=words, standalone_mode=False))
-            code = 0
         except SystemExit as end:
-            code = int(end.code or 0)
-        finally:
-            sys.stderr.flush()
-            os._exit(code)
-    _, status = os.waitpid(child, 0)
-    said = report.read_text(errors="replace") if report.exists() else ""
-    report.unlink(missing_ok=True)
-    return os.waitstatus_to_exitcode(status), said
+            return int(end.code or 0), said.getvalue()
+    return 0, said.getvalue()
 
 
 def listed(folder: Path) -> dict[str, bytes]:
@@ -150,8 +138,6 @@ def listed(folder: Path) -> dict[str, bytes]:
 def judge(code: int, said: str, before: dict[str, bytes], after: dict[str, bytes], output: str) -> str:
     """What is wrong with the end of a command; "" if nothing is."""
     lines = said.splitlines()
-    if code < 0:
-        return "too long" if code == -signal.SIGALRM else f"crash, signal {-code}"
     if "Traceback" in said or code not in (0, 2):
         return f"code {code}: {said[:300]}"
     if code == 0:
@@ -161,21 +147,48 @@ def judge(code: int, said: str, before: dict[str, bytes], after: dict[str, bytes
     return "" if after == before else f"refused, but files differ: {sorted(set(after) ^ set(before)) or 'the output'}"
 
 
-def give(importer: Importer, data: bytes, folder: Path, command: Any = cli, name: str = "file") -> str:
-    """One file to an importer; what is wrong, or ""."""
-    path, output = folder / f"{name}{importer.suffix}", folder / importer.output
+def give(importer: Importer, data: bytes, folder: Path, command: Any) -> tuple[int, str, str]:
+    """One file to an importer, in this process: code, what is wrong or "", and what it said."""
+    path, output = folder / f"file{importer.suffix}", folder / importer.output
     path.write_bytes(data)
     if output.suffix:
         output.write_bytes(KEPT)
     before = listed(folder)
     code, said = called(importer.words(path, output), command, folder)
     after = listed(folder)
-    found = judge(code, said, before, after, importer.output)
-    importer.taken += code == 0
-    importer.refused += code == 2
-    importer.lines |= {"".join(c for c in line if not c.isdigit())[:60] for line in said.replace(str(folder), "").splitlines()}
     for extra in set(after) - set(before):
         (folder / extra).unlink()
+    return code, judge(code, said, before, after, importer.output), said.replace(str(folder), "")
+
+
+def many(importer: Importer, files: list[bytes], folder: Path, command: Any = cli) -> list[str]:
+    """Files to an importer, in forks; what is wrong with each, or ""."""
+    report, found = folder.parent / f"{folder.name}.report", []
+    while len(found) < len(files):
+        report.unlink(missing_ok=True)
+        child = os.fork()
+        if child == 0:
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
+            quiet = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(quiet, 1)
+            os.dup2(quiet, 2)
+            with open(report, "w") as lines:
+                for data in files[len(found) : len(found) + FORK]:
+                    signal.alarm(LIMIT)
+                    lines.write(json.dumps(give(importer, data, folder, command)) + "\n")
+                    lines.flush()
+            os._exit(0)
+        _, status = os.waitpid(child, 0)
+        ended = [json.loads(line) for line in report.read_text().splitlines()] if report.exists() else []
+        for code, wrong, said in ended:
+            importer.taken += code == 0
+            importer.refused += code == 2
+            importer.lines |= {"".join(c for c in line if not c.isdigit())[:60] for line in said.splitlines()}
+            found.append(wrong)
+        code = os.waitstatus_to_exitcode(status)
+        if code != 0:
+            found.append("too long" if code == -signal.SIGALRM else f"crash, signal {-code}" if code < 0 else f"the process ended with code {code}")
+    report.unlink(missing_ok=True)
     return found
 
 
@@ -205,8 +218,8 @@ def given(importer: Importer, seeds: range) -> Iterator[bytes]:
 
 def search(importer: Importer, seeds: range, folder: Path, command: Any = cli) -> None:
     """Give it all files; problems are kept with the file that brought them."""
-    for seed, data in zip(seeds, given(importer, seeds)):
-        wrong = give(importer, data, folder, command)
+    files = list(given(importer, seeds))
+    for seed, data, wrong in zip(seeds, files, many(importer, files, folder, command)):
         if wrong:
             kept = gate.BUILD / "imports" / f"{importer.name.replace(' ', '-')}-{seed}{importer.suffix}"
             kept.parent.mkdir(parents=True, exist_ok=True)
@@ -239,31 +252,31 @@ def importers(folder: Path) -> list[Importer]:
 
     return [
         Importer("Modelica records", ".mo", "out.json", read, [made["modelica"]], text_changed),
-        Importer("Modelica models", ".mo", "out.toml", lambda path, output: [*read(path, output), "--model", "Translation.Swing"], [library], text_changed),
+        Importer("eFMU and others", ".fmu", "out.json", read, [made["ssp"]], network_changed),
         Importer("SSP", ".ssp", "out.csv", play, [made["ssp"]], inside(".ssd", "schedule.xml")),
         Importer("SSV and SSM", ".ssp", "out.csv", play, [made["ssp"]], inside(".ssv", ".ssm")),
         Importer("FMU", ".ssp", "out.csv", play, [made["ssp"]], inside("modelDescription.xml", deep=".fmu")),
-        Importer("eFMU and others", ".fmu", "out.json", read, [made["ssp"]], network_changed),
         Importer("ONNX", ".onnx", "out", generate("onnx.toml"), [p.read_bytes() for p in networks], network_changed),
         Importer("network files", ".json", "out", generate("json.toml"), [p.read_bytes() for p in layers], text_changed),
         Importer("model files", ".toml", "out", generate(""), [SMALL.replace("NETWORK", "net.json").encode()], text_changed),
+        Importer("Modelica models", ".mo", "out.toml", lambda path, output: [*read(path, output), "--model", "Translation.Swing"], [library], text_changed),
     ]  # fmt: skip
 
 
-def check(seeds: range, only: str = "") -> list[Importer]:
-    """So many files for each importer (or those whose name has `only` in it)."""
-    with tempfile.TemporaryDirectory() as place:
-        every = [i for i in importers(Path(place)) if only in i.name]
-        gc.freeze()
+def check(seeds: range, only: str = "") -> Iterator[Importer]:
+    """So many files for each importer (or those whose name has `only` in it), which is returned when it has had all."""
+    with tempfile.TemporaryDirectory() as outer:
+        place = Path(outer, "files")
+        place.mkdir()
+        every = [i for i in importers(place) if only in i.name]
         for importer in every:
-            warm(importer, Path(place))
-            wrong = [give(importer, data, Path(place)) for data in importer.good]
-            importer.problems += [f"{importer.name}: a good file: {w}" for w in wrong if w]
+            warm(importer, place)
+            importer.problems += [f"{importer.name}: a good file: {wrong}" for wrong in many(importer, importer.good, place) if wrong]
             if importer.taken != len(importer.good) and importer.suffix != ".fmu":  # penode reads no file of that suffix
                 importer.problems.append(f"{importer.name}: a good file is refused")
             importer.taken = importer.refused = 0
-            search(importer, seeds, Path(place))
-        return every
+            search(importer, seeds, place)
+            yield importer
 
 
 def main() -> int:
