@@ -97,6 +97,12 @@ REFUSED = {
     "  der(v) = -k*x;\n  v = der(x);\n": "rumoca cannot compile M",
     "  der(v) = -k*cosh(x);\n": "the function 'cosh' with 1 arguments is not read",
     "  der(v) = -k*x;\ninitial equation\n  x = 2;\n": "'initial equation' is not read",
+    "  der(v) = -k*x/0;\n": "no model file can be made of it",
+    "  der(v) = -k*x + 0/0;\n": "",
+    "  der(v) = -k*(x + v)^99999;\n": "the exponent '99999' is not read",
+    "  der(v) = -k*x + 9^9^9;\n": "",
+    f"  der(v) = -k*{'(' * 3000}x{')' * 3000};\n": "",
+    "  der(v) = -k*x + 1e999;\n": "",
     "  der(v) = -k*x;\n": "no model file can be made of it",  # m/s^2 is no N: the units do not fit
 }
 

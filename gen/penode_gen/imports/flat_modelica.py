@@ -134,7 +134,7 @@ def number(expr: sympy.Expr, found: Flat, where: str) -> float:
         if not names or not names <= set(found.values):
             break
         expr = expr.subs({found.variables[name].symbol: found.values[name] for name in names})
-    if expr.free_symbols or not expr.is_number or not sympy.Abs(expr) < 1e300:
+    if expr.free_symbols or not expr.is_number or not expr.is_finite or not expr.is_real or abs(expr) > 1e300:
         raise ImportProblem(f"{where} is '{str(expr)[:60]}', which is no finite number; give it a number")
     return float(expr)
 
@@ -146,6 +146,8 @@ def _unit(text: str) -> str:
 
 def expression(text: str, found: Flat, where: str) -> sympy.Expr:
     """An expression of numbers, known names and functions. Raises ImportProblem."""
+    if len(text) > 20_000:
+        raise ImportProblem(f"{where}: an expression of {len(text)} characters is not read; divide it")
     words, at = [], 0
     while text[at:].strip():
         match = _TOKEN.match(text, at)
@@ -200,7 +202,12 @@ class _Parser:
 
     def power(self) -> sympy.Expr:
         base = self.atom()
-        return base ** self.atom() if self.take("^") else base
+        if not self.take("^"):
+            return base
+        exponent = self.atom()
+        if not exponent.is_Rational or abs(exponent) > 8:
+            raise ImportProblem(f"{self.where}: the exponent '{str(exponent)[:40]}' is not read; use a number from -8 to 8")
+        return base**exponent
 
     def atom(self) -> sympy.Expr:
         kind, word = self.words[self.at]

@@ -46,10 +46,13 @@ def model_file(text: str, path: Path, model: str | None = None) -> str:
     found, where = flat(path, text, chosen), f"{path}: {chosen}"
     if len(found.equations) > _MOST:
         raise ImportProblem(f"{where}: {len(found.equations)} equations, and {_MOST} at most are read; import a smaller model")
-    units = _units(found, where)
-    reduced = _Reduction(found, where)
-    reduced.run()
-    return _Page(found, reduced, units, where).text(chosen.rpartition(".")[2])
+    try:
+        units = _units(found, where)
+        reduced = _Reduction(found, where)
+        reduced.run()
+        return _Page(found, reduced, units, where).text(chosen.rpartition(".")[2])
+    except RecursionError:
+        raise ImportProblem(f"{where}: its equations are nested too deep; simplify them") from None
 
 
 class _Reduction:
