@@ -238,3 +238,4 @@ figures-check: | $(READY) ## No figure may be 2 % worse than the kept one, or ab
 
 include test/packages/packages.mk
 include test/builds/builds.mk
+include test/exports/exports.mk

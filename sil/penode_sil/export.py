@@ -12,7 +12,7 @@ import click
 import penode_gen
 from penode_gen import exports
 
-from .console import FILE
+from .console import FILE, note
 from .errors import UserError, hint
 from .output import check_writable, whole
 
@@ -64,4 +64,6 @@ def export(model: Path, name: str, output: Path, **given: Any) -> None:
     data = exports.export(penode_gen.load(model), name, output, options)
     with whole(output) as part:
         part.write_bytes(data)
+    for line in chosen.notes(options):
+        note(line)
     click.echo(str(output))

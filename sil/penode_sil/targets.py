@@ -65,11 +65,11 @@ class Run:
 
 def build_directory() -> Path:
     """Where compiled things are kept: PENODE_BUILD, else build/sil of the checkout, else the user's cache."""
-    if "PENODE_BUILD" in os.environ:
-        return Path(os.environ["PENODE_BUILD"])
+    if os.environ.get("PENODE_BUILD"):
+        return Path(os.environ["PENODE_BUILD"]).absolute()
     if os.access(ROOT, os.W_OK):
         return ROOT / "build" / "sil"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "penode"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute() / "penode"
 
 
 def _digest(parts: Iterable[str | bytes | Path]) -> str:

@@ -305,21 +305,22 @@ def test_models_without_inputs_states_sensors_or_sets(tmp_path: Path) -> None:
                 assert master.get("set_id") == 1000
 
 
-def test_the_lines_of_the_manual(nqvm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """What gen/EXPORTS.md shows for FMPy, as it stands there."""
-    text = (Path(__file__).parents[2] / "gen" / "EXPORTS.md").read_text()
-    lines = text.split("```python\n")[1].split("```")[0]
-    export(nqvm, 3, tmp_path).rename(tmp_path / "nqvm.fmu")
-    monkeypatch.chdir(tmp_path)
-    space: dict[str, Any] = {}
-    exec(lines, space)  # noqa: S102 - our own page
-    assert space["result"]["set_id"][-1] == penode_gen.set_head(nqvm, SET)[2] and "body height" in capsys.readouterr().out
-    assert space["result"]["z_b"][0] == np.float32(0.02) and len(space["result"]) > 100
-
-
 def test_all_functions_of_the_standard_are_there(unpacked: Unpacked) -> None:
     """Importers that look for each of them find it."""
     from penode_gen.exports.fmi_functions import functions
 
     library = ctypes.CDLL(str(next(unpacked.folder.rglob("*.so"))))
     assert all(hasattr(library, f.name) for f in functions(unpacked.version)) and len(functions(unpacked.version)) == {3: 75, 2: 44}[unpacked.version]
+
+
+def test_a_binary_that_is_missing_is_a_note(nqvm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """With no compiler at all the FMU has its sources, and a line for each platform says why there is no more."""
+    from penode_sil.cli import cli
+
+    monkeypatch.setenv("PATH", str(tmp_path))
+    cli(args=["export", str(nqvm.path), "--format", "fmu3", "-o", str(tmp_path / "bare.fmu")], standalone_mode=False)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2 and all(line.startswith("note: no binary for ") and line.endswith(" is not installed") for line in lines), lines
+    assert not any(name.startswith("binaries/") for name in zipfile.ZipFile(tmp_path / "bare.fmu").namelist())
+    cli(args=["export", str(nqvm.path), "--format", "fmu3", "--source-only", "-o", str(tmp_path / "bare.fmu")], standalone_mode=False)
+    assert capsys.readouterr().err == ""

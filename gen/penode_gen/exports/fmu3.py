@@ -30,4 +30,4 @@ def build(model: Model, options: Options) -> bytes:
     return zipped(files)
 
 
-EXPORTER = Exporter("FMI 3.0 Co-Simulation FMU, with sources", (".fmu",), build, options=fmu_files.OPTIONS)
+EXPORTER = Exporter("FMI 3.0 Co-Simulation FMU, with sources", (".fmu",), build, options=fmu_files.OPTIONS, notes=fmu_files.notes)

@@ -33,7 +33,7 @@ _LEFT_OUT = ("pen_xcp", "pen_selftest")
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-ffunction-sections", "-fdata-sections", "-shared", "-Wl,--gc-sections")
 # What a compiler is called, the suffix of a shared library and more options, by platform of FMI 3.
 _COMPILERS: dict[str, tuple[str, str, tuple[str, ...]]] = {
-    "x86_64-windows": ("x86_64-w64-mingw32-gcc", ".dll", ("-static-libgcc", "-Wl,--no-insert-timestamp")),
+    "x86_64-windows": ("x86_64-w64-mingw32-gcc", ".dll", ("-s", "-static-libgcc", "-Wl,--no-insert-timestamp")),
 }
 if platform.system() == "Linux" and platform.machine() in ("x86_64", "aarch64"):
     _COMPILERS[f"{platform.machine()}-linux"] = ("gcc", ".so", ("-fPIC", "-Wl,--build-id=none"))
@@ -129,6 +129,13 @@ def binaries(texts: dict[str, str], name: str, fmi: int, debug: bool = False) ->
                 raise ExportError(f"{compiler} refused the C of the FMU: {lines[0]}; report this with the model file")
             made[target] = Path(folder, output).read_bytes()
     return made
+
+
+def notes(options: Options) -> list[str]:
+    """The binaries that are missing for want of a compiler, a line each; none where they are not wanted."""
+    if options.get("source_only"):
+        return []
+    return [f"no binary for {target} inside: {compiler} is not installed" for target, (compiler, _, _) in _COMPILERS.items() if shutil.which(compiler) is None]
 
 
 def documentation(context: dict[str, Any], platforms: list[str]) -> dict[str, str]:

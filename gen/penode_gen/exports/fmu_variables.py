@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product, repeat
 from math import prod
 
 import numpy as np
@@ -60,9 +61,18 @@ class Variable:
 
     def elements(self) -> Iterator[tuple[str, int, float | None]]:
         """Name, place and start of each element: W[1,2] as FMI 2 and Modelica write it."""
-        for i, index in enumerate(np.ndindex(self.shape)):
-            suffix = f"[{','.join(str(k + 1) for k in index)}]" if self.shape else ""
-            yield self.name + suffix, self.first + i, None if self.start is None else self.start[i]
+        starts = repeat(None) if self.start is None else self.start
+        indices = product(*([str(k + 1) for k in range(n)] for n in self.shape))
+        names = (f"{self.name}[{','.join(index)}]" for index in indices) if self.shape else (self.name,)
+        yield from zip(names, range(self.first, self.first + self.count), starts)
+
+    def scalars(self, head: str, body: str) -> str:
+        """The lines of all elements in FMI 2, with what they share: attributes, and the element inside. 200 000 of them are too many for a template's loop."""
+        before, between = '    <ScalarVariable name="', f' {head}><{body}'
+        if self.start is None:
+            return "".join(f'{before}{name}" valueReference="{place}"{between}/></ScalarVariable>\n' for name, place, _ in self.elements())
+        kind = "choice" if self.kind == "choice" else "real"
+        return "".join(f'{before}{name}" valueReference="{place}"{between} start="{number(start, kind)}"/></ScalarVariable>\n' for (name, place, _), start in zip(self.elements(), self.start))
 
 
 def number(value: float, kind: str = "real") -> str:

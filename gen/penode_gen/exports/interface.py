@@ -51,12 +51,11 @@ class Exporter:
     build: Callable[[Model, Options], bytes]
     options: tuple[Option, ...] = ()
     needs: tuple[str, ...] = ()
+    notes: Callable[[Options], list[str]] = lambda options: []  # what the file lacks because something is not installed here, a line each
 
     def missing(self) -> list[str]:
         """The packages of `needs` that are not installed."""
         return [name for name in self.needs if importlib.util.find_spec(name) is None]
-
-
 
 
 def run(exporter: Exporter, name: str, model: Model, path: Path, options: Options) -> bytes:

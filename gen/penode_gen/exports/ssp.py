@@ -105,4 +105,5 @@ EXPORTER = Exporter(
         Option("schedule", 'exchanges of sets in time, "2:altered_friction, 7:default" in seconds', default=""),
         Option("set", "parameter set (default: default)", default="default"),
     ),
+    notes=fmu_files.notes,
 )  # fmt: skip
