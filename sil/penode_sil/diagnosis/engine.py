@@ -57,7 +57,8 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     """By innovations where a guess is all that the file has of a parameter, or where more acts than the search by sensor noise explains;
     by that search else. What innovations explain but in part may have no name at all, if the search has none for it either; and what acts
     beside several causes of that search may be but the form of one, unless innovations have an answer with fewer. The search ends early
-    where more acts than any one cause explains, and than all that innovations found, but not so much that more causes are to be expected."""
+    where more acts than any one cause explains, and than all that innovations found, but not so much that more causes are to be expected. Where it ends
+    without a name, innovations may have one."""
     if weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values()):
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
@@ -76,7 +77,10 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
         simpler = best and w.verdict != "unexplained" and max(len(w.causes), 1) < len(best.groups)
         if whole and (level > weighed.UNMODELLED or simpler):
             return _by_innovations(case, best, w)
-    return by_noise(case, study, explanations, faults, bursts)
+    answer = by_noise(case, study, explanations, faults, bursts)
+    if w and w.verdict == "explained" and answer.verdict == "unexplained":
+        return _by_innovations(case, best, w)
+    return answer
 
 
 def _weighed(case: Case, study: Study) -> weighed.Weighed:
