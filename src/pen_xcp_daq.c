@@ -81,20 +81,20 @@ static void xcp_take(pen_xcp_daq_t *daq, const pen_xcp_list_t *list)
 void pen_xcp_sample(pen_xcp_t *xcp, uint32_t time)
 {
     pen_xcp_daq_t *const daq = xcp->config->daq;
-    uint32_t running;
 
     pen_port_store(&daq->time, time);
     pen_port_store(&daq->busy, 1U);
     pen_port_barrier(); /* what runs is looked at when the tuning context can see that it is */
-    running = pen_port_load(&xcp->sampling);
+    const uint32_t running = pen_port_load(&xcp->sampling);
     for (uint32_t i = 0U; i < PEN_XCP_LISTS; i++) {
         if (((running >> i) & 1U) != 0U) {
             pen_xcp_list_t *const list = &daq->list[i];
-            if (list->wait == 0U) {
+            if (list->wait > 1U) {
+                list->wait--;
+            } else {
                 list->wait = list->prescaler;
                 xcp_take(daq, list);
             }
-            list->wait--;
         }
     }
     pen_port_barrier();

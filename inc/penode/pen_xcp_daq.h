@@ -43,7 +43,7 @@ typedef struct {
     uint8_t odts;
     uint8_t mode;      /* 0x10: with time stamp                  */
     uint8_t prescaler;
-    uint8_t wait;      /* steps until the next sample; the step's */
+    uint8_t wait;      /* steps until the next sample, that one included; 0: the next step; the step's */
 } pen_xcp_list_t;
 
 /** Lists and ring. Owned by the caller; use it only through the functions below. */
