@@ -34,7 +34,7 @@ def started(model: Model, e: Experiment, study: Study) -> tuple[Array, Array]:
     metrics = [metric(e, study.levels[0][:1].repeat(e.band, 0), np.zeros((e.band, len(model.sensors), len(model.inputs))))]
     problem = Problem(model, [e], metrics, study.set_name, study.linear.fastest)
     spread = [1.0] * (2 * len(model.bodies)) + [SPREAD.get(s.unit, 1.0) for s in model.extra_states]
-    free = tuple(Free(("start", 0, i), x, 1e-3, sigma=s) for i, (x, s) in enumerate(zip(model.start, spread)))
+    free = tuple(Free(("start", 0, i), x, 1e-3, sigma=s) for i, (x, s) in enumerate(zip(start_of(model, e, study), spread)))
     fit = problem.solve(free)
     return np.array([f.value for f in fit.free]), fit.simulated[0]
 

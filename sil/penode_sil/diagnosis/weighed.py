@@ -97,7 +97,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     scale = np.array([s.noise or 1.0 for s in model.sensors])
     after = tuple(measuring.started(extended, e, study)[1] for e in study.experiments)
     fit = replace(study.null, simulated=after)
-    left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, study.null.simulated))
+    left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
@@ -108,7 +108,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
 
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float) -> str:
-    """From what is named, the share of the residual that it takes in a free run, and what is left: the residual of the nominal model as a
+    """From what is named, the share of the residual that it takes in a free run, and what is left: the residual with all that was found as a
     share of the signal, or what wanders as a share of what moves. Small deviations that have been found are what any model has."""
     if causes:
         return "explained" if share > ENOUGH else "partly_explained"
