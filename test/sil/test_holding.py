@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import penode_gen
 import pytest
+from one_mass import STEP, model
 from scipy.signal import StateSpace, lsim
 
 from penode_sil.diagnosis import driven, plant, real
@@ -16,30 +17,11 @@ from penode_sil.diagnosis.holding import held
 from penode_sil.diagnosis.noise import Experiment
 from penode_sil.measured import load
 
-STEP, FINE, SAMPLES = 2e-3, 8, 4000  # [s] of the recording, steps of the plant in one, samples
+FINE, SAMPLES = 8, 4000  # steps of the plant in a sample, samples
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 6.0
-MODEL = f"""
-[model]
-name = "rig"
-sample_time = "2 ms"
-[parameters]
-m = {{ value = {MASS}, unit = "kg", tolerance = 0.02 }}
-k = {{ value = {STIFFNESS}, unit = "N/m", tolerance = 0.02 }}
-d = {{ value = {DAMPING}, unit = "N*s/m", tolerance = 0.02 }}
-[inputs]
-push = {{ unit = "N" }}
-[bodies]
-mass = {{ mass = "m", position = "x", velocity = "v" }}
-[elements]
-spring = {{ between = ["mass", "ground"], law = "linear_spring", stiffness = "k" }}
-damper = {{ between = ["mass", "ground"], law = "linear_damper", damping = "d" }}
-drive = {{ between = ["mass", "ground"], law = "expression", force = "-push" }}
-[outputs]
-x = {{ value = "x", unit = "m" }}
-[sensors]
-x_mass = {{ value = "x", unit = "m", noise = 1e-6 }}
-a_mass = {{ value = "der(v)", unit = "m/s^2", noise = 1e-3 }}
-"""
+SENSORS = '''x_mass = { value = "x", unit = "m", noise = 1e-6 }
+a_mass = { value = "der(v)", unit = "m/s^2", noise = 1e-3 }'''
+MODEL = model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS)
 
 
 def recording(path: Path, how: str, period: float, seed: int) -> Path:
@@ -68,14 +50,14 @@ def recording(path: Path, how: str, period: float, seed: int) -> Path:
 @pytest.fixture
 def answer(tmp_path: Path):
     (tmp_path / "rig.toml").write_text(MODEL)
-    model = penode_gen.load(tmp_path / "rig.toml")
+    rig = penode_gen.load(tmp_path / "rig.toml")
 
     def search(how: str, period: float, seed: int) -> real.Answer:
-        (m,) = load([recording(tmp_path / "r.csv", how, period, seed)], model)
-        e: Experiment = driven.experiment(m, model)
-        places = plant.places(model)
-        fastest = plant.linearise(model, places, np.array([model.start]), e.u[:1]).fastest
-        return real.answer(model, places, [e], fastest, "default", lambda text: None)
+        (m,) = load([recording(tmp_path / "r.csv", how, period, seed)], rig)
+        e: Experiment = driven.experiment(m, rig)
+        places = plant.places(rig)
+        fastest = plant.linearise(rig, places, np.array([rig.start]), e.u[:1]).fastest
+        return real.answer(rig, places, [e], fastest, "default", lambda text: None)
 
     return search
 

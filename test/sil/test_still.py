@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import penode_gen
 import pytest
+from one_mass import STEP, model
 from scipy.signal import StateSpace, lsim
 
 from penode_sil.cli import main
@@ -18,30 +19,10 @@ from penode_sil.diagnosis.still import with_noise_at_rest
 from penode_sil.errors import UserError
 from penode_sil.measured import load
 
-STEP, SAMPLES = 2e-3, 4000
+SAMPLES = 4000
 MASS, STIFFNESS, DAMPING, NOISE = 2.0, 800.0, 8.0, 1e-5
 STATED = 3e-3  # [m] in the model file: that of another sensor, half of the motion
-MODEL = f"""
-[model]
-name = "rig"
-sample_time = "2 ms"
-[parameters]
-m = {{ value = {MASS}, unit = "kg", tolerance = 0.01 }}
-k = {{ value = {STIFFNESS}, unit = "N/m", tolerance = 0.01 }}
-d = {{ value = {DAMPING}, unit = "N*s/m", tolerance = 0.01 }}
-[inputs]
-push = {{ unit = "N" }}
-[bodies]
-mass = {{ mass = "m", position = "x", velocity = "v" }}
-[elements]
-spring = {{ between = ["mass", "ground"], law = "linear_spring", stiffness = "k" }}
-damper = {{ between = ["mass", "ground"], law = "linear_damper", damping = "d" }}
-force = {{ between = ["mass", "ground"], law = "expression", force = "-push" }}
-[outputs]
-x = {{ value = "x", unit = "m" }}
-[sensors]
-x_mass = {{ value = "x", unit = "mm", noise = {STATED * 1e3} }}
-"""
+MODEL = model(MASS, STIFFNESS, DAMPING, 0.01, f'x_mass = {{ value = "x", unit = "mm", noise = {STATED * 1e3} }}')
 
 
 def recording(path: Path, damping: float, seed: int, moves: bool = True) -> Path:
@@ -80,13 +61,13 @@ def test_a_wrong_damping_is_found_in_the_noise_of_the_bench_not_in_that_of_the_f
 
 
 def test_noise_is_that_of_all_recordings_about_a_drift(rig):
-    model = penode_gen.load(rig / "rig.toml")
+    known = penode_gen.load(rig / "rig.toml")
     t, push, x = np.loadtxt(rig / "still.csv", delimiter=",", skiprows=1).T
     np.savetxt(rig / "drifts.csv", np.column_stack([t, push, x + 5.0 * t]), delimiter=",", header="time [s],push [N],x_mass [mm]", comments="")
-    quiet = with_noise_at_rest(model, [rig / "still.csv", rig / "drifts.csv"], (), ())
+    quiet = with_noise_at_rest(known, [rig / "still.csv", rig / "drifts.csv"], (), ())
     assert abs(quiet.sensors[0].noise / NOISE - 1.0) < 4.0 / np.sqrt(2.0 * SAMPLES)  # four deviations of an estimate from so many samples
-    assert quiet.inputs == model.inputs  # a push that is exactly zero shows no noise
-    assert with_noise_at_rest(model, [], (), ()) == model
+    assert quiet.inputs == known.inputs  # a push that is exactly zero shows no noise
+    assert with_noise_at_rest(known, [], (), ()) == known
 
 
 @pytest.mark.parametrize(
@@ -103,7 +84,7 @@ def test_what_is_no_standstill_is_one_line(rig, text, line):
     if text is not None:
         path = rig / "bad.csv"
         path.write_text(text)
-    model = penode_gen.load(rig / "rig.toml")
+    known = penode_gen.load(rig / "rig.toml")
     with pytest.raises(UserError, match=line) as caught:
-        with_noise_at_rest(model, [path], (), load([rig / "moves.csv"], model))
+        with_noise_at_rest(known, [path], (), load([rig / "moves.csv"], known))
     assert len(caught.value.problems) == 1
