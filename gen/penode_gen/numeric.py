@@ -45,7 +45,10 @@ class Numeric:
         )
 
     def with_parameters(self, values: Mapping[str, float]) -> Numeric:
-        """The same equations with other values of these parameters, at no cost: nothing is ordered or compiled again."""
+        """The same equations with other values of these parameters, at no cost: nothing is ordered or compiled again. KeyError for
+        a parameter that the model does not have."""
+        if unknown := values.keys() - self._values.keys():
+            raise KeyError(f"{self.model.path.name} has no parameter {', '.join(sorted(unknown))}")
         other = copy(self)
         other._values = {**self._values, **values}
         return other

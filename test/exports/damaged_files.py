@@ -33,6 +33,7 @@ HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parents[0] / "prove"), str(HERE.parents[0] / "sil")]
 import gate  # needs the path above
 import readers_check
+from lag import lag
 
 import penode_gen
 from penode_gen import exports
@@ -44,24 +45,6 @@ from penode_sil.guard import guarded
 LIMIT = 60  # [s] of wall-clock time for one file
 FORK = 50  # files for a process
 KEPT = b"this file stood here before"
-SMALL = """[model]
-name = "lag"
-sample_time = "1 ms"
-[inputs]
-u = { unit = "m" }
-[states]
-x = { unit = "m" }
-[parameters]
-T = { value = 1, unit = "s", tunable = true }
-[networks]
-n = { inputs = ["m"], output = "m" }
-[equations]
-q = "der(x) = (n(u) - x)/T"
-[outputs]
-y = { value = "x", unit = "m" }
-[sets.default]
-n = "NETWORK"
-"""
 FOREIGN = [
     b"", b"\0" * 500, b"PK\x03\x04", b"PK\x05\x06" + bytes(18), b"\x7fELF" + bytes(200), b"%PDF-1.7\n%\xe2\xe3", b"\x89PNG\r\n\x1a\n" + bytes(40), gzip.compress(b"model M end M;"),
     "model M\n end M;".encode("utf-16"), b"\xef\xbb\xbfmodel M end M;", b"{}", b"[]", b"null", b"<?xml version='1.0'?><a/>", b"MZ" + bytes(300), b"time,x\n0,1\n", b"-" * 70_000,
@@ -232,9 +215,9 @@ def importers(folder: Path) -> list[Importer]:
     networks = sorted((gate.ROOT / "gen" / "nqvm" / "networks").glob("*.onnx"))
     layers = sorted((gate.HERE / "small").glob("*.json"))
     for kind, suffix in (("onnx", ".onnx"), ("json", ".json")):
-        (folder / f"{kind}.toml").write_text(SMALL.replace("NETWORK", f"file{suffix}").replace('name = "lag"', f'name = "lag_{kind}"'))
+        (folder / f"{kind}.toml").write_text(lag(f"lag_{kind}", f"file{suffix}", tunable=True))
     (folder / "net.json").write_bytes(layers[0].read_bytes())
-    (folder / "small.toml").write_text(SMALL.replace("NETWORK", "net.json"))
+    (folder / "small.toml").write_text(lag("lag", "net.json", tunable=True))
     small = penode_gen.load(folder / "small.toml")
     made = {name: exports.export(small, name, folder / f"x.{suffix}", {"form": "library"} if suffix == "mo" else {}) for name, suffix in (("ssp", "ssp"), ("modelica", "mo"))}
     road = folder / "road.csv"
@@ -258,7 +241,7 @@ def importers(folder: Path) -> list[Importer]:
         Importer("FMU in an SSP", ".ssp", "out.csv", play, [made["ssp"]], inside("modelDescription.xml", deep=".fmu")),
         Importer("ONNX", ".onnx", "out", generate("onnx.toml"), [p.read_bytes() for p in networks], network_changed),
         Importer("network files", ".json", "out", generate("json.toml"), [p.read_bytes() for p in layers], text_changed),
-        Importer("model files", ".toml", "out", generate(""), [SMALL.replace("NETWORK", "net.json").encode()], text_changed),
+        Importer("model files", ".toml", "out", generate(""), [lag("lag", "net.json", tunable=True).encode()], text_changed),
         Importer("Modelica models", ".mo", "out.toml", lambda path, output: [*read(path, output), "--model", "Translation.Swing"], [library], text_changed),
     ]  # fmt: skip
 

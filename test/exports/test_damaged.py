@@ -13,14 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import click
+import damaged_files as df
 import pytest
 
 import penode_gen
-
-if not hasattr(os, "fork"):
-    pytest.skip("there is no fork here", allow_module_level=True)
-
-import damaged_files as df  # needs fork
 
 
 @pytest.mark.skipif(any(importlib.util.find_spec(p) is None for p in ("fmpy", "rumoca")), reason="FMPy or rumoca is not installed: pip install penode[ssp,modelica]")

@@ -12,25 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lag import lag
 
-TEXT = """[model]
-name = "big"
-sample_time = "1 ms"
-[inputs]
-u = { unit = "m" }
-[states]
-x = { unit = "m" }
-[parameters]
-T = { value = 1, unit = "s" }
-[networks]
-n = { inputs = ["m"], output = "m" }
-[equations]
-q = "der(x) = (n(u) - x)/T"
-[outputs]
-y = { value = "x", unit = "m" }
-[sets.default]
-n = "big.json"
-"""
 FORMATS = {"fmu3": ("big.fmu",), "fmu2": ("big.fmu",), "modelica": ("big.mo",), "ssp": ("big.ssp",), "efmu": ("big.fmu",)}
 
 
@@ -41,7 +24,7 @@ def write_model(folder: Path) -> Path:
     layers = [{"activation": "relu" if n_out > 1 else "identity", "weights": (rng.standard_normal((n_out, n_in)) / 16).tolist(), "bias": [0.0] * n_out}
               for n_in, n_out in zip(widths, widths[1:])]  # fmt: skip
     (folder / "big.json").write_text(json.dumps({"layers": layers}))
-    (folder / "big.toml").write_text(TEXT)
+    (folder / "big.toml").write_text(lag("big", "big.json"))
     return folder / "big.toml"
 
 

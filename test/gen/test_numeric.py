@@ -6,7 +6,7 @@ the float64 functions of the reference, then in the generated C."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import models
@@ -333,3 +333,19 @@ n = "net.json"
         _, y, status = sil.instance().step(u)
         assert status & ~np.uint32(0x10) == 0  # outside of the trained range, perhaps
         np.testing.assert_allclose(y, expected, rtol=1e-11, atol=1e-11)
+
+
+def test_other_values_of_parameters_are_those_of_another_file(tmp_path):
+    """with_parameters does what a model file with these values does, and leaves the first one as it was."""
+    model = loaded(tmp_path, "thermal")
+    name, p = next((n, p) for n, p in model.parameters.items() if p.value)
+    changed = replace(model, parameters={**model.parameters, name: replace(p, value=1.5 * p.value)})
+    x, u = np.array(model.start, dtype=float) + 0.3, np.full(len(model.inputs), 0.7)
+    first = penode_gen.numeric(model)
+    before = first.rates(x, u, 0.0 * u)
+    other = first.with_parameters({name: 1.5 * p.value}).rates(x, u, 0.0 * u)
+    np.testing.assert_array_equal(other, penode_gen.numeric(changed).rates(x, u, 0.0 * u))
+    np.testing.assert_array_equal(first.rates(x, u, 0.0 * u), before)
+    assert not np.array_equal(other, before)
+    with pytest.raises(KeyError, match="has no parameter nothing"):
+        first.with_parameters({"nothing": 1.0})

@@ -148,16 +148,22 @@ def clean(port: int, a2l: a2l_read.A2l, chosen: pages.ChosenSet, default: int, w
         master.back(a2l.measurements["set_in_force"].address)
 
 
+def whole(served: tuple) -> tuple[bytes, bytes]:
+    """What passes in either direction for a bulk write with its switch; the set is in force after it, and withdrawn again."""
+    port, a2l, chosen, default = served
+    cable = Cable(port)
+    assert through(cable, a2l, chosen, 10.0) == ""
+    clean(port, a2l, chosen, default, True)
+    return bytes(cable.passed[0]), bytes(cable.passed[1])
+
+
 @pytest.mark.parametrize("every", [97, pytest.param(1, marks=pytest.mark.long)])
 def test_set_is_whole_or_not_there_wherever_the_master_breaks_off(served: tuple, every: int) -> None:
     """The bytes that pyxcp sends for a bulk write and its switch, up to any of them."""
     port, a2l, chosen, default = served
-    cable = Cable(port)
-    assert through(cable, a2l, chosen, 10.0) == ""
-    sent = bytes(cable.passed[0])
+    sent, _ = whole(served)
     switch = sent.index(bytes([0xEB, ECU, 0, WORKING])) + 4  # bytes until it is whole
     assert sent.count(bytes([0xEB, ECU, 0, WORKING])) == 1 and 4792 < switch < len(sent)
-    clean(port, a2l, chosen, default, True)
     for cut in sorted({*range(0, len(sent), every), *range(switch - 8, switch + 2)}):
         with socket.create_connection(("127.0.0.1", port)) as line:
             line.sendall(sent[:cut])
@@ -170,10 +176,7 @@ def test_set_is_whole_or_not_there_wherever_the_master_breaks_off(served: tuple,
 @pytest.mark.parametrize("every", [37, pytest.param(1, marks=pytest.mark.long)])
 def test_penode_stage_ends_with_one_line_wherever_the_answers_break_off(served: tuple, every: int) -> None:
     port, a2l, chosen, default = served
-    whole = Cable(port)
-    assert through(whole, a2l, chosen, 10.0) == ""
-    answers = bytes(whole.passed[1])
-    clean(port, a2l, chosen, default, True)
+    _, answers = whole(served)
     written = answers.index(struct.pack("<I", chosen.checksum))  # BUILD_CHECKSUM is answered; the switch follows
     for cut in sorted({*range(1, written, every), written - 9, written, written + 3}):
         report = through(Cable(port, answered=cut), a2l, chosen, 0.3)

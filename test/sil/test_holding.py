@@ -12,7 +12,7 @@ import pytest
 from one_mass import STEP, model
 from scipy.signal import StateSpace, lsim
 
-from penode_sil.diagnosis import driven, plant, real
+from penode_sil.diagnosis import applied, driven, plant, real
 from penode_sil.diagnosis.holding import held
 from penode_sil.diagnosis.noise import Experiment
 from penode_sil.measured import load
@@ -73,13 +73,17 @@ def test_steps_have_the_mean_of_a_hold_about_each_sample():
     assert np.mean((held(np.arange(400.0), 2.5, 0.3) - late)[10:-10]) == pytest.approx(0.0, abs=0.02)  # later by half a period
 
 
-def test_a_hold_is_named_with_its_period(answer):
+def test_a_hold_is_named_with_its_period_and_written_down(answer, tmp_path):
     found = answer("hold", 0.0235, 1)
     (cause,) = found.causes
     assert (cause.kind, cause.where) == ("input_hold", "push")
     assert cause.parameters["period"].value == pytest.approx(0.0235, abs=1e-5)  # 8 s resolve 1/8 Hz of 43 Hz; looked at in twentieths: 3.5e-6 s
     low, high = cause.parameters["period"].ci95
     assert low < 0.0235 < high
+    nominal = penode_gen.load(tmp_path / "rig.toml")
+    (tmp_path / "extended.toml").write_text(applied.apply(nominal, found.found.bench, found.run, found.found.terms, set()).text)
+    (held,) = penode_gen.load(tmp_path / "extended.toml").sampled
+    assert (held.source, held.law, held.time) == ("push", "held", 0.024)  # the nearest whole number of samples
 
 
 def test_a_delay_is_no_hold(answer):

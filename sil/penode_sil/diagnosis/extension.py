@@ -42,6 +42,8 @@ def toml(value: object) -> str:
         return "true" if value else "false"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(toml, value)) + "]"
+    if isinstance(value, int):
+        return str(value)
     return repr(float(f"{value:.7g}"))
 
 

@@ -41,9 +41,9 @@ def held(u: Array, period: float, phase: float) -> Array:
 
 
 def propose(bench: Bench, index: int, delay: float) -> tuple[Score, Form] | None:
-    """The hold of an input that promises most, where one of `delay` [s] does; None if it would be shorter than two samples."""
+    """The hold of an input that promises most, where one of `delay` [s] does; None if it cannot be longer than two samples."""
     step, about = bench.step, 2.0 * delay / bench.step
-    if about * SPREAD[1] < 2.0:
+    if about * SPREAD[1] <= 2.0:
         return None
     wide = 1.0 / (FINER * max(len(r) for r in bench.records))
     frequencies = np.arange(1.0 / (SPREAD[1] * about), min(0.5, 1.0 / (SPREAD[0] * about)), wide)[:MOST]

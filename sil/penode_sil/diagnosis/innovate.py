@@ -31,25 +31,28 @@ MAX_CAUSES = 4  # at most
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends with: the bench with all accepted terms in it, the one before with the `named` first of them alone, which
-    are worth a name, their `shares` of what acts, and of every round the trials compared, the best first."""
+    """What a search ends with: the bench with all accepted terms in it, and a `plain` one with those alone that are worth a name; the last
+    term is not where it is `small`, its trial. Of every round the trials compared, the best first."""
 
     bench: Bench
     plain: Bench
-    named: int
     terms: tuple[Term, ...]
-    shares: tuple[float, ...]
+    small: Trial | None
     rounds: tuple[tuple[Trial, ...], ...]
+
+    @property
+    def named(self) -> tuple[Term, ...]:
+        return self.terms if self.small is None else self.terms[:-1]
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Causes one by one, each the one that predicts best, until none predicts enough better, or the best is not worth a name."""
     terms: list[Term] = []
     rounds: list[tuple[Trial, ...]] = []
-    shares: list[float] = []
+    small = None
     blocks = Blocks.of([len(r) // bench.update for r in bench.records])
     bench, base = _based(bench, blocks)
-    benches = [bench]  # with as many terms as there were
+    plain = bench
     while len(terms) < MAX_CAUSES:
         trials, wide = propose(bench, terms, log)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _large(t, WORTH), -t.gain))
@@ -65,13 +68,12 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         best = _simplest(rounds[-1], base)
         bench, term = adopt(bench, best)
         terms.append(term)
-        shares.append(best.share if _large(best, 0.0) else 0.0)
         bench, base = _based(bench, blocks)
-        benches.append(bench)
-        if shares[-1] < least(bench.level.size):
-            break  # what is left is small
-    named = next((k for k, s in enumerate(shares) if s < least(bench.level.size)), len(shares))
-    return Found(bench, benches[named], named, tuple(terms), tuple(shares), tuple(rounds))
+        if not _large(best, least(bench.level.size)):
+            small = best  # and so is what is left
+            break
+        plain = bench
+    return Found(bench, plain, tuple(terms), small, tuple(rounds))
 
 
 def _large(t: Trial, least_share: float) -> bool:

@@ -22,7 +22,7 @@ from .evidence.fit import Fit
 from .evidence.observer import Filter, Record, bias, sample_noise
 from .evidence.screening import Probe
 from .fit import Free
-from .innovate import Found
+from .innovate import MIN_TAKEN, Found
 from .noise import Experiment
 from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
@@ -65,7 +65,7 @@ def answer(
     probe = Probe.of(plain)
     moved = motions(probe)
     probabilities = [_weighed(r) for r in found.rounds]
-    named, enough = found.terms[: found.named], least(after.level.size)
+    named, enough = found.named, least(after.level.size)
     for k, term in enumerate(named):
         size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
         cause = _cause(model, plain, term, size, _rivals(probabilities[k], term), _sure(probabilities[k], term))
@@ -73,8 +73,9 @@ def answer(
         if size >= enough:
             causes = _merged(causes, cause)
         else:
-            notes.append(_small(term, size))
-    notes += [_small(t, s) for t, s in zip(found.terms[found.named :], found.shares[found.named :])]
+            notes.append(_small(term, f"{size:.1%} of what acts there"))
+    if t := found.small:
+        notes.append(_small(found.terms[-1], f"{t.taken:.0%} of the power of prediction errors" if t.taken < MIN_TAKEN else f"{t.share:.1%} of what acts there"))
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
     biased, remarks = _offsets(model, plain, probe)
     notes += more + remarks
@@ -88,8 +89,8 @@ def _name(t: Term) -> tuple[str, str]:
     return t.form.kind, t.form.where
 
 
-def _small(t: Term, size: float) -> str:
-    return f"{place(*_name(t))} is real but small: {size:.1%} of what acts there; not named, but in model_extended.toml"
+def _small(t: Term, size: str) -> str:
+    return f"{place(*_name(t))} is real but small: {size}; not named, but in model_extended.toml"
 
 
 def _merged(causes: list[Cause], new: Cause) -> list[Cause]:

@@ -32,8 +32,8 @@ UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """What a diagnosis needs of it: the study with the motion that it has seen, causes, verdict, notes, explanations, text and model of the extended file, gain, hold-out, and the
-    training as the extended model has it."""
+    """What a diagnosis needs of it: the study with the motion that it has seen, causes, verdict, notes, explanations, text and model of the
+    extended file, gain, hold-out, and the training as the extended model has it."""
 
     study: Study
     causes: tuple[Cause, ...]

@@ -168,7 +168,7 @@ def fit_level(bench: Bench, problem: Problem, fit: Fit, level: Level) -> tuple[L
     tried = [level] + [Level(size, CORRELATION * period) for size in SIZES]
     filters = [gains.at(l) for l in tried]
     nu = problem.nu(fit.free, np.zeros((len(tried), len(fit.free))), Filter.many(filters))
-    worth = [likelihood(n, problem.used(n), problem.floor)[1] for n in nu]
+    worth = [likelihood(n, np.isfinite(n), problem.floor)[1] for n in nu]
     best = int(np.argmax(worth))
     again = tried[best], problem.solve(fit.free, filters[best], AGAIN)
     return max((level, fit), again, key=lambda f: f[1].cost)

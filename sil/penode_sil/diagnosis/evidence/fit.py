@@ -85,12 +85,10 @@ def likelihood(nu: Array, used: NDArray[np.bool_], floor: Array) -> tuple[Array,
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Fits of a predictor's innovations; `floor` [n_z]: variance that sensor noise alone leaves; `left` [updates]: those
-    that are not fitted."""
+    """Fits of a predictor's innovations; `floor` [n_z]: variance that sensor noise alone leaves."""
 
     predictor: Predictor
     floor: Array
-    left: NDArray[np.bool_] | None = None
 
     def nu(self, free: Sequence[Free], shifts: Array, by: Filter) -> Array:
         """[runs, updates, n_z], of all recordings in turn."""
@@ -99,10 +97,6 @@ class Problem:
         nu[~lanes.sane] = np.where(np.isfinite(nu[~lanes.sane]), 1e12, np.nan)
         return nu
 
-    def used(self, nu: Array) -> NDArray[np.bool_]:
-        good = np.isfinite(nu)
-        return good if self.left is None else good & ~self.left[:, None]
-
     def at(self, free: Sequence[Free], by: Filter) -> Fit:
         """The fit that ends at these free values."""
         shifts = np.vstack([np.zeros(len(free)), MOVE * np.eye(len(free))])
@@ -110,7 +104,7 @@ class Problem:
             if f.at(MOVE) == f.value:
                 shifts[i + 1, i] = -MOVE
         nu = self.nu(free, shifts, by)
-        used = self.used(nu[0])
+        used = np.isfinite(nu[0])
         moves = np.array([shifts[i + 1, i] for i in range(len(free))])
         slopes = np.moveaxis((nu[1:] - nu[0]) / moves[:, None, None], 0, -1)
         slopes[~np.isfinite(slopes)] = 0.0
@@ -126,7 +120,7 @@ class Problem:
             costs = []
             for k, step in enumerate(steps):
                 there = put(fit.free, step)
-                costs.append(likelihood(nu[k], self.used(nu[k]), self.floor)[1] - sum(map(cost, there)))
+                costs.append(likelihood(nu[k], np.isfinite(nu[k]), self.floor)[1] - sum(map(cost, there)))
             costs = [c if np.isfinite(c) else -np.inf for c in costs]
             best = int(np.argmax(costs))
             if not costs[best] > fit.cost + 1e-9:
@@ -158,7 +152,7 @@ class Problem:
 
     def _at(self, fit: Fit, nu: Array, left: NDArray[np.bool_], free: tuple[Free, ...]) -> Fit:
         """Other free values, with their innovations, and the slopes of a fit; without what is left out."""
-        used = self.used(nu) & ~left[:, None]
+        used = np.isfinite(nu) & ~left[:, None]
         variance, value = likelihood(nu, used, self.floor)
         return replace(fit, free=free, nu=nu, used=used, variance=variance, likelihood=value, cost=value - sum(map(cost, free)))
 
