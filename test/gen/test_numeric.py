@@ -338,7 +338,8 @@ n = "net.json"
 def test_other_values_of_parameters_are_those_of_another_file(tmp_path):
     """with_parameters does what a model file with these values does, and leaves the first one as it was."""
     model = loaded(tmp_path, "thermal")
-    name, p = next((n, p) for n, p in model.parameters.items() if p.value)
+    of_set = model.sets["default"].parameters if model.sets else {}  # values of a set go before those of the model
+    name, p = next((n, p) for n, p in model.parameters.items() if p.value and n not in of_set)
     changed = replace(model, parameters={**model.parameters, name: replace(p, value=1.5 * p.value)})
     x, u = np.array(model.start, dtype=float) + 0.3, np.full(len(model.inputs), 0.7)
     first = penode_gen.numeric(model)
