@@ -12,6 +12,7 @@ EXPERIMENT := gen/nqvm/nqvm.toml --scenario sil/scenarios/recalibration.toml
 RECORDED  := sil/recordings/friction
 RIGS_DIR  ?= ../shared/measured
 WORLDS    := 300
+WATCHED   := $(PYTHON) test/diagnosis/ablation/probes.py
 CASES     := 192 # eight rounds of the 24 cases of a draw
 # and of each kind seven in a common form and four in a foreign one, so that one wrong answer is not below 85 or 70 %
 LEAST     := single_common=161 single_foreign=88 pair=48 triple=16 null=100 null_hard=100 outside=60
@@ -83,6 +84,12 @@ campaign-worlds: setup ## Wrong worlds: plants that are a few per cent wrong eve
 	$(Q)$(PYTHON) test/diagnosis/worlds_campaign.py --stratum halfcar --stratum drive --cases 20 --jobs $$(nproc) --out build/worlds/mechanisms
 	$(Q)$(PYTHON) test/diagnosis/worlds_campaign.py --stratum main --stratum halfcar --stratum drive --cases 20 --no-tolerance --jobs $$(nproc) --out build/worlds/bare
 
+ablate: setup ## Which thresholds of the diagnosis decide something, and which go, with every one of them watched: build/ablate/ABLATION.md; hours
+	$(Q)PROBES=build/ablate/notes $(PYTHON) test/diagnosis/campaign.py --seed 20261126 --cases 300 --jobs $$(nproc) --command "$(WATCHED) diagnose" --out build/ablate/draw
+	$(Q)PROBES=build/ablate/notes $(PYTHON) test/diagnosis/worlds_campaign.py --seed 808 --cases 80 --jobs $$(nproc) --command "$(WATCHED) diagnose" --out build/ablate/worlds
+	-$(Q)PROBES=build/ablate/notes $(PYTHON) test/diagnosis/rigs_table.py --rigs $(RIGS_DIR) --command "$(WATCHED)" --page build/ablate/RIGS.md
+	$(Q)$(PYTHON) test/diagnosis/ablation/ablate.py table build/ablate/notes > build/ablate/ABLATION.md
+
 rigs: setup ## Real rigs in RIGS_DIR: names, hold-out before and after, what a plain expert fit reaches, time; build/rigs/RIGS.md
 	$(Q)$(PYTHON) test/diagnosis/rigs_table.py --rigs $(RIGS_DIR) --command $(PENODE) --page build/rigs/RIGS.md
 
@@ -95,7 +102,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table rigs hidden-mechanisms dist structure clean
+.PHONY: help setup run test prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table ablate rigs hidden-mechanisms dist structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools
