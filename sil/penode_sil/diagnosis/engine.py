@@ -74,13 +74,19 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     if level := weighed.misfit(study, best.fit if best else study.null, case.log):
         w = w or _weighed(case, study)
         whole = w.verdict != "partly_explained" or best and share(study, best) > ENOUGH
-        simpler = best and w.verdict != "unexplained" and max(len(w.causes), 1) < len(best.groups)
+        simpler = best and w.verdict != "unexplained" and _simpler(w, best)
         if whole and (level > weighed.UNMODELLED or simpler):
             return _by_innovations(case, best, w)
     answer = by_noise(case, study, explanations, faults, bursts)
     if w and w.verdict == "explained" and answer.verdict == "unexplained":
         return _by_innovations(case, best, w)
     return answer
+
+
+def _simpler(w: weighed.Weighed, best: Explanation) -> bool:
+    """Do innovations explain the same with fewer causes, or with as many and fewer laws?"""
+    causes = max(len(w.causes), 1)
+    return causes < len(best.groups) or bool(w.causes) and causes == len(best.groups) and w.laws < len(best.terms)
 
 
 def _weighed(case: Case, study: Study) -> weighed.Weighed:

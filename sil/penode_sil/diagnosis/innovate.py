@@ -57,15 +57,15 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         trials, wide = propose(bench, terms, log)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _large(t, WORTH), -t.gain))
         trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
-        better = [_better(t, base, bench) for t in trials]
+        better = [t.blocks - base for t in trials]
         for t, b in zip(trials, better):
             log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
-        good = [t for t, b in zip(trials, better) if _accepted(t, b)]
+        good = [t for t, b in zip(trials, better) if _accepted(t, b) and not any(_is_enough(part, t) for part in trials)]
         good = [t for t in good if _large(t, WORTH)] or good
         rounds.append(tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks)))))
         if not good:
             break
-        best = _simplest(rounds[-1], base)
+        best = _simplest(rounds[-1], base, terms)
         bench, term = adopt(bench, best)
         terms.append(term)
         bench, base = _based(bench, blocks)
@@ -89,16 +89,20 @@ def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
 
 
 def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
+    """A trial with how it predicts left-out blocks, and lets parameters be what the file states."""
     own = [] if t.level == bench.level else [bench.level.size]
     level, fit, scores = blocks.fit_level(replace(bench, model=problem.predictor.model), problem, t.fit, t.level, own)
-    return replace(t, level=level, fit=fit, blocks=scores)
+    relief = stated(bench.fit.free) - stated(fit.free)
+    return replace(t, level=level, fit=fit, blocks=scores + relief / len(scores))
 
 
-def _simplest(trials: Sequence[Trial], base: Array) -> Trial:
+def _simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Trial:
     """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
-    them by MIN_FORM of what it gains."""
-    first = trials[0].form
-    same = [t for t in trials if t.form.where == first.where and curve(t.form.kind) == curve(first.kind)]
+    them by MIN_FORM of what it gains. So much more also has a new name to gain than another law of one that is there."""
+    enough = max(MIN_GAIN, MIN_FORM * float(np.sum(trials[0].blocks - base)))
+    named = {(t.form.kind, t.form.where) for t in terms}
+    best = next((t for t in trials if (t.form.kind, t.form.where) in named and np.sum(trials[0].blocks - t.blocks) <= enough), trials[0])
+    same = [t for t in trials if t.form.where == best.form.where and curve(t.form.kind) == curve(best.form.kind)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
     for t in more:
         better = t.blocks - found.blocks
@@ -107,10 +111,11 @@ def _simplest(trials: Sequence[Trial], base: Array) -> Trial:
     return found
 
 
-def _better(t: Trial, base: Array, bench: Bench) -> Array:
-    """By how much a form predicts left-out blocks better [blocks], and lets parameters be what the file states."""
-    relief = stated(bench.fit.free) - stated(t.fit.free)
-    return t.blocks - base + relief / len(base)
+def _is_enough(part: Trial, t: Trial) -> bool:
+    """Does a form with some of the laws of another one, a constant beside a friction, predict about as well alone?"""
+    laws, more = ([p.law for p in x.form.parts] for x in (part, t))
+    within = part.form.index == t.form.index and 0 < len(laws) < len(more) and set(laws) < set(more)
+    return within and float(np.sum(t.blocks) - np.sum(part.blocks)) <= MIN_GAIN
 
 
 def _accepted(t: Trial, better: Array) -> bool:

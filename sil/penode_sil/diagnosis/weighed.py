@@ -13,7 +13,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from . import applied, extension, measuring, real
-from .evidence.bench import build
+from .evidence.bench import CORRELATION, FAR, UNSTATED, Bench, build
 from .evidence.gain import Level
 from .evidence.observer import Record, bias, sample_noise
 from .fit import Fit, Problem
@@ -47,6 +47,7 @@ class Weighed:
     fit: Fit
     explained: float  # share of the power that the nominal model leaves in training
     level: float  # of what moves wanders beside all that was found
+    laws: int  # of all causes named
 
 
 def supports(model: Model) -> bool:
@@ -55,7 +56,8 @@ def supports(model: Model) -> bool:
 
 
 def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> float:
-    """How much more acts than an explanation has, beyond the noise of sensors, as a share of what moves; 0 if that may be chance. Beyond
+    """How much more acts than an explanation has, beyond the noise of sensors, as a share of what moves; 0 if that may be chance, infinite
+    if it does not even follow the measurement: its curves hold along its own way alone, and bend away beside it. Beyond
     UNMODELLED innovations have to decide; less than that, only a simpler answer of theirs counts."""
     if not supports(study.model) or _is_noise(study, fit):
         return 0.0
@@ -72,8 +74,18 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
     bench = build(model, study.places, records, noise, study.linear.fastest, study.set_name, study.model)
     still = bench.problem().solve(bench.fit.free, bench.gains(bench.fit).at(Level(0.0, 1.0)), 12)
     gained = bench.fit.likelihood - still.likelihood
+    if _diverges(bench):
+        log("beside it an observer diverges")
+        return np.inf
     log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats")
     return bench.level.size if gained > MIN_GAIN and bench.level.size > MIN_UNMODELLED else 0.0
+
+
+def _diverges(bench: Bench) -> bool:
+    """Is a model far off where it is corrected by as little as wanders beside causes that are the truth?"""
+    gains = bench.gains(bench.fit, bench.problem().predictor.model)
+    nu = bench.problem().nu(bench.fit.free, np.zeros((1, len(bench.fit.free))), gains.at(Level(MIN_UNMODELLED, CORRELATION * gains.period)))
+    return not float(np.nanmax(np.abs(nu))) < FAR * float(np.nanmax(np.abs(bench.fit.nu)))
 
 
 def _is_noise(study: Study, fit: Fit) -> bool:
@@ -104,7 +116,8 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     verdict = _verdict(found, causes, share, max(left, found.found.bench.level.size))
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
-    return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size)
+    laws = sum(max(len(t.form.parts), 1) for t in found.found.named)
+    return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws)
 
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float) -> str:
@@ -118,12 +131,14 @@ def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:
     """Causes, none where several parameters have left tolerances that the file states: that is another plant, and what else was found is
     of that; and a note on it. All by one factor, they are the gain of an input that the file does not have."""
-    off = [c for c in causes if c.kind == "wrong_parameter" and 0.0 < model.parameters[c.where].tolerance <= 1.0]
+    off = [c for c in causes if c.kind == "wrong_parameter" and model.parameters[c.where].tolerance <= 1.0]
     if len(off) < 2:
         return causes, []
     names = ", ".join(c.where for c in off)
     if gain := _gain(model, off):
         return (gain, *(c for c in causes if c not in off)), [f"{names} by one factor do the same; model_extended.toml has it so"]
+    if sum(model.parameters[c.where].tolerance > 0.0 for c in off) < 2:
+        return causes, []
     return (), [f"{names} would all have to be outside of their tolerances: another plant, or dynamics that the model does not have"]
 
 
@@ -137,7 +152,7 @@ def _gain(model: Model, off: Sequence[Cause]) -> Cause | None:
     low, high = (np.array([v.ci95[k] / p.value for v, p in values]) for k in (0, 1))
     weights = 1.0 / np.maximum(high - low, 1e-300) ** 2
     factor = float(np.sum(weights * 0.5 * (low + high)) / np.sum(weights))
-    if factor <= 0.0 or any(abs(v.value / p.value / factor - 1.0) > p.tolerance for v, p in values):
+    if factor <= 0.0 or any(abs(v.value / p.value / factor - 1.0) > (p.tolerance or UNSTATED) for v, p in values):
         return None
     gain = Value(1.0 / factor, "1", (1.0 / float(np.max(high)), 1.0 / float(np.min(low))))  # what a model leaves out moves each another way
     others = tuple(Named(c.kind, c.where) for c in off[:3])

@@ -21,7 +21,7 @@ from .prior import SHARE, Stated
 Array = NDArray[np.float64]
 UPDATES = 16  # a period of the motion
 UNSTATED = 0.05  # tolerance of a parameter for which the file has none: one that is farther off is worth a name
-FAR = 1e3  # a parameter is at most so many times as large or small as the file has it
+FAR = 1e3  # times what a file has of a parameter, or what is expected of a motion: nothing is as far off
 SIZES = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3)  # of what wanders, relative to what moves: levels that are tried
 CORRELATION = 0.5  # updates for which it stays: about white. One that stays longer winds up against a friction that sticks
 AGAIN = 6  # iterations with another level
@@ -123,7 +123,7 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
         rates = np.concatenate([s[:, n_q : 2 * n_q] for s in x])
         slopes = np.concatenate([np.gradient(smooth(s[:, n_q : 2 * n_q], bench.update), bench.step, axis=0) for s in x])
         v, a = (np.sqrt(np.mean(r**2, axis=0)) for r in (rates, slopes))
-        if not (np.isfinite(v).all() and np.isfinite(a).all()):  # it does not follow: what was guessed has to do
+        if not (np.isfinite(v).all() and np.all(a < FAR * scale)):  # it does not follow: what was guessed has to do
             return replace(bench, forces=scale), [np.where(np.abs(s) < np.inf, s, 0.0) for s in x]
         period = float(np.min(2.0 * np.pi * v / np.maximum(a, 1e-300)))
         update = int(np.clip(round(period / UPDATES / bench.step), 1, max(len(r) for r in bench.records) // 40 or 1))
