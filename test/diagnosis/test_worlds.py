@@ -11,7 +11,7 @@ import rigs_expert
 import rigs_table
 from worlds import equivalents, solver, world
 from worlds_campaign import page
-from worlds_score import added_laws, score
+from worlds_score import added_laws, score, small
 
 SEED = 5
 
@@ -169,3 +169,8 @@ def test_rigs_without_data(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", ["rigs_table.py", "--rigs", str(tmp_path / "none")])
     assert rigs_table.main() == 0
     assert "SKIPPED" in capsys.readouterr().out
+
+
+def test_small_causes_that_are_kept_count_as_reported():
+    notes = ["Maxwell bushing at spring is real but small: 2.6% of what acts there; not named, but in model_extended.toml", "x has an offset of 1 m: gravity?"]
+    assert small(notes) == ["maxwell_bushing"]

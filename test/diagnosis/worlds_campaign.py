@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from campaign import commit, diagnose
 from score import wilson
 from worlds import equivalents, world
-from worlds_score import added_laws, score
+from worlds_score import added_laws, score, small
 
 DEMANDED = {"single": 0.85, "null": 0.98, "pair": 0.65, "halfcar": 0.90, "drive": 0.90}  # of the issue; null: at most 2 % named
 
@@ -39,7 +39,8 @@ def one(seed: int, index: int, stratum: str, tolerances: bool | None, command: s
     row = score(truth, found) | {"seconds": round(seconds, 1), "why": why}
     extended = folder / "diagnosis" / "model_extended.toml"
     if row["answer"] and extended.exists():
-        row["laws"] = added_laws((folder / "model.toml").read_text(), extended.read_text(), [a.split()[0] for a in row["answer"]])
+        kinds = [a.split()[0] for a in row["answer"]] + small(found["notes"])
+        row["laws"] = added_laws((folder / "model.toml").read_text(), extended.read_text(), kinds)
     world.write_truth(truth, out / "truth" / f"{stratum}-{seed}-{index}.json")
     if not keep:
         shutil.rmtree(folder)

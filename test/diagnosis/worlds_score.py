@@ -93,7 +93,12 @@ def score(truth: Mapping, diagnosis: Mapping | None) -> dict:
             "verdict": (diagnosis or {}).get("verdict"), "outcome": what, "right": what == "right", "covered": covered}  # fmt: skip
 
 
+def small(notes: Sequence[str]) -> list[str]:
+    """Kinds that a diagnosis reports as real but small, and keeps in its extended model."""
+    return [n.split(" at ")[0].lower().replace(" ", "_") for n in notes if "is real but small" in n and "not named, but in model_extended.toml" in n]
+
+
 def added_laws(nominal: str, extended: str, kinds: Sequence[str]) -> tuple[int, int]:
-    """Elements that the extended model has beyond the nominal one, and how many of the kinds that it names act by a law of their own."""
+    """Elements that the extended model has beyond the nominal one, and how many of the kinds reported act by a law of their own."""
     before, after = (tomllib.loads(x).get("elements", {}) for x in (nominal, extended))
     return len([k for k in after if k not in before]), sum(not k.startswith(FORCELESS) for k in kinds)

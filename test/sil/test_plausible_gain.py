@@ -12,10 +12,10 @@ from penode_sil.diagnosis import weighed
 from penode_sil.diagnosis.result import Cause, Value
 
 
-def plant(unit: str = "N", inputs: int = 1) -> SimpleNamespace:
+def plant(unit: str = "N", inputs: int = 1, tolerance: float = 0.03) -> SimpleNamespace:
     """A mass on spring and damper, each known to 3 %."""
     return SimpleNamespace(
-        parameters={k: SimpleNamespace(value=v, tolerance=0.03) for k, v in {"m": 50.0, "c": 3e4, "d": 900.0}.items()},
+        parameters={k: SimpleNamespace(value=v, tolerance=tolerance) for k, v in {"m": 50.0, "c": 3e4, "d": 900.0}.items()},
         bodies=[SimpleNamespace(mass="m")], inputs=[SimpleNamespace(name="push", unit=unit)] * inputs,
     )  # fmt: skip
 
@@ -50,6 +50,14 @@ def test_one_factor_is_the_gain_of_the_input():
 def test_other_factors_are_another_plant(model, factors):
     causes, notes = weighed._plausible(model, wrong(model, **factors))
     assert causes == () and "another plant" in notes[0]
+
+
+def test_without_tolerances_one_factor_is_a_gain_too_and_several_are_parameters():
+    model = plant(tolerance=0.0)
+    (gain,), _ = weighed._plausible(model, wrong(model, m=1.17, c=1.18))
+    assert (gain.kind, gain.where) == ("input_gain", "push")
+    causes = wrong(model, m=1.17, c=1.40)
+    assert weighed._plausible(model, causes) == (causes, [])
 
 
 def test_one_parameter_is_itself():

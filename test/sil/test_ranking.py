@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Which of several forms a search by innovations takes, and whose answer stands: made-up trials, no simulation."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from penode_sil.diagnosis import engine, innovate
+from penode_sil.diagnosis.catalogue import springs
+from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
+
+BASE = np.zeros(4)
+SLIDES, PUSHES = Part("coulomb_friction", ("force", "N")), Part("constant_force", ("force", "N"))
+LOOSE, LATE = Part("loose_damper", ("damping", "N*s/m")), Part("maxwell_bushing", ("stiffness", "N/m"))
+
+
+def trial(kind: str, blocks: float, *parts: Part, note: str = "", where: str = "spring", free: int = 1) -> SimpleNamespace:
+    """A form that predicts each of four blocks better by so many nats."""
+    form = Form(kind, where, "force", 0, parts, note)
+    return SimpleNamespace(form=form, blocks=np.full(4, blocks), gain=4.0 * blocks, term=SimpleNamespace(free=[None] * free))
+
+
+def test_a_form_has_to_predict_better_than_a_part_of_it():
+    constant = trial("constant_force", 20.0, PUSHES)
+    both = trial("coulomb_friction", 22.0, SLIDES, PUSHES, note="with a constant")
+    assert innovate._is_enough(constant, both)  # 8 nats more, of 10 that a law has to gain
+    assert not innovate._is_enough(constant, trial("coulomb_friction", 30.0, SLIDES, PUSHES, note="with a constant"))
+    assert not innovate._is_enough(both, constant)
+    assert not innovate._is_enough(trial("constant_force", 20.0, PUSHES, where="tyre"), trial("coulomb_friction", 1.0, SLIDES))
+
+
+def test_another_law_of_a_name_goes_before_a_new_name_that_is_hardly_better():
+    bushing, play = trial("maxwell_bushing", 100.0, LATE), trial("backlash", 97.0, LOOSE, note="of a damper")
+    named = [SimpleNamespace(form=Form("backlash", "spring", "force", 0, ()))]
+    assert innovate._simplest([bushing, play], BASE, named) is play
+    assert innovate._simplest([bushing, play], BASE, []) is bushing
+    far = trial("backlash", 70.0, LOOSE, note="of a damper")  # 120 nats of 400 are more than a fifth
+    assert innovate._simplest([bushing, far], BASE, named) is bushing
+
+
+@pytest.mark.parametrize(
+    "causes, laws, groups, terms, simpler",
+    [
+        (1, 1, 2, 2, True),  # fewer causes
+        (1, 1, 1, 4, True),  # as many, by fewer laws
+        (1, 2, 1, 2, False),
+        (2, 2, 1, 4, False),
+        (0, 0, 1, 4, False),  # nothing named is no explanation by fewer laws
+        (0, 0, 2, 8, True),  # small deviations everywhere, where the other has two causes
+    ],
+)
+def test_the_simpler_explanation(causes, laws, groups, terms, simpler):
+    weighed = SimpleNamespace(causes=(None,) * causes, laws=laws)
+    assert engine._simpler(weighed, SimpleNamespace(groups=(None,) * groups, terms=(None,) * terms)) is simpler
+
+
+def test_a_stop_stays_away_from_the_middle():
+    """Nearer than 0.15 of what the deflection reaches it is a spring with play, the same formula (naming)."""
+    place = SimpleNamespace(role="force", name="spring", ends=("body", "wheel"))
+    gaps = [p for f in springs.forms(None, 0, place, Motion((), 0.01, 0.1, 0.04, 0.4)) if f.kind == "bump_stop" for p in f.parts]
+    assert gaps and all(p.shapes["gap"][0] / p.span >= 0.15 * 0.04 for p in gaps)
