@@ -135,7 +135,9 @@ def kept(given: Promises, random: np.random.Generator, layers: list[int], bound:
     is enough?"""
     network = untrained({"layers": layers}, 1, "net")
     count = unfold.capacity(network)
-    knots = np.sort(np.concatenate([random.uniform(-1.0, 1.0, count - 1), [0.0]]))
+    others = random.uniform(-1.0, 1.0, count - 1)
+    others[0] *= -1.0 if len(set(np.sign(others))) == 1 else 1.0  # 0 lies within the range, as in training
+    knots = np.sort(np.append(others, 0.0))
     zero = int(np.flatnonzero(knots == 0.0)[0])
     values = np.where(knots == 0.0, 0.0, random.normal(0.0, 10.0 ** random.uniform(0.0, 3.0), count))
     wild = curve.Curve(knots, values, zero)

@@ -94,6 +94,8 @@ def test_a_curve_is_its_network_exactly(layers: list[int]) -> None:
     with pytest.raises(ValueError, match="do not fit"):
         more = np.sort(np.append(knots, 0.5 * (knots[0] + knots[1])))
         unfold.unfold(curve.Curve(more, np.zeros(len(more)), int(np.flatnonzero(more == 0.0)[0])), network, -0.9, 1.3)
+    with pytest.raises(ValueError, match="do not fit"):  # all on one side of 0: a kink more
+        unfold.unfold(curve.Curve(np.append(0.0, np.sort(np.abs(knots[knots != 0.0]))), np.zeros(len(knots)), 0), network, -0.9, 1.3)
 
 
 def test_knots_that_matter_stay() -> None:

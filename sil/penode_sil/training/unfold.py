@@ -67,9 +67,9 @@ def unfold(curve: Curve, template: Network, low: float, high: float) -> Network:
     """The network of the template's shape that is this curve, which is 0 at 0. ValueError where it has no room for the kinks."""
     if curve.zero < 0:
         raise ValueError("a curve that is not 0 at 0 has no exact network: its value there is free")
-    if len(curve.knots) > capacity(template):
-        raise ValueError(f"{len(curve.knots)} knots do not fit: the network holds {capacity(template)}")
     found, widths = _kinks(curve), hidden(template)
+    if not capacity(template) or len(found.at) > sum(rooms(widths)):
+        raise ValueError(f"{len(curve.knots)} knots do not fit: the network holds {capacity(template)}, of which one at 0 is not the outermost")
     scale, size = _scales(template, max(abs(low), abs(high)), curve)
     at = found.at / scale
     shares = np.split(np.arange(len(at)), np.cumsum(rooms(widths))[:-1])
