@@ -22,6 +22,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 from campaign import commit, diagnose
+from claims import nominals
 from score import wilson
 from worlds import equivalents, world
 from worlds_score import added_laws, score
@@ -36,7 +37,7 @@ def one(seed: int, index: int, stratum: str, tolerances: bool | None, command: s
     shutil.rmtree(folder, ignore_errors=True)
     found, seconds, why = diagnose(command, folder, case.write(folder), timeout)
     truth = equivalents.truth(case)
-    row = score(truth, found) | {"seconds": round(seconds, 1), "why": why}
+    row = score(truth, found, nominals(folder / "model.toml")) | {"seconds": round(seconds, 1), "why": why}
     extended = folder / "diagnosis" / "model_extended.toml"
     if row["answer"] and extended.exists():
         row["laws"] = added_laws((folder / "model.toml").read_text(), extended.read_text(), [a.split()[0] for a in row["answer"]])
