@@ -17,7 +17,7 @@ from test_diagnosis import MODEL, SAMPLES, STEP, drive, record, road
 import penode_gen
 from penode_sil import targets
 from penode_sil.cli import cli
-from penode_sil.diagnosis import files, noise, report, report_figure as fig, report_price, residual, restoring, result
+from penode_sil.diagnosis import files, noise, report, report_figure as fig, report_price, residual, restoring, result, terminal
 from penode_sil.diagnosis.report_figure import Axis
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
@@ -311,10 +311,10 @@ def test_other_verdicts_have_a_page_too(model, found, extended):
 def test_summary_fits_one_screen(model, found, tmp_path):
     many = replace(found, causes=found.causes * 9, notes=("a long note " * 20,) * 5)
     for d in (found, many):
-        lines = result.sentences(model, d, tmp_path).splitlines()
+        lines = terminal.sentences(model, d, tmp_path).splitlines()
         assert len(lines) <= 24 and all(len(line) <= 80 or "report.html" in line for line in lines)
         assert "explained" in lines[0] and lines[-1].endswith("report.html")
-    text = result.sentences(model, found, tmp_path)
+    text = terminal.sentences(model, found, tmp_path)
     assert "61.3 N" in text and "[59.8, 62.9]" in text and "Stribeck friction at damper" in text and "0.0203" in text
 
 

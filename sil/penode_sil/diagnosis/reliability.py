@@ -30,13 +30,13 @@ def _in(decile: dict[str, Any], confidence: float) -> bool:
 
 
 def line(known: dict[str, Any] | None, confidence: float) -> str:
-    """A sentence on a confidence, with its source."""
+    """What is known of a confidence, with its source."""
     if known is None:
-        return "No figure is kept of how often causes named as surely are right."
+        return "no figure is kept of how often causes named as surely are right"
     found = next((d for d in known["deciles"] if _in(d, confidence)), None)
     if found is None:
-        return f"No cause was named as surely in made-up cases with a known truth ({known['source']})."
+        return f"no cause was named as surely in made-up cases with a known truth ({known['source']})"
     low, high = (f"{100 * x:.0f}" for x in found["ci95"])
     surely = f"{100 * found['from']:.0f} to {100 * found['to']:.0f} %"
     share = f"{found['right']} of {found['named']} were right ({100 * found['right'] / found['named']:.0f} %, 95 % interval {low} to {high} %)"
-    return f"Of causes named with {surely} in made-up cases, {share}. Source: {known['source']}."
+    return f"of causes named with {surely} in made-up cases, {share}; source: {known['source']}"
