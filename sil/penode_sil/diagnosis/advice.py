@@ -66,7 +66,7 @@ def _take_over(d: Diagnosis) -> list[str]:
     found = [f"check {', '.join(c.where for c in faults)}: the sensor is at fault, not the model"] if faults else []
     found += [f"check actuator and channel of {', '.join(c.where for c in channels)}"] if channels else []
     if len(faults) < len([c for c in d.causes if c.kind != OUTSIDE]):
-        found.append("use model_extended.toml: `penode generate` makes its C")
+        found.append("use model_extended.toml; penode generate makes its C")
     return found
 
 
@@ -75,7 +75,7 @@ def _where_to_look(d: Diagnosis) -> list[str]:
     if not places:
         return ["compare signals and times of the largest residual in the report with what the plant did then"]
     shares = ", ".join(f"{p['place']} {p['share']:.0%}" for p in places[:3])
-    return [f"look at {places[0]['place']} first: give it a law in the model file, or train a network there (`penode train`), and diagnose again; "
+    return [f"look at {places[0]['place']} first: give it a law in the model file, or train a network there (penode train), and diagnose again; "
             f"share of the residual that a missing force could make up for: {shares}"]  # fmt: skip
 
 

@@ -106,11 +106,11 @@ constant_force, sensor_bias: put the load on or take it off during the recording
 coulomb_friction, stribeck_friction: slow motion with many reversals, and fast motion too: the lowest rates tell
 coulomb_friction, bouc_wen: small strokes besides large ones: before it slides, one is a spring, the other is not
 degressive_damper, quadratic_damper: rates over more than a decade
-degressive_damper, wrong_parameter: two amplitudes of one road: lower damping scales, a bend does not
-quadratic_damper, wrong_parameter: two amplitudes of one road: other damping scales, a bend does not
+degressive_damper, wrong_parameter: one excitation at two amplitudes: lower damping scales, a bend does not
+quadratic_damper, wrong_parameter: one excitation at two amplitudes: other damping scales, a bend does not
 damper_fading, wrong_parameter: the same excitation at the start and at the end of one long recording
 damper_fading, degressive_damper: the same excitation at the start and at the end of one recording, at two amplitudes
-cubic_spring, bump_stop: a rough road, which has small and large amplitudes, instead of a chirp of constant amplitude
+cubic_spring, bump_stop: broadband excitation, which has small and large amplitudes, instead of a chirp of constant amplitude
 bouc_wen, maxwell_bushing: several amplitudes at one frequency: memory of the way depends on them, that in time not
 tyre_nonlinear, wrong_parameter: two amplitudes of a rough road, up to large tyre loads; no chirp
 tyre_nonlinear, tyre_liftoff: a rough road that unloads the tyre for moments, and a smooth one that does not
@@ -119,7 +119,7 @@ sensor_delay, sensor_scale: excitation up to higher frequencies: a delay turns t
 """
 _PAIRS = (line.split(": ", 1) for line in _RIVALS.strip().split("\n"))
 RIVALS = {frozenset(pair.split(", ")): how for pair, how in _PAIRS}
-OTHERWISE = "a rough road at two amplitudes, with all sensors of the model file; chirps of constant amplitude tell least"
+OTHERWISE = "broadband excitation at two amplitudes, with all sensors of the model file; chirps of constant amplitude tell least"
 
 
 def separating(c: Cause) -> str:
