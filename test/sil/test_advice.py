@@ -8,8 +8,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from penode_sil.diagnosis.advice import advice, likely, rivals
-from penode_sil.diagnosis.result import OUTSIDE, Cause, Diagnosis, Gain, Named, Recorded, Value, separating
+from penode_sil.diagnosis.advice import advice, doubts, likely
+from penode_sil.diagnosis.catalogue import MEANING, OTHERWISE, RIVALS, separating
+from penode_sil.diagnosis.result import OUTSIDE, Cause, Diagnosis, Gain, Named, Recorded, Value
 from penode_sil.diagnosis.terminal import sentences
 
 RUB, PEAK, LOOP = (Named(kind, "damper") for kind in ("coulomb_friction", "stribeck_friction", "bouc_wen"))
@@ -19,7 +20,7 @@ CAR = SimpleNamespace(name="car")
 
 def cause(kind="coulomb_friction", where="damper", confidence=0.9, alternatives=()):
     c = Cause(kind, where, {"force": Value(40.0, "N", (38.0, 42.0))}, confidence, tuple(alternatives))
-    return replace(c, separate=separating(c))
+    return replace(c, separate=separating(kind, [a.kind for a in alternatives]))
 
 
 def said(verdict="explained", *causes, posteriors=None, gain=GAIN, notes=(), residual=None, explained=0.99, data=()):
@@ -48,18 +49,30 @@ def test_sets_that_hold_95_percent_are_left(posteriors, left):
 
 def test_what_the_data_do_not_tell_is_said_with_what_would():
     d = said("explained", cause(confidence=0.6, alternatives=(PEAK, LOOP)), posteriors={RUB: 0.6, PEAK: 0.38, LOOP: 0.02})
-    sets, how = rivals(d)
-    assert sets == [("Coulomb friction at damper", 0.6), ("Stribeck friction at damper", 0.38)]
-    assert how.startswith("slow motion with many reversals") and "strokes" not in how  # that would tell a Bouc-Wen loop
-    assert d.advice[0] == f"tell these explanations apart by another recording: {how}"
-    text = screen(d)
-    assert "it is one of these; the recordings do not tell which: 60% Coulomb friction at damper 38% Stribeck friction at damper" in text
-    assert " or " not in text.split("it is one")[0]
+    (found,) = doubts(d)
+    assert found.others == ((PEAK, 0.38),) and str(found) == "Stribeck friction at damper (38%)"
+    assert found.how.startswith("slow motion with many reversals") and "strokes" not in found.how  # that would tell a Bouc-Wen loop
+    assert d.advice[0] == f"tell Coulomb friction at damper from Stribeck friction at damper: {found.how}"
+    assert "or Stribeck friction at damper (38%): the recordings do not tell which" in screen(d)
+
+
+def test_what_is_the_same_in_all_sets_is_not_told_either():
+    """A load and an offset that do the same to all sensors: no set of explanations has the second, for nothing could weigh it."""
+    load, offset = Named("constant_force", "body"), Named("input_offset", "u")
+    d = said("explained", cause("constant_force", "body", alternatives=(offset,)), posteriors={RUB: 0.99})
+    assert [x.others for x in doubts(d)] == [((offset, None),)] and load != offset
+    assert "or input offset at u: the recordings do not tell which" in screen(d)
+    assert d.advice[0] == "tell constant force at body from input offset at u: switch the actuator off: a load stays"
 
 
 def test_what_is_told_has_no_rivals():
     d = said("explained", cause(confidence=0.98, alternatives=(PEAK,)), posteriors={RUB: 0.98, PEAK: 0.02})
-    assert rivals(d) == ([], "") and "one of these" not in screen(d) and "or Stribeck friction at damper" in screen(d)
+    assert doubts(d) == [] and "do not tell" not in screen(d) and "Stribeck" not in screen(d)
+
+
+def test_pairs_of_the_catalogue_are_of_its_kinds():
+    assert all(pair <= set(MEANING) and how for pair, how in RIVALS.items())
+    assert separating("coulomb_friction", []) == "" and separating("coulomb_friction", ["tyre_damping", "backlash"]) == OTHERWISE
 
 
 @pytest.mark.parametrize("d, parts", [

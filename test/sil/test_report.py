@@ -17,7 +17,7 @@ from test_diagnosis import MODEL, SAMPLES, STEP, drive, record, road
 import penode_gen
 from penode_sil import targets
 from penode_sil.cli import cli
-from penode_sil.diagnosis import advice, files, noise, reliability, report, report_figure as fig, report_price, residual, restoring, result, terminal
+from penode_sil.diagnosis import advice, catalogue, files, noise, reliability, report, report_figure as fig, report_price, residual, restoring, result, terminal
 from penode_sil.diagnosis.report_figure import Axis
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
@@ -86,7 +86,7 @@ def found(model):
         0.87,
         (result.Named("stribeck_friction", "damper"),),
     )
-    cause = replace(cause, separate=result.separating(cause))
+    cause = replace(cause, separate=catalogue.separating("coulomb_friction", ["stribeck_friction"]))
     gain = {
         "a_body": result.Gain(0.104, 0.0203, 0.02, 0.9964, "m/s^2", 0.31, (0.97, 1.02)),
         "a_wheel": result.Gain(0.1, 0.1, 0.1, None, "m/s^2", 0.31),
@@ -168,8 +168,8 @@ def test_page_says_what_the_diagnosis_says(found, tree):
         *("61.3 N", "59.8 N … 62.9 N", "± 2.5 %", "Confidence 87 %"),
         *("Stribeck friction at damper", found.causes[0].separate),
         "Of causes named with 80 to 90 % in made-up cases, 51 of 60 were right (85 %, 95 % interval 74 to 92 %); source: 100 cases of seed 7.",
-        *("One of these; the recordings do not tell which", "Coulomb friction at damper, posterior 87 %", "Stribeck friction at damper, posterior 13 %"),
-        *("or another of the explanations below does.", "Tell these explanations apart by another recording: slow motion"),
+        *("The recordings do not tell these apart", "Coulomb friction at damper (87 %) or Stribeck friction at damper (13 %)"),
+        *("or what the recordings do not tell from it.", "Tell Coulomb friction at damper from Stribeck friction at damper: slow motion"),
         "0.104 m/s² → 0.0203 m/s² RMS of a_body; noise 0.02 m/s², 99.6 % of what can be gained",
         *("0.104 m/s²", "0.0203 m/s²", "99.6 %", "97 % … 102 %", "nothing to gain", "31.0% of the samples"),
         *("512 σ", "deflection: 12 samples are missing", RECORDING, "0.00125 m/s²", "0.2 %"),
@@ -328,7 +328,7 @@ def test_summary_fits_one_screen(model, found, tmp_path):
         assert len(lines) <= 24 and all(len(line) <= 80 or "report.html" in line for line in lines)
         assert "explained" in lines[0] and lines[-1].endswith("report.html")
     text = terminal.sentences(model, found, tmp_path)
-    assert "87%  Coulomb" in text and "it is one of these" in text and "next: tell these explanations apart" in text
+    assert "or Stribeck friction at damper (13%): the recordings do not tell which" in text and "next: tell Coulomb friction at damper from Str" in text
     assert "61.3 N" in text and "[59.8, 62.9]" in text and "Stribeck friction at damper" in text and "0.0203" in text
 
 

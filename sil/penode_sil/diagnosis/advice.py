@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from .by_noise import FARTHER
-from .result import OUTSIDE, Diagnosis, place, separating
+from .catalogue import separating
+from .result import OUTSIDE, Cause, Diagnosis, Named, place
 
 
 def likely(d: Diagnosis) -> list[Mapping[str, Any]]:
@@ -23,25 +24,39 @@ def likely(d: Diagnosis) -> list[Mapping[str, Any]]:
     return found
 
 
-def words(causes: Iterable[Mapping[str, Any]]) -> str:
-    """A set of causes in words."""
-    return " and ".join(place(c["kind"], c["where"]) for c in causes)
+@dataclass(frozen=True)
+class Doubt:
+    """A cause that the data do not tell from others, each with its posterior where one is known, and what would tell them apart."""
+
+    cause: Cause
+    others: tuple[tuple[Named, float | None], ...]
+    how: str
+
+    def __str__(self) -> str:
+        return ", ".join(place(n.kind, n.where) + (f" ({p:.0%})" if p is not None else "") for n, p in self.others)
 
 
-def rivals(d: Diagnosis) -> tuple[list[tuple[str, float]], str]:
-    """Where the data do not say which set of causes it is: each in words with its posterior, and what would tell them apart."""
-    sets = likely(d)
-    if len(sets) < 2:
-        return [], ""
-    listed = {(c["kind"], c["where"]) for x in sets for c in x["causes"]}
-    hows = [separating(replace(c, alternatives=tuple(a for a in c.alternatives if (a.kind, a.where) in listed))) for c in d.causes]
-    return [(words(x["causes"]), x["posterior"]) for x in sets], "; ".join(dict.fromkeys(filter(None, hows)))
+def doubts(d: Diagnosis) -> list[Doubt]:
+    """Of the named causes those that may as well be others: not what explanations with little posterior have in their place."""
+    found = []
+    for c in d.causes:
+        others = tuple((a, p) for a in c.alternatives if (p := _posterior(d, a)) != 0.0)
+        if others:
+            found.append(Doubt(c, others, separating(c.kind, [n.kind for n, _ in others])))
+    return found
+
+
+def _posterior(d: Diagnosis, a: Named) -> float | None:
+    """Of the likeliest set that has it, 0 if the others hold 95 %; None where no set does, for none of the data can tell it."""
+    own = [x for x in d.explanations if any((c["kind"], c["where"]) == (a.kind, a.where) for c in x["causes"])]
+    if not own:
+        return None
+    return max((float(x["posterior"]) for x in own if x in likely(d)), default=0.0)
 
 
 def advice(d: Diagnosis) -> tuple[str, ...]:
     """What to do next, the most useful first."""
-    _, how = rivals(d)
-    first = [f"tell these explanations apart by another recording: {how}"] if how else []
+    first = [f"tell {place(x.cause.kind, x.cause.where)} from {' and '.join(place(n.kind, n.where) for n, _ in x.others)}: {x.how}" for x in doubts(d)]
     return (*first, *_of_verdict(d), *_of_holdout(d))
 
 

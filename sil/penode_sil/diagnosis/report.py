@@ -30,7 +30,7 @@ from penode_gen.model import Model
 from ..output import whole
 from . import catalogue
 from . import report_figure as fig
-from .advice import rivals
+from .advice import doubts
 from .reliability import line
 from .report_figure import Axis, Figure, pretty, readable
 from .report_price import difference, price
@@ -70,7 +70,7 @@ def render(model: Model, d: Diagnosis, extended: Path) -> str:
         verdict=VERDICTS[d.verdict],
         lead=lead(d, train),
         tiles=key_figures(d),
-        rivals=rivals(d),
+        doubts=doubts(d),
         line=line,
         train=[panel(c, points) for c in train],
         held=[panel(c, points) for c in held],

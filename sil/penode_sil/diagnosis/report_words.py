@@ -11,7 +11,7 @@ import numpy as np
 
 from . import catalogue
 from . import report_figure as fig
-from .advice import rivals
+from .advice import doubts
 from .reliability import line
 from .report_figure import pretty, readable
 from .residual import Channel
@@ -70,7 +70,7 @@ def headline(d: Diagnosis) -> str:
             verb = "explain" if len(named) > 1 else "explains"
             what = "what the model gets wrong" if d.verdict == "explained" else "a part of what the model gets wrong"
             text = joined([place(c.kind, c.where) for c in named])
-            doubt = ", or another of the explanations below does" if rivals(d)[0] else ""
+            doubt = ", or what the recordings do not tell from it" if doubts(d) else ""
             return f"{text[0].upper()}{text[1:]} {verb} {what}{doubt}."
         case "not_identifiable":
             return "These recordings cannot tell what is wrong."

@@ -101,33 +101,6 @@ class Diagnosis:
         return {k: v for k, v in asdict(shallow).items() if k != "shown"}
 
 
-_RIVALS = """
-constant_force, sensor_bias: put the load on or take it off during the recording: only that transient tells them apart
-coulomb_friction, stribeck_friction: slow motion with many reversals, and fast motion too: the lowest rates tell
-coulomb_friction, bouc_wen: small strokes besides large ones: before it slides, one is a spring, the other is not
-degressive_damper, quadratic_damper: rates over more than a decade
-degressive_damper, wrong_parameter: one excitation at two amplitudes: lower damping scales, a bend does not
-quadratic_damper, wrong_parameter: one excitation at two amplitudes: other damping scales, a bend does not
-damper_fading, wrong_parameter: the same excitation at the start and at the end of one long recording
-damper_fading, degressive_damper: the same excitation at the start and at the end of one recording, at two amplitudes
-cubic_spring, bump_stop: broadband excitation, which has small and large amplitudes, instead of a chirp of constant amplitude
-bouc_wen, maxwell_bushing: several amplitudes at one frequency: memory of the way depends on them, that in time not
-tyre_nonlinear, wrong_parameter: two amplitudes of a rough road, up to large tyre loads; no chirp
-tyre_nonlinear, tyre_liftoff: a rough road that unloads the tyre for moments, and a smooth one that does not
-sensor_scale, wrong_parameter: record wheel acceleration and deflection too, or weigh the body
-sensor_delay, sensor_scale: excitation up to higher frequencies: a delay turns the phase, a scale does not
-"""
-_PAIRS = (line.split(": ", 1) for line in _RIVALS.strip().split("\n"))
-RIVALS = {frozenset(pair.split(", ")): how for pair, how in _PAIRS}
-OTHERWISE = "broadband excitation at two amplitudes, with all sensors of the model file; chirps of constant amplitude tell least"
-
-
-def separating(c: Cause) -> str:
-    """The excitation that would tell a cause from its alternatives; empty if it has none."""
-    found = dict.fromkeys(RIVALS.get(frozenset((c.kind, a.kind)), OTHERWISE) for a in c.alternatives)
-    return "; ".join(found)
-
-
 # -- words ------------------------------------------------------------------------------------------------------------
 
 VERDICTS = {

@@ -8,7 +8,7 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-from .advice import rivals
+from .advice import doubts
 from .reliability import line
 from .result import OUTSIDE, VERDICTS, Cause, Diagnosis, place, plain, sigmas
 
@@ -29,15 +29,13 @@ def sentences(model: Any, d: Diagnosis, output: Path) -> str:
 
 def _causes(d: Diagnosis) -> list[str]:
     """Why, and how sure that is."""
-    sets, how = rivals(d)
+    open_to = {id(x.cause): x for x in doubts(d)}
     body = []
     for c in _named(d):
         body.append(f"  {place(c.kind, c.where)}, confidence {min(c.confidence, 0.99):.0%}")
         body += [f"    {k:<18} {v.value:>11.5g} {v.unit:<10} [{v.ci95[0]:.5g}, {v.ci95[1]:.5g}]" for k, v in c.parameters.items()]
-        body += [f"    or {', '.join(place(a.kind, a.where) for a in c.alternatives)}"] if c.alternatives and not sets else []
-    if sets:
-        body.append("  it is one of these; the recordings do not tell which:")
-        body += [f"    {min(p, 0.99):>4.0%}  {what}" for what, p in sets]
+        if id(c) in open_to:
+            body.append(f"    or {open_to[id(c)]}: the recordings do not tell which")
     return [*body, *_sure(d)]
 
 
