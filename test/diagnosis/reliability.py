@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from score import wilson
 
-TABLE = Path(__file__).resolve().parents[2] / "sil/penode_sil/diagnosis/reliability.json"  # of which penode_sil.diagnosis.reliability reads
+TABLE = Path(__file__).resolve().parents[2] / "sil/penode_sil/diagnosis/templates/reliability.json"  # of which penode_sil.diagnosis.reliability reads
 APART = 0.05  # that mean confidence and share right may be, over all
 
 

@@ -105,7 +105,7 @@ def test_taken_over_and_told(tmp_path, monkeypatch):
         "source: 40 cases of seed 7 and 10 of seed 7, commit abc"
     )
     assert [d["from"] for d in known["deciles"]] == [0.9]
-    assert told.line(known, 0.2).startswith("no cause was named as surely")
+    assert told.line(known, 0.2).startswith("no cause was named with this confidence")
     reliability.TABLE.unlink()
     for code in ("", "commit abc-dirty"):
         written(rows[0], [claim(0.97, True)], code=code)
@@ -114,7 +114,7 @@ def test_taken_over_and_told(tmp_path, monkeypatch):
 
 def test_without_a_table_that_is_said(tmp_path):
     assert told.reliability([], tmp_path / "none.json") is None
-    assert told.line(None, 0.9) == "no figure is kept of how often causes named as surely are right"
+    assert told.line(None, 0.9) == "no figure is kept of how often causes named with this confidence are right"
 
 
 def test_kept_table_is_sound():

@@ -107,3 +107,9 @@ def test_a_screen_without_room_says_how_much_the_report_has_more():
     shown = [word for word in ("one", "two", "three", "four", "five", "six") if f"note: {word} {word}" in text]
     assert text.index("next: ") < text.index("note: ") and text.count(" end") == len(shown) < 6
     assert f"{7 - len(shown)} more in the report" in text
+
+
+def test_a_full_screen_still_has_the_first_advice():
+    many = tuple(cause("coulomb_friction", f"damper_{k}") for k in range(20))
+    text = screen(said("explained", *many, notes=("a note",)))
+    assert "next: use model_extended.toml" in text and "more in the report" in text

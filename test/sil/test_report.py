@@ -306,7 +306,7 @@ def test_price_is_left_out_without_a_compiler(model, found, monkeypatch, extende
 
 def test_notes_are_there_without_a_hold_out(model, found, extended):
     text = " ".join(Tree(report.render(model, replace(found, gain={}, notes=("a long note " * 60 + "to its end",)), extended)).text)
-    assert "A long note" in text and "note to its end." in text and "not measured" in text
+    assert "a long note" in text and "note to its end." in text and "not measured" in text
 
 
 def test_other_verdicts_have_a_page_too(model, found, extended):

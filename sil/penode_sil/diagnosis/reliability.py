@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""How often causes that were named as surely were right: the table that test/diagnosis/reliability.py --take-over keeps beside this file."""
+"""How often causes that were named as surely were right: the table that test/diagnosis/reliability.py --take-over keeps in templates/."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 from .result import OUTSIDE, Cause
 
-TABLE = Path(__file__).with_name("reliability.json")
+TABLE = Path(__file__).with_name("templates") / "reliability.json"  # beside the page that states it
 
 
 def reliability(causes: Sequence[Cause], table: Path = TABLE) -> dict[str, Any] | None:
@@ -32,10 +32,10 @@ def _in(decile: dict[str, Any], confidence: float) -> bool:
 def line(known: dict[str, Any] | None, confidence: float) -> str:
     """What is known of a confidence, with its source."""
     if known is None:
-        return "no figure is kept of how often causes named as surely are right"
+        return "no figure is kept of how often causes named with this confidence are right"
     found = next((d for d in known["deciles"] if _in(d, confidence)), None)
     if found is None:
-        return f"no cause was named as surely in made-up cases with a known truth ({known['source']})"
+        return f"no cause was named with this confidence in made-up cases with a known truth ({known['source']})"
     low, high = (f"{100 * x:.0f}" for x in found["ci95"])
     surely = f"{100 * found['from']:.0f} to {100 * found['to']:.0f} %"
     share = f"{found['right']} of {found['named']} were right ({100 * found['right'] / found['named']:.0f} %, 95 % interval {low} to {high} %)"

@@ -51,8 +51,8 @@ def joined(parts: Sequence[str]) -> str:
 
 
 def sentence(text: str) -> str:
-    """A note as a sentence."""
-    return text[:1].upper() + text[1:] + "." * (text[-1:] not in (".", "?"))
+    """Words that begin with no name, as a sentence."""
+    return text[:1].upper() + text[1:] + "."
 
 
 def known(d: Diagnosis) -> list[Cause]:

@@ -18,11 +18,12 @@ WIDTH, HEIGHT = 80, 24
 def sentences(model: Any, d: Diagnosis, output: Path) -> str:
     """One screen: at most HEIGHT lines of WIDTH columns; files that are named may stand out. What has no room there is in the report."""
     head = [f"{model.name}: {plain(d.verdict)}", f"  {VERDICTS[d.verdict]}"]
-    body = [*_causes(d), *_gain(d)]
-    body += [f"  next: {text}" for text in d.advice]
-    body += [f"  note: {n}" for n in d.notes]
-    body += [f"  {r.name}: {p}" for r in d.data for p in r.problems]
-    body = _fitted(body, HEIGHT - len(head) - 2)
+    steps = [f"  next: {text}" for text in d.advice]
+    rest = [*steps[1:], *(f"  note: {n}" for n in d.notes), *(f"  {r.name}: {p}" for r in d.data for p in r.problems)]
+    room = HEIGHT - len(head) - 2
+    first = _fitted(steps[:1], room)  # is there, however much there is to tell
+    answer = _fitted([*_causes(d), *_gain(d)], room - len(first) - bool(rest))
+    body = [*answer, *first, *_fitted(rest, room - len(first) - len(answer))]
     explained = f"{d.explained:.1%} of the avoidable residual explained, " if _named(d) else ""
     return "\n".join([*head, *body, f"  {explained}{d.seconds:.1f} s", f"  -> {output / 'report.html'}"])
 
