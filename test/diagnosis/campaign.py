@@ -27,6 +27,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 import score
+from claims import nominals
 from hidden import cases
 
 ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1")
@@ -91,8 +92,8 @@ def run(seed: int, index: int, commands: dict[str, str], simulate: str, timeout:
         answers.append((name, found, seconds, why, error))
         if (folder / "diagnosis").exists() and len(commands) > 1:
             (folder / "diagnosis").rename(folder / f"diagnosis of {name}")
-    truth = case.truth()
-    rows = [{"command": name, **score.score(truth, found, seconds, why, error)} for name, found, seconds, why, error in answers]
+    truth, nominal = case.truth(), nominals(folder / "model.toml")
+    rows = [{"command": name, **score.score(truth, found, seconds, why, error, nominal)} for name, found, seconds, why, error in answers]
     if keep or not rows[0]["right"]:
         cases.write_truth(truth, out / "truth" / f"{seed}-{index}.json")
     if not keep:

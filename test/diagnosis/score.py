@@ -7,6 +7,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import permutations
 from math import ceil, sqrt
 
+from claims import claims
+from claims import right as rightly
+
 OUTSIDE = "outside_taxonomy"
 MOST_ALTERNATIVES = 4  # who lists more has not decided
 EXACT = 1.0  # chi-square that an exact equivalent may leave of an effect
@@ -70,11 +73,12 @@ def outcome(truth: Mapping, causes: Sequence[Mapping], verdict: str | None) -> s
 
 
 def score(
-    truth: Mapping, diagnosis: Mapping | None, seconds: float, why: str = "", measured: Mapping[str, float] | None = None
+    truth: Mapping, diagnosis: Mapping | None, seconds: float, why: str = "", measured: Mapping[str, float] | None = None,
+    nominal: Mapping[str, float] | None = None,
 ) -> dict:
     """One row of the table. `diagnosis` None: the command gave none, `why` says so (crash, timeout).
 
-    `measured`: RMSE of the extended model on the hold-out, by who does not believe the diagnosis.
+    `measured`: RMSE of the extended model on the hold-out, by who does not believe the diagnosis; `nominal`: parameters of the model file.
     """
     row = {
         "case": f"{truth['seed']}:{truth['index']}",
@@ -85,6 +89,7 @@ def score(
         "forms": [e["form"] for e in truth["effects"]],
         "energies": [e["energy"] for e in truth["effects"]],
         "answer": [],
+        "named": [],
         "verdict": None,
         "right": False,
         "why": why,
@@ -98,6 +103,8 @@ def score(
     causes, verdict = diagnosis.get("causes") or [], diagnosis.get("verdict")
     what = outcome(truth, causes, verdict)
     row |= {"answer": [" at ".join(_named(c)) for c in causes], "verdict": verdict, "right": what == "right", "outcome": what}
+    named = [c for c in causes if isinstance(c, Mapping) and c.get("kind") != OUTSIDE]
+    row["named"] = claims(named, rightly(named, truth["effects"], lambda c, e: explains(c, e, told=False)), nominal or {})
     pairs = pairing(causes, truth["effects"], truth["bound"]) if what == "right" else None
     for i, k in (pairs or {}).items():
         effect, said = truth["effects"][k], causes[i].get("parameters") or {}

@@ -127,6 +127,48 @@ def test_outcome(effects, diagnosis, outcome):
     assert (row["outcome"], row["right"]) == (outcome, outcome == "right")
 
 
+def sized(kind, where="", confidence=0.9, alternatives=(), **intervals):
+    """A cause whose parameters have these 95 % intervals."""
+    values = {name: {"value": sum(ends) / 2, "ci95": list(ends)} for name, ends in intervals.items()}
+    return cause(kind, where, alternatives, **values) | {"confidence": confidence}
+
+
+@pytest.mark.parametrize("effects, causes, right", [
+    ((FRICTION,), [sized("coulomb_friction", "damper")], [True]),
+    ((FRICTION,), [sized("coulomb_friction", "damper"), sized("coulomb_friction", "spring")], [True, False]),
+    ((FRICTION, LOAD), [sized("backlash", "spring"), sized("constant_force", "body")], [False, True]),
+    ((LOAD,), [sized("sensor_bias", "deflection")], [True]),  # it is, whether it tells its equivalent or not
+    ((LOAD, LOAD | {"rivals": []}), [sized("constant_force", "body"), sized("sensor_bias", "deflection")], [True, True]),
+    ((ALIEN,), [sized("backlash", "spring")], [False]),
+    ((), [sized("backlash", "spring")], [False]),
+    ((ALIEN,), [sized("outside_taxonomy")], []),
+    ((), [], []),
+])
+def test_rows_say_of_each_named_cause_how_sure_and_whether_right(effects, causes, right):
+    row = score.score(truth(*effects), said(*causes), 1.0)
+    assert [c["right"] for c in row["named"]] == right
+    assert all(c["confidence"] == 0.9 and c["cause"] for c in row["named"])
+
+
+@pytest.mark.parametrize("told, nothing", [
+    (sized("coulomb_friction", "damper", force=(-1.0, 9.0)), True),
+    (sized("coulomb_friction", "damper", force=(1.0, 9.0)), False),
+    (sized("sensor_scale", "x", scale=(0.98, 1.05)), True),
+    (sized("sensor_scale", "x", scale=(-0.1, 0.9)), False),
+    (sized("input_gain", "u", gain=(0.7, 1.1)), True),
+    (sized("wrong_parameter", c=(1.9e4, 2.3e4)), True),
+    (sized("wrong_parameter", c=(2.1e4, 2.3e4)), False),
+    (sized("bump_stop", "spring", gap=(-0.1, 0.1), stiffness=(1.0, 2.0)), False),
+    (sized("asymmetric_damper", "damper", rebound=(1.0, 3.0), compression=(1.5, 3.5)), True),
+    (sized("asymmetric_damper", "damper", rebound=(1.0, 3.0), compression=(4.0, 6.0)), False),
+    (cause("coulomb_friction", "damper", force={"value": 3.0}), False),
+    (cause("coulomb_friction", "damper"), False),
+])
+def test_a_size_may_be_nothing_where_its_interval_holds_the_model_without_it(told, nothing):
+    row = score.score(truth(FRICTION), said(told), 1.0, nominal={"c": 2e4})
+    assert [c["nothing"] for c in row["named"]] == [nothing]
+
+
 def test_without_an_answer_every_case_is_wrong():
     assert not score.score(truth(), None, 9.0, "timeout")["right"]
 

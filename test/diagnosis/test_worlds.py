@@ -135,6 +135,25 @@ def test_scoring(effects, causes, verdict, outcome):
     assert (row["outcome"], row["right"]) == (outcome, outcome == "right")
 
 
+@pytest.mark.parametrize(
+    "effects, causes, right",
+    [
+        ((FRICTION,), [RUB, SCALE], [True, False]),
+        ((FRICTION, STIFF), [K, RUB], [True, True]),
+        ((GAIN,), [K, cause("wrong_parameter", J=2.0)], [True, True]),
+        ((GAIN,), [K], [False]),
+        ((SIDE,), [K, cause("asymmetric_spring", "spring")], [True, True]),
+        ((), [{**RUB, "small": True}], []),
+        ((), [SCALE], [False]),
+    ],
+)
+def test_rows_say_which_named_cause_is_right(effects, causes, right):
+    """Parts of a whole and companions are right with it."""
+    row = score(truth(*effects), {"causes": causes, "verdict": "explained"}, {"k": 9.0})
+    assert [c["right"] for c in row["named"]] == right
+    assert all(c["nothing"] == (c["cause"] == "wrong_parameter at k") for c in row["named"])  # 9.1 within 10 % of 9
+
+
 def test_sets_are_not_names():
     """A set that holds the truth behind another name is seen, and not right."""
     found = {"causes": [SCALE], "verdict": "explained", "explanations": [{"causes": [SCALE], "posterior": 0.6}, {"causes": [RUB], "posterior": 0.4}]}

@@ -22,6 +22,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 from campaign import commit, diagnose
+from claims import nominals
 from score import wilson
 from worlds import equivalents, world
 from worlds_score import added_laws, score, small
@@ -36,7 +37,7 @@ def one(seed: int, index: int, stratum: str, tolerances: bool | None, command: s
     shutil.rmtree(folder, ignore_errors=True)
     found, seconds, why = diagnose(command, folder, case.write(folder), timeout)
     truth = equivalents.truth(case)
-    row = score(truth, found) | {"seconds": round(seconds, 1), "why": why}
+    row = score(truth, found, nominals(folder / "model.toml")) | {"seconds": round(seconds, 1), "why": why}
     extended = folder / "diagnosis" / "model_extended.toml"
     if row["answer"] and extended.exists():
         kinds = [a.split()[0] for a in row["answer"]] + small(found["notes"])
@@ -120,15 +121,15 @@ def main() -> int:
             case.write(args.out / "cases" / f"{s}-{seed}-{i}")
             world.write_truth(equivalents.truth(case), args.out / "truth" / f"{s}-{seed}-{i}.json")
         return 0
-    rows = []
+    rows, code = [], commit()
     with ProcessPoolExecutor(args.jobs) as pool, (args.out / "rows.jsonl").open("w") as file:
         jobs = [pool.submit(one, seed, i, s, tolerances, args.command, args.timeout, args.out, args.keep or bool(args.only)) for s, i in chosen]
         for job in jobs:
-            rows.append(job.result())
+            rows.append(job.result() | {"code": code})
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
             print(line(rows[-1]), flush=True)
-    text = page(rows, f"Seed {seed}, {commit()}, `{args.command}`{', no tolerances' * args.no_tolerance}. Effects 3 to 10 times the mis-modelling at their place.")
+    text = page(rows, f"Seed {seed}, {code}, `{args.command}`{', no tolerances' * args.no_tolerance}. Effects 3 to 10 times the mis-modelling at their place.")
     (args.out / "WORLDS.md").write_text(text)
     print(text)
     return 0

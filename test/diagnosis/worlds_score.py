@@ -8,6 +8,8 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from itertools import permutations
 
+from claims import claims, right
+
 OUTSIDE = "outside_taxonomy"
 FORCELESS = ("wrong_parameter", "sensor_", "input_", "integration_error")  # causes that need no law
 HONEST = ("no_discrepancy", "unexplained", "not_identifiable")  # verdicts of a null world; mis-modelling is real, and may be seen
@@ -75,8 +77,15 @@ def outcome(truth: Mapping, diagnosis: Mapping | None) -> str:
     return "part missed" if all(any(explains(c, e) for e in effects) for c in causes) else "wrong name"
 
 
-def score(truth: Mapping, diagnosis: Mapping | None) -> dict:
-    """One row; `covered`: whether each 95 % interval of a parameter that the truth names holds it."""
+def rightly(causes: Sequence[Mapping], effects: Sequence[Mapping]) -> list[bool]:
+    """Which named causes are right. Those that `outcome` does not count by themselves, as companions or parts of a whole, are."""
+    counted = without_companions(together(causes, effects), effects)
+    correct = right(causes, effects, explains)
+    return [ok or not any(c is x for x in counted) for c, ok in zip(causes, correct)]
+
+
+def score(truth: Mapping, diagnosis: Mapping | None, nominal: Mapping[str, float] | None = None) -> dict:
+    """One row; `covered`: whether each 95 % interval of a parameter that the truth names holds it; `nominal`: parameters of the model file."""
     what, effects = outcome(truth, diagnosis), truth["effects"]
     causes = named(diagnosis or {})
     covered = []
@@ -90,6 +99,7 @@ def score(truth: Mapping, diagnosis: Mapping | None) -> dict:
     return {"case": f"{truth['seed']}:{truth['index']}", "stratum": truth["stratum"], "group": truth["group"], "plant": truth["plant"],
             "tolerance": truth["tolerance"], "mismodelling": truth["mismodelling"], "kinds": [e["kind"] for e in effects],
             "ratios": [e["ratio"] for e in effects], "answer": words, "confidence": [c.get("confidence") for c in causes],
+            "named": claims(causes, rightly(causes, effects), nominal or {}),
             "verdict": (diagnosis or {}).get("verdict"), "outcome": what, "right": what == "right", "covered": covered}  # fmt: skip
 
 

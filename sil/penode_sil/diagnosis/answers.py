@@ -15,7 +15,8 @@ from penode_gen.model import Model
 
 from ..measured import Measured
 from . import explanation, extension, numerics, plausible, residual, weighed
-from .result import OUTSIDE, Cause, Diagnosis, Recorded, separating
+from .catalogue import separating
+from .result import OUTSIDE, Cause, Diagnosis, Recorded
 from .explanation import Explanation
 
 
@@ -62,6 +63,6 @@ def by_innovations(
     doubt = plausible.doubt(study, best, w.verdict) if w.verdict == "unexplained" else ""
     causes = w.causes or ((Cause(OUTSIDE, "", {}, 0.5),) if w.verdict == "unexplained" else ())
     return Diagnosis(
-        w.verdict, tuple(replace(c, separate=separating(c)) for c in causes), w.gain, numbers, w.explained, evidence, 0.0,
+        w.verdict, tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives])) for c in causes), w.gain, numbers, w.explained, evidence, 0.0,
         (*[doubt] * bool(doubt), *remarks, *w.notes), residual=shown.numbers(), explanations=w.explanations, shown=shown,
     )  # fmt: skip

@@ -3,7 +3,7 @@
 """report.html: one page that needs nothing else and tells what is wrong, why, how sure that is, and what knowing it
 gains.
 
-From the top: the answer in a sentence; per sensor and recording the residual over time, its spectrum above the noise
+From the top: the answer in a sentence, how sure it is, what it costs, what to do next; per sensor and recording the residual over time, its spectrum above the noise
 floor, its coherence with the input and a test for whiteness; the causes with parameters, intervals, confidence and
 rivals; the restoring force of each element over deflection and rate, measured, nominal and extended; the gain on
 held-out data with the generated C, samples outside of the trained range marked; the change of the model file and what
@@ -30,15 +30,17 @@ from penode_gen.model import Model
 from ..output import whole
 from . import catalogue
 from . import report_figure as fig
+from .advice import doubts
+from .reliability import line
 from .report_figure import Axis, Figure, pretty, readable
 from .report_price import difference, price
+from .report_words import LIKE_NOISE, gains, headline, key_figures, lead, percent, relative, sentence, sure, value, where
 from .residual import LEAST, Channel, Residual, Shown, Surface, averages, cells, rms
 from .result import VERDICTS, Cause, Diagnosis, place, plain
 
 Array = NDArray[np.float64]
 SAMPLES = 800  # that a picture of forces shows one by one
 FINE = 40  # bins of a section through forces
-LIKE_NOISE = 1.1  # times the noise power
 BUDGET = 60_000  # points of all lines over time together, so that the page stays small
 
 
@@ -56,7 +58,7 @@ def render(model: Model, d: Diagnosis, extended: Path) -> str:
         loader=folder, bytecode_cache=compiled_templates(), autoescape=True, trim_blocks=True, lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )  # fmt: skip
-    environment.filters |= {"plain": plain, "pretty": pretty, "percent": percent, "value": value, "sure": sure}
+    environment.filters |= {"plain": plain, "pretty": pretty, "percent": percent, "value": value, "sure": sure, "sentence": sentence}
     shown: Shown = d.shown
     train, held = (ordered(channels) for channels in (shown.train, shown.holdout))
     points = max(BUDGET // (2 * max(len(train) + len(held), 1)), 400)
@@ -68,6 +70,8 @@ def render(model: Model, d: Diagnosis, extended: Path) -> str:
         verdict=VERDICTS[d.verdict],
         lead=lead(d, train),
         tiles=key_figures(d),
+        doubts=doubts(d),
+        line=line,
         train=[panel(c, points) for c in train],
         held=[panel(c, points) for c in held],
         meaning=catalogue.MEANING,
@@ -81,114 +85,6 @@ def render(model: Model, d: Diagnosis, extended: Path) -> str:
         WIDE=fig.WIDE,
         HIGH=fig.HIGH,
     )
-
-
-# -- words ------------------------------------------------------------------------------------------------------------
-
-
-def percent(x: float) -> str:
-    """Two digits, no false precision near 0 and 100 %."""
-    if x != 0.0 and abs(x) < 0.001:
-        return "< 0.1 %"
-    return f"{100.0 * x:.1f} %" if abs(x) < 0.0995 or 0.995 <= abs(x) < 0.9995 else f"{100.0 * x:.0f} %"
-
-
-def value(x: float, unit: str = "") -> str:
-    """Four digits in a unit that reads well."""
-    factor, unit = readable(abs(x), unit) if unit else (1.0, "")
-    text = f"{x * factor:.4g}" if 1e-4 <= abs(x * factor) < 1e6 or x == 0.0 else fig.number(float(f"{x * factor:.4g}"))
-    return f"{text.replace('-', '−')} {pretty(unit)}".removesuffix(" 1").strip()
-
-
-def sure(confidence: float) -> str:
-    """A confidence; nothing is certain."""
-    return "> 99 %" if confidence > 0.99 else percent(confidence)
-
-
-def relative(c: Cause, name: str) -> str:
-    """Half of a 95 % interval as a share of the value."""
-    v = c.parameters[name]
-    half = 0.5 * (v.ci95[1] - v.ci95[0])
-    return "± " + (percent(half / abs(v.value)) if 10.0 * abs(v.value) > half else value(half, v.unit))
-
-
-def joined(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
-
-
-def headline(d: Diagnosis) -> str:
-    """The answer in one sentence."""
-    named = [c for c in d.causes if c.kind != "outside_taxonomy"]
-    match d.verdict:
-        case "no_discrepancy":
-            return "The model agrees with the recordings."
-        case "explained" | "partly_explained" if named:
-            verb = "explain" if len(named) > 1 else "explains"
-            what = "what the model gets wrong" if d.verdict == "explained" else "a part of what the model gets wrong"
-            text = joined([place(c.kind, c.where) for c in named])
-            return f"{text[0].upper()}{text[1:]} {verb} {what}."
-        case "not_identifiable":
-            return "These recordings cannot tell what is wrong."
-    return "The model is wrong in a way that has no name on the list."
-
-
-def lead(d: Diagnosis, train: Sequence[Channel]) -> list[str]:
-    """A few sentences with the numbers that matter most; `train` has the most wrong first."""
-    if not train:
-        return []
-    seconds = {c.recording: c.time[-1] for c in train}
-    counts = ((len(seconds), "recording"), (len({c.sensor for c in train}), "sensor"))
-    recordings, sensors = (f"{n} {word}{'s' * (n > 1)}" for n, word in counts)
-    worst = train[0]
-    times, share = worst.level(worst.before) / worst.noise, percent(worst.share)
-    found = [f"Learnt from {recordings} of {sum(seconds.values()):.0f} s with {sensors}."]
-    if d.verdict == "no_discrepancy":
-        return [*found, f"The largest residual, of {worst.sensor}, is {times:.2f} × its noise, {share} of the signal."]
-    found.append(f"It errs most at {worst.sensor}: {times:.1f} × the noise, {share} of the signal, {where(worst)}.")
-    if worst.after is not None:
-        now = worst.level(worst.after) / worst.noise
-        found.append(f"With the cause{'s' * (len(d.causes) > 1)} in the model that falls to {now:.2f} × the noise.")
-    return found
-
-
-def where(c: Channel) -> str:
-    """Where the residual beyond the noise is, in frequency and time."""
-    if c.before.white.level < LIKE_NOISE:
-        return "no more than noise"
-    excess = np.maximum(c.before.density - c.floor, 0.0)
-    total = np.cumsum(excess)
-    if total[-1] <= 0.0:
-        return "no more than noise"
-    low, high = (float(c.f[int(np.searchsorted(total, q * total[-1]))]) for q in (0.25, 0.75))
-    text = f"half of it between {low:.2g} and {high:.2g} Hz" if high > 1.05 * low else f"half of it near {low:.2g} Hz"
-    blocks = np.array_split(np.where(c.good, c.before.values, 0.0) ** 2, 20)
-    powers = np.sort([float(np.sum(b)) for b in blocks])
-    burst = powers[-2:].sum() / max(powers.sum(), 1e-300)
-    return text + (f", {percent(burst)} in a tenth of the time" if burst > 0.3 else "")
-
-
-def key_figures(d: Diagnosis) -> list[tuple[str, str, str]]:
-    """What, how much, and a remark: the tiles at the top."""
-    evidence = f"{d.evidence:.0f} σ" if d.evidence > 3.0 else "none"
-    found = [("Evidence of an error", evidence, "residual beyond noise and tolerances")]
-    if d.causes:
-        found.append(("Explained", percent(d.explained), "of the avoidable residual, in training"))
-        found.append(("Confidence", sure(min(c.confidence for c in d.causes)), "against the next best answer"))
-    shares = [(g.share_of_achievable, name) for name, g in d.gain.items() if g.share_of_achievable is not None]
-    if shares and d.causes:
-        best = max(shares)
-        found.append(("Gained on hold-out", percent(best[0]), f"of what is achievable at {best[1]}"))
-    return found
-
-
-def gains(d: Diagnosis) -> list[dict[str, Any]]:
-    """Rows of the table of gains; positions in percent of the largest error for its bars."""
-    rows = []
-    for name, g in d.gain.items():
-        top = 1.05 * max(g.before_rmse, g.after_rmse, g.noise_floor, 1e-300)
-        at = {key: round(100.0 * getattr(g, key) / top, 1) for key in ("before_rmse", "after_rmse", "noise_floor")}
-        rows.append({"name": name, "g": g, "at": at})
-    return rows
 
 
 # -- figures ----------------------------------------------------------------------------------------------------------

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import asdict, dataclass, field, fields
-from pathlib import Path
 from typing import Any
 
 from ..measured import Measured
@@ -91,6 +89,8 @@ class Diagnosis:
     residual: dict[str, Any] = field(default_factory=dict)
     absorbed: dict[str, Any] = field(default_factory=dict)  # the same effect as a set of the running code, see absorb.py
     explanations: tuple[dict[str, Any], ...] = ()  # sets of causes that the recordings cannot tell apart, each with its posterior
+    reliability: dict[str, Any] | None = None  # how often causes that were named as surely were right, see reliability.py
+    advice: tuple[str, ...] = ()  # what to do next, the most useful first
     seconds: float = field(default=0.0, compare=False)
     compile_seconds: float = field(default=0.0, compare=False)  # processor time of compilers, which the next call of its like needs not
     shown: Any = field(default=None, compare=False, repr=False)
@@ -101,36 +101,8 @@ class Diagnosis:
         return {k: v for k, v in asdict(shallow).items() if k != "shown"}
 
 
-_RIVALS = """
-constant_force, sensor_bias: put the load on or take it off during the recording: only that transient tells them apart
-coulomb_friction, stribeck_friction: slow motion with many reversals, and fast motion too: the lowest rates tell
-coulomb_friction, bouc_wen: small strokes besides large ones: before it slides, one is a spring, the other is not
-degressive_damper, quadratic_damper: rates over more than a decade
-degressive_damper, wrong_parameter: two amplitudes of one road: lower damping scales, a bend does not
-quadratic_damper, wrong_parameter: two amplitudes of one road: other damping scales, a bend does not
-damper_fading, wrong_parameter: the same excitation at the start and at the end of one long recording
-damper_fading, degressive_damper: the same excitation at the start and at the end of one recording, at two amplitudes
-cubic_spring, bump_stop: a rough road, which has small and large amplitudes, instead of a chirp of constant amplitude
-bouc_wen, maxwell_bushing: several amplitudes at one frequency: memory of the way depends on them, that in time not
-tyre_nonlinear, wrong_parameter: two amplitudes of a rough road, up to large tyre loads; no chirp
-tyre_nonlinear, tyre_liftoff: a rough road that unloads the tyre for moments, and a smooth one that does not
-sensor_scale, wrong_parameter: record wheel acceleration and deflection too, or weigh the body
-sensor_delay, sensor_scale: excitation up to higher frequencies: a delay turns the phase, a scale does not
-"""
-_PAIRS = (line.split(": ", 1) for line in _RIVALS.strip().split("\n"))
-RIVALS = {frozenset(pair.split(", ")): how for pair, how in _PAIRS}
-OTHERWISE = "a rough road at two amplitudes, with all sensors of the model file; chirps of constant amplitude tell least"
+# -- words ------------------------------------------------------------------------------------------------------------
 
-
-def separating(c: Cause) -> str:
-    """The excitation that would tell a cause from its alternatives; empty if it has none."""
-    found = dict.fromkeys(RIVALS.get(frozenset((c.kind, a.kind)), OTHERWISE) for a in c.alternatives)
-    return "; ".join(found)
-
-
-# -- for the terminal -------------------------------------------------------------------------------------------------
-
-WIDTH, HEIGHT = 80, 24
 VERDICTS = {
     "no_discrepancy": "the model agrees with the recordings within noise and tolerances",
     "explained": "the model is wrong, and the causes named explain it",
@@ -152,46 +124,10 @@ def plain(name: str) -> str:
     return text
 
 
+def sigmas(evidence: float) -> str:
+    """A number of standard deviations; beyond a thousand, how many says nothing."""
+    return f"{evidence:.0f}" if evidence < 1000.0 else "> 1000"
+
+
 def place(kind: str, where: str) -> str:
     return f"{plain(kind)} at {where}" if where else plain(kind)
-
-
-def sentences(model: Any, d: Diagnosis, output: Path) -> str:
-    """One screen: at most HEIGHT lines of WIDTH columns; files that are named may stand out."""
-    head = [f"{model.name}: {plain(d.verdict)}", f"  {VERDICTS[d.verdict]}"]
-    body: list[str] = []
-    for c in d.causes:
-        body.append(f"  {place(c.kind, c.where)}, confidence {min(c.confidence, 0.99):.0%}")
-        body += [
-            f"    {k:<18} {v.value:>11.5g} {v.unit:<10} [{v.ci95[0]:.5g}, {v.ci95[1]:.5g}]"
-            for k, v in c.parameters.items()
-        ]
-        body += [f"    or {', '.join(place(a.kind, a.where) for a in c.alternatives)}"] if c.alternatives else []
-    if d.gain:
-        body.append(f"  {'RMS error on held-out data':<28}{'before':>10}{'after':>11}{'noise':>11}  gained")
-        for name, g in d.gain.items():
-            gained = "" if g.share_of_achievable is None else f"{g.share_of_achievable:.0%}"
-            body.append(
-                f"    {name:<26}{g.before_rmse:>10.4g}{g.after_rmse:>11.4g}{g.noise_floor:>11.4g}  {gained:<6} {g.unit}"
-            )
-    body += [f"  note: {n}" for n in d.notes]
-    body += [f"  {r.name}: {p}" for r in d.data for p in r.problems]
-    body = _fitted(body, HEIGHT - len(head) - 2)
-    tail = (
-        [f"  {d.explained:.1%} of the avoidable residual explained, {d.seconds:.1f} s"]
-        if d.verdict != "no_discrepancy"
-        else [f"  {d.seconds:.1f} s"]
-    )
-    return "\n".join([*head, *body, *tail, f"  -> {output / 'report.html'}"])
-
-
-def _fitted(items: list[str], room: int) -> list[str]:
-    """Items on so many lines of WIDTH columns, each of them whole; how many have no room there is the last line."""
-    lines: list[str] = []
-    for k, item in enumerate(items):
-        more = textwrap.wrap(item, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False) if len(item) > WIDTH else [item]
-        last = k + 1 == len(items)
-        if len(lines) + len(more) > room - (not last):
-            return [*lines, f"  {len(items) - k} more in the report"]
-        lines += more
-    return lines

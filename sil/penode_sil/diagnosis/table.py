@@ -17,7 +17,7 @@ import jinja2
 from ..output import whole
 
 JSON = "diagnoses.json"
-KEPT = ("verdict", "causes", "gain", "numerics", "explained", "evidence", "notes", "seconds")  # of each diagnosis.json
+KEPT = ("verdict", "causes", "gain", "numerics", "explained", "evidence", "explanations", "advice", "notes", "seconds")  # of each diagnosis.json
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,22 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The causes that a diagnosis knows: one file for a kind, or for kinds of one curve. A new one is a file and a row here."""
+"""The causes that a diagnosis knows: one file for a kind, or for kinds of one curve. A new one is a file and its name here."""
+
+from collections.abc import Iterable
 
 from . import aerated, bushings, dampers, drives, friction, loads, masses, others, plays, springs, tyres
 
 FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aerated)
 MEANING = {kind: text for file in (*FILES, drives, others) for kind, text in file.MEANING.items()}
 OF = {kind: file for file in FILES for kind in file.KINDS}
+
+RIVALS = {frozenset(pair): how for file in (*FILES, drives, others) for pair, how in getattr(file, "RIVALS", {}).items()}
+OTHERWISE = "broadband excitation at two amplitudes, with all sensors of the model file; chirps of constant amplitude tell least"
+
+
+def separating(kind: str, alternatives: Iterable[str]) -> str:
+    """The excitation that would tell a kind from others; empty if there are none."""
+    return "; ".join(dict.fromkeys(RIVALS.get(frozenset((kind, other)), OTHERWISE) for other in alternatives))
 
 
 def curve(kind: str) -> object:

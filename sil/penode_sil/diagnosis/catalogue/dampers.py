@@ -18,6 +18,13 @@ MEANING = {
     "quadratic_damper": "A damper whose damping grows with the rate.",
     "damper_fading": "A damper that loses damping while the recording goes on, as with heat.",
 }
+RIVALS = {
+    ("degressive_damper", "quadratic_damper"): "rates over more than a decade",
+    ("degressive_damper", "wrong_parameter"): "one excitation at two amplitudes: lower damping scales, a bend does not",
+    ("quadratic_damper", "wrong_parameter"): "one excitation at two amplitudes: other damping scales, a bend does not",
+    ("damper_fading", "wrong_parameter"): "the same excitation at the start and at the end of one long recording",
+    ("damper_fading", "degressive_damper"): "the same excitation at the start and at the end of one recording, at two amplitudes",
+}
 STRAIGHT = ("asymmetric_damper", "degressive_damper")
 KNEES = (0.3, 1.0)  # of the rms rate
 

@@ -17,6 +17,10 @@ MEANING = {
     "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",
     "bouc_wen": "Hysteresis: the force depends on the way since the last reversal, elastic at first, then yielding.",
 }
+RIVALS = {
+    ("coulomb_friction", "stribeck_friction"): "slow motion with many reversals, and fast motion too: the lowest rates tell",
+    ("coulomb_friction", "bouc_wen"): "small strokes besides large ones: before it slides, one is a spring, the other is not",
+}
 ONE = True  # friction at a place is one curve, with a peak or with memory
 EDGES = (0.04, 0.12)  # of the rms rate: transitions of a friction, within a factor of 2; smooth enough for Gauss-Newton, steep enough for any motion
 PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway

@@ -13,6 +13,10 @@ KINDS = ("constant_force",)
 MEANING = {
     "constant_force": "A constant force that the model does not have.",
 }
+RIVALS = {
+    ("constant_force", "sensor_bias"): "put the load on or take it off during the recording: only that transient tells them apart",
+    ("constant_force", "input_offset"): "switch the actuator off: a load stays",
+}
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:

@@ -15,6 +15,9 @@ MEANING = {
     "asymmetric_spring": "A spring that is stiffer on one side than on the other.",
     "bump_stop": "A stop: beyond a gap an extra spring comes into contact.",
 }
+RIVALS = {
+    ("cubic_spring", "bump_stop"): "broadband excitation, which has small and large amplitudes, instead of a chirp of constant amplitude",
+}
 STRAIGHT = ("asymmetric_spring",)
 GAPS = (0.5, 0.75)  # of what the deflection reaches
 NEAREST = 3.3  # times nearer, to 0.15 of the reach: a spring that begins nearer to the middle is one with play

@@ -16,6 +16,10 @@ MEANING = {
     "tyre_liftoff": "The tyre leaves the road: it cannot pull.",
     "tyre_nonlinear": "The tyre's stiffness changes with its load.",
 }
+RIVALS = {
+    ("tyre_nonlinear", "wrong_parameter"): "two amplitudes of a rough road, up to large tyre loads; no chirp",
+    ("tyre_nonlinear", "tyre_liftoff"): "a rough road that unloads the tyre for moments, and a smooth one that does not",
+}
 STRAIGHT = ("tyre_nonlinear",)
 SHARES = (0.3, 0.6)  # of the greatest stretch: where a tyre leaves the road
 

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What to do next, from what a diagnosis says: tell rivals apart, take the model over or not, record what is lacking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .by_noise import FARTHER
+from .catalogue import separating
+from .result import OUTSIDE, Cause, Diagnosis, Named, place
+
+
+def likely(d: Diagnosis) -> list[Mapping[str, Any]]:
+    """The sets of causes that hold 95 % of the posterior together, the likeliest first: more than one, and the data do not say which."""
+    sets = sorted(d.explanations, key=lambda x: -x["posterior"])
+    total, held, found = sum(x["posterior"] for x in sets), 0.0, []
+    for x in sets:
+        if not found or held < 0.95 * total:
+            found.append(x)
+            held += x["posterior"]
+    return found
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A cause that the data do not tell from others, each with its posterior where one is known, and what would tell them apart."""
+
+    cause: Cause
+    others: tuple[tuple[Named, float | None], ...]
+    how: str
+
+    def __str__(self) -> str:
+        return ", ".join(place(n.kind, n.where) + (f" ({p:.0%})" if p is not None else "") for n, p in self.others)
+
+
+def doubts(d: Diagnosis) -> list[Doubt]:
+    """Of the named causes those that may as well be others: not what explanations with little posterior have in their place."""
+    found = []
+    for c in d.causes:
+        others = tuple((a, p) for a in c.alternatives if (p := _posterior(d, a)) != 0.0)
+        if others:
+            found.append(Doubt(c, others, separating(c.kind, [n.kind for n, _ in others])))
+    return found
+
+
+def _posterior(d: Diagnosis, a: Named) -> float | None:
+    """Of the likeliest set that has it, 0 if the others hold 95 %; None where no set does, for none of the data can tell it."""
+    own = [x for x in d.explanations if any((c["kind"], c["where"]) == (a.kind, a.where) for c in x["causes"])]
+    if not own:
+        return None
+    return max((float(x["posterior"]) for x in own if x in likely(d)), default=0.0)
+
+
+def advice(d: Diagnosis) -> tuple[str, ...]:
+    """What to do next, the most useful first."""
+    first = [f"tell {place(x.cause.kind, x.cause.where)} from {' and '.join(place(n.kind, n.where) for n, _ in x.others)}: {x.how}" for x in doubts(d)]
+    return (*first, *_of_verdict(d), *_of_holdout(d))
+
+
+def _of_verdict(d: Diagnosis) -> list[str]:
+    if d.verdict == "no_discrepancy":
+        return ["keep the model; before you use it for faster or larger motion, record some"]
+    if d.verdict == "not_identifiable":
+        return ["record again with more in it: larger motion, more frequencies, all sensors of the model file"]
+    if d.verdict == "unexplained":
+        return _where_to_look(d)
+    worse = [name for name, g in d.gain.items() if g.after_rmse > 1.05 * g.before_rmse]  # less may be chance
+    found = [f"do not use model_extended.toml yet: it makes {', '.join(worse)} of the hold-out worse"] if worse else _take_over(d)
+    if d.verdict == "partly_explained":
+        found.append(f"look for the rest: {1.0 - d.explained:.0%} of the avoidable residual has no name; the report shows where and when it is")
+    return found
+
+
+def _take_over(d: Diagnosis) -> list[str]:
+    """Mend what is not the model's, and take over what is."""
+    faults = [c for c in d.causes if c.kind.startswith("sensor_")]
+    channels = [c for c in d.causes if c.kind.startswith("input_")]
+    found = [f"check {', '.join(c.where for c in faults)}: the sensor is at fault, not the model"] if faults else []
+    found += [f"check actuator and channel of {', '.join(c.where for c in channels)}"] if channels else []
+    if len(faults) < len([c for c in d.causes if c.kind != OUTSIDE]):
+        found.append("use model_extended.toml; penode generate makes its C")
+    return found
+
+
+def _where_to_look(d: Diagnosis) -> list[str]:
+    places = d.residual.get("places") or []
+    if not places:
+        return ["compare signals and times of the largest residual in the report with what the plant did then"]
+    shares = ", ".join(f"{p['place']} {p['share']:.0%}" for p in places[:3])
+    return [f"look at {places[0]['place']} first: give it a law in the model file, or train a network there (penode train), and diagnose again; "
+            f"share of the residual that a missing force could make up for: {shares}"]  # fmt: skip
+
+
+def _of_holdout(d: Diagnosis) -> list[str]:
+    if not d.gain:
+        return ["give a recording that was not learnt from with --holdout: without, nothing says what the error costs"]
+    beyond = max(g.outside for g in d.gain.values())
+    return [f"train with motion as large and fast as that of the hold-out: {beyond:.0%} of it is beyond"] if beyond > FARTHER else []

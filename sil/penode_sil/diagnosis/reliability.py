@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""How often causes that were named as surely were right: the table that test/diagnosis/reliability.py --take-over keeps in templates/."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from .result import OUTSIDE, Cause
+
+TABLE = Path(__file__).with_name("templates") / "reliability.json"  # beside the page that states it
+
+
+def reliability(causes: Sequence[Cause], table: Path = TABLE) -> dict[str, Any] | None:
+    """What is known of these causes: its `source`, and the `deciles` of confidence that they are in; None if no table is kept."""
+    if not table.exists():
+        return None
+    kept = json.loads(table.read_text(encoding="utf-8"))
+    own = [c.confidence for c in causes if c.kind != OUTSIDE]
+    deciles = [d for d in kept["deciles"] if any(_in(d, x) for x in own)]
+    return {"source": kept["source"], "cases": kept["cases"], "deciles": deciles}
+
+
+def _in(decile: dict[str, Any], confidence: float) -> bool:
+    top = decile["to"] >= 1.0
+    return bool(decile["from"] <= confidence + 1e-9 and (top or confidence + 1e-9 < decile["to"]))
+
+
+def line(known: dict[str, Any] | None, confidence: float) -> str:
+    """What is known of a confidence, with its source."""
+    if known is None:
+        return "no figure is kept of how often causes named with this confidence are right"
+    found = next((d for d in known["deciles"] if _in(d, confidence)), None)
+    if found is None:
+        return f"no cause was named with this confidence in made-up cases with a known truth ({known['source']})"
+    low, high = (f"{100 * x:.0f}" for x in found["ci95"])
+    surely = f"{100 * found['from']:.0f} to {100 * found['to']:.0f} %"
+    share = f"{found['right']} of {found['named']} were right ({100 * found['right'] / found['named']:.0f} %, 95 % interval {low} to {high} %)"
+    return f"of causes named with {surely} in made-up cases, {share}; source: {known['source']}"
