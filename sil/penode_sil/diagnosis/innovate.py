@@ -26,7 +26,6 @@ MIN_FORM = 0.2  # of what a form gains, which one with more values gains beyond 
 MIN_TAKEN = 0.25  # of the power of the innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
 MIN_BLOCKS = 3  # of the blocks in which it does
 LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
-MAX_CAUSES = 4  # at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +52,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
     blocks = Blocks.of([len(r) // bench.update for r in bench.records])
     bench, base = _based(bench, blocks)
     plain = bench
-    while len(terms) < MAX_CAUSES:
+    while True:
         trials, wide = propose(bench, terms, log)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _large(t, WORTH), -t.gain))
         trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
