@@ -54,11 +54,9 @@ def diagnose(
 
 
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
-    """By innovations where a guess is all that the file has of a parameter, or where more acts than the search by sensor noise explains;
-    by that search else. What innovations explain but in part may have no name at all, if the search has none for it either; and what acts
-    beside several causes of that search may be but the form of one, unless innovations have an answer with fewer. The search ends early
-    where more acts than any one cause explains, and than all that innovations found, but not so much that more causes are to be expected. Where it ends
-    without a name, innovations may have one."""
+    """By innovations where a guess is all that the file has of a parameter, or where more acts than the search by sensor noise explains
+    (`_decides`); by that search else. The search ends early where more acts than any one cause explains, and than all that innovations
+    found, but not so much that more causes are to be expected. Where it ends without a name, innovations may have one."""
     if weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values()):
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
@@ -73,9 +71,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     best = explanations[0] if explanations else None
     if level := weighed.misfit(study, best.fit if best else study.null, case.log):
         w = w or _weighed(case, study)
-        whole = w.verdict != "partly_explained" or best and share(study, best) > ENOUGH
-        simpler = best and w.verdict != "unexplained" and _simpler(w, best)
-        if whole and (level > weighed.UNMODELLED or simpler):
+        if _decides(w, level, study, best, bool(faults)):
             return _by_innovations(case, best, w)
     answer = by_noise(case, study, explanations, faults, bursts)
     if w and w.verdict == "explained" and answer.verdict == "unexplained":
@@ -83,8 +79,19 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     return answer
 
 
+def _decides(w: weighed.Weighed, level: float, study: Study, best: Explanation | None, faulty: bool) -> bool:
+    """Do innovations decide, where more acts beside the `best` explanation than noise, by `level`? Not where they explain but in part and it
+    explains more, nor where a sensor is `faulty` and neither search has a cause: they see samples that are no measurements. Where little
+    acts beside it, they have to explain the same by fewer causes, or by as many and fewer laws: of one swing, many laws explain anything."""
+    if w.verdict == "partly_explained" and not (best and share(study, best) > ENOUGH):
+        return False
+    if w.verdict == "unexplained":
+        return level > weighed.UNMODELLED and (best is not None or not faulty)
+    return level > weighed.UNMODELLED or best is not None and _simpler(w, best)
+
+
 def _simpler(w: weighed.Weighed, best: Explanation) -> bool:
-    """Do innovations explain the same with fewer causes, or with as many and fewer laws?"""
+    """Do innovations explain the same by fewer causes, or by as many and fewer laws?"""
     causes = max(len(w.causes), 1)
     return causes < len(best.groups) or bool(w.causes) and causes == len(best.groups) and w.laws < len(best.terms)
 
