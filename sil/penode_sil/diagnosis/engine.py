@@ -56,7 +56,8 @@ def diagnose(
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
     """By innovations where a guess is all that the file has of a parameter, or where more acts than the search by sensor noise explains
     (`_decides`); by that search else. The search ends early where more acts than any one cause explains, and than all that innovations
-    found, but not so much that more causes are to be expected. Where it ends without a name, innovations may have one."""
+    found, but not so much that more causes are to be expected. Where it ends without a name, innovations may have one: of all that acts, or
+    of a part, where what wanders everywhere is the rest."""
     if weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values()):
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
@@ -74,7 +75,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
         if _decides(w, level, study, best, bool(faults)):
             return _by_innovations(case, best, w)
     answer = by_noise(case, study, explanations, faults, bursts)
-    if w and w.verdict == "explained" and answer.verdict == "unexplained":
+    if w and answer.verdict == "unexplained" and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED):
         return _by_innovations(case, best, w)
     return answer
 

@@ -9,6 +9,7 @@ import numpy as np
 from penode_gen.model import GROUND, Model
 
 from ..plant import Place
+from . import friction
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("asymmetric_damper", "degressive_damper", "quadratic_damper", "damper_fading")
@@ -26,7 +27,7 @@ RIVALS = {
     ("damper_fading", "degressive_damper"): "the same excitation at the start and at the end of one recording, at two amplitudes",
 }
 STRAIGHT = ("asymmetric_damper", "degressive_damper")
-KNEES = (0.3, 1.0)  # of the rms rate
+KNEES = (0.3, 1.0)  # of the rms rate: bends, from where the transition of a friction ends
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
@@ -38,7 +39,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     yield Form(KINDS[0], place.name, "force", index, (Part("rebound_damper", ("damping", "N*s/m")),))
     for share in KNEES:
-        bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1, span=3.0)
+        bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1, span=share / friction.WIDEST)
         yield Form(KINDS[1], place.name, "force", index, (bent,))
     yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2")),))
     time = 0.5 * motion.longest

@@ -22,13 +22,14 @@ RIVALS = {
     ("coulomb_friction", "bouc_wen"): "small strokes besides large ones: before it slides, one is a spring, the other is not",
 }
 ONE = True  # friction at a place is one curve, with a peak or with memory
-EDGES = (0.04, 0.12)  # of the rms rate: transitions of a friction, within a factor of 2; smooth enough for Gauss-Newton, steep enough for any motion
+EDGES, SPAN = (0.04, 0.12), 2.0  # of the rms rate: transitions of a friction, within that factor; smooth enough for Gauss-Newton, steep enough for any motion
+WIDEST = EDGES[-1] * SPAN  # what bends slower is a damper
 PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway
 WAYS = (0.06, 0.25, 0.8)  # of the rms deflection: how far a hysteresis is bent before it slides
 
 
 def coulomb(motion: Motion, edge: float) -> Part:
-    return Part("coulomb_friction", ("force", "N"), {"transition": (edge * motion.v_rms, "m/s")}, 1, span=2.0)
+    return Part("coulomb_friction", ("force", "N"), {"transition": (edge * motion.v_rms, "m/s")}, 1, span=SPAN)
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
