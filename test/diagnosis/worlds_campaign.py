@@ -91,6 +91,7 @@ def parsed() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0, help="index of the first case (0), to go on with a draw")
     parser.add_argument("--seed", type=int, default=None)
     parser.add_argument("--only", help="SEED:INDEX")
     parser.add_argument("--stratum", choices=("main", "halfcar", "drive"), action="append")
@@ -107,7 +108,7 @@ def parsed() -> argparse.Namespace:
 def main() -> int:
     args = parsed()
     seed = secrets.randbelow(10**6) if args.seed is None else args.seed
-    indices = list(range(args.cases))
+    indices = list(range(args.first, args.first + args.cases))
     if args.only:
         seed, index = map(int, args.only.split(":"))
         indices = [index]
