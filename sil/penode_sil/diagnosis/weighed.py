@@ -13,7 +13,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from . import applied, extension, measuring, real
-from .evidence.bench import CORRELATION, FAR, UNSTATED, Bench, build
+from .evidence.bench import UNSTATED, build
 from .evidence.gain import Level
 from .evidence.observer import Record, bias, sample_noise
 from .fit import Fit, Problem
@@ -57,7 +57,7 @@ def supports(model: Model) -> bool:
 
 def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> float:
     """How much more acts than an explanation has, beyond the noise of sensors, as a share of what moves; 0 if that may be chance, infinite
-    if it does not even follow the measurement: its curves hold along its own way alone, and bend away beside it. Beyond
+    if it follows the measurement worse than the model as it is: its curves hold along its own way alone, and bend away beside it. Beyond
     UNMODELLED innovations have to decide; less than that, only a simpler answer of theirs counts."""
     if not supports(study.model) or _is_noise(study, fit):
         return 0.0
@@ -71,21 +71,14 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
         alone = np.array(problem.simulate(e, plain, np.zeros((1, len(plain))))[0][0])
         records.append(replace(Record.of(x), y=np.where(x.good, x.y - fit.simulated[e] + alone, np.nan)))
     noise = sample_noise(records, np.array([s.noise for s in model.sensors]))
-    bench = build(model, study.places, records, noise, study.linear.fastest, study.set_name, study.model)
+    nominal = build(study.model, study.places, records, noise, study.linear.fastest, study.set_name)
+    bench = build(model, study.places, records, noise, study.linear.fastest, study.set_name, nominal)
     still = bench.problem().solve(bench.fit.free, bench.gains(bench.fit).at(Level(0.0, 1.0)), 12)
     gained = bench.fit.likelihood - still.likelihood
-    if _diverges(bench):
-        log("beside it an observer diverges")
+    log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats; it follows better than the nominal model by {bench.fit.likelihood - nominal.fit.likelihood:.0f}")
+    if bench.fit.likelihood < nominal.fit.likelihood - MIN_GAIN * len(nominal.free):
         return np.inf
-    log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats")
     return bench.level.size if gained > MIN_GAIN and bench.level.size > MIN_UNMODELLED else 0.0
-
-
-def _diverges(bench: Bench) -> bool:
-    """Is a model far off where it is corrected by as little as wanders beside causes that are the truth?"""
-    gains = bench.gains(bench.fit, bench.problem().predictor.model)
-    nu = bench.problem().nu(bench.fit.free, np.zeros((1, len(bench.fit.free))), gains.at(Level(MIN_UNMODELLED, CORRELATION * gains.period)))
-    return not float(np.nanmax(np.abs(nu))) < FAR * float(np.nanmax(np.abs(bench.fit.nu)))
 
 
 def _is_noise(study: Study, fit: Fit) -> bool:

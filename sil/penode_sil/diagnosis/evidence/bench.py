@@ -84,8 +84,9 @@ def with_tolerances(model: Model) -> Model:
     return replace(model, parameters=known)
 
 
-def build(model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default", base: Model | None = None) -> Bench:  # fmt: skip
-    """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]; `base`: the nominal one, if it is not."""
+def build(model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default", like: Bench | None = None) -> Bench:  # fmt: skip
+    """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]. `like`: that of the nominal model, where
+    this is another one: gains, updates and forces are of that."""
     wide = augmented(model, places)
     free = [f for f in map(parameter, model.parameters.values()) if f]
     spans = np.array([max(np.nanstd(np.concatenate([r.y[:, j] for r in records])), noise[j]) for j in range(len(noise))])
@@ -96,8 +97,12 @@ def build(model: Model, places: Sequence[Place], records: Sequence[Record], nois
     longest = sum(map(len, records)) * records[0].step
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
     wanders = [n for n in wide.states if n.startswith(WANDER)]
-    bench = Bench(wide, set_name, tuple(places), tuple(records), augmented(base or model, places), (), first, np.ones(len(wanders)), noise, fastest, Level(0.0, 1.0), plain)
-    bench, x = _moved(bench, model, spans)
+    bench = Bench(wide, set_name, tuple(places), tuple(records), like.base if like else augmented(model, places), (), first, np.ones(len(wanders)), noise, fastest, Level(0.0, 1.0), plain)
+    if like:
+        bench = replace(bench, update=like.update, forces=like.forces)
+        x = [np.where(np.abs(s) < np.inf, s, 0.0) for s in _followed(bench)]
+    else:
+        bench, x = _moved(bench, model, spans)
     starts = []
     for e, states in enumerate(x):
         for i, start in enumerate(model.start):
@@ -108,15 +113,11 @@ def build(model: Model, places: Sequence[Place], records: Sequence[Record], nois
 
 def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]]:
     """The bench with the update and the forces that its motion asks for, and the states [n, n_x] that follow the measurement."""
-    names = bench.model.states
     n_q = len(model.bodies)
     x: list[Array] = []
     for again in range(3):
-        predictor = bench.problem().predictor
         scale = bench.forces if again else _guess(bench, model, spans)
-        by = replace(bench.gains(), forces=scale).at(Level(1.0, 2.0 * bench.update * bench.step))
-        moved = predictor.predict((), np.zeros((1, 0)), by, states=names)[2]
-        x = [np.array(m[0]) for m in moved]
+        x = _followed(replace(bench, forces=scale))
         if not n_q:
             rms = np.array([np.sqrt(np.nanmean(np.concatenate([r.y[:, j] for r in bench.records]) ** 2)) for j in range(len(spans))])
             return replace(bench, forces=np.full(len(bench.forces), float(np.max(rms)))), x
@@ -129,6 +130,12 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
         update = int(np.clip(round(period / UPDATES / bench.step), 1, max(len(r) for r in bench.records) // 40 or 1))
         bench = replace(bench, forces=np.maximum(a, 1e-12), update=update)
     return bench, x
+
+
+def _followed(bench: Bench) -> list[Array]:
+    """States [n, n_x] of every recording, corrected as if all that moves wandered."""
+    by = bench.gains().at(Level(1.0, 2.0 * bench.update * bench.step))
+    return [np.array(m[0]) for m in bench.problem().predictor.predict((), np.zeros((1, 0)), by, states=bench.model.states)[2]]
 
 
 def _guess(bench: Bench, model: Model, spans: Array) -> Array:
