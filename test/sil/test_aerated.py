@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import penode_gen
 import pytest
@@ -72,6 +74,17 @@ def test_a_damper_that_has_lost_oil_is_found(tmp_path, gas, show):
     found = real.answer(model, places, experiments, fastest, "default", lambda text: None)
     show([(c.kind, c.where, {k: v.value for k, v in c.parameters.items()}) for c in found.causes])
     assert [(c.kind, c.where) for c in found.causes] == ([("aerated_damper", "spring")] if gas else [])
+
+
+def test_the_command_names_it_too(tmp_path, penode):
+    """Four plays in series with the damper fit this motion better than its law, and follow it worse."""
+    held = tmp_path / "held"
+    held.mkdir()
+    rig(held, 1.5e-3, 6)
+    rig(tmp_path, 1.5e-3, 5)
+    penode("diagnose", tmp_path / "model.toml", "--data", tmp_path / "train.csv", "--holdout", held / "train.csv", "-o", tmp_path / "out")
+    found = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert [(c["kind"], c["where"]) for c in found["causes"]] == [("aerated_damper", "spring")]
 
 
 def test_its_force_along_a_motion_is_that_of_the_law():
