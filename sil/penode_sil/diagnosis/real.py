@@ -38,7 +38,8 @@ RIVAL = 0.1  # posterior from which on an explanation is listed
 @dataclass(frozen=True, eq=False)
 class Answer:
     """Causes, notes on what is small, the sets of explanations that held-out blocks cannot tell apart with their posterior, and where
-    the search ended; the free `run` that fits best, and the share `taken` by it of what the free run of the file's own model leaves."""
+    the search ended; the free `run` that fits best, and the share `taken` of what the file's own model leaves: by it in a free run, or of the power of
+    the innovations, whichever is more, for a free run that drifts shows little else."""
 
     causes: tuple[Cause, ...]
     notes: tuple[str, ...]
@@ -81,7 +82,7 @@ def answer(
     notes += more + remarks
     run = after.problem().solve(after.fit.free, Filter.none(*after.fit.by.gain.shape), 20)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
-    taken = 1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300)))
+    taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken(after.fit, bench.problem().floor))
     return Answer((*wrong, *causes, *biased), tuple(notes), _explanations(named, probabilities), found, run, taken, after.model)
 
 
