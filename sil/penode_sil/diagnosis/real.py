@@ -32,7 +32,8 @@ from .worth import SYSTEMATIC, WORTH, Z_95, least, share, shift
 
 Array = NDArray[np.float64]
 INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
-RIVAL = 0.1  # posterior from which on an explanation is listed
+KNOWN = 0.9  # of causes named in wrong worlds are right: of those left over, the list has none, or what else is wrong is like one (make campaign-worlds)
+RIVAL = 1.0 - KNOWN  # posterior from which on an explanation is listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +143,7 @@ def _explanations(terms: Sequence[Term], names: Sequence[Sequence[tuple[Form, fl
 
 
 def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Named, ...], sure: float) -> Cause:
-    """A term as a cause with sizes and intervals."""
+    """A term as a cause with sizes and intervals; `sure` among the forms of the list."""
     form = term.form
     file = catalogue.OF.get(form.kind, drives)
     own = {t.target for t in term.free}
@@ -183,7 +184,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
             alone = term.free[0].target
             sd = wider * abs(value) * bench.fit.deviation(alone) / max(abs(bench.fit.value(alone)), 1e-300)
         parameters[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
-    return Cause(form.kind, form.where, parameters, min(max(sure, 0.0), 0.99), rivals)
+    return Cause(form.kind, form.where, parameters, KNOWN * min(max(sure, 0.0), 1.0), rivals)
 
 
 def _wider(bench: Bench, term: Term, size: float) -> float:
@@ -226,8 +227,7 @@ def _parameters(model: Model, bench: Bench, moved: Sequence[Motion], shared: Col
             if size < WORTH:
                 notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)}, which changes {size:.1%} of what acts there: as much as anything that the model leaves out might")
                 continue
-            sure = 0.99 if p.tolerance else 0.95
-            causes.append(Cause("wrong_parameter", name, {name: Value(f.value, units.si(p.unit), (low, high))}, sure))
+            causes.append(Cause("wrong_parameter", name, {name: Value(f.value, units.si(p.unit), (low, high))}, KNOWN))
     return causes, notes
 
 
@@ -248,7 +248,7 @@ def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], lis
 
 
 def _constant(kind: str, where: str, name: str, value: float, sd: float, unit: str, alike: tuple[Named, ...] = ()) -> Cause:
-    return Cause(kind, where, {name: Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))}, 0.95, alike)
+    return Cause(kind, where, {name: Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))}, KNOWN, alike)
 
 
 def _load(model: Model, bench: Bench, probe: Probe, sensor: str) -> Cause | None:
