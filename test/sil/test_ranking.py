@@ -9,9 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import engine, innovate
+from penode_sil.diagnosis import engine, innovate, real
 from penode_sil.diagnosis.catalogue import springs
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
+from penode_sil.diagnosis.result import Cause, Value
 
 BASE = np.zeros(4)
 SLIDES, PUSHES = Part("coulomb_friction", ("force", "N")), Part("constant_force", ("force", "N"))
@@ -56,6 +57,13 @@ def test_another_law_of_a_name_goes_before_a_new_name_that_is_hardly_better():
 def test_the_simpler_explanation(causes, laws, groups, terms, simpler):
     weighed = SimpleNamespace(causes=(None,) * causes, laws=laws)
     assert engine._simpler(weighed, SimpleNamespace(groups=(None,) * groups, terms=(None,) * terms)) is simpler
+
+
+@pytest.mark.parametrize("low, high, unsized", [(-1e-5, 3e-4, True), (1e-5, 3e-4, False), (-3e-4, -1e-5, False)])
+def test_a_cause_whose_interval_holds_0_has_no_size(low, high, unsized):
+    gap = Value(0.5 * (low + high), "m", (low, high))
+    assert real._unsized(Cause("backlash", "spring", {"gap": gap}, 0.9)) is unsized
+    assert not real._unsized(Cause("bump_stop", "spring", {"gap": gap, "stiffness": Value(1e4, "N/m", (9e3, 1.1e4))}, 0.9))
 
 
 def test_a_stop_stays_away_from_the_middle():

@@ -72,10 +72,10 @@ def answer(
         size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
         cause = _cause(model, plain, term, size, _rivals(probabilities[k], term), _sure(probabilities[k], term))
         log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")
-        if size >= enough:
+        if size >= enough and not _unsized(cause):
             causes = _merged(causes, cause)
         else:
-            notes.append(_small(term, f"{size:.1%} of what acts there"))
+            notes.append(_small(term, f"{size:.1%} of what acts there" if size < enough else "the interval of its size holds 0"))
     if t := found.small:
         notes.append(_small(found.terms[-1], f"{t.taken:.0%} of the power of prediction errors" if t.taken < MIN_TAKEN else f"{t.share:.1%} of what acts there"))
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
@@ -93,6 +93,11 @@ def _name(t: Term) -> tuple[str, str]:
 
 def _small(t: Term, size: str) -> str:
     return f"{place(*_name(t))} is real but small: {size}; not named, but in model_extended.toml"
+
+
+def _unsized(c: Cause) -> bool:
+    """Does the interval of its one size hold 0?"""
+    return len(c.parameters) == 1 and all(v.ci95[0] <= 0.0 <= v.ci95[1] for v in c.parameters.values())
 
 
 def _merged(causes: list[Cause], new: Cause) -> list[Cause]:
