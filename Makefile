@@ -85,6 +85,7 @@ campaign-worlds: setup ## Wrong worlds: plants that are a few per cent wrong eve
 	$(Q)$(PYTHON) test/diagnosis/worlds_campaign.py --stratum main --stratum halfcar --stratum drive --cases 20 --no-tolerance --jobs $$(nproc) --out build/worlds/bare
 
 ablate: setup ## Which thresholds of the diagnosis decide something, and which go, with every one of them watched: build/ablate/ABLATION.md; hours
+	$(Q)rm -rf build/ablate/notes
 	$(Q)PROBES=build/ablate/notes $(PYTHON) test/diagnosis/campaign.py --seed 20261126 --cases 300 --jobs $$(nproc) --command "$(WATCHED) diagnose" --out build/ablate/draw
 	$(Q)PROBES=build/ablate/notes $(PYTHON) test/diagnosis/worlds_campaign.py --seed 808 --cases 80 --jobs $$(nproc) --command "$(WATCHED) diagnose" --out build/ablate/worlds
 	-$(Q)PROBES=build/ablate/notes $(PYTHON) test/diagnosis/rigs_table.py --rigs $(RIGS_DIR) --command "$(WATCHED)" --page build/ablate/RIGS.md

@@ -101,7 +101,7 @@ def test_taken_over_and_told(tmp_path, monkeypatch):
     known = told.reliability([Cause("coulomb_friction", "damper", {}, 0.99)], reliability.TABLE)
     low, high = (f"{100 * x:.0f}" for x in stats.binomtest(39, 40).proportion_ci(method="wilson"))
     assert told.line(known, 0.99) == (
-        f"of causes named with 90 to 100 % in made-up cases, 39 of 40 were right (98 %, 95 % interval {low} to {high} %); "
+        f"of causes named with 90 to 100 % confidence in simulated cases, 39 of 40 were right (98 %, 95 % interval {low} to {high} %); "
         "source: 40 cases of seed 7 and 10 of seed 7, commit abc"
     )
     assert [d["from"] for d in known["deciles"]] == [0.9]
@@ -114,7 +114,7 @@ def test_taken_over_and_told(tmp_path, monkeypatch):
 
 def test_without_a_table_that_is_said(tmp_path):
     assert told.reliability([], tmp_path / "none.json") is None
-    assert told.line(None, 0.9) == "no figure is kept of how often causes named with this confidence are right"
+    assert told.line(None, 0.9) == "how often causes named with this confidence are right is not recorded"
 
 
 def test_kept_table_is_sound():

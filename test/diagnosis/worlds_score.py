@@ -105,7 +105,7 @@ def score(truth: Mapping, diagnosis: Mapping | None, nominal: Mapping[str, float
 
 def small(notes: Sequence[str]) -> list[str]:
     """Kinds that a diagnosis reports as real but small, and keeps in its extended model."""
-    return [n.split(" at ")[0].lower().replace(" ", "_") for n in notes if "is real but small" in n and "not named, but in model_extended.toml" in n]
+    return [n.split(" at ")[0].lower().replace(" ", "_") for n in notes if "; not named, but in model_extended.toml" in n]
 
 
 def added_laws(nominal: str, extended: str, kinds: Sequence[str]) -> tuple[int, int]:

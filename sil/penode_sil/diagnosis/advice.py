@@ -47,7 +47,7 @@ def doubts(d: Diagnosis) -> list[Doubt]:
 
 
 def _posterior(d: Diagnosis, a: Named) -> float | None:
-    """Of the likeliest set that has it, 0 if the others hold 95 %; None where no set does, for none of the data can tell it."""
+    """Posterior of the likeliest set that contains it; 0 if the other sets hold 95 %; None if no set contains it, because no data here can tell."""
     own = [x for x in d.explanations if any((c["kind"], c["where"]) == (a.kind, a.where) for c in x["causes"])]
     if not own:
         return None
@@ -64,13 +64,13 @@ def _of_verdict(d: Diagnosis) -> list[str]:
     if d.verdict == "no_discrepancy":
         return ["keep the model; before you use it for faster or larger motion, record some"]
     if d.verdict == "not_identifiable":
-        return ["record again with more in it: larger motion, more frequencies, all sensors of the model file"]
+        return ["record again with more excitation: larger motion, more frequencies, all sensors of the model file"]
     if d.verdict == "unexplained":
         return _where_to_look(d)
     worse = [name for name, g in d.gain.items() if g.after_rmse > 1.05 * g.before_rmse]  # less may be chance
-    found = [f"do not use model_extended.toml yet: it makes {', '.join(worse)} of the hold-out worse"] if worse else _take_over(d)
+    found = [f"do not use model_extended.toml yet: on the hold-out its error of {', '.join(worse)} is larger than that of the model as it is"] if worse else _take_over(d)
     if d.verdict == "partly_explained":
-        found.append(f"look for the rest: {1.0 - d.explained:.0%} of the avoidable residual has no name; the report shows where and when it is")
+        found.append(f"look for the rest: {1.0 - d.explained:.0%} of the avoidable residual is unexplained; the report shows where and when it occurs")
     return found
 
 
@@ -96,6 +96,6 @@ def _where_to_look(d: Diagnosis) -> list[str]:
 
 def _of_holdout(d: Diagnosis) -> list[str]:
     if not d.gain:
-        return ["give a recording that was not learnt from with --holdout: without, nothing says what the error costs"]
+        return ["hold out a recording with --holdout: without one, nothing shows how far the model errs on new data"]
     beyond = max(g.outside for g in d.gain.values())
-    return [f"train with motion as large and fast as that of the hold-out: {beyond:.0%} of it is beyond"] if beyond > FARTHER else []
+    return [f"train on motion as large and fast as that of the hold-out: {beyond:.0%} of its samples go beyond the training"] if beyond > FARTHER else []

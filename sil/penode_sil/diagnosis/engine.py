@@ -54,10 +54,9 @@ def diagnose(
 
 
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
-    """By innovations where a guess is all that the file has of a parameter, or where more acts than the search by sensor noise explains
-    (`_decides`); by that search else. The search ends early where more acts than any one cause explains, and than all that innovations
-    found, but not so much that more causes are to be expected. Where it ends without a name, innovations may have one: of all that acts, or
-    of a part, where what wanders everywhere is the rest."""
+    """Innovations decide where the file only guesses a parameter, or where more acts than the search by sensor noise explains (`_decides`);
+    else that search does. It ends early where more acts than any single cause explains and innovations explain it all, unless so much is left
+    that more causes are to be expected. Where it finds no name, innovations may: for everything, or for a part if the rest wanders everywhere."""
     if weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values()):
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
@@ -81,9 +80,10 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
 
 
 def _decides(w: weighed.Weighed, level: float, study: Study, best: Explanation | None, faulty: bool) -> bool:
-    """Do innovations decide, where more acts beside the `best` explanation than noise, by `level`? Not where they explain but in part and it
-    explains more, nor where a sensor is `faulty` and neither search has a cause: they see samples that are no measurements. Where little
-    acts beside it, they have to explain the same by fewer causes, or by as many and fewer laws: of one swing, many laws explain anything."""
+    """Do innovations decide, where `level` acts beside the `best` explanation? Not where they explain only a part, unless `best` explains
+    enough: `_answer` may still take that part. Nor where a sensor is `faulty` and neither search has a cause: they would judge samples that
+    are no measurements. Where `level` is small, they decide only with fewer causes, or as many with fewer laws: many laws together fit any
+    single swing."""
     if w.verdict == "partly_explained" and not (best and share(study, best) > ENOUGH):
         return False
     if w.verdict == "unexplained":

@@ -20,7 +20,7 @@ from .terms import Term, Trial
 from .worth import WORTH, Z_95, least
 
 Array = NDArray[np.float64]
-SCORED = 4  # of which so many have to predict blocks
+SCORED = 4  # of the promising trials, how many are scored on held-out blocks
 MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
 MIN_FORM = 0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
 MIN_TAKEN = 0.25  # of the power of the innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
@@ -59,7 +59,8 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         better = [t.blocks - base for t in trials]
         for t, b in zip(trials, better):
             log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
-        good = [t for t, b in zip(trials, better) if _accepted(t, b) and not any(_is_enough(part, t) for part in trials)]
+        good = [t for t, b in zip(trials, better) if _accepted(t, b)]
+        good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
         good = [t for t in good if _large(t, WORTH)] or good
         rounds.append(tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks)))))
         if not good:
@@ -97,7 +98,7 @@ def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
 
 def _simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Trial:
     """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
-    them by MIN_FORM of what it gains. So much more also has a new name to gain than another law of one that is there."""
+    them by MIN_FORM of what it gains. A new name, too, has to gain that much more than another law of a name already accepted."""
     enough = max(MIN_GAIN, MIN_FORM * float(np.sum(trials[0].blocks - base)))
     named = {(t.form.kind, t.form.where) for t in terms}
     best = next((t for t in trials if (t.form.kind, t.form.where) in named and np.sum(trials[0].blocks - t.blocks) <= enough), trials[0])

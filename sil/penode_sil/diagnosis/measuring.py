@@ -96,7 +96,7 @@ BLOCKS = 40  # of the held-out samples, drawn anew together: errors near in time
 
 def achieved(before: Array, after: Array, floor: float) -> tuple[float | None, tuple[float, float] | None]:
     """Share of the achievable gain in RMS [errors before and after, n each], and its 95 % interval by a block bootstrap; None
-    where there is next to nothing to gain."""
+    where there is next to nothing to gain. All of it where less is left than the stated noise: that is then less than stated."""
     power = np.array([[np.mean(b**2) for b in np.array_split(x, min(BLOCKS, len(x)))] for x in (before, after)])
     draws = np.random.default_rng(0).integers(power.shape[1], size=(DRAWS, power.shape[1]))
     b, a = np.sqrt(power[:, draws].mean(axis=2))
@@ -104,8 +104,8 @@ def achieved(before: Array, after: Array, floor: float) -> tuple[float | None, t
     if not room > 0.05 * floor:
         return None, None
     shares = (b - a) / np.maximum(b - floor, 0.01 * floor)
-    low, high = np.quantile(shares, (0.025, 0.975))
-    return (rms(before) - rms(after)) / room, (float(low), float(high))
+    low, high = np.minimum(np.quantile(shares, (0.025, 0.975)), 1.0)
+    return min((rms(before) - rms(after)) / room, 1.0), (float(low), float(high))
 
 
 def followed(model: Model, e: Experiment, start: Array, study: Study) -> Array:

@@ -32,8 +32,8 @@ from .worth import SYSTEMATIC, WORTH, Z_95, least, share, shift
 
 Array = NDArray[np.float64]
 INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
-KNOWN = 0.9  # of causes named in wrong worlds are right: of those left over, the list has none, or what else is wrong is like one (make campaign-worlds)
-RIVAL = 1.0 - KNOWN  # posterior from which on an explanation is listed
+RIGHT = 0.9  # share of the causes named in wrong worlds that are right (make campaign-worlds); others stand for what is not in the catalogue, or look like it
+RIVAL = (1.0 - RIGHT) / RIGHT  # posterior, RIGHT of which is as much as what is not in the catalogue has: from there on an explanation is listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +75,11 @@ def answer(
         if size >= enough and not _unsized(cause):
             causes = _merged(causes, cause)
         else:
-            notes.append(_small(term, f"{size:.1%} of what acts there" if size < enough else "the interval of its size holds 0"))
+            found_small = f"is real but small: {size:.1%} of what acts there"
+            notes.append(_kept(term, found_small if size < enough else "may be nothing: the 95 % interval of its size holds that"))
     if t := found.small:
-        notes.append(_small(found.terms[-1], f"{t.taken:.0%} of the power of prediction errors" if t.taken < MIN_TAKEN else f"{t.share:.1%} of what acts there"))
+        size_of = f"{t.taken:.0%} of the power of prediction errors" if t.taken < MIN_TAKEN else f"{t.share:.1%} of what acts there"
+        notes.append(_kept(found.terms[-1], f"is real but small: {size_of}"))
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
     biased, remarks = _offsets(model, plain, probe)
     notes += more + remarks
@@ -91,13 +93,15 @@ def _name(t: Term) -> tuple[str, str]:
     return t.form.kind, t.form.where
 
 
-def _small(t: Term, size: str) -> str:
-    return f"{place(*_name(t))} is real but small: {size}; not named, but in model_extended.toml"
+def _kept(t: Term, why: str) -> str:
+    """A note on a term without a name."""
+    return f"{place(*_name(t))} {why}; not named, but in model_extended.toml"
 
 
 def _unsized(c: Cause) -> bool:
-    """Does the interval of its one size hold 0?"""
-    return len(c.parameters) == 1 and all(v.ci95[0] <= 0.0 <= v.ci95[1] for v in c.parameters.values())
+    """Does the interval of its one size hold what the model has without it?"""
+    nothing = {"scale": 1.0, "gain": 1.0}
+    return len(c.parameters) == 1 and all(v.ci95[0] <= nothing.get(name, 0.0) <= v.ci95[1] for name, v in c.parameters.items())
 
 
 def _merged(causes: list[Cause], new: Cause) -> list[Cause]:
@@ -134,21 +138,23 @@ def _sure(names: Sequence[tuple[Form, float]], term: Term) -> float:
 
 
 def _explanations(terms: Sequence[Term], names: Sequence[Sequence[tuple[Form, float]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
-    """Sets of causes with their posterior: the one found, and it with one cause exchanged for a rival."""
+    """Sets of causes with their posterior: the one found, and it with one cause exchanged for a rival; what is not in the catalogue has the rest."""
     own = tuple(dict.fromkeys(Named(t.form.kind, t.form.where) for t in terms))
     if not own:
         return ()
-    sets = [(own, float(np.prod([_sure(n, t) for n, t in zip(names, terms)])))]
+    sure = [_sure(n, t) for n, t in zip(names, terms)]
+    sets = [(own, RIGHT * float(np.prod(sure)))]
     for k, (options, term) in enumerate(zip(names, terms)):
+        others = RIGHT * float(np.prod(sure[:k] + sure[k + 1 :]))
         for r in _rivals(options, term):
             p = next(p for f, p in options if (f.kind, f.where) == (r.kind, r.where))
             here = Named(term.form.kind, term.form.where)
-            sets.append((tuple(r if n == here else n for n in own), p))
+            sets.append((tuple(r if n == here else n for n in own), others * p))
     return tuple(sets)
 
 
 def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Named, ...], sure: float) -> Cause:
-    """A term as a cause with sizes and intervals; `sure` among the forms of the list."""
+    """A term as a cause with sizes and intervals; `sure`: posterior of its name among the forms of the catalogue."""
     form = term.form
     file = catalogue.OF.get(form.kind, drives)
     own = {t.target for t in term.free}
@@ -189,7 +195,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
             alone = term.free[0].target
             sd = wider * abs(value) * bench.fit.deviation(alone) / max(abs(bench.fit.value(alone)), 1e-300)
         parameters[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
-    return Cause(form.kind, form.where, parameters, KNOWN * min(max(sure, 0.0), 1.0), rivals)
+    return Cause(form.kind, form.where, parameters, RIGHT * min(max(sure, 0.0), 1.0), rivals)
 
 
 def _wider(bench: Bench, term: Term, size: float) -> float:
@@ -232,7 +238,7 @@ def _parameters(model: Model, bench: Bench, moved: Sequence[Motion], shared: Col
             if size < WORTH:
                 notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)}, which changes {size:.1%} of what acts there: as much as anything that the model leaves out might")
                 continue
-            causes.append(Cause("wrong_parameter", name, {name: Value(f.value, units.si(p.unit), (low, high))}, KNOWN))
+            causes.append(Cause("wrong_parameter", name, {name: Value(f.value, units.si(p.unit), (low, high))}, RIGHT))
     return causes, notes
 
 
@@ -253,7 +259,7 @@ def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], lis
 
 
 def _constant(kind: str, where: str, name: str, value: float, sd: float, unit: str, alike: tuple[Named, ...] = ()) -> Cause:
-    return Cause(kind, where, {name: Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))}, KNOWN, alike)
+    return Cause(kind, where, {name: Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))}, RIGHT, alike)
 
 
 def _load(model: Model, bench: Bench, probe: Probe, sensor: str) -> Cause | None:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""How often causes that were named as surely were right: the table that test/diagnosis/reliability.py --take-over keeps in templates/."""
+"""How often causes named with the same confidence were right: the table that test/diagnosis/reliability.py --take-over keeps in templates/."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def _in(decile: dict[str, Any], confidence: float) -> bool:
 def line(known: dict[str, Any] | None, confidence: float) -> str:
     """What is known of a confidence, with its source."""
     if known is None:
-        return "no figure is kept of how often causes named with this confidence are right"
+        return "how often causes named with this confidence are right is not recorded"
     found = next((d for d in known["deciles"] if _in(d, confidence)), None)
     if found is None:
-        return f"no cause was named with this confidence in made-up cases with a known truth ({known['source']})"
+        return f"no cause was named with this confidence in simulated cases ({known['source']})"
     low, high = (f"{100 * x:.0f}" for x in found["ci95"])
-    surely = f"{100 * found['from']:.0f} to {100 * found['to']:.0f} %"
+    band = f"{100 * found['from']:.0f} to {100 * found['to']:.0f} %"
     share = f"{found['right']} of {found['named']} were right ({100 * found['right'] / found['named']:.0f} %, 95 % interval {low} to {high} %)"
-    return f"of causes named with {surely} in made-up cases, {share}; source: {known['source']}"
+    return f"of causes named with {band} confidence in simulated cases, {share}; source: {known['source']}"

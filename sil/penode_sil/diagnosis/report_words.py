@@ -70,7 +70,7 @@ def headline(d: Diagnosis) -> str:
             verb = "explain" if len(named) > 1 else "explains"
             what = "what the model gets wrong" if d.verdict == "explained" else "a part of what the model gets wrong"
             text = joined([place(c.kind, c.where) for c in named])
-            doubt = ", or what the recordings do not tell from it" if doubts(d) else ""
+            doubt = "; the recordings do not rule out others" if doubts(d) else ""
             return f"{text[0].upper()}{text[1:]} {verb} {what}{doubt}."
         case "not_identifiable":
             return "These recordings cannot tell what is wrong."

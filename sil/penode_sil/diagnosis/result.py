@@ -126,7 +126,7 @@ def plain(name: str) -> str:
 
 def sigmas(evidence: float) -> str:
     """A number of standard deviations; beyond a thousand, how many says nothing."""
-    return f"{evidence:.0f}" if evidence < 1000.0 else "> 1000"
+    return f"{evidence:.0f}" if evidence < 1000.0 else "more than 1000"
 
 
 def place(kind: str, where: str) -> str:

@@ -45,7 +45,7 @@ class Weighed:
     gain: dict[str, Gain]
     held: list[Channel]
     fit: Fit
-    explained: float  # share of the power that the nominal model leaves in training
+    explained: float  # share taken of the residual in a free run, or of the power of the innovations, whichever is larger
     level: float  # of what moves wanders beside all that was found
     laws: int  # of all causes named
 
@@ -127,12 +127,13 @@ def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ..
     off = [c for c in causes if c.kind == "wrong_parameter" and model.parameters[c.where].tolerance <= 1.0]
     if len(off) < 2:
         return causes, []
-    names = ", ".join(c.where for c in off)
     if gain := _gain(model, off):
+        names = ", ".join(c.where for c in off)
         return (gain, *(c for c in causes if c not in off)), [f"{names} by one factor do the same; model_extended.toml has it so"]
-    if sum(model.parameters[c.where].tolerance > 0.0 for c in off) < 2:
+    stated = [c.where for c in off if model.parameters[c.where].tolerance > 0.0]
+    if len(stated) < 2:
         return causes, []
-    return (), [f"{names} would all have to be outside of their tolerances: another plant, or dynamics that the model does not have"]
+    return (), [f"{', '.join(stated)} would all have to be outside of their tolerances: another plant, or dynamics that the model does not have"]
 
 
 def _gain(model: Model, off: Sequence[Cause]) -> Cause | None:

@@ -7,7 +7,7 @@ What each threshold of the diagnosis decides: which of them go, and what each of
     ablate.py off NAME NOTES [NOTES...] --draw SEED:INDEX... --worlds SEED:INDEX...    those cases again with NAME switched off: won and lost
 
 A threshold is switched off by giving each of its comparisons the outcome that it has most often. Where all of its comparisons come out
-the same in all cases, it decides nothing, and is removed. Else only the cases in which one of them came out otherwise are run again.
+the same in all cases, it decides nothing, and can be removed. Else only the cases in which one of them came out otherwise are run again.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ def read(folders: Iterable[Path]) -> Seen:
     seen: Seen = {}
     for line in (line for folder in folders for file in sorted(folder.glob("*.jsonl")) for line in file.read_text().splitlines()):
         entry = json.loads(line)
-        seen[entry["case"]] = {place: (held > 0, failed > 0) for place, (held, failed) in entry["seen"].items()}
+        places = seen.setdefault(entry["case"], {})
+        for place, (held, failed) in entry["seen"].items():
+            before = places.get(place, (False, False))
+            places[place] = before[0] or held > 0, before[1] or failed > 0
     return seen
 
 

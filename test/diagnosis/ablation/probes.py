@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 """
-`penode`, with every named number of the diagnosis replaced by one that notes how each comparison with it comes out.
+`penode`, with every scalar constant of the diagnosis that is a literal replaced by one that notes how each comparison with it comes out.
 
     PROBES=FOLDER probes.py diagnose MODEL.toml --data REC... -o DIR
 
@@ -155,7 +155,7 @@ def main() -> None:
 
         penode()
     finally:
-        if "PROBES" in os.environ:
+        if "PROBES" in os.environ and SEEN:
             folder = Path(os.environ["PROBES"])
             folder.mkdir(parents=True, exist_ok=True)
             case = next((Path(a).resolve().parent.name for a in sys.argv if a.endswith(".toml")), "")

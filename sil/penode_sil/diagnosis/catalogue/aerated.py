@@ -14,8 +14,8 @@ MEANING = {
     "aerated_damper": "A damper that has lost oil: after each reversal it has no force until the gas in it is pressed together.",
 }
 RIVALS = {
-    ("aerated_damper", "backlash"): "small strokes at low and at high frequency: with gas more force is lost at high ones, with a play it is not",
-    ("aerated_damper", "maxwell_bushing"): "several amplitudes at one frequency: with gas less of the force is lost at large ones, with rubber it is not",
+    ("aerated_damper", "backlash"): "small strokes at low and at high frequency: gas loses more of the force at high frequency, a play does not",
+    ("aerated_damper", "maxwell_bushing"): "several amplitudes at one frequency: gas loses a smaller share of the force at large amplitudes, rubber the same share",
 }
 STRAIGHT = KINDS
 POCKETS = (0.1, 0.3, 0.8)  # of the rms deflection

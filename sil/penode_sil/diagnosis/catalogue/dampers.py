@@ -21,13 +21,13 @@ MEANING = {
 }
 RIVALS = {
     ("degressive_damper", "quadratic_damper"): "rates over more than a decade",
-    ("degressive_damper", "wrong_parameter"): "one excitation at two amplitudes: lower damping scales, a bend does not",
-    ("quadratic_damper", "wrong_parameter"): "one excitation at two amplitudes: other damping scales, a bend does not",
+    ("degressive_damper", "wrong_parameter"): "one excitation at two amplitudes: with other damping the force scales with the amplitude, with a bent curve it does not",
+    ("quadratic_damper", "wrong_parameter"): "one excitation at two amplitudes: with other damping the force scales with the amplitude, with a bent curve it does not",
     ("damper_fading", "wrong_parameter"): "the same excitation at the start and at the end of one long recording",
     ("damper_fading", "degressive_damper"): "the same excitation at the start and at the end of one recording, at two amplitudes",
 }
 STRAIGHT = ("asymmetric_damper", "degressive_damper")
-KNEES = (0.3, 1.0)  # of the rms rate: bends, from where the transition of a friction ends
+KNEES = (0.3, 1.0)  # of the rms rate; fitted down to friction.WIDEST, where the transition of a friction ends
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:

@@ -21,7 +21,7 @@ MEANING = {
 RIVALS = {
     ("sensor_scale", "wrong_parameter"): "record acceleration and deflection of other parts too, or weigh a body",
     ("sensor_delay", "sensor_scale"): "excitation up to higher frequencies: a delay turns the phase, a scale does not",
-    ("input_gain", "wrong_parameter"): "weigh a body, or measure the force of the actuator: motion alone shows forces over masses only",
+    ("input_gain", "wrong_parameter"): "weigh a body, or measure the force of the actuator: motion alone shows only ratios of force to mass",
 }
 
 

@@ -19,7 +19,7 @@ MEANING = {
 }
 RIVALS = {
     ("coulomb_friction", "stribeck_friction"): "slow motion with many reversals, and fast motion too: the lowest rates tell",
-    ("coulomb_friction", "bouc_wen"): "small strokes besides large ones: before it slides, one is a spring, the other is not",
+    ("coulomb_friction", "bouc_wen"): "small strokes as well as large ones: before it slides, a Bouc-Wen element acts as a spring, Coulomb friction does not",
 }
 ONE = True  # friction at a place is one curve, with a peak or with memory
 EDGES, SPAN = (0.04, 0.12), 2.0  # of the rms rate: transitions of a friction, within that factor; smooth enough for Gauss-Newton, steep enough for any motion

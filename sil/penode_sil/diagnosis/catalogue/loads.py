@@ -15,7 +15,7 @@ MEANING = {
 }
 RIVALS = {
     ("constant_force", "sensor_bias"): "put the load on or take it off during the recording: only that transient tells them apart",
-    ("constant_force", "input_offset"): "switch the actuator off: a load stays",
+    ("constant_force", "input_offset"): "switch the actuator off: a load remains, an offset of the input does not",
 }
 
 

@@ -20,7 +20,7 @@ RIVALS = {
 }
 STRAIGHT = ("asymmetric_spring",)
 GAPS = (0.5, 0.75)  # of what the deflection reaches
-NEAREST = 3.3  # times nearer, to 0.15 of the reach: a spring that begins nearer to the middle is one with play
+SPAN = 3.3  # a gap starts at 0.5 of the reach and is fitted down to 0.15: below that it is a spring with play
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
@@ -32,9 +32,9 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     yield Form(KINDS[1], place.name, "force", index, (Part("asymmetric_spring", ("stiffness", "N/m")),))
     for share in GAPS:
         gap = {"gap": (share * motion.s_reach, "m")}
-        yield Form(KINDS[2], place.name, "force", index, (Part("stiffness*(max(s - gap, 0) + min(s + gap, 0))", ("stiffness", "N/m"), gap, 1, span=NEAREST),))
-        yield Form(KINDS[2], place.name, "force", index, (Part("bump_stop", ("stiffness", "N/m"), gap, 1, span=NEAREST),), "one side")
-        yield Form(KINDS[2], place.name, "force", index, (Part("rebound_stop", ("stiffness", "N/m"), gap, 1, span=NEAREST),), "the other side")
+        yield Form(KINDS[2], place.name, "force", index, (Part("stiffness*(max(s - gap, 0) + min(s + gap, 0))", ("stiffness", "N/m"), gap, 1, span=SPAN),))
+        yield Form(KINDS[2], place.name, "force", index, (Part("bump_stop", ("stiffness", "N/m"), gap, 1, span=SPAN),), "one side")
+        yield Form(KINDS[2], place.name, "force", index, (Part("rebound_stop", ("stiffness", "N/m"), gap, 1, span=SPAN),), "the other side")
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

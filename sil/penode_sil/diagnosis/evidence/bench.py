@@ -21,7 +21,7 @@ from .prior import SHARE, Stated
 Array = NDArray[np.float64]
 UPDATES = 16  # a period of the motion
 UNSTATED = 0.05  # tolerance of a parameter for which the file has none: one that is farther off is worth a name
-FAR = 1e3  # times what a file has of a parameter, or what is expected of a motion: nothing is as far off
+FAR = 1e3  # factor off the file's value, or off the expected motion, beyond which nothing is believed
 SIZES = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3)  # of what wanders, relative to what moves: levels that are tried
 CORRELATION = 0.5  # updates for which it stays: about white. One that stays longer winds up against a friction that sticks
 AGAIN = 6  # iterations with another level
@@ -85,8 +85,8 @@ def with_tolerances(model: Model) -> Model:
 
 
 def build(model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default", like: Bench | None = None) -> Bench:  # fmt: skip
-    """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]. `like`: that of the nominal model, where
-    this is another one: gains, updates and forces are of that."""
+    """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]. `like`: the bench of
+    the nominal model if `model` is another one; base, updates and forces are taken from it."""
     wide = augmented(model, places)
     free = [f for f in map(parameter, model.parameters.values()) if f]
     spans = np.array([max(np.nanstd(np.concatenate([r.y[:, j] for r in records])), noise[j]) for j in range(len(noise))])
