@@ -88,6 +88,8 @@ def test_only_cases_that_a_threshold_decides_are_run_without_it(tmp_path, monkey
         return {case: off is None for case in cases}
 
     monkeypatch.setattr(ablate, "run", run)
+    assert ablate.switched_off("a.ONCE", ablate.read([notes]), {"worlds_campaign.py": ["1:1"]}).startswith("a.ONCE off: 0 cases")  # another draw
+    calls.clear()
     said = ablate.switched_off("a.ONCE", ablate.read([notes]), {"campaign.py": ["1:0", "1:1", "1:2"]})
     assert said == "a.ONCE off: 1 cases run, won none; lost 1:1"
     assert calls == [("campaign.py", ["1:1"], None), ("campaign.py", ["1:1"], {"a.ONCE @ a.py:2": True})]

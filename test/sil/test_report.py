@@ -332,7 +332,10 @@ def test_summary_fits_one_screen(model, found, tmp_path):
     assert "61.3 N" in text and "[59.8, 62.9]" in text and "Stribeck friction at damper" in text and "0.0203" in text
 
 
-def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path):
+def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path, monkeypatch):
+    table = {"source": "100 cases of seed 7", "cases": 100, "deciles": [{"from": 0.9, "to": 1.0, "named": 60, "right": 51, "ci95": [0.74, 0.92]}]}
+    (tmp_path / "table.json").write_text(json.dumps(table))
+    monkeypatch.setattr(reliability, "TABLE", tmp_path / "table.json")
     (tmp_path / "car.toml").write_text(MODEL)
     z = road(21)
     files = [
@@ -354,7 +357,7 @@ def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path):
     assert done.exit_code == 0 and done.stderr == ""
     written = json.loads((tmp_path / "d" / "diagnosis.json").read_text())
     assert json.loads(done.stdout) == written and written["causes"][0]["kind"] == "coulomb_friction"
-    assert written["advice"] and written["reliability"] == json.loads(json.dumps(reliability.reliability([result.Cause("", "", {}, written["causes"][0]["confidence"])])))
+    assert written["advice"] and written["reliability"] == table
     assert {"verdict", "causes", "gain", "numerics", "residual", "data"} <= set(written) and "shown" not in written
     text = (tmp_path / "d" / "report.html").read_text(encoding="utf-8")
     tree = Tree(text)

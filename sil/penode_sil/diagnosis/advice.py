@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from .by_noise import FARTHER
 from .catalogue import separating
+from .reliability import reliability
 from .result import OUTSIDE, Cause, Diagnosis, Named, place
 
 
@@ -52,6 +53,13 @@ def _posterior(d: Diagnosis, a: Named) -> float | None:
     if not own:
         return None
     return max((float(x["posterior"]) for x in own if x in likely(d)), default=0.0)
+
+
+def advised(d: Diagnosis) -> Diagnosis:
+    """A diagnosis with what follows from it: what would tell its causes from others, how often such causes are right, what to do next."""
+    causes = tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives])) for c in d.causes)
+    d = replace(d, causes=causes)
+    return replace(d, reliability=reliability(causes), advice=advice(d))
 
 
 def advice(d: Diagnosis) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,6 @@ from penode_gen.model import Model
 
 from ..measured import Measured
 from . import explanation, extension, numerics, plausible, residual, weighed
-from .catalogue import separating
 from .result import OUTSIDE, Cause, Diagnosis, Recorded
 from .explanation import Explanation
 
@@ -63,6 +61,6 @@ def by_innovations(
     doubt = plausible.doubt(study, best, w.verdict) if w.verdict == "unexplained" else ""
     causes = w.causes or ((Cause(OUTSIDE, "", {}, 0.5),) if w.verdict == "unexplained" else ())
     return Diagnosis(
-        w.verdict, tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives])) for c in causes), w.gain, numbers, w.explained, evidence, 0.0,
+        w.verdict, causes, w.gain, numbers, w.explained, evidence, 0.0,
         (*[doubt] * bool(doubt), *remarks, *w.notes), residual=shown.numbers(), explanations=w.explanations, shown=shown,
     )  # fmt: skip

@@ -20,7 +20,6 @@ from ..measured import Measured
 from . import absorb, echo, explaining, extension, measuring, nameless, noise, numerics, plant, plausible, refining, residual, steady, tones
 from .answers import alternatives, write_extended
 from .broken import broken_sensors, still_wild
-from .catalogue import separating
 from .explanation import Explanation
 from .hypotheses import CLOCK
 from .judging import cause, damped, judge, pitching, resized, worth
@@ -90,11 +89,10 @@ def by_noise(case: Case, study: Study, explanations: Sequence[Explanation], faul
     case.tell(0.9, "showing what is wrong")
     whole = judged.named is not None and (judged.named is judged.unnamed or best is not None and bool(judged.causes))
     shown = residual.show(study, judged.named.fit if whole else None, extended if whole else None, held, judged.verdict == "unexplained")
-    causes = tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives])) for c in judged.causes)
     return Diagnosis(
-        judged.verdict, causes, gain, judged.numbers, judged.explained, judged.evidence, judged.alike,
+        judged.verdict, judged.causes, gain, judged.numbers, judged.explained, judged.evidence, judged.alike,
         tuple([judged.doubt] * bool(judged.doubt)) + judged.notes, residual=shown.numbers(), absorbed=absorbed,
-        explanations=alternatives(causes), shown=shown,
+        explanations=alternatives(judged.causes), shown=shown,
     )  # fmt: skip
 
 

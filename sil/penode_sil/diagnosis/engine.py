@@ -16,6 +16,7 @@ from penode_gen.model import Model
 from ..errors import UserError
 from ..measured import Measured, with_shared_rails
 from . import dropouts, plausible, search, weighed
+from .advice import advised
 from .answers import by_innovations, recorded
 from .broken import broken_sensors
 from .by_noise import SEARCH, Case, by_noise
@@ -50,7 +51,7 @@ def diagnose(
         raise UserError(*problems)
     case = Case(model, train, holdout, unused, remarks, output, log, tell)
     answer = _answer(case, *unburst(widened, experiments, set_name))
-    return replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started)
+    return advised(replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started))
 
 
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:

@@ -16,9 +16,7 @@ import penode_gen
 from ..errors import UserError, hint
 from ..measured import load
 from . import report
-from .advice import advice
 from .engine import diagnose
-from .reliability import reliability
 from .result import Diagnosis
 from .still import with_noise_at_rest
 
@@ -56,7 +54,6 @@ def run(
     model = with_noise_at_rest(model, job.still, job.channels, train)
     with all_or_none(job.output):
         found = diagnose(model, train, held, job.output, job.set_name, log, tell)
-        found = replace(found, reliability=reliability(found.causes), advice=advice(found))
         report.write(job.output / "report.html", model, found, job.output / "model_extended.toml")
         found = replace(found, compile_seconds=compilers() - compiled)
         (job.output / "diagnosis.json").write_text(json.dumps(found.as_json(), indent=2) + "\n", encoding="utf-8")

@@ -99,14 +99,17 @@ def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
 def _simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Trial:
     """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
     them by MIN_FORM of what it gains. A new name, too, has to gain that much more than another law of a name already accepted."""
-    enough = max(MIN_GAIN, MIN_FORM * float(np.sum(trials[0].blocks - base)))
+
+    def more_than(other: Trial) -> float:
+        return max(MIN_GAIN, MIN_FORM * float(np.sum(other.blocks - base)))
+
     named = {(t.form.kind, t.form.where) for t in terms}
-    best = next((t for t in trials if (t.form.kind, t.form.where) in named and np.sum(trials[0].blocks - t.blocks) <= enough), trials[0])
+    best = next((t for t in trials if (t.form.kind, t.form.where) in named and np.sum(trials[0].blocks - t.blocks) <= more_than(trials[0])), trials[0])
     same = [t for t in trials if t.form.where == best.form.where and curve(t.form.kind) == curve(best.form.kind)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
     for t in more:
         better = t.blocks - found.blocks
-        if np.all(better > 0.0) and np.sum(better) > max(MIN_GAIN, MIN_FORM * np.sum(found.blocks - base)):
+        if np.all(better > 0.0) and np.sum(better) > more_than(found):
             found = t
     return found
 

@@ -96,7 +96,8 @@ BLOCKS = 40  # of the held-out samples, drawn anew together: errors near in time
 
 def achieved(before: Array, after: Array, floor: float) -> tuple[float | None, tuple[float, float] | None]:
     """Share of the achievable gain in RMS [errors before and after, n each], and its 95 % interval by a block bootstrap; None
-    where there is next to nothing to gain. All of it where less is left than the stated noise: that is then less than stated."""
+    where there is next to nothing to gain. All of it where less is left than the floor, which training
+    recordings show above the band: there, edges of forces are in it too."""
     power = np.array([[np.mean(b**2) for b in np.array_split(x, min(BLOCKS, len(x)))] for x in (before, after)])
     draws = np.random.default_rng(0).integers(power.shape[1], size=(DRAWS, power.shape[1]))
     b, a = np.sqrt(power[:, draws].mean(axis=2))

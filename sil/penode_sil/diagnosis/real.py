@@ -75,11 +75,11 @@ def answer(
         if size >= enough and not _unsized(cause):
             causes = _merged(causes, cause)
         else:
-            found_small = f"is real but small: {size:.1%} of what acts there"
-            notes.append(_kept(term, found_small if size < enough else "may be nothing: the 95 % interval of its size holds that"))
+            why = f"is real but small: {size:.1%} of what acts there" if size < enough else "may be nothing: the 95 % interval of its size holds that"
+            notes.append(_kept(term, why))
     if t := found.small:
-        size_of = f"{t.taken:.0%} of the power of prediction errors" if t.taken < MIN_TAKEN else f"{t.share:.1%} of what acts there"
-        notes.append(_kept(found.terms[-1], f"is real but small: {size_of}"))
+        what = f"{t.taken:.0%} of the power of prediction errors" if t.taken < MIN_TAKEN else f"{t.share:.1%} of what acts there"
+        notes.append(_kept(found.terms[-1], f"is real but small: {what}"))
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
     biased, remarks = _offsets(model, plain, probe)
     notes += more + remarks

@@ -14,8 +14,9 @@ from .result import OUTSIDE, Cause
 TABLE = Path(__file__).with_name("templates") / "reliability.json"  # beside the page that states it
 
 
-def reliability(causes: Sequence[Cause], table: Path = TABLE) -> dict[str, Any] | None:
+def reliability(causes: Sequence[Cause], table: Path | None = None) -> dict[str, Any] | None:
     """What is known of these causes: its `source`, and the `deciles` of confidence that they are in; None if no table is kept."""
+    table = table or TABLE
     if not table.exists():
         return None
     kept = json.loads(table.read_text(encoding="utf-8"))

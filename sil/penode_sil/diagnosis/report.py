@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import jinja2
 import numpy as np
@@ -36,7 +35,7 @@ from .report_figure import Axis, Figure, pretty, readable
 from .report_price import difference, price
 from .report_words import LIKE_NOISE, gains, headline, key_figures, lead, percent, relative, sentence, sure, value, where
 from .residual import LEAST, Channel, Residual, Shown, Surface, averages, cells, rms
-from .result import VERDICTS, Cause, Diagnosis, place, plain
+from .result import VERDICTS, Diagnosis, place, plain
 
 Array = NDArray[np.float64]
 SAMPLES = 800  # that a picture of forces shows one by one

@@ -24,6 +24,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 PROBES = f"{sys.executable} {HERE / 'probes.py'} diagnose"
+FOLDER = {"campaign.py": "", "worlds_campaign.py": "main-"}  # how the folder of case SEED-INDEX begins, which is its name in the notes
 Seen = dict[str, dict[str, tuple[bool, bool]]]  # case: place: did a comparison there hold, and did one not
 
 
@@ -87,13 +88,13 @@ def run(campaign: str, cases: Sequence[str], off: Path | None) -> dict[str, bool
 def switched_off(name: str, seen: Seen, cases: dict[str, Sequence[str]]) -> str:
     """Cases won and lost without a threshold, among those that it decides and that are given."""
     off = {place: outcome for place, outcome in usual(seen).items() if place.partition(" @ ")[0] == name}
-    decided = {tuple(case.split("-")[-2:]) for case in deciding(seen).get(name, set())}
+    decided = deciding(seen).get(name, set())
     with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
         file.write(json.dumps(off))
         file.flush()
         won, lost, tried = [], [], 0
         for campaign, some in cases.items():
-            chosen = [case for case in some if tuple(case.split(":")) in decided]
+            chosen = [case for case in some if FOLDER[campaign] + case.replace(":", "-") in decided]
             before, after = run(campaign, chosen, None), run(campaign, chosen, Path(file.name))
             tried += len(chosen)
             won += [c for c in chosen if after[c] > before[c]]
