@@ -41,9 +41,9 @@ QUICK = ("-ffp-contract=fast", "-fno-trapping-math", "-fno-signed-zeros", "-fass
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """A run that follows a measurement: after every `update` samples its states move by gain [n_x, n_z] or [runs, n_x, n_z] times the
-    mean of measured [n, n_z] or [runs, n, n_z] less simulated since the update before. NaN: nothing was measured. What is kept of a
-    sample is as it was before its update."""
+    """A run that follows a measurement: after every `update` of the samples that are kept its states move by gain [n_x, n_z] or
+    [runs, n_x, n_z] times the mean of measured [kept, n_z] or [runs, kept, n_z] less simulated since the update before. NaN: nothing was
+    measured. What is kept of a sample is as it was before its update."""
 
     update: int
     measured: Array
@@ -143,20 +143,20 @@ class Batch:
         job.first_bad, job.first_outside = (a.ctypes.data for a in first)
         job.count = tuple(map(len, wanted))
         job.which, job.kept = (tuple(a.ctypes.data for a in arrays) for arrays in (wanted, kept))
-        kept.append(self._observed(observer, job, n, padded))  # arrays that the job points to
+        kept.append(self._observed(observer, job, -(-n // every), padded))  # arrays that the job points to
         if not self._step(self._library(per_run), job, vectors, threads):
             raise UserError(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
         x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept[:3])
         return BatchRun(x, y, z, *first[:, :runs].astype(np.int64))
 
     def _observed(self, observer: Observer | None, job: _Job, n: int, padded: int) -> tuple[Array, ...]:
-        """Sets the observer of a job. Raises ValueError for shapes."""
+        """Sets the observer of a job that keeps n samples. Raises ValueError for shapes."""
         if observer is None or not self.model.states or not self.model.sensors:
             return ()
         n_x, n_z = len(self.model.states), len(self.model.sensors)
         measured, gain = (np.asarray(a, dtype=self.dtype) for a in (observer.measured, observer.gain))
         if measured.shape[-2:] != (n, n_z) or gain.shape[-2:] != (n_x, n_z):
-            raise ValueError(f"measured {measured.shape} must be [n, n_z] = [{n}, {n_z}], gain {gain.shape} [n_x, n_z] = [{n_x}, {n_z}]")
+            raise ValueError(f"measured {measured.shape} must be [kept, n_z] = [{n}, {n_z}], gain {gain.shape} [n_x, n_z] = [{n_x}, {n_z}]")
         if measured.ndim == 3:
             measured = self._spread(np.moveaxis(measured, 0, -1), padded)
         gain = self._spread(np.moveaxis(gain, 0, -1) if gain.ndim == 3 else gain[:, :, None], padded)

@@ -110,21 +110,32 @@ def _driven(model: Model, fit: Fit, terms: Sequence[Term]) -> tuple[dict[str, li
     left = []
     for t in (t for t in terms if t.form.how.startswith("input_")):
         name, value = t.form.where, fit.value(t.free[0].target)
-        if t.form.how in ("input_offset", "input_delay"):
+        acts, samples = f"{name}_acts", round((t.form.series.period if t.form.series else value) / model.sample_time)
+        if t.form.how == "input_offset" and not _places(model, name):
+            found["parameters"].append(f"{name}_offset = {table({'value': value, 'unit': units.si(_unit(model, name))})}")
+            _redirected(model, name, f"({name} + {name}_offset)", found["elements"])
+            continue
+        if t.form.how == "input_offset" or t.form.how == "input_delay" and samples < 1:
             left.append(f"{t.form.how} of {name}: a recording has to be corrected, the model file has no law for it")
             continue
-        acts = f"{name}_acts"
-        if t.form.series:
-            samples = max(round(t.form.series.period / model.sample_time), 1)
-            found["actuators"].append(f"{acts} = {table({'input': name, 'law': 'held', 'samples': samples})}")
-            _redirected(model, name, acts, found["elements"])
-            continue
-        law = {"law": "gain", "gain": f"{name}_gain"} if t.form.how == "input_gain" else {"law": "lag", "time": f"{name}_lag"}
-        size = {"value": 1.0 + value, "unit": "1"} if t.form.how == "input_gain" else {"value": value, "unit": "s"}
-        found["parameters"].append(f"{list(law.values())[1]} = {table(size)}")
+        if t.form.how in ("input_delay", "input_added"):
+            law: dict[str, object] = {"law": "held" if t.form.series else "delay", "samples": max(samples, 1)}
+        else:
+            law = {"law": "gain", "gain": f"{name}_gain"} if t.form.how == "input_gain" else {"law": "lag", "time": f"{name}_lag"}
+            size = {"value": 1.0 + value, "unit": "1"} if t.form.how == "input_gain" else {"value": value, "unit": "s"}
+            found["parameters"].append(f"{list(law.values())[1]} = {table(size)}")
         found["actuators"].append(f"{acts} = {table({'input': name, **law})}")
         _redirected(model, name, acts, found["elements"])
     return found, left
+
+
+def _unit(model: Model, name: str) -> str:
+    return next(i.unit for i in model.inputs if i.name == name)
+
+
+def _places(model: Model, name: str) -> bool:
+    """Is an input a position to which elements are tied, rather than a part of expressions?"""
+    return any(name in e.ends for e in model.elements) or any(re.search(rf"\b{name}\b", p.text) for p in model.points)
 
 
 def _redirected(model: Model, name: str, acts: str, elements: list[str]) -> None:

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from penode_gen.model import Model
@@ -31,7 +33,7 @@ def start_of(model: Model, e: Experiment, study: Study, set_name: str = "") -> A
     x = np.array(problem.simulate(0, study.null.free, np.zeros((1, len(study.null.free))), study.model.states)[1][0])
     size = dict(zip(study.model.states, 3.0 * np.sqrt(np.mean(np.where(np.abs(x) < 1e12, x, 0.0) ** 2, axis=0)) + 1e-9))
     record = Record.of(e)
-    few = Record(record.name, record.step, record.u[:FIRST], record.y[:FIRST], record.held)
+    few = replace(record, u=record.u[:FIRST], y=record.y[:FIRST])
     wide = augmented(model, study.places)
     noise = sample_noise([record], np.array([s.noise for s in model.sensors]))
     free = tuple(Free(("start", 0, i), start[i], 0.01 * size[model.states[i]], sigma=size[model.states[i]], origin=start[i]) for i in own)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from itertools import chain, count
 from pathlib import Path
@@ -17,14 +16,13 @@ from numpy.typing import NDArray
 import penode_gen
 from penode_gen import units
 from penode_gen.laws import LAWS
-from penode_gen.model import INTERPOLATIONS, Model
+from penode_gen.model import Model
 
 from .build import Term
 from .explanation import Explanation
 from .faulty import BLUNT
 from .hypotheses import VALUED, Basis, Fault, size
-from .measuring import deployed, started
-from .residual import rms
+from .resolving import resolved
 from .result import Cause
 from .study import Study
 
@@ -47,6 +45,11 @@ def toml(value: object) -> str:
     return repr(float(f"{value:.7g}"))
 
 
+def _resolved(study: Study, lines: Sequence[str]) -> tuple[str, Model]:
+    found = resolved(study, "\n".join(lines))
+    return found.text, found.model
+
+
 def unlike(stem: str, taken: Collection[str]) -> str:
     """A name that is not taken: the stem, or the stem with a number."""
     return next(name for name in chain([stem], (f"{stem}_{n}" for n in count(2))) if name not in taken)
@@ -61,7 +64,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     """Text of model_extended.toml, and the model that it describes."""
     lines = _head(study, e, causes)
     if e is None:
-        return joined(study, "\n".join(lines))
+        return _resolved(study, lines)
     taken = {*study.model.parameters, *study.model.states, *(x.name for x in study.model.elements), *(s.name for s in study.model.sensors)}
     written = _Written(study, e, causes, _renaming(e, taken), unlike("age", taken), unlike("recorded", taken))
     for j in range(len(study.model.sensors)):
@@ -70,7 +73,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     for title, entries in written.sections():
         if entries:
             lines += [f"[{title}]", *entries, ""]
-    return joined(study, "\n".join(lines))
+    return _resolved(study, lines)
 
 
 def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[str]:
@@ -212,33 +215,6 @@ class _Written:
 
 SHORT = 0.02  # of a sample: a delay that is left out
 ONE_POLE = 0.48  # of a delay squared: beyond that the second pole of a filter is 50 times as fast as the first
-ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast
-
-
-def joined(study: Study, text: str) -> tuple[str, Model]:
-    """The model of a text; its inputs follow a curve through more samples if the way between them is too rough for the first recording,
-    and the C then meets it better. The more samples, the finer, but the louder the noise of the inputs."""
-    model, e = _load(text), study.experiments[0]
-    ways = INTERPOLATIONS[INTERPOLATIONS.index(model.interpolation) + 1 :]
-    if model.interpolation == "held" or not ways:
-        return text, model
-    start, exact = started(model, e, study)
-    scale = np.sqrt(np.mean(study.levels[0], axis=0))
-    joined = deployed(model, e, start, study.set_name)
-    plain = text.replace('input = "linear"\n', "")
-    for way in ways:
-        if np.max(np.sqrt(np.mean(((joined - exact) / scale) ** 2, axis=0))) < ROUGH:
-            break
-        better = plain.replace("sample_time =", f'input = "{way}"\nsample_time =', 1)
-        curved = _load(better)
-        finer = deployed(curved, e, start, study.set_name)
-        before, after = (rms(((z - e.y) * e.good / scale).ravel()) for z in (joined, finer))
-        if after >= before:
-            break
-        text, model, joined = better, curved, finer
-    return text, model
-
-
 def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
     """Steps a sample, so that none jumps over the presliding of a friction, a relaxation, or the motion of a small mass."""
     what, step = term.candidate.what, study.model.sample_time
@@ -328,10 +304,3 @@ def _drift(e: Explanation, values: dict[object, float], sensor: int, name: str, 
     named = [f"drift_{name}_{n}" for n in range(1, len(parts) + 1)]
     parameters += [f"{own} = {table({'value': size, 'unit': unit})}" for own, (size, _) in zip(named, parts)]
     return " + ".join(own + shape for own, (_, shape) in zip(named, parts))
-
-
-def _load(text: str) -> Model:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "model_extended.toml"
-        path.write_text(text)
-        return penode_gen.load(path)

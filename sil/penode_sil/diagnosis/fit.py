@@ -18,6 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from penode_gen.model import Model
 
+from .between import CLOSE, joined, parts
 from .compiling import compiled, folded, longest, moving, ordered
 from .faulty import delayed, drifted, railed
 from .hypotheses import Fault
@@ -25,7 +26,6 @@ from .noise import Experiment, Metric, Thinning, thinning
 from .plant import anonymous
 
 Array = NDArray[np.float64]
-CLOSE = 1e-3  # [s] of samples through which parabolas are the inputs in between, and cubics have their rates
 KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
 FAR = 1e20  # residual of a run that cannot be simulated, and the most that it shows
@@ -367,20 +367,5 @@ def _thinned(e: Experiment) -> tuple[Thinning, NDArray[np.bool_] | None, NDArray
 
 @lru_cache(maxsize=KEPT)
 def _drive(e: Experiment, fine: int) -> Array:
-    """Inputs with `fine` - 1 samples between each two, for a step that joins them by straight lines.
-
-    At the samples they are what they are, for that is what sensors see. In between, the middle one is such that the
-    integral over each interval, which moves the plant, is that of the smooth input; and of 3, the last is such that the
-    line to the next sample has its rate, which sensors may see as well.
-    """
-    smooth = CubicSpline(e.time, e.drive)
-    u, h = e.drive, e.step
-    whole = np.diff(smooth.antiderivative()(e.time), axis=0) / h
-    parts = np.empty((len(u) - 1, fine, u.shape[1]))
-    parts[:, 0] = u[:-1]
-    if fine == 2:
-        parts[:, 1] = 2.0 * whole - 0.5 * (u[:-1] + u[1:])
-    else:
-        parts[:, 2] = u[1:] - h * e.rate[1:] / 3.0
-        parts[:, 1] = 3.0 * whole - 0.5 * (u[:-1] + u[1:]) - parts[:, 2]
-    return np.concatenate([e.stepped(parts).reshape(-1, u.shape[1]), u[-1:]])
+    """Inputs with `fine` - 1 samples between each two, see `between`."""
+    return joined(e.stepped(parts(e.time, e.drive, e.rate, fine)), e.drive)

@@ -31,11 +31,13 @@ LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
 @dataclass(frozen=True, eq=False)
 class Found:
     """What a search ends with: the bench with all accepted terms in it, and a `plain` one with those alone that are worth a name; the last
-    term is not where it is `small`, its trial. Of every round the trials compared, the best first."""
+    term is not where it is `small`, its trial. Of each term the share `taken` of the power that innovations had beyond sensor noise, and of
+    every round the trials compared, the best first."""
 
     bench: Bench
     plain: Bench
     terms: tuple[Term, ...]
+    taken: tuple[float, ...]
     small: Trial | None
     rounds: tuple[tuple[Trial, ...], ...]
 
@@ -47,6 +49,7 @@ class Found:
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Causes one by one, each the one that predicts best, until none predicts enough better, or the best is not worth a name."""
     terms: list[Term] = []
+    taken: list[float] = []
     rounds: list[tuple[Trial, ...]] = []
     small = None
     blocks = Blocks.of([len(r) // bench.update for r in bench.records])
@@ -68,12 +71,13 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         best = _simplest(rounds[-1], base, terms)
         bench, term = adopt(bench, best)
         terms.append(term)
+        taken.append(best.taken)
         bench, base = _based(bench, blocks)
-        if not _large(best, least(bench.level.size)):
+        if not _large(best, least(bench.level.size, best.taken)):
             small = best  # and so is what is left
             break
         plain = bench
-    return Found(bench, plain, tuple(terms), small, tuple(rounds))
+    return Found(bench, plain, tuple(terms), tuple(taken), small, tuple(rounds))
 
 
 def _large(t: Trial, least_share: float) -> bool:

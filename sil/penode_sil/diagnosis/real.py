@@ -67,8 +67,9 @@ def answer(
     probe = Probe.of(plain)
     moved = motions(probe)
     probabilities = [_weighed(r) for r in found.rounds]
-    named, enough = found.named, least(after.level.size)
+    named = found.named
     for k, term in enumerate(named):
+        enough = least(after.level.size, found.taken[k])
         size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
         cause = _cause(model, plain, term, size, _rivals(probabilities[k], term), _sure(probabilities[k], term))
         log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")

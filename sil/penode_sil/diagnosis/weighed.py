@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from penode_gen import units
 from penode_gen.model import Model
 
-from . import applied, extension, measuring, real
+from . import applied, measuring, numerics, real
 from .evidence.bench import UNSTATED, build
 from .evidence.gain import Level
 from .evidence.observer import Record, bias, sample_noise
@@ -21,6 +21,7 @@ from .innovate import MIN_GAIN
 from .judging import ENOUGH
 from .noise import UNSEEN, Experiment
 from .residual import Channel, rms
+from .resolving import resolved
 from .result import Cause, Gain, Named, Value
 from .study import Study, look
 from .worth import WORTH, Z_95
@@ -97,7 +98,8 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     bench = found.found.bench
     offsets = {s.name for s in model.sensors if abs(bench.fit.value(bias(s.name))) > Z_95 * bench.fit.deviation(bias(s.name))}
     made = applied.apply(model, bench, found.run, found.found.terms, offsets)
-    text, extended = extension.joined(study, made.text)
+    resolution = resolved(study, made.text)
+    text, extended = resolution.text, resolution.model
     gain, more, held = measuring.measure(study, extended, unused) if unused else ({}, [], [])
     scale = np.array([s.noise or 1.0 for s in model.sensors])
     after = tuple(measuring.started(extended, e, study)[1] for e in study.experiments)
@@ -105,6 +107,8 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
+    coarse = numerics.cause(study, resolution.exact, resolution.stepped)
+    causes += (coarse,) if coarse else ()
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
     verdict = _verdict(found, causes, share, max(left, found.found.bench.level.size))
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)

@@ -26,10 +26,12 @@ LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of th
 ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
 
-def least(level: float) -> float:
+def least(level: float, taken: float = 0.0) -> float:
     """Share of what acts from which on a term is worth a name, where `level` of what moves wanders beside all that was found: WORTH, or
-    less where the model is else nearly right; never less than what keeps zero out of its interval."""
-    return min(WORTH, max(RATIO * level, Z_95 * SYSTEMATIC))
+    less where the model is else nearly right; never less than what keeps zero out of its interval. A term that has `taken` so much of the
+    power that innovations had beyond sensor noise is RATIO times all that it left."""
+    alone = taken > RATIO**2 / (1.0 + RATIO**2)
+    return min(WORTH, max(0.0 if alone else RATIO * level, Z_95 * SYSTEMATIC))
 
 
 def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]) -> float:

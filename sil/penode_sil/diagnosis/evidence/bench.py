@@ -15,7 +15,7 @@ from ..fit import Free
 from ..plant import Place
 from .fit import Fit, Problem, likelihood
 from .gain import Gains, Level, linear
-from .observer import WANDER, Filter, Predictor, Record, bias, augmented
+from .observer import MAX_TURN, MIN_STEPS, WANDER, Filter, Predictor, Record, augmented, bias, scale
 from .prior import SHARE, Stated
 
 Array = NDArray[np.float64]
@@ -57,9 +57,10 @@ class Bench:
         return Problem(predictor, self.noise**2 / self.update)
 
     def gains(self, fit: Fit | None = None, model: Model | None = None) -> Gains:
-        """The linear plant with the values of a fit."""
+        """The linear plant with the values of a fit; but for scales of sensors, see Predictor._scales."""
         model = model or self.model
-        values = {} if fit is None else fit.values
+        scales = {scale(s.name) for s in self.model.sensors}
+        values = {} if fit is None else {name: x for name, x in fit.values.items() if name not in scales}
         noise = np.array([i.noise for i in self.base.inputs])
         return Gains(self.base.states, model.states, linear(self.base, values), noise, self.forces, self.noise, self.update * self.step, self.update)
 
@@ -113,7 +114,7 @@ def build(model: Model, places: Sequence[Place], records: Sequence[Record], nois
 
 def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]]:
     """The bench with the update and the forces that its motion asks for, and the states [n, n_x] that follow the measurement."""
-    n_q = len(model.bodies)
+    n_q, fastest = len(model.bodies), bench.fastest
     x: list[Array] = []
     for again in range(3):
         scale = bench.forces if again else _guess(bench, model, spans)
@@ -128,7 +129,7 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
             return replace(bench, forces=scale), [np.where(np.abs(s) < np.inf, s, 0.0) for s in x]
         period = float(np.min(2.0 * np.pi * v / np.maximum(a, 1e-300)))
         update = int(np.clip(round(period / UPDATES / bench.step), 1, max(len(r) for r in bench.records) // 40 or 1))
-        bench = replace(bench, forces=np.maximum(a, 1e-12), update=update)
+        bench = replace(bench, forces=np.maximum(a, 1e-12), update=update, fastest=max(fastest, MAX_TURN * UPDATES * MIN_STEPS / period))
     return bench, x
 
 

@@ -11,12 +11,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter, Signal, State
+from scipy.interpolate import CubicSpline
 
 from ...batch import Observer
+from ..between import CLOSE, joined, parts, straight
 from ..compiling import compiled, ordered
 from ..fit import Free
 from ..hypotheses import lag
 from ..noise import Experiment
+from . import samples
 from ..plant import Place, anonymous, extend, rotational_unit
 
 Array = NDArray[np.float64]
@@ -28,33 +31,28 @@ MAX_INNOVATION = 1e15  # innovation of a run that left all bounds
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A recording: inputs u [n, n_u], sensors y [n, n_z] (NaN: nothing measured), `step` [s] apart; `held`: inputs move in steps."""
+    """A recording: inputs u [n, n_u], sensors y [n, n_z] (NaN: nothing measured), `step` [s] apart; `held`: inputs move in steps,
+    `smooth`: none of them does."""
 
     name: str
     step: float
     u: Array
     y: Array
     held: bool = False
+    smooth: bool = True
 
     @staticmethod
     def of(e: Experiment) -> Record:
         held = e.held is not None and bool(e.held.all())
-        return Record(e.name, e.step, e.drive if e.held is None else e.u, np.where(e.good, e.y, np.nan), held)
+        return Record(e.name, e.step, e.drive if e.held is None else e.u, np.where(e.good, e.y, np.nan), held, e.held is None)
 
     def __len__(self) -> int:
         return len(self.y)
 
 
 def sample_noise(records: Sequence[Record], stated: Array) -> Array:
-    """Noise [n_z] of a sample: what the model file states (0: nothing), but not more than neighbouring samples show, whose second
-    differences have six times its variance where the motion is smooth."""
-    own = []
-    for j, most in enumerate(stated):
-        bends = np.concatenate([np.diff(r.y[:, j], 2) for r in records])
-        bends = bends[np.isfinite(bends)]
-        seen = float(np.sqrt(np.mean(bends**2) / 6.0)) if bends.size else 0.0
-        own.append(max(min(seen, most) if most > 0.0 else seen, 1e-12))
-    return np.array(own)
+    """Noise [n_z] of a sample of each sensor, see `samples.noise`."""
+    return samples.noise([[r.y[:, j] for r in records] for j in range(len(stated))], stated)
 
 
 def bias(sensor: str) -> str:
@@ -146,10 +144,12 @@ class Predictor:
     def __init__(self, model: Model, records: Sequence[Record], update: int, set_name: str = "default", fastest: float = 0.0):
         self.model, self.records, self.update, self.set_name = model, tuple(records), update, set_name
         causal, moves = ordered(model)
-        step = model.sample_time
-        substeps = max(1, int(np.ceil(step * fastest / MAX_TURN)), -(-MIN_STEPS // update), model.substeps)
-        way = "cubic" if moves else "held" if any(r.held for r in records) else "linear"
-        self.batch = compiled(anonymous(replace(model, method="rk4", interpolation=way, substeps=substeps)), causal)
+        far = model.sample_time > CLOSE and bool(model.inputs) and all(r.smooth for r in records)
+        self.fine = (3 if moves else 2) if far else 1  # samples of an input in one of a recording, see `between`
+        step = model.sample_time / self.fine
+        substeps = max(1, int(np.ceil(step * fastest / MAX_TURN)), -(-MIN_STEPS // (update * self.fine)), -(-model.substeps // self.fine))
+        way = "linear" if far else "cubic" if moves else "held" if any(r.held for r in records) else "linear"
+        self.batch = compiled(anonymous(replace(model, method="rk4", interpolation=way, substeps=substeps, sample_time=step)), causal)
         self.n_z = len(records[0].y[0])  # sensors that were measured; the model may have more
 
     def predict(
@@ -163,13 +163,16 @@ class Predictor:
         for e in range(len(self.records)):
             start, parameters, u, y = self._given(e, free, shifts)
             parameters[f"{WANDER}_tau"] = by.tau
+            u = self._finer(u)
             if e in extra:
-                u = np.concatenate([np.broadcast_to(u, (len(extra[e]), *u.shape[-2:])), extra[e]], axis=-1)
+                more = joined(straight(extra[e], self.fine), extra[e])
+                u = np.concatenate([np.broadcast_to(u, (len(more), *u.shape[-2:])), more], axis=-1)
             blank = np.full((*y.shape[:-1], len(self.model.sensors) - self.n_z), np.nan)
-            wide = np.zeros((*by.gain.shape[:-1], len(self.model.sensors)))
-            wide[..., : self.n_z] = by.gain
+            gain = by.gain / self._scales(parameters)
+            wide = np.zeros((*gain.shape[:-1], len(self.model.sensors)))
+            wide[..., : self.n_z] = gain
             run = self.batch.run(
-                u, x0=start, parameters=parameters, set_name=self.set_name, states=states,
+                u, x0=start, parameters=parameters, set_name=self.set_name, states=states, every=self.fine,
                 observer=Observer(self.update, np.concatenate([y, blank], axis=-1), wide),
             )  # fmt: skip
             z = run.z
@@ -179,6 +182,19 @@ class Predictor:
             seen.append(z[:, :, self.n_z : self.n_z + watched])
             moved.append(run.x)
         return Lanes(nus, sane), seen, moved
+
+    def _scales(self, parameters: Mapping[str, Array]) -> Array:
+        """Scales of sensors, [1, n_z] or [runs, 1, n_z]: a filter's gain is for sensors of scale 1, else a scale would tune it."""
+        known = [parameters.get(scale(s.name), np.ones(1)) for s in self.model.sensors[: self.n_z]]
+        return np.stack(np.broadcast_arrays(*known), axis=-1)[:, None, :] if any(len(k) > 1 for k in known) else np.array(known).T
+
+    def _finer(self, u: Array) -> Array:
+        """Inputs [n, n_u] or [runs, n, n_u] with samples in between."""
+        if self.fine == 1:
+            return u
+        time = np.arange(u.shape[-2]) * (self.fine * self.batch.model.sample_time)
+        rate = CubicSpline(time, u, axis=-2)(time, 1) if self.fine == 3 else u
+        return joined(parts(time, u, rate, self.fine), u)
 
     def _beyond(self, e: int, y: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Means [runs, updates, n_z] of what was measured, y [n, n_z] or [runs, n, n_z], beyond what was predicted, z [runs, n, n_z]; and

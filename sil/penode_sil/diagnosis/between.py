@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Inputs between samples that are too far apart to be joined by straight lines."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+Array = NDArray[np.float64]
+CLOSE = 1e-3  # [s] of samples through which parabolas are the inputs in between, and cubics have their rates
+
+
+def parts(time: Array, u: Array, rate: Array, count: int) -> Array:
+    """Signals u [..., n, n_u] at `time` [n] as `count` samples from each to before the next one, [..., n - 1, count, n_u], for a step that
+    joins them by straight lines; 2 or 3, for a model that uses the `rate` [..., n, n_u] of an input.
+
+    At the samples they are what they are, for that is what sensors see. In between, the middle one is such that the
+    integral over each interval, which moves the plant, is that of the smooth input (a cubic spline); and of 3, the last is such that the
+    line to the next sample has its rate, which sensors may see as well.
+    """
+    h = float(time[1] - time[0])
+    whole = np.diff(CubicSpline(time, u, axis=-2).antiderivative()(time), axis=-2) / h
+    first, last = u[..., :-1, :], u[..., 1:, :]
+    found = np.empty((*first.shape[:-1], count, u.shape[-1]))
+    found[..., 0, :] = first
+    if count == 2:
+        found[..., 1, :] = 2.0 * whole - 0.5 * (first + last)
+    else:
+        found[..., 2, :] = last - h * rate[..., 1:, :] / 3.0
+        found[..., 1, :] = 3.0 * whole - 0.5 * (first + last) - found[..., 2, :]
+    return found
+
+
+def straight(u: Array, count: int) -> Array:
+    """The same [..., n - 1, count, n_u] on straight lines: what has edges."""
+    share = np.arange(count)[:, None] / count
+    return u[..., :-1, None, :] + share * np.diff(u, axis=-2)[..., None, :]
+
+
+def joined(split: Array, u: Array) -> Array:
+    """Parts [..., n - 1, count, n_u] of signals u [..., n, n_u] as one signal [..., (n - 1) count + 1, n_u]."""
+    return np.concatenate([split.reshape(*u.shape[:-2], -1, u.shape[-1]), u[..., -1:, :]], axis=-2)

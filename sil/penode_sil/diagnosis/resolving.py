@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""An extended model whose own step is fine enough for what it describes."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import penode_gen
+from numpy.typing import NDArray
+from penode_gen.model import INTERPOLATIONS, Model
+
+from .measuring import deployed, started
+from .residual import rms
+from .study import Study
+
+Array = NDArray[np.float64]
+ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast
+COSTLY = 1.02  # times the error that the exact solution leaves: from there on a step is too long
+MOST = 16  # steps of a sample
+
+
+@dataclass(frozen=True, eq=False)
+class Resolved:
+    """A text and the model of it; sensors [n, n_z] on the first recording as the exact solution has them, and as the step had them before."""
+
+    text: str
+    model: Model
+    exact: Array
+    stepped: Array
+
+
+def resolved(study: Study, text: str) -> Resolved:
+    """The model of a text; its inputs follow a curve through more samples if the way between them is too rough for the first recording,
+    and it takes more steps a sample if they are too long, where the C then meets it better. The more samples, the finer, but the louder
+    the noise of the inputs."""
+    model, e = _load(text), study.experiments[0]
+    start, exact = started(model, e, study)
+    scale = np.sqrt(np.mean(study.levels[0], axis=0))
+
+    def left(z: Array) -> float:
+        return rms(((z - e.y) * e.good / scale).ravel())
+
+    as_written = stepped = deployed(model, e, start, study.set_name)
+    ways = INTERPOLATIONS[INTERPOLATIONS.index(model.interpolation) + 1 :] if model.interpolation != "held" else ()
+    for way in ways:
+        if np.max(np.sqrt(np.mean(((stepped - exact) / scale) ** 2, axis=0))) < ROUGH:
+            break
+        better = _with(text, "input", f'"{way}"')
+        finer = deployed(_load(better), e, start, study.set_name)
+        if left(finer) >= left(stepped):
+            break
+        text, stepped = better, finer
+    substeps = 2 * model.substeps
+    while left(stepped) > COSTLY * left(exact) and substeps <= MOST:
+        better = _with(text, "substeps", str(substeps))
+        finer = deployed(_load(better), e, start, study.set_name)
+        if left(finer) >= left(stepped):
+            break
+        text, stepped, substeps = better, finer, 2 * substeps
+    return Resolved(text, _load(text), exact, as_written)
+
+
+def _with(text: str, key: str, value: str) -> str:
+    """A text with another option of its step."""
+    plain = re.sub(rf'^{key} = ("(linear|parabola|cubic)"|\d+)\n', "", text, flags=re.MULTILINE)
+    return plain.replace("sample_time =", f"{key} = {value}\nsample_time =", 1)
+
+
+def _load(text: str) -> Model:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model_extended.toml"
+        path.write_text(text)
+        return penode_gen.load(path)
