@@ -41,4 +41,5 @@ def straight(u: Array, count: int) -> Array:
 
 def joined(split: Array, u: Array) -> Array:
     """Parts [..., n - 1, count, n_u] of signals u [..., n, n_u] as one signal [..., (n - 1) count + 1, n_u]."""
-    return np.concatenate([split.reshape(*u.shape[:-2], -1, u.shape[-1]), u[..., -1:, :]], axis=-2)
+    longer = (u.shape[-2] - 1) * split.shape[-2]
+    return np.concatenate([split.reshape(*u.shape[:-2], longer, u.shape[-1]), u[..., -1:, :]], axis=-2)

@@ -80,7 +80,7 @@ def _taken(form: Form, terms: Sequence[Term]) -> bool:
 
 def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence[Motion]) -> list[tuple[Score, Form]]:
     forces = [(f.index, [p.along(m) for m in moved[f.index].parts]) for f in forms if f.how == "force" for p in f.parts]
-    size = SMALL * min(m.force for m in moved if m.force > 0.0)
+    size = SMALL * min((m.force for m in moved if m.force > 0.0), default=1.0)
     columns = iter(probe.columns(forces, size))
     hypotheses = []
     for f in forms:

@@ -39,7 +39,7 @@ RIVAL = (1.0 - RIGHT) / RIGHT  # posterior, RIGHT of which is as much as what is
 @dataclass(frozen=True, eq=False)
 class Answer:
     """Causes, notes on what is small, the sets of explanations that held-out blocks cannot tell apart with their posterior, and where
-    the search ended; the free `run` that fits best, and the share `taken` of what the file's own model leaves: by it in a free run, or of the power of
+    the search ended; the free `run` that fits best, sensors whose `offsets` it has, and the share `taken` of what the file's own model leaves: by it in a free run, or of the power of
     the innovations, whichever is more, for a free run that drifts shows little else."""
 
     causes: tuple[Cause, ...]
@@ -47,6 +47,7 @@ class Answer:
     explanations: tuple[tuple[tuple[Named, ...], float], ...]
     found: Found
     run: Fit
+    offsets: tuple[str, ...]
     taken: float
     model: Model
 
@@ -84,10 +85,12 @@ def answer(
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
     biased, remarks = _offsets(model, plain, probe)
     notes += more + remarks
-    run = after.problem().solve(after.fit.free, Filter.none(*after.fit.by.gain.shape), 20)
+    offsets = [s.name for s in model.sensors if abs(after.fit.value(bias(s.name))) > Z_95 * after.fit.deviation(bias(s.name))]
+    none = {bias(s.name) for s in model.sensors if s.name not in offsets}
+    run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 20)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
     taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken(after.fit, bench.problem().floor))
-    return Answer((*wrong, *causes, *biased), tuple(notes), _explanations(named, probabilities), found, run, taken, after.model)
+    return Answer((*wrong, *causes, *biased), tuple(notes), _explanations(named, probabilities), found, run, tuple(offsets), taken, after.model)
 
 
 def _name(t: Term) -> tuple[str, str]:

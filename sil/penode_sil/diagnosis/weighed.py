@@ -15,7 +15,7 @@ from penode_gen.model import Model
 from . import applied, measuring, numerics, real
 from .evidence.bench import UNSTATED, build
 from .evidence.gain import Level
-from .evidence.observer import Record, bias, sample_noise
+from .evidence.observer import Record, sample_noise
 from .fit import Fit, Problem
 from .innovate import MIN_GAIN
 from .judging import ENOUGH
@@ -24,7 +24,7 @@ from .residual import Channel, rms
 from .resolving import resolved
 from .result import Cause, Gain, Named, Value
 from .study import Study, look
-from .worth import WORTH, Z_95
+from .worth import WORTH
 
 Array = NDArray[np.float64]
 MIN_UNMODELLED = 0.0055  # of what moves, and worth MIN_GAIN: less wanders beside causes that are the truth, 0.003 of the levels tried at most
@@ -53,7 +53,7 @@ class Weighed:
 
 def supports(model: Model) -> bool:
     """Can innovations judge a model? Not yet where motion is prescribed, for nothing moves, nor laws of networks."""
-    return bool(model.bodies) and not model.networks
+    return bool(model.bodies or model.states and not model.elements) and not model.networks
 
 
 def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> float:
@@ -96,8 +96,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     model, study = study.model, replace(study, seen=look(study, study.null))
     found = real.answer(model, study.places, study.experiments, study.linear.fastest, study.set_name, log)
     bench = found.found.bench
-    offsets = {s.name for s in model.sensors if abs(bench.fit.value(bias(s.name))) > Z_95 * bench.fit.deviation(bias(s.name))}
-    made = applied.apply(model, bench, found.run, found.found.terms, offsets)
+    made = applied.apply(model, bench, found.run, found.found.terms, found.offsets)
     resolution = resolved(study, made.text)
     text, extended = resolution.text, resolution.model
     gain, more, held = measuring.measure(study, extended, unused) if unused else ({}, [], [])

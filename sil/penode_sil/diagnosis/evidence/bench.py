@@ -14,8 +14,8 @@ from penode_gen.model import Model, Parameter
 from ..fit import Free
 from ..plant import Place
 from .fit import Fit, Problem, likelihood
-from .gain import Gains, Level, linear
-from .observer import MAX_TURN, MIN_STEPS, WANDER, Filter, Predictor, Record, augmented, bias, scale
+from .gain import Gains, Level, linear, wandering
+from .observer import MAX_TURN, MIN_STEPS, Filter, Predictor, Record, augmented, bias, scale
 from .prior import SHARE, Stated
 
 Array = NDArray[np.float64]
@@ -97,8 +97,7 @@ def build(model: Model, places: Sequence[Place], records: Sequence[Record], nois
     plain = Fit((), Filter.none(0, 0), *(np.zeros(0),) * 2, np.zeros(0, bool), np.zeros(0), 0.0, 0.0)
     longest = sum(map(len, records)) * records[0].step
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
-    wanders = [n for n in wide.states if n.startswith(WANDER)]
-    bench = Bench(wide, set_name, tuple(places), tuple(records), like.base if like else augmented(model, places), (), first, np.ones(len(wanders)), noise, fastest, Level(0.0, 1.0), plain)
+    bench = Bench(wide, set_name, tuple(places), tuple(records), like.base if like else augmented(model, places), (), first, np.ones(len(wandering(wide.states))), noise, fastest, Level(0.0, 1.0), plain)
     if like:
         bench = replace(bench, update=like.update, forces=like.forces)
         x = [np.where(np.abs(s) < np.inf, s, 0.0) for s in _followed(bench)]
@@ -119,6 +118,10 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
     for again in range(3):
         scale = bench.forces if again else _guess(bench, model, spans)
         x = _followed(replace(bench, forces=scale))
+        if not n_q and not bench.places:
+            rates = np.concatenate([np.gradient(smooth(s, bench.update), bench.step, axis=0) for s in x])
+            bench = replace(bench, forces=np.maximum(np.sqrt(np.mean(rates**2, axis=0)), 1e-12))
+            continue
         if not n_q:
             rms = np.array([np.sqrt(np.nanmean(np.concatenate([r.y[:, j] for r in bench.records]) ** 2)) for j in range(len(spans))])
             return replace(bench, forces=np.full(len(bench.forces), float(np.max(rms)))), x
@@ -142,10 +145,9 @@ def _followed(bench: Bench) -> list[Array]:
 def _guess(bench: Bench, model: Model, spans: Array) -> Array:
     """Forces that would move the sensors about as much as they do."""
     if not model.bodies:
-        return np.full(len(bench.forces), float(np.max(spans)))
+        return np.full(len(bench.forces), float(np.max(spans)) / (1.0 if bench.places else UPDATES * bench.update * bench.step))
     gains = bench.gains()
-    wanders = [i for i, n in enumerate(gains.names) if n.startswith(WANDER)]
-    step = gains.period
+    wanders, step = wandering(gains.names), gains.period
     reach = np.abs(gains.plant.c @ np.linalg.matrix_power(np.eye(len(gains.plant.a)) + gains.plant.a * step, 3)[:, wanders])
     return np.array([float(np.min(spans / np.maximum(reach[:, k], 1e-300))) for k in range(len(wanders))])
 

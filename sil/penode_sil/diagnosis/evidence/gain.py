@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,7 +23,8 @@ DOUBLINGS = 30  # of the time for which the filter has run: 1e9 updates
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """How much force wanders: `size` is its standard deviation at each place, in units of the force there; `tau` [s] how long it stays."""
+    """How much force wanders: `size` is its standard deviation at each place, in units of the force there; `tau` [s] how long it stays.
+    Of a model of states and equations alone the rates of its states wander, as white noise of the same density."""
 
     size: float
     tau: float
@@ -45,7 +47,7 @@ class Gains:
 
     @cached_property
     def _wanders(self) -> list[int]:
-        return [i for i, n in enumerate(self.names) if n.startswith(WANDER)]
+        return wandering(self.names)
 
     def at(self, level: Level) -> Filter:
         """The steady filter: what an update does with the mean innovation since the one before."""
@@ -53,11 +55,11 @@ class Gains:
         if not n_x or level.size == 0.0 and not self.input_noise.any():
             return Filter.none(len(self.into), n_z)
         a = self.plant.a.copy()
-        for i in self._wanders:
-            a[i, i] = -1.0 / level.tau
         drive = np.zeros((n_x, n_x))
         for i, force in zip(self._wanders, self.forces):
-            drive[i, i] = 2.0 * (level.size * force) ** 2 / level.tau
+            forces = self.names[i].startswith(WANDER)
+            a[i, i] = -1.0 / level.tau if forces else a[i, i]
+            drive[i, i] = 2.0 * (level.size * force) ** 2 * (1.0 / level.tau if forces else level.tau)
         step, q = sampled(a, drive, self.period / self.samples)
         # states, and means of the sensors at the samples since the last update, from one sample to the next
         n = n_x + n_z
@@ -74,6 +76,11 @@ class Gains:
         whole = np.zeros((len(self.into), n_z))
         whole[[self.into.index(n) for n in self.names]] = gain
         return Filter(whole, np.array([level.tau]))
+
+
+def wandering(states: Sequence[str]) -> list[int]:
+    """Which states wander: forces of an augmented model, or all where it has none."""
+    return [i for i, n in enumerate(states) if n.startswith(WANDER)] or list(range(len(states)))
 
 
 def sampled(a: Array, drive: Array, step: float) -> tuple[Array, Array]:
@@ -109,6 +116,7 @@ def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
 
 
 def linear(model: Model, values: dict[str, float]) -> Linear:
-    """An augmented model with these parameters where it stands still."""
+    """An augmented model with these parameters where it stands still; of states and equations alone, where it starts."""
     known = {n: replace(p, value=values.get(n, p.value)) for n, p in model.parameters.items()}
-    return linearise(replace(model, parameters=known), (), np.zeros((1, len(model.states))), np.zeros((1, len(model.inputs))))
+    x = np.zeros(len(model.states)) if model.bodies else np.array(model.start, dtype=float)
+    return linearise(replace(model, parameters=known), (), x[None, :], np.zeros((1, len(model.inputs))))
