@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .adopting import adopt
 from .catalogue import curve
+from .catalogue.form import Form
 from .evidence.bench import SIZES, Bench
 from .evidence.blocks import Blocks
 from .evidence.fit import Problem
 from .evidence.prior import stated
-from .propose import PROMISE, adopt, propose
+from .propose import PROMISE, propose
 from .terms import Term, Trial
 from .worth import WORTH, Z_95, least
 
@@ -29,33 +31,44 @@ LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
 
 
 @dataclass(frozen=True, eq=False)
+class Accepted:
+    """A term, the form `of` which it is a law, the share `taken` by that of the power that innovations had beyond sensor noise, and the
+    `trials` compared in its round, the best first."""
+
+    term: Term
+    of: Form
+    taken: float
+    trials: tuple[Trial, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends with: the bench with all accepted terms in it, and a `plain` one with those alone that are worth a name; the last
-    term is not where it is `small`, its trial. Of each term the share `taken` of the power that innovations had beyond sensor noise, and of
-    every round the trials compared, the best first."""
+    """What a search ends with: the bench with all accepted terms in it, and a `plain` one with those alone that are worth a name, `named`;
+    the last form is not where it is `small`, its trial."""
 
     bench: Bench
     plain: Bench
-    terms: tuple[Term, ...]
-    taken: tuple[float, ...]
+    accepted: tuple[Accepted, ...]
     small: Trial | None
-    rounds: tuple[tuple[Trial, ...], ...]
 
     @property
-    def named(self) -> tuple[Term, ...]:
-        return self.terms if self.small is None else self.terms[:-1]
+    def named(self) -> tuple[Accepted, ...]:
+        return tuple(a for a in self.accepted if self.small is None or a.of is not self.small.form)
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        return tuple(a.term for a in self.accepted)
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Causes one by one, each the one that predicts best, until none predicts enough better, or the best is not worth a name."""
-    terms: list[Term] = []
-    taken: list[float] = []
-    rounds: list[tuple[Trial, ...]] = []
+    accepted: list[Accepted] = []
     small = None
     blocks = Blocks.of([len(r) // bench.update for r in bench.records])
     bench, base = _based(bench, blocks)
     plain = bench
     while True:
+        terms = [a.term for a in accepted]
         trials, wide = propose(bench, terms, log)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _large(t, WORTH), -t.gain))
         trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
@@ -65,19 +78,18 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         good = [t for t, b in zip(trials, better) if _accepted(t, b)]
         good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
         good = [t for t in good if _large(t, WORTH)] or good
-        rounds.append(tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks)))))
+        good = sorted(good, key=lambda t: -float(np.sum(t.blocks)))
         if not good:
             break
-        best = _simplest(rounds[-1], base, terms)
-        bench, term = adopt(bench, best)
-        terms.append(term)
-        taken.append(best.taken)
+        best = _simplest(good, base, terms)
+        bench, more = adopt(bench, best)
+        accepted += [Accepted(term, best.form, best.taken, tuple(good)) for term in more]
         bench, base = _based(bench, blocks)
         if not _large(best, least(bench.level.size, best.taken)):
             small = best  # and so is what is left
             break
         plain = bench
-    return Found(bench, plain, tuple(terms), tuple(taken), small, tuple(rounds))
+    return Found(bench, plain, tuple(accepted), small)
 
 
 def _large(t: Trial, least_share: float) -> bool:

@@ -133,14 +133,3 @@ def _sized(term: Term, sizes: Array) -> list[Free]:
     """The free values of a term with sizes of its parts, halved, for a score looks at small ones, and of the sign that they may have."""
     at = iter(sizes)
     return [f if f.log else replace(f, value=float(np.clip(f.value + 0.5 * next(at), f.low, f.high))) for f in term.free]
-
-
-def adopt(bench: Bench, t: Trial) -> tuple[Bench, Term]:
-    """The bench with a trial's form in its model, and the term that it has become."""
-    moved = motions(Probe.of(bench))
-    wide, (term,) = with_forms(bench, [t.form], moved, 90 + len(bench.model.elements))
-    names = dict(zip([f.target for f in t.term.free], term.free))
-    free = tuple(replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free)
-    fresh = replace(bench, model=wide, free=free, level=t.level)
-    problem = fresh.problem()
-    return replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(wide.states)), FOLLOWED)), term

@@ -67,16 +67,17 @@ def answer(
     notes = []
     probe = Probe.of(plain)
     moved = motions(probe)
-    probabilities = [_weighed(r) for r in found.rounds]
-    named = found.named
-    for k, term in enumerate(named):
-        enough = least(after.level.size, found.taken[k])
+    named = [a.term for a in found.named]
+    chances = {a.of: _weighed(a.trials) for a in found.named}
+    for a in found.named:
+        term, enough, chance = a.term, least(after.level.size, a.taken), chances[a.of]
         size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
-        cause = _cause(model, plain, term, size, _rivals(probabilities[k], term), _sure(probabilities[k], term))
+        rivals = _rivals(chance, term) if term.form.kind == a.of.kind else _loads(model, bench.places[term.form.index])
+        cause = _cause(model, plain, term, size, rivals, _sure(chance, a.of))
         log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")
         if size >= enough and not _unsized(cause):
             causes = _merged(causes, cause)
-        else:
+        elif term.form.kind == a.of.kind:
             why = f"is real but small: {size:.1%} of what acts there" if size < enough else "may be nothing: the 95 % interval of its size holds that"
             notes.append(_kept(term, why))
     if t := found.small:
@@ -90,7 +91,7 @@ def answer(
     run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 20)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
     taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken(after.fit, bench.problem().floor))
-    return Answer((*wrong, *causes, *biased), tuple(notes), _explanations(named, probabilities), found, run, tuple(offsets), taken, after.model)
+    return Answer((*wrong, *causes, *biased), tuple(notes), _explanations([(a.term, chances[a.of]) for a in found.named if a.term.form.kind == a.of.kind]), found, run, tuple(offsets), taken, after.model)
 
 
 def _name(t: Term) -> tuple[str, str]:
@@ -135,25 +136,24 @@ def _rivals(names: Sequence[tuple[Form, float]], term: Term) -> tuple[Named, ...
     return tuple(Named(f.kind, f.where) for f, p in names if (f.kind, f.where) != own and p > RIVAL)[:3]
 
 
-def _sure(names: Sequence[tuple[Form, float]], term: Term) -> float:
+def _sure(names: Sequence[tuple[Form, float]], form: Form) -> float:
     """Posterior of a name, with that of the other forms of its curve: of these the simplest that will do is taken."""
-    own = (catalogue.curve(term.form.kind), term.form.where)
+    own = (catalogue.curve(form.kind), form.where)
     return sum(p for f, p in names if (catalogue.curve(f.kind), f.where) == own)
 
 
-def _explanations(terms: Sequence[Term], names: Sequence[Sequence[tuple[Form, float]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
+def _explanations(named: Sequence[tuple[Term, Sequence[tuple[Form, float]]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
     """Sets of causes with their posterior: the one found, and it with one cause exchanged for a rival; what is not in the catalogue has the rest."""
-    own = tuple(dict.fromkeys(Named(t.form.kind, t.form.where) for t in terms))
+    own = tuple(dict.fromkeys(Named(*_name(t)) for t, _ in named))
     if not own:
         return ()
-    sure = [_sure(n, t) for n, t in zip(names, terms)]
+    sure = [_sure(options, t.form) for t, options in named]
     sets = [(own, RIGHT * float(np.prod(sure)))]
-    for k, (options, term) in enumerate(zip(names, terms)):
+    for k, (term, options) in enumerate(named):
         others = RIGHT * float(np.prod(sure[:k] + sure[k + 1 :]))
         for r in _rivals(options, term):
             p = next(p for f, p in options if (f.kind, f.where) == (r.kind, r.where))
-            here = Named(term.form.kind, term.form.where)
-            sets.append((tuple(r if n == here else n for n in own), others * p))
+            sets.append((tuple(r if n == Named(*_name(term)) else n for n in own), others * p))
     return tuple(sets)
 
 
@@ -283,6 +283,11 @@ def _load(model: Model, bench: Bench, probe: Probe, sensor: str) -> Cause | None
         if np.linalg.norm(seen - columns @ sizes) < WORTH * np.linalg.norm(seen):
             factor = float(sizes[0]) / float(np.linalg.norm(column[bench.fit.used]))
             value, sd = -factor * f.value, abs(factor) * bench.fit.deviation(bias(sensor))
-            alike = (Named("sensor_bias", sensor), *(Named("input_offset", x.name) for x in model.inputs if p.unit("N") == x.unit))
+            alike = (Named("sensor_bias", sensor), *_loads(model, p))
             return _constant("constant_force", p.name, "force", value, sd, p.unit("N"), alike)
     return None
+
+
+def _loads(model: Model, p: Place) -> tuple[Named, ...]:
+    """Inputs whose offset may be a constant force at a place."""
+    return tuple(Named("input_offset", x.name) for x in model.inputs if p.unit("N") == x.unit)

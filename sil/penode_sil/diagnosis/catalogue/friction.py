@@ -3,12 +3,14 @@
 """Dry friction: of Coulomb, with a constant force beside it or a peak at low rates, and with memory of the way."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 
 from penode_gen.model import GROUND, Model
 
 from ..hypotheses import slips
 from ..plant import Place
+from . import loads
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("coulomb_friction", "stribeck_friction", "bouc_wen")
@@ -29,7 +31,7 @@ WAYS = (0.06, 0.25, 0.8)  # of the rms deflection: how far a hysteresis is bent 
 
 
 def coulomb(motion: Motion, edge: float) -> Part:
-    return Part("coulomb_friction", ("force", "N"), {"transition": (edge * motion.v_rms, "m/s")}, 1, span=SPAN)
+    return Part("coulomb_friction", ("force", "N"), {"transition": (edge * motion.v_rms, "m/s")}, 1, span=SPAN, edge="transition")
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
@@ -41,7 +43,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         slides = coulomb(motion, edge)
         yield Form(KINDS[0], place.name, "force", index, (slides,))
         if grounded:
-            yield Form(KINDS[0], place.name, "force", index, (slides, Part("constant_force", ("force", "N"))), "with a constant")
+            yield Form(KINDS[0], place.name, "force", index, (slides, replace(loads.constant(), kind=loads.KINDS[0])), "with a constant")
         for share in PEAKS if place.role != "body" else ():
             peak = Part("2.3316439815971242*rise*exp(-(v/width)^2)*v/width", ("rise", "N"), {"width": (share * motion.v_rms, "m/s")}, 1)
             yield Form(KINDS[1], place.name, "force", index, (slides, peak))

@@ -19,10 +19,14 @@ RIVALS = {
 }
 
 
+def constant() -> Part:
+    return Part("constant_force", ("force", "N"))
+
+
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
     """See Kind."""
     if place.role == "body" or GROUND in place.ends:
-        yield Form(KINDS[0], place.name, "force", index, (Part("constant_force", ("force", "N")),))
+        yield Form(KINDS[0], place.name, "force", index, (constant(),))
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

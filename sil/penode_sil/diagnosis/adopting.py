@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""An accepted form in the bench: its laws as terms of their own, its edges as steep as the recordings show them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from .evidence.bench import Bench
+from .evidence.screening import Probe
+from .propose import FOLLOWED, motions
+from .terms import Term, Trial, with_forms
+
+HALVINGS = 7  # of the width of an edge: from 0.02 of the rms rate down to 1e-4 of it
+
+
+def adopt(bench: Bench, t: Trial) -> tuple[Bench, list[Term]]:
+    """The bench with a trial's form in its model, and the terms that it has become: one for each kind that its laws are of."""
+    moved = motions(Probe.of(bench))
+    wide, (term,) = with_forms(bench, [t.form], moved, 90 + len(bench.model.elements))
+    names = dict(zip([f.target for f in t.term.free], term.free))
+    free = tuple(replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free)
+    fresh = replace(bench, model=wide, free=free, level=t.level)
+    problem = fresh.problem()
+    fresh = replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(wide.states)), FOLLOWED))
+    return steepened(fresh, term), apart(term)
+
+
+def steepened(bench: Bench, term: Term) -> Bench:
+    """The bench with the edges of a term half as wide, as often as that is likelier; with steps as much shorter, for a steep edge damps as
+    much more."""
+    edges = {f"{name}_{part.edge}" for name, part in zip(term.elements, term.form.parts) if part.edge}
+    for _ in range(HALVINGS if edges else 0):
+        free = tuple(replace(f, value=0.5 * f.value, low=0.5 * f.low) if f.target in edges else f for f in bench.fit.free)
+        finer = replace(bench, fastest=2.0 * bench.fastest)
+        fit = finer.problem().solve(free, bench.fit.by, FOLLOWED)
+        if not fit.cost > bench.fit.cost:
+            break
+        bench = replace(finer, free=fit.free, fit=fit)
+    return bench
+
+
+def apart(term: Term) -> list[Term]:
+    """A term as one for each kind that its laws are of; that of the form comes first."""
+    kinds = dict.fromkeys([term.form.kind, *(p.kind for p in term.form.parts if p.kind)])
+    if len(kinds) == 1:
+        return [term]
+    found = []
+    for kind in kinds:
+        own = [(n, p) for n, p in zip(term.elements, term.form.parts) if (p.kind or term.form.kind) == kind]
+        names = tuple(n for n, _ in own)
+        form = replace(term.form, kind=kind, parts=tuple(p for _, p in own), note="")
+        found.append(Term(form, names, tuple(f for f in term.free if any(f.target.startswith(f"{n}_") for n in names))))
+    return found
