@@ -13,7 +13,7 @@ import penode_gen
 from penode_gen.model import Model
 
 from ..measured import Measured
-from . import explanation, extension, numerics, plausible, residual, weighed
+from . import explanation, extension, plausible, residual, weighed
 from .result import OUTSIDE, Cause, Diagnosis, Recorded
 from .explanation import Explanation
 
@@ -57,10 +57,9 @@ def by_innovations(
     shown = residual.show(study, w.fit, extended, w.held, w.verdict == "unexplained")
     rows = explanation.rows(study)
     evidence = (study.null.cost - rows) / np.sqrt(2.0 * rows)
-    numbers, _ = numerics.numerics(study)
     doubt = plausible.doubt(study, best, w.verdict) if w.verdict == "unexplained" else ""
     causes = w.causes or ((Cause(OUTSIDE, "", {}, 0.5),) if w.verdict == "unexplained" else ())
     return Diagnosis(
-        w.verdict, causes, w.gain, numbers, w.explained, evidence, 0.0,
+        w.verdict, causes, w.gain, w.numerics, w.explained, evidence, 0.0,
         (*[doubt] * bool(doubt), *remarks, *w.notes), residual=shown.numbers(), explanations=w.explanations, shown=shown,
     )  # fmt: skip

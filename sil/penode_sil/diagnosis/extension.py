@@ -45,11 +45,6 @@ def toml(value: object) -> str:
     return repr(float(f"{value:.7g}"))
 
 
-def _resolved(study: Study, lines: Sequence[str]) -> tuple[str, Model]:
-    found = resolved(study, "\n".join(lines))
-    return found.text, found.model
-
-
 def unlike(stem: str, taken: Collection[str]) -> str:
     """A name that is not taken: the stem, or the stem with a number."""
     return next(name for name in chain([stem], (f"{stem}_{n}" for n in count(2))) if name not in taken)
@@ -64,7 +59,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     """Text of model_extended.toml, and the model that it describes."""
     lines = _head(study, e, causes)
     if e is None:
-        return _resolved(study, lines)
+        return resolved(study, "\n".join(lines))
     taken = {*study.model.parameters, *study.model.states, *(x.name for x in study.model.elements), *(s.name for s in study.model.sensors)}
     written = _Written(study, e, causes, _renaming(e, taken), unlike("age", taken), unlike("recorded", taken))
     for j in range(len(study.model.sensors)):
@@ -73,7 +68,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     for title, entries in written.sections():
         if entries:
             lines += [f"[{title}]", *entries, ""]
-    return _resolved(study, lines)
+    return resolved(study, "\n".join(lines))
 
 
 def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[str]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from penode_gen import units
 
 from ..batch import Batch
@@ -17,34 +16,23 @@ from .result import Cause, Value
 from .stepped import run
 from .study import Study
 
-Array = NDArray[np.float64]
 COARSE = 0.02  # of a signal: what the deployed step may err by
 
 
 def numerics(study: Study) -> tuple[dict[str, object], Cause | None]:
     """Error of the deployed step on the first training recording, against the exact solution of the same model with the same
-    start and input; and the cause of it."""
+    start and input; and the cause `integration_error` if that is more than COARSE of a signal and more than its noise."""
     model, e = study.model, replace(study.experiments[0], lead=0.0)
     fixed = tuple(f for f in study.null.free if f.target[0] == "start")
     start = np.array([next((f.value for f in fixed if f.target == ("start", 0, i)), x) for i, x in enumerate(model.start)])
     problem = Problem(model, [e], study.metrics[:1], study.set_name, study.linear.fastest)
     exact = problem.simulate(0, fixed, np.zeros((1, len(fixed))))[0][0]
     stepped = run(model, e, lambda m: Batch(anonymous(m)).run(e.drive, x0=start, set_name=study.set_name).z[0])
-    found = {}
-    for s, (error, signal) in zip(model.sensors, errors(exact, stepped)):
+    found: dict[str, object] = {}
+    parameters: dict[str, Value] = {}
+    for j, s in enumerate(model.sensors):
+        error, signal = float(np.sqrt(np.mean((stepped[:, j] - exact[:, j]) ** 2))), float(np.std(exact[:, j]))
         found[s.name] = {"rms_error": error, "unit": units.si(s.unit), "share_of_signal": error / signal if signal else 0.0}
-    return found, cause(study, exact, stepped)
-
-
-def errors(exact: Array, stepped: Array) -> list[tuple[float, float]]:
-    """Rms of what a step errs by in each sensor [n, n_z], and of the sensor about its mean."""
-    return [(float(np.sqrt(np.mean((y - x) ** 2))), float(np.std(x))) for x, y in zip(exact.T, stepped.T)]
-
-
-def cause(study: Study, exact: Array, stepped: Array) -> Cause | None:
-    """`integration_error` where a step errs by more than COARSE of a signal and more than its noise."""
-    found = {}
-    for j, (s, (error, signal)) in enumerate(zip(study.model.sensors, errors(exact, stepped))):
         if error > COARSE * signal and error**2 > float(np.mean(study.levels[0][:, j])):
-            found[f"rms_error_{s.name}"] = Value(error, units.si(s.unit), (error, error))
-    return Cause("integration_error", study.model.name, found, 0.99) if found else None
+            parameters[f"rms_error_{s.name}"] = Value(error, units.si(s.unit), (error, error))
+    return found, Cause("integration_error", model.name, parameters, 0.99) if parameters else None

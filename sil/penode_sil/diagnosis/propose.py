@@ -60,15 +60,21 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     forms += drives.sensors(bench.model, len(bench.noise))
     forms = [f for f in forms if not _taken(f, terms)]
     ranked = _screened(bench, probe, forms, moved)
-    ranked = sorted([*ranked, *_holds(bench, ranked, terms)], key=lambda pair: -pair[0].gain)
-    chosen: dict[tuple[str, str, str], tuple[Score, Form]] = {}
-    for score, form in ranked:
-        if score.gain > PROMISE and len(chosen) < TRIED:
-            chosen.setdefault((form.kind, form.where, form.note), (score, form))
+    holds = _holds(bench, list(_chosen(ranked).values()), terms)
+    chosen = _chosen(sorted([*ranked, *holds], key=lambda pair: -pair[0].gain))
     wide, made = with_forms(bench, [form for _, form in chosen.values()], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
     trials = [_fitted(bench, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen.values())]
     return sorted(trials, key=lambda t: -t.gain), wide
+
+
+def _chosen(ranked: Sequence[tuple[Score, Form]]) -> dict[tuple[str, str, str], tuple[Score, Form]]:
+    """The best TRIED that promise enough, of each name and place one."""
+    found: dict[tuple[str, str, str], tuple[Score, Form]] = {}
+    for score, form in ranked:
+        if score.gain > PROMISE and len(found) < TRIED:
+            found.setdefault((form.kind, form.where, form.note), (score, form))
+    return found
 
 
 def _taken(form: Form, terms: Sequence[Term]) -> bool:
@@ -92,9 +98,9 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
 
 
 def _holds(bench: Bench, ranked: Sequence[tuple[Score, Form]], terms: Sequence[Term]) -> list[tuple[Score, Form]]:
-    """Holds of inputs that seem to act late."""
+    """Holds of inputs that seem to act late, more than most that the model may have wrong."""
     taken = [t.form.where for t in terms if t.form.kind == holding.KIND]
-    late = [(s, f) for s, f in ranked if f.how == "input_delay" and s.gain > PROMISE and s.sizes[0] > 0.0 and f.where not in taken]
+    late = [(s, f) for s, f in ranked if f.how == "input_delay" and s.sizes[0] > 0.0 and f.where not in taken]
     found = [holding.propose(bench, f.index, float(s.sizes[0])) for s, f in late]
     return [pair for pair in found if pair]
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import re
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,17 +23,7 @@ COSTLY = 1.02  # times the error that the exact solution leaves: from there on a
 MOST = 16  # steps of a sample
 
 
-@dataclass(frozen=True, eq=False)
-class Resolved:
-    """A text and the model of it; sensors [n, n_z] on the first recording as the exact solution has them, and as the step had them before."""
-
-    text: str
-    model: Model
-    exact: Array
-    stepped: Array
-
-
-def resolved(study: Study, text: str) -> Resolved:
+def resolved(study: Study, text: str) -> tuple[str, Model]:
     """The model of a text; its inputs follow a curve through more samples if the way between them is too rough for the first recording,
     and it takes more steps a sample if they are too long, where the C then meets it better. The more samples, the finer, but the louder
     the noise of the inputs."""
@@ -45,7 +34,7 @@ def resolved(study: Study, text: str) -> Resolved:
     def left(z: Array) -> float:
         return rms(((z - e.y) * e.good / scale).ravel())
 
-    as_written = stepped = deployed(model, e, start, study.set_name)
+    stepped = deployed(model, e, start, study.set_name)
     ways = INTERPOLATIONS[INTERPOLATIONS.index(model.interpolation) + 1 :] if model.interpolation != "held" else ()
     for way in ways:
         if np.max(np.sqrt(np.mean(((stepped - exact) / scale) ** 2, axis=0))) < ROUGH:
@@ -62,7 +51,7 @@ def resolved(study: Study, text: str) -> Resolved:
         if left(finer) >= left(stepped):
             break
         text, stepped, substeps = better, finer, 2 * substeps
-    return Resolved(text, _load(text), exact, as_written)
+    return text, _load(text)
 
 
 def _with(text: str, key: str, value: str) -> str:

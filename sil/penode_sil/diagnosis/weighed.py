@@ -23,7 +23,7 @@ from .noise import UNSEEN, Experiment
 from .residual import Channel, rms
 from .resolving import resolved
 from .result import Cause, Gain, Named, Value
-from .study import Study, look
+from .study import Study, fitted, look
 from .worth import WORTH
 
 Array = NDArray[np.float64]
@@ -49,6 +49,7 @@ class Weighed:
     explained: float  # share taken of the residual in a free run, or of the power of the innovations, whichever is larger
     level: float  # of what moves wanders beside all that was found
     laws: int  # of all causes named
+    numerics: dict[str, object]  # of the step as the file has it, with parameters as they are fitted
 
 
 def supports(model: Model) -> bool:
@@ -97,8 +98,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     found = real.answer(model, study.places, study.experiments, study.linear.fastest, study.set_name, log)
     bench = found.found.bench
     made = applied.apply(model, bench, found.run, found.found.terms, found.offsets)
-    resolution = resolved(study, made.text)
-    text, extended = resolution.text, resolution.model
+    text, extended = resolved(study, made.text)
     gain, more, held = measuring.measure(study, extended, unused) if unused else ({}, [], [])
     scale = np.array([s.noise or 1.0 for s in model.sensors])
     after = tuple(measuring.started(extended, e, study)[1] for e in study.experiments)
@@ -106,14 +106,14 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
-    coarse = numerics.cause(study, resolution.exact, resolution.stepped)
+    numbers, coarse = numerics.numerics(replace(study, model=fitted(model, found.run)))
     causes += (coarse,) if coarse else ()
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
     verdict = _verdict(found, causes, share, max(left, found.found.bench.level.size))
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
     laws = sum(max(len(a.term.form.parts), 1) for a in found.found.named)
-    return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws)
+    return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws, numbers)
 
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float) -> str:
