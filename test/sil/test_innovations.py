@@ -194,13 +194,13 @@ def test_nothing_wanders_where_nothing_is_missing(tmp_path):
     """Made-up data of the model itself: a free run is the likeliest observer, and sensor noise alone may judge."""
     model, experiments = swing(tmp_path, lambda s, v: 0.0)
     study, _ = begin(with_tolerances(model), experiments)
-    assert not weighed.misfit(study, study.null)
+    assert not weighed.misfit(study, study.null).size
 
 
 def test_sensor_noise_does_not_judge_what_is_bent_everywhere(tmp_path):
     model, experiments = swing(tmp_path, lambda s, v: 0.03 * 0.64 * 0.3 * math.sin(9.0 * s) + 0.0005 * math.sin(40.0 * v))
     study, _ = begin(with_tolerances(model), experiments)
-    assert weighed.misfit(study, study.null)
+    assert weighed.misfit(study, study.null).size
 
 
 BENT = 0.03 * 0.64 * 0.5  # a spring of waves, 3 % of what acts: no law of the catalogue

@@ -104,33 +104,53 @@ def _sensor(
     return {"value": expression, "unit": s.unit}
 
 
+SAMPLED = ("input_delay", "input_added")  # laws of samples: gains and lags go behind them
+
+
 def _driven(model: Model, fit: Fit, terms: Sequence[Term]) -> tuple[dict[str, list[str]], list[str]]:
-    """What terms of inputs add to a model file, and what they cannot."""
+    """What terms of inputs add to a model file, those of one input in a row, and what they cannot."""
     found: dict[str, list[str]] = {"parameters": [], "actuators": [], "elements": []}
-    left = []
-    for t in (t for t in terms if t.form.how.startswith("input_")):
-        name, value = t.form.where, fit.value(t.free[0].target)
-        acts, samples = f"{name}_acts", round((t.form.series.period if t.form.series else value) / model.sample_time)
-        if t.form.how == "input_offset" and not _places(model, name):
-            found["parameters"].append(f"{name}_offset = {table({'value': value, 'unit': units.si(_unit(model, name))})}")
-            _redirected(model, name, f"({name} + {name}_offset)", found["elements"])
-            continue
-        if t.form.how == "input_offset" or t.form.how == "input_delay" and samples < 1:
-            left.append(f"{t.form.how} of {name}: a recording has to be corrected, the model file has no law for it")
-            continue
-        if t.form.how in ("input_delay", "input_added"):
-            law: dict[str, object] = {"law": "held" if t.form.series else "delay", "samples": max(samples, 1)}
-        else:
-            law = {"law": "gain", "gain": f"{name}_gain"} if t.form.how == "input_gain" else {"law": "lag", "time": f"{name}_lag"}
-            size = {"value": 1.0 + value, "unit": "1"} if t.form.how == "input_gain" else {"value": value, "unit": "s"}
-            found["parameters"].append(f"{list(law.values())[1]} = {table(size)}")
-        found["actuators"].append(f"{acts} = {table({'input': name, **law})}")
-        _redirected(model, name, acts, found["elements"])
+    left: list[str] = []
+    own = sorted((t for t in terms if t.form.how.startswith("input_")), key=lambda t: t.form.how not in SAMPLED)
+    for name in dict.fromkeys(t.form.where for t in own):
+        acts = name
+        for t in (t for t in own if t.form.where == name and t.form.how != "input_offset"):
+            acts = _actuator(model, t, fit.value(t.free[0].target), acts, found, left)
+        offsets = [t for t in own if t.form.where == name and t.form.how == "input_offset"]
+        if offsets and _places(model, name):
+            left.append(_uncorrected(offsets[0]))
+        elif offsets:
+            value, unit = fit.value(offsets[0].free[0].target), units.si(next(i.unit for i in model.inputs if i.name == name))
+            found["parameters"].append(f"{name}_offset = {table({'value': value, 'unit': unit})}")
+            acts = f"({acts} + {name}_offset)"
+        if acts != name:
+            _redirected(model, name, acts, found["elements"])
     return found, left
 
 
-def _unit(model: Model, name: str) -> str:
-    return next(i.unit for i in model.inputs if i.name == name)
+def _actuator(model: Model, t: Term, value: float, source: str, found: dict[str, list[str]], left: list[str]) -> str:
+    """Adds what a term makes of a signal; the name of that, or of the signal itself where the model file has no law for it."""
+    name, acts = t.form.where, f"{source}_acts"
+    samples = round((t.form.series.period if t.form.series else value) / model.sample_time)
+    law: dict[str, object] = {}
+    match t.form.how:
+        case "input_gain":
+            law = {"law": "gain", "gain": f"{name}_gain"}
+            found["parameters"].append(f"{name}_gain = {table({'value': 1.0 + value, 'unit': '1'})}")
+        case "input_lag":
+            law = {"law": "lag", "time": f"{name}_lag"}
+            found["parameters"].append(f"{name}_lag = {table({'value': value, 'unit': 's'})}")
+        case "input_delay" if samples < 1:
+            left.append(_uncorrected(t))
+            return source
+        case _:
+            law = {"law": "held" if t.form.series else "delay", "samples": max(samples, 1)}
+    found["actuators"].append(f"{acts} = {table({'input': source, **law})}")
+    return acts
+
+
+def _uncorrected(t: Term) -> str:
+    return f"{t.form.how} of {t.form.where}: a recording has to be corrected, the model file has no law for it"
 
 
 def _places(model: Model, name: str) -> bool:

@@ -55,27 +55,35 @@ def diagnose(
 
 
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
-    """Innovations decide where the file only guesses a parameter, or where more acts than the search by sensor noise explains (`_decides`);
-    else that search does. It ends early where more acts than any single cause explains and innovations explain it all, unless so much is left
-    that more causes are to be expected. Where it finds no name, innovations may: for everything, or for a part if the rest wanders everywhere."""
-    if weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values()):
+    """Innovations decide where the file only guesses a parameter, on a free motion that the model misses, or where more acts than the search
+    by sensor noise explains (`_decides`); else that search does. It ends early where more acts than any single cause explains and
+    innovations explain it all, unless so much is left that more causes are to be expected. Where it finds no name, innovations may: for
+    everything, or for a part if the rest wanders everywhere."""
+    guessed = weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values())
+    if guessed or not study.model.inputs and weighed.misfit(study, study.null, case.log).size > weighed.UNMODELLED:
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
     case.tell(SEARCH[0], "looking for causes")
     study, beam = search.first(study, case.log)
     w = None
-    if beam and weighed.misfit(study, beam[0].fit, case.log) > weighed.UNMODELLED:
+    if beam and weighed.misfit(study, beam[0].fit, case.log).size > weighed.UNMODELLED:
         w = _weighed(case, study)
         if w.verdict == "explained" and weighed.UNMODELLED < w.level < 2.0 * WORTH:
             return _by_innovations(case, beam[0], w)
     study, explanations = resting(other, *search.grow(study, beam, case.log), case.log)
     best = explanations[0] if explanations else None
-    if level := weighed.misfit(study, best.fit if best else study.null, case.log):
+    beside = weighed.misfit(study, best.fit if best else study.null, case.log)
+    if beside.size:
         w = w or _weighed(case, study)
-        if _decides(w, level, study, best, bool(faults)):
+        if _decides(w, beside.size, study, best, bool(faults)):
             return _by_innovations(case, best, w)
     answer = by_noise(case, study, explanations, faults, bursts)
-    if w and answer.verdict == "unexplained" and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED):
+    if answer.verdict != "unexplained":
+        return answer
+    if w is None and best and weighed.supports(study.model):
+        other = _weighed(case, study)
+        w = other if other.follows_better(beside) else None
+    if w and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED):
         return _by_innovations(case, best, w)
     return answer
 

@@ -31,6 +31,18 @@ MIN_UNMODELLED = 0.0055  # of what moves, and worth MIN_GAIN: less wanders besid
 UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be that, or a curve that stands for another one
 
 
+@dataclass(frozen=True)
+class Misfit:
+    """How much more acts than an explanation has, beyond the noise of sensors: `size`, as a share of what moves; 0 if that may be chance,
+    infinite if it follows the measurement worse than the model as it is: its curves hold along its own way alone, and bend away beside it.
+    Beyond UNMODELLED innovations have to decide; less than that, only a simpler answer of theirs counts. `likelihood`: log likelihood of its
+    innovations, in steps of `update` samples; infinite where sensor noise is all that is left."""
+
+    size: float = 0.0
+    likelihood: float = np.inf
+    update: int = 0
+
+
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """What a diagnosis needs of it: the study with the motion that it has seen, causes, verdict, notes, explanations, text and model of the
@@ -50,6 +62,12 @@ class Weighed:
     level: float  # of what moves wanders beside all that was found
     laws: int  # of all causes named
     numerics: dict[str, object]  # of the step as the file has it, with parameters as they are fitted
+    likelihood: float  # of the innovations with what is named, in steps of
+    update: int  # samples
+
+    def follows_better(self, other: Misfit) -> bool:
+        """Do its causes follow the recordings better than another explanation does?"""
+        return self.verdict == "explained" and self.update == other.update and self.likelihood > other.likelihood
 
 
 def supports(model: Model) -> bool:
@@ -57,12 +75,10 @@ def supports(model: Model) -> bool:
     return bool(model.bodies or model.states and not model.elements) and not model.networks
 
 
-def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> float:
-    """How much more acts than an explanation has, beyond the noise of sensors, as a share of what moves; 0 if that may be chance, infinite
-    if it follows the measurement worse than the model as it is: its curves hold along its own way alone, and bend away beside it. Beyond
-    UNMODELLED innovations have to decide; less than that, only a simpler answer of theirs counts."""
+def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> Misfit:
+    """Of an explanation."""
     if not supports(study.model) or _is_noise(study, fit):
-        return 0.0
+        return Misfit()
     values = {f.target: f.value for f in fit.free if isinstance(f.target, str)}
     known = {n: replace(p, value=values.get(n, p.value), exact=True) for n, p in fit.model.parameters.items()}
     model = replace(fit.model, parameters=known)
@@ -79,8 +95,8 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
     gained = bench.fit.likelihood - still.likelihood
     log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats; it follows better than the nominal model by {bench.fit.likelihood - nominal.fit.likelihood:.0f}")
     if bench.fit.likelihood < nominal.fit.likelihood - MIN_GAIN * len(nominal.free):
-        return np.inf
-    return bench.level.size if gained > MIN_GAIN and bench.level.size > MIN_UNMODELLED else 0.0
+        return Misfit(np.inf, bench.fit.likelihood, bench.update)
+    return Misfit(bench.level.size if gained > MIN_GAIN and bench.level.size > MIN_UNMODELLED else 0.0, bench.fit.likelihood, bench.update)
 
 
 def _is_noise(study: Study, fit: Fit) -> bool:
@@ -113,7 +129,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
     laws = sum(max(len(a.term.form.parts), 1) for a in found.found.named)
-    return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws, numbers)
+    return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws, numbers, found.found.plain.fit.likelihood, bench.update)
 
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float) -> str:
