@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from penode_gen import units
@@ -55,7 +55,8 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     driven, left = _driven(model, fit, terms)
     own = [(e, bench.places[t.form.index]) for t in forces for e in bench.model.elements if e.name in t.elements]
     grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
-    sensors = [_sensor(model, j, named(grown.sensors[j].expression), values, offsets, parameters) for j in range(len(model.sensors))]
+    limits = {t.form.index: values[t.free[0].target] for t in terms if t.form.how == "clip"}
+    sensors = [_sensor(model, j, named(grown.sensors[j].expression), values, offsets, limits, parameters) for j in range(len(model.sensors))]
     units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
     outputs = [f"{s.name} = {table({**x, 'unit': units_of[s.name]})}" for s, x in zip(model.sensors, sensors) if x and s.name in units_of]
     learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
@@ -89,8 +90,9 @@ def _element(e: Element, named: Callable[[str], str]) -> dict[str, object]:
 
 
 def _sensor(
-    model: Model, j: int, expression: str, values: dict[str, float], offsets: Collection[str], parameters: list[str]
-) -> dict[str, object]:
+    model: Model, j: int, expression: str, values: dict[str, float], offsets: Collection[str], limits: Mapping[int, float],
+    parameters: list[str],
+) -> dict[str, object]:  # fmt: skip
     """What a sensor that measures otherwise has as its value and unit; nothing for one that does not."""
     s, unit = model.sensors[j], units.si(model.sensors[j].unit)
     if scale(s.name) in values:
@@ -99,6 +101,9 @@ def _sensor(
     if s.name in offsets:
         parameters.append(f"bias_{s.name} = {table({'value': values[bias(s.name)], 'unit': unit})}")
         expression = f"{expression} + bias_{s.name}"
+    if j in limits:
+        parameters.append(f"limit_{s.name} = {table({'value': limits[j], 'unit': unit})}")
+        expression = f"min(max({expression}, -limit_{s.name}), limit_{s.name})"
     if expression == s.expression:
         return {}
     return {"value": expression, "unit": s.unit}

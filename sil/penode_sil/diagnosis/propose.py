@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from penode_gen.model import Model
 
-from . import catalogue, holding
+from . import catalogue, clipping, holding
 from .catalogue import drives
 from .catalogue.form import Form, Motion, Moved
 from .evidence.bench import Bench, fit_level
@@ -61,6 +61,8 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     forms = [f for f in forms if not _taken(f, terms)]
     ranked = _screened(bench, probe, forms, moved)
     holds = _holds(bench, list(_chosen(ranked).values()), terms)
+    cut = {t.form.where for t in terms if t.form.how == "clip"}
+    ranked += [clipping.propose(bench, j) for j, s in enumerate(bench.model.sensors) if s.name not in cut]
     chosen = _chosen(sorted([*ranked, *holds], key=lambda pair: -pair[0].gain))
     wide, made = with_forms(bench, [form for _, form in chosen.values()], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))

@@ -166,7 +166,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
 
     def sizes(values: Mapping[object, float]) -> dict[str, tuple[str, float]]:
         if file is drives:
-            unit = units.si(model.inputs[form.index].unit) if form.how.startswith("input_") else "1"
+            unit = units.si((model.inputs if form.how.startswith("input_") else model.sensors)[form.index].unit)
             return drives.sizes(form, Sizes({}, {}, 0.0, True, values[term.free[0].target]), unit)
         parts = {}
         for k, (name, part) in enumerate(zip(term.elements, form.parts)):
@@ -204,7 +204,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
 
 def _wider(bench: Bench, term: Term, size: float) -> float:
     """Factor of the deviations of a term of this share of what acts: noise alone makes less of them than what the model leaves out."""
-    known = min(bench.fit.deviation(f.target) / max(abs(f.value - f.origin), 1e-300) for f in _fitted(bench, term) if not f.log)
+    known = min(bench.fit.deviation(f.target) / max(abs(f.value - f.origin), 1e-300) for f in _fitted(bench, term) if not f.log or term.form.how == "clip")
     return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
 
 

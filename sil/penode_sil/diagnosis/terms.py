@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 
+from . import clipping
 from .catalogue.form import Form, Motion, Part
 from .evidence.bench import Bench
 from .evidence.fit import Fit
@@ -70,8 +71,12 @@ def free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
 
 def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], first: int) -> tuple[Model, list[Term]]:
     """The model with all forms in it, each without any force yet, and their terms."""
-    elements, where, parameters, terms = [], [], {}, []
+    elements, where, parameters, terms, model = [], [], {}, [], bench.model
     for i, form in enumerate(forms):
+        if form.how == "clip":
+            model, value = clipping.limited(model, form, f"x{first}_{i}_limit")
+            terms.append(Term(form, (), (value,)))
+            continue
         if form.how != "force":
             terms.append(Term(form, (), free_of(bench, form)))
             continue
@@ -90,7 +95,7 @@ def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], fir
                 if key not in part.fixed:
                     free.append(Free(f"{name}_{key}", value, value, log=True, sigma=1.0, origin=value, low=value / part.span, high=part.span * value))
         terms.append(Term(form, tuple(names), tuple(free)))
-    return extend(bench.model, elements, parameters, where), terms
+    return extend(model, elements, parameters, where), terms
 
 
 def _element(name: str, ends: tuple[str, str], part: Part) -> Element:

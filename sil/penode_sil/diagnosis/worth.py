@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from penode_gen.model import GROUND, Model
 
+from . import clipping
 from .catalogue.form import Motion
 from .evidence.bench import UPDATES, Bench
 from .evidence.fit import Fit
@@ -39,6 +40,8 @@ def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]
     that is free could do as well, a parameter, an offset, a start: in forces, and in what sensors show. How much of a line is whose is a
     matter of writing it down, so a force counts by what is left of it beside lines, that of a bent curve over BENT."""
     form, targets = terms[0].form, [f.target for t in terms for f in t.free]
+    if form.how == "clip":
+        return clipping.share(bench, form, next(f for f in fit.free if f.target == targets[0]))
     if form.how == "force":
         motion = moved[form.index]
         force = np.sum([np.concatenate(_force(t, fit, motion)) for t in terms], axis=0)

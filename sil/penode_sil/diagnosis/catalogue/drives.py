@@ -41,7 +41,7 @@ def sensors(model: Model, count: int) -> Iterable[Form]:
 
 
 def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:
-    """What a report gives of a form; `unit` of its input."""
+    """What a report gives of a form; `unit` of its input or sensor."""
     match form.how:
         case "input_gain":
             return {"gain": ("1", 1.0 + v.alone)}
@@ -49,6 +49,8 @@ def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:
             return {"offset": (unit, v.alone)}
         case "input_added":
             return {"period": ("s", form.series.period)} if form.series else {}
+        case "clip":
+            return {"limit": (unit, v.alone)}
         case "scale":
             return {"scale": ("1", v.alone)}
     return {"lag" if form.how == "input_lag" else "delay": ("s", v.alone)}

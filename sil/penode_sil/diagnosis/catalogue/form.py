@@ -100,7 +100,7 @@ class Series:
 @dataclass(frozen=True, eq=False)
 class Form:
     """A form of a kind at a place of the model (its index), an input or a sensor (its index): `how` is "force", or what is wrong with the
-    input ("input_gain", ..., "input_added": a `series`) or sensor ("scale", "late"). Of one family, forms stand for the same name."""
+    input ("input_gain", ..., "input_added": a `series`) or sensor ("scale", "late", "clip": beyond a `limit`). Of one family, forms stand for the same name."""
 
     kind: str
     where: str
@@ -109,6 +109,7 @@ class Form:
     parts: tuple[Part, ...] = ()
     note: str = ""
     series: Series | None = None
+    limit: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

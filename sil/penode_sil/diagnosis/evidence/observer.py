@@ -183,6 +183,15 @@ class Predictor:
             moved.append(run.x)
         return Lanes(nus, sane), seen, moved
 
+    def sensors(self, free: Sequence[Free]) -> list[Array]:
+        """Sensors that were measured, as a free run has them, per recording [n, n_z]."""
+        found = []
+        for e in range(len(self.records)):
+            start, parameters, u, _ = self._given(e, free, np.zeros((1, len(free))))
+            run = self.batch.run(self._finer(u), x0=start, parameters=parameters, set_name=self.set_name, every=self.fine)
+            found.append(run.z[0, :, : self.n_z])
+        return found
+
     def _scales(self, parameters: Mapping[str, Array]) -> Array:
         """Scales of sensors, [1, n_z] or [runs, 1, n_z]: a filter's gain is for sensors of scale 1, else a scale would tune it."""
         known = [parameters.get(scale(s.name), np.ones(1)) for s in self.model.sensors[: self.n_z]]
