@@ -27,7 +27,7 @@ from .judging import ENOUGH, share
 from .noise import Experiment
 from .resting import resting
 from .result import Diagnosis
-from .study import VAGUE, Study, begin
+from .study import Study, begin, guessed
 from .worth import WORTH
 
 AGAIN = 3  # times that bursts are looked for in what is left without them
@@ -59,8 +59,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     by sensor noise explains (`_decides`); else that search does. It ends early where more acts than any single cause explains and
     innovations explain it all, unless so much is left that more causes are to be expected. Where it finds no name, innovations may: for
     everything, or for a part if the rest wanders everywhere."""
-    guessed = weighed.supports(study.model) and any(p.tolerance > VAGUE for p in study.model.parameters.values())
-    if guessed or not study.model.inputs and weighed.misfit(study, study.null, case.log).size > weighed.UNMODELLED:
+    if weighed.supports(study.model) and guessed(study.model) or not study.model.inputs and weighed.misfit(study, study.null, case.log).size > weighed.UNMODELLED:
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
     case.tell(SEARCH[0], "looking for causes")
@@ -78,12 +77,12 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
         if _decides(w, beside.size, study, best, bool(faults)):
             return _by_innovations(case, best, w)
     answer = by_noise(case, study, explanations, faults, bursts)
-    if answer.verdict != "unexplained":
-        return answer
-    if w is None and best and weighed.supports(study.model):
-        other = _weighed(case, study)
-        w = other if other.follows_better(beside) else None
-    if w and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED):
+    if answer.verdict in ("unexplained", "partly_explained") and w is None and best and weighed.supports(study.model):
+        w = _weighed(case, study)
+        if not w.follows_better(beside):
+            return answer
+        return _by_innovations(case, best, w)
+    if w and answer.verdict == "unexplained" and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED):
         return _by_innovations(case, best, w)
     return answer
 

@@ -19,7 +19,7 @@ from .evidence.fit import Problem
 from .evidence.prior import stated
 from .propose import PROMISE, propose
 from .terms import Term, Trial
-from .worth import WORTH, Z_95, least
+from .worth import WORTH, Z_95, alone, least
 
 Array = NDArray[np.float64]
 SCORED = 4  # of the promising trials, how many are scored on held-out blocks
@@ -70,14 +70,14 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
     while True:
         terms = [a.term for a in accepted]
         trials, wide = propose(bench, terms, log)
-        trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _large(t, WORTH), -t.gain))
+        trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
         trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
         better = [t.blocks - base for t in trials]
         for t, b in zip(trials, better):
             log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
         good = [t for t, b in zip(trials, better) if _accepted(t, b)]
         good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
-        good = [t for t in good if _large(t, WORTH)] or good
+        good = [t for t in good if _matters(t)] or good
         good = sorted(good, key=lambda t: -float(np.sum(t.blocks)))
         if not good:
             break
@@ -90,6 +90,11 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
             break
         plain = bench
     return Found(bench, plain, tuple(accepted), small)
+
+
+def _matters(t: Trial) -> bool:
+    """Is a form large, or, as small as it is, nearly all that is missed?"""
+    return _large(t, WORTH) or alone(t.taken)
 
 
 def _large(t: Trial, least_share: float) -> bool:

@@ -15,7 +15,7 @@ from penode_gen.model import Model
 from .fit import Free, Problem
 from .noise import Experiment
 from .explanation import COST, NEW, Explanation, cost
-from .study import VAGUE, Study
+from .study import Study, guessed
 
 Array = NDArray[np.float64]
 MIXED = (  # factor that a wrong unit makes, what is mixed up, units of signals that it happens to
@@ -35,7 +35,7 @@ UNLIKE = 0.5  # share of a signal's power that the model misses, beyond which th
 
 def misfits(model: Model, experiments: Sequence[Experiment], set_name: str) -> list[str]:
     """A line for each signal whose unit or sign contradicts the model, which is simulated as the file has it."""
-    if any(p.tolerance > VAGUE for p in model.parameters.values()):
+    if guessed(model):
         return []
     problem = Problem(model, experiments, [], set_name)
     found = []

@@ -27,6 +27,7 @@ from .noise import Experiment
 from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
 from .result import Cause, Named, Value, place
+from .study import guessed
 from .terms import Term, Trial
 from .worth import SYSTEMATIC, WORTH, Z_95, least, share, shift
 
@@ -85,7 +86,7 @@ def answer(
         notes.append(_kept(found.terms[-1], f"is real but small: {what}"))
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
     biased, remarks = _offsets(model, plain, probe)
-    notes += more + remarks
+    notes += more + remarks + _fitted_values(model, plain)
     offsets = [s.name for s in model.sensors if abs(after.fit.value(bias(s.name))) > Z_95 * after.fit.deviation(bias(s.name))]
     none = {bias(s.name) for s in model.sensors if s.name not in offsets}
     run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 20)
@@ -204,11 +205,11 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
 
 def _wider(bench: Bench, term: Term, size: float) -> float:
     """Factor of the deviations of a term of this share of what acts: noise alone makes less of them than what the model leaves out."""
-    known = min(bench.fit.deviation(f.target) / max(abs(f.value - f.origin), 1e-300) for f in _fitted(bench, term) if not f.log or term.form.how == "clip")
+    known = min(bench.fit.deviation(f.target) / max(abs(f.value - f.origin), 1e-300) for f in _values_of(bench, term) if not f.log or term.form.how == "clip")
     return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
 
 
-def _fitted(bench: Bench, term: Term) -> list[Free]:
+def _values_of(bench: Bench, term: Term) -> list[Free]:
     """The free values of a term as they are in the bench."""
     return [f for f in bench.fit.free if f.target in {t.target for t in term.free}]
 
@@ -244,6 +245,15 @@ def _parameters(model: Model, bench: Bench, moved: Sequence[Motion], shared: Col
                 continue
             causes.append(Cause("wrong_parameter", name, {name: Value(f.value, units.si(p.unit), (low, high))}, RIGHT))
     return causes, notes
+
+
+def _fitted_values(model: Model, bench: Bench) -> list[str]:
+    """A note on parameters that the file only guesses."""
+    found = []
+    for name in guessed(model):
+        if any(f.target == name for f in bench.fit.free):
+            found.append(f"{name} = {bench.fit.value(name):.4g} {units.si(model.parameters[name].unit)} +- {Z_95 * bench.fit.deviation(name):.2g}")
+    return [f"as fitted, for the file only guesses: {', '.join(found)}"] if found else []
 
 
 def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], list[str]]:

@@ -47,6 +47,11 @@ class Study:
     nothing: float = 0.0  # loss of the null fit, see `loss`
 
 
+def guessed(model: Model) -> list[str]:
+    """Parameters that the file hardly knows."""
+    return [name for name, p in model.parameters.items() if p.tolerance > VAGUE]
+
+
 def uncertain(p: Parameter, guessed: float = 1e3) -> Free:
     """A parameter within its tolerance. One that is only guessed (above 100 %), or unknown, keeps its sign and moves by ratios; an unknown
     one is at most `guessed` times as large or small as the file has it."""
@@ -125,7 +130,7 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
             metrics[e] = metric(experiment, levels[e], h)
         problem = Problem(model, experiments, metrics, set_name)
         free = fit.free
-        if any(p.tolerance > VAGUE for p in model.parameters.values()):  # what the file says is no point to linearise about
+        if guessed(model):  # what the file says is no point to linearise about
             linear = plant.linearise(fitted(model, fit), found, np.array(x[0][pick]), experiments[0].u[pick])
     fit = problem.solve(free)
     study = Study(model, set_name, experiments, found, linear, tuple(levels), tuple(metrics), fit.free, fit)

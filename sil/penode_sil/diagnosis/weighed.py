@@ -101,9 +101,14 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
 
 def _is_noise(study: Study, fit: Fit) -> bool:
     """Does an explanation leave of every sensor no more than the noise that the file states for it? Slow noise looks like what wanders."""
-    for j, s in enumerate(study.model.sensors):
+    return _within(study, fit, np.array([s.noise for s in study.model.sensors]))
+
+
+def _within(study: Study, fit: Fit, noise: Array) -> bool:
+    """Does an explanation leave of every sensor no more than its noise [n_z]?"""
+    for j, most in enumerate(noise):
         left = np.concatenate([(e.y - z)[e.good[:, j], j] for e, z in zip(study.experiments, fit.simulated)])
-        if left.size and rms(left) > UNSEEN * s.noise:
+        if left.size and rms(left) > UNSEEN * most:
             return False
     return True
 
@@ -125,19 +130,21 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     numbers, coarse = numerics.numerics(replace(study, model=fitted(model, found.run)))
     causes += (coarse,) if coarse else ()
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
-    verdict = _verdict(found, causes, share, max(left, found.found.bench.level.size))
+    quiet = _within(study, fit, np.where([s.noise > 0.0 for s in model.sensors], [s.noise for s in model.sensors], bench.noise))
+    verdict = _verdict(found, causes, share, max(left, bench.level.size), quiet)
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
     laws = sum(max(len(a.term.form.parts), 1) for a in found.found.named)
     return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws, numbers, found.found.plain.fit.likelihood, bench.update)
 
 
-def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float) -> str:
+def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float, quiet: bool) -> str:
     """From what is named, the share of the residual that it takes in a free run, and what is left: the residual with all that was found as a
-    share of the signal, or what wanders as a share of what moves. Small deviations that have been found are what any model has."""
+    share of the signal, or what wanders as a share of what moves. Small deviations that have been found are what any model has; `quiet`:
+    noise is all that is left."""
     if causes:
         return "explained" if share > ENOUGH else "partly_explained"
-    return "no_discrepancy" if not found.causes and left < WORTH and found.found.terms else "unexplained"
+    return "no_discrepancy" if not found.causes and (quiet or left < WORTH and found.found.terms) else "unexplained"
 
 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:

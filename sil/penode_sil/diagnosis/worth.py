@@ -31,8 +31,12 @@ def least(level: float, taken: float = 0.0) -> float:
     """Share of what acts from which on a term is worth a name, where `level` of what moves wanders beside all that was found: WORTH, or
     less where the model is else nearly right; never less than what keeps zero out of its interval. A term that has `taken` so much of the
     power that innovations had beyond sensor noise is RATIO times all that it left."""
-    alone = taken > RATIO**2 / (1.0 + RATIO**2)
-    return min(WORTH, max(0.0 if alone else RATIO * level, Z_95 * SYSTEMATIC))
+    return min(WORTH, max(0.0 if alone(taken) else RATIO * level, Z_95 * SYSTEMATIC))
+
+
+def alone(taken: float) -> bool:
+    """Is what takes so much of a power RATIO times all that it leaves?"""
+    return taken > RATIO**2 / (1.0 + RATIO**2)
 
 
 def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]) -> float:
