@@ -10,8 +10,8 @@ from typing import Any
 
 from .by_noise import FARTHER
 from .catalogue import separating
-from .reliability import reliability
 from .noise import UNSEEN
+from .reliability import reliability
 from .result import OUTSIDE, Cause, Diagnosis, Named, place
 
 

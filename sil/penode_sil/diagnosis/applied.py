@@ -67,7 +67,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     ]  # fmt: skip
     for title, entries in (
         ("parameters", [*parameters, *driven["parameters"]]), ("actuators", driven["actuators"]), ("elements", [*driven["elements"], *elements]),
-        ("outputs", outputs), ("sensors", [f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}" for s, x in zip(model.sensors, sensors) if x]),
+        ("equations", driven["equations"]), ("outputs", outputs), ("sensors", [f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}" for s, x in zip(model.sensors, sensors) if x]),
     ):  # fmt: skip
         if entries:
             lines += [f"[{title}]", *entries, ""]
@@ -114,7 +114,7 @@ SAMPLED = ("input_delay", "input_added")  # laws of samples: gains and lags go b
 
 def _driven(model: Model, fit: Fit, terms: Sequence[Term]) -> tuple[dict[str, list[str]], list[str]]:
     """What terms of inputs add to a model file, those of one input in a row, and what they cannot."""
-    found: dict[str, list[str]] = {"parameters": [], "actuators": [], "elements": []}
+    found: dict[str, list[str]] = {"parameters": [], "actuators": [], "elements": [], "equations": []}
     left: list[str] = []
     own = sorted((t for t in terms if t.form.how.startswith("input_")), key=lambda t: t.form.how not in SAMPLED)
     for name in dict.fromkeys(t.form.where for t in own):
@@ -129,7 +129,7 @@ def _driven(model: Model, fit: Fit, terms: Sequence[Term]) -> tuple[dict[str, li
             found["parameters"].append(f"{name}_offset = {table({'value': value, 'unit': unit})}")
             acts = f"({acts} + {name}_offset)"
         if acts != name:
-            _redirected(model, name, acts, found["elements"])
+            _redirected(model, name, acts, found)
     return found, left
 
 
@@ -163,11 +163,15 @@ def _places(model: Model, name: str) -> bool:
     return any(name in e.ends for e in model.elements) or any(re.search(rf"\b{name}\b", p.text) for p in model.points)
 
 
-def _redirected(model: Model, name: str, acts: str, elements: list[str]) -> None:
-    """Adds the elements on which an input acts, with what an actuator makes of it instead."""
+def _redirected(model: Model, name: str, acts: str, found: dict[str, list[str]]) -> None:
+    """Adds the elements and equations on which an input acts, with what an actuator makes of it instead."""
     for e in model.elements:
         ends = tuple(acts if x == name else x for x in e.ends)
         text = re.sub(rf"\b{name}\b", acts, e.expression)
         if ends != e.ends or text != e.expression:
             entry = _element(Element(e.name, ends, e.law, e.arguments, e.network, e.network_inputs, text), lambda x: x)
-            elements.append(f"{e.name} = {table(entry)}")
+            found["elements"].append(f"{e.name} = {table(entry)}")
+    for q in model.equations:
+        text = re.sub(rf"\b{name}\b", acts, q.text)
+        if text != q.text:
+            found["equations"].append(f"{q.name} = {toml(text)}")

@@ -265,7 +265,7 @@ def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], lis
         size = abs(value) / max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
         if abs(value) <= 3.0 * sd:
             continue
-        if WORTH <= size < INTENDED and abs(abs(value) / constants.g - 1.0) > WORTH:
+        if bench.places and WORTH <= size < INTENDED and abs(abs(value) / constants.g - 1.0) > WORTH:  # without places it may stand for any law
             causes.append(_load(model, bench, probe, s.name) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
         else:
             notes.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")

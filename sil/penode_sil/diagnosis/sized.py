@@ -106,7 +106,8 @@ def functions(study: Study, e: Explanation, group: Group, reach: float, speed: f
     if isinstance(what, str):
         return {what: (study.model.parameters[what].unit, lambda p: p[what])}
     if isinstance(what, Fault):
-        return _fault(study.model, group[0], what)
+        shown = max(float(np.max(np.abs(z[:, what.sensor]))) for z in e.fit.simulated)
+        return _fault(study.model, group[0], what, shown)
     if isinstance(what, tuple):
         return _mass(names[0])  # others only help it
     return OF[group[0]](_Cause(study, e, terms, names, study.places[what.place], reach, speed))
@@ -126,7 +127,8 @@ def having(terms: Sequence[Term], *shapes: str) -> list[int]:
     return [i for i, t in enumerate(terms) if not t.candidate.what.shapes.keys().isdisjoint(shapes)]
 
 
-def _fault(model: Model, kind: str, what: Fault) -> Parameters:
+def _fault(model: Model, kind: str, what: Fault, shown: float) -> Parameters:
+    """Of a fault of a sensor, of which `shown` is the most that it shows."""
     unit, j = model.sensors[what.sensor].unit, what.sensor
     si = units.si(unit)
     match kind:
@@ -136,6 +138,8 @@ def _fault(model: Model, kind: str, what: Fault) -> Parameters:
             return {"scale": ("1", lambda p: 1.0 + p.get(("scale", j), 0.0))}
         case "sensor_delay":
             return {"delay": ("s", lambda p: p[("delay", j)])}
+        case "sensor_clipping":  # to which it goes however far it is driven, or has gone
+            return {"limit": (si, lambda p: 1.0 / p[("rail", j)] if ("rail", j) in p else shown)}
         case "clock_drift":
             return {"drift": ("1", lambda p: p[("clock", 0)])}
     return {}

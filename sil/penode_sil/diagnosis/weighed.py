@@ -127,7 +127,8 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
-    numbers, coarse = numerics.numerics(replace(study, model=fitted(model, found.run)))
+    levels = tuple(np.tile(bench.noise**2, (len(x), 1)) for x in study.levels)  # those of the study have in them what the model misses
+    numbers, coarse = numerics.numerics(replace(study, model=fitted(model, found.run), levels=levels))
     causes += (coarse,) if coarse else ()
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
     quiet = _within(study, fit, np.where([s.noise > 0.0 for s in model.sensors], [s.noise for s in model.sensors], bench.noise))
