@@ -23,57 +23,68 @@ Array = NDArray[np.float64]
 SCORED = 4  # of the promising trials, how many are scored on held-out blocks
 MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
 MIN_FORM = 0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
-MIN_TAKEN = 0.25  # of the power of the innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
+MIN_TAKEN = 0.25  # of the power of a sensor's innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
 MIN_BLOCKS = 3  # of the blocks in which it does
 LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends with: the bench with all accepted terms in it, and a `plain` one with those alone that are worth a name; the last
-    term is not where it is `small`, its trial. Of every round the trials compared, the best first."""
+    """What a search ends with: the bench with all accepted `terms` in it, and a `plain` one with those alone that are worth a name, `named`;
+    `small`: the others, with their trials. Of every named one the trials compared, the best first."""
 
     bench: Bench
     plain: Bench
     terms: tuple[Term, ...]
-    small: Trial | None
+    named: tuple[Term, ...]
+    small: tuple[tuple[Term, Trial], ...]
     rounds: tuple[tuple[Trial, ...], ...]
-
-    @property
-    def named(self) -> tuple[Term, ...]:
-        return self.terms if self.small is None else self.terms[:-1]
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
-    """Causes one by one, each the one that predicts best, until none predicts enough better, or the best is not worth a name."""
+    """Causes one by one, each the one that predicts best, until none predicts enough better, or the best is not worth a name and hides none
+    that is."""
     terms: list[Term] = []
+    named: list[Term] = []
+    small: list[tuple[Term, Trial]] = []
     rounds: list[tuple[Trial, ...]] = []
-    small = None
     blocks = Blocks.of([len(r) // bench.update for r in bench.records])
     bench, base = _based(bench, blocks)
     plain = bench
-    while True:
-        trials, wide = propose(bench, terms, log)
-        trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _large(t, WORTH), -t.gain))
-        trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
-        better = [t.blocks - base for t in trials]
-        for t, b in zip(trials, better):
-            log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
-        good = [t for t, b in zip(trials, better) if _accepted(t, b)]
-        good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
-        good = [t for t in good if _large(t, WORTH)] or good
-        rounds.append(tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks)))))
-        if not good:
-            break
-        best = _simplest(rounds[-1], base, terms)
+    while good := _good(bench, terms, blocks, base, log):
+        best = _simplest(good, base, terms)
         bench, term = adopt(bench, best)
         terms.append(term)
         bench, base = _based(bench, blocks)
-        if not _large(best, least(bench.level.size)):
-            small = best  # and so is what is left
-            break
-        plain = bench
-    return Found(bench, plain, tuple(terms), small, tuple(rounds))
+        if _large(best, least(bench.level.size)):
+            plain, term = adopt(plain, best) if small else (bench, term)
+            named.append(term)
+            rounds.append(good)
+        else:
+            small.append((term, best))
+            if not any(_hidden(t, best) for t in good):
+                break
+    return Found(bench, plain, tuple(terms), tuple(named), tuple(small), tuple(rounds))
+
+
+def _good(bench: Bench, terms: Sequence[Term], blocks: Blocks, base: Array, log: Callable[[str], None]) -> tuple[Trial, ...]:
+    """Trials that predict left-out blocks enough better than `base`, the best first; only large ones if there are any."""
+    trials, wide = propose(bench, terms, log)
+    trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _large(t, WORTH), -t.gain))
+    trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
+    better = [t.blocks - base for t in trials]
+    for t, b in zip(trials, better):
+        log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
+    good = [t for t, b in zip(trials, better) if _accepted(t, b)]
+    good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
+    good = [t for t in good if _large(t, WORTH)] or good
+    return tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks))))
+
+
+def _hidden(t: Trial, small: Trial) -> bool:
+    """May a form elsewhere be large once a small one is in the model? Its force is; what it takes of the innovations is less while others are
+    in them, and the level of what wanders is theirs."""
+    return t.form.where != small.form.where and t.share >= WORTH
 
 
 def _large(t: Trial, least_share: float) -> bool:

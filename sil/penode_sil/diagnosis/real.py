@@ -77,15 +77,16 @@ def answer(
         else:
             why = f"is real but small: {size:.1%} of what acts there" if size < enough else "may be nothing: the 95 % interval of its size holds that"
             notes.append(_kept(term, why))
-    if t := found.small:
+    for term, t in found.small:
         what = f"{t.taken:.0%} of the power of prediction errors" if t.taken < MIN_TAKEN else f"{t.share:.1%} of what acts there"
-        notes.append(_kept(found.terms[-1], f"is real but small: {what}"))
+        notes.append(_kept(term, f"is real but small: {what}"))
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
     biased, remarks = _offsets(model, plain, probe)
     notes += more + remarks
     run = after.problem().solve(after.fit.free, Filter.none(*after.fit.by.gain.shape), 20)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
-    taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken(after.fit, bench.problem().floor))
+    left = np.prod(1.0 - bench.fit.taken(after.fit, bench.problem().floor)) ** (1.0 / len(noise))
+    taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), 1.0 - float(left))
     return Answer((*wrong, *causes, *biased), tuple(notes), _explanations(named, probabilities), found, run, taken, after.model)
 
 

@@ -36,7 +36,7 @@ class Term:
 @dataclass(frozen=True, eq=False)
 class Trial:
     """A form beside what was accepted already, fitted: `gain` of the criterion, its `share` of what acts (see `worth`), the share `taken` of
-    the power that innovations have beyond sensor noise, `blocks` [blocks] of predictive density."""
+    the power that the innovations of a sensor have beyond its noise, of that which shows it most, `blocks` [blocks] of predictive density."""
 
     form: Form
     term: Term
