@@ -28,7 +28,7 @@ from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
 from .result import Cause, Named, Value, place
 from .terms import Term, Trial
-from .worth import SYSTEMATIC, WORTH, Z_95, least, share, shift
+from .worth import SYSTEMATIC, WORTH, Z_95, least, own, share, shift
 
 Array = NDArray[np.float64]
 INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
@@ -245,12 +245,13 @@ def _parameters(model: Model, bench: Bench, moved: Sequence[Motion], shared: Col
 
 def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], list[str]]:
     """Offsets of sensors that the recordings show: causes where they are worth it, notes where they are small, or as large as what is
-    not in a model by intent: gravity, ride height."""
+    not in a model by intent: gravity, ride height. Nothing where starts do the same: a plant without a spring to ground has no zero."""
     causes, notes = [], []
+    alone = own(bench.model, bench.fit, {bias(s.name) for s in model.sensors})
     for j, s in enumerate(model.sensors):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
-        size = abs(value) / max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
-        if abs(value) <= 3.0 * sd:
+        size = alone * abs(value) / max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
+        if alone * abs(value) <= 3.0 * sd:
             continue
         if WORTH <= size < INTENDED and abs(abs(value) / constants.g - 1.0) > WORTH:
             causes.append(_load(model, bench, probe, s.name) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
