@@ -509,6 +509,7 @@ def test_a_curve_has_the_parameter_of_its_element_in_it(tmp_path, model):
     assert len(two.groups) == 2 and curve.groups == (("degressive_damper", "damper"),) and curve.gain > two.gain - 10.0
     low, high = (sized.values(one, curve, curve.groups[0])[f"{rate}_rate_damping"] for rate in ("low", "high"))
     assert low.value == pytest.approx(1.1 * D, rel=0.01) and high.value == pytest.approx(0.9 * D, rel=0.02)
+    assert textbook.unbent(one, curve, lambda text: None) is curve  # its straight part is no reason to call it straight
 
 
 def test_a_bushing_without_memory_is_a_spring(tmp_path, model):

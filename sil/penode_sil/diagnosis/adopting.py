@@ -15,11 +15,13 @@ HALVINGS = 7  # of the width of an edge: from 0.02 of the rms rate down to 1e-4 
 
 
 def adopt(bench: Bench, t: Trial) -> tuple[Bench, list[Term]]:
-    """The bench with a trial's form in its model, and the terms that it has become: one for each kind that its laws are of."""
+    """The bench with a trial's form in its model, and the terms that it has become, one for each kind that its laws are of; of what else was
+    fitted with it what the bench has."""
     moved = motions(Probe.of(bench))
     wide, (term,) = with_forms(bench, [t.form], moved, 90 + len(bench.model.elements))
     names = dict(zip([f.target for f in t.term.free], term.free))
-    free = tuple(replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free)
+    own = {f.target for f in bench.free}
+    free = tuple(replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free if f.target in own | set(names))
     fresh = replace(bench, model=wide, free=free, level=t.level)
     problem = fresh.problem()
     fresh = replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(wide.states)), FOLLOWED))

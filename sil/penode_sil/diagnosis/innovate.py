@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from .adopting import adopt
 from .catalogue import curve
-from .catalogue.form import Form
 from .evidence.bench import SIZES, Bench
 from .evidence.blocks import Blocks
 from .evidence.fit import Problem
@@ -25,76 +24,91 @@ Array = NDArray[np.float64]
 SCORED = 4  # of the promising trials, how many are scored on held-out blocks
 MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
 MIN_FORM = 0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
-MIN_TAKEN = 0.25  # of the power of the innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
+MIN_TAKEN = 0.25  # of the power of a sensor's innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
 MIN_BLOCKS = 3  # of the blocks in which it does
+MOST = 0.5  # of what is missed: a small form that takes less ends the search
 LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
 
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """A term, the form `of` which it is a law, the share `taken` by that of the power that innovations had beyond sensor noise, and the
-    `trials` compared in its round, the best first."""
+    """A form that was accepted: its trial, what it is in the bench, one term for each kind of its laws, and the `trials` compared in its
+    round, the best first."""
 
-    term: Term
-    of: Form
-    taken: float
+    trial: Trial
+    terms: tuple[Term, ...]
     trials: tuple[Trial, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends with: the bench with all accepted terms in it, and a `plain` one with those alone that are worth a name, `named`;
-    the last form is not where it is `small`, its trial."""
+    """What a search ends with: the bench with all accepted `terms` in it, and a `plain` one with those forms alone that are worth a name,
+    `named`, as they are in there; the others are `small`."""
 
     bench: Bench
+    terms: tuple[Term, ...]
     plain: Bench
-    accepted: tuple[Accepted, ...]
-    small: Trial | None
-
-    @property
-    def named(self) -> tuple[Accepted, ...]:
-        return tuple(a for a in self.accepted if self.small is None or a.of is not self.small.form)
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        return tuple(a.term for a in self.accepted)
+    named: tuple[Accepted, ...]
+    small: tuple[Accepted, ...]
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
-    """Causes one by one, each the one that predicts best, until none predicts enough better, or the best is not worth a name."""
+    """Causes one by one, each the one that predicts best, until none predicts enough better, or the best is not worth a name and hides none
+    that is. A small one that takes most of what was missed may hide one that is nearly all of the rest; beside that it is judged again."""
     accepted: list[Accepted] = []
-    small = None
+    large: list[bool] = []
     blocks = Blocks.of([len(r) // bench.update for r in bench.records])
     bench, base = _based(bench, blocks)
-    plain = bench
-    while True:
-        terms = [a.term for a in accepted]
-        trials, wide = propose(bench, terms, log)
-        trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
-        trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
-        better = [t.blocks - base for t in trials]
-        for t, b in zip(trials, better):
-            log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
-        good = [t for t, b in zip(trials, better) if _accepted(t, b)]
-        good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
-        good = [t for t in good if _matters(t)] or good
-        good = sorted(good, key=lambda t: -float(np.sum(t.blocks)))
-        if not good:
+    start, hides = bench, True
+    while good := _good(bench, [x for a in accepted for x in a.terms], blocks, base, log):
+        best = _simplest(good, base, [x for a in accepted for x in a.terms])
+        if not hides and not _matters(best):
             break
-        best = _simplest(good, base, terms)
-        bench, more = adopt(bench, best)
-        accepted += [Accepted(term, best.form, best.taken, tuple(good)) for term in more]
+        bench, terms = adopt(bench, best)
         bench, base = _based(bench, blocks)
-        if not _large(best, least(bench.level.size, best.taken)):
-            small = best  # and so is what is left
+        accepted.append(Accepted(best, tuple(terms), good))
+        large.append(_large(best, least(bench.level.size, best.whole)))
+        hides = large[-1] or any(_hidden(t, best) for t in good)
+        if not hides and best.whole < MOST:
             break
-        plain = bench
-    return Found(bench, plain, tuple(accepted), small)
+    if accepted and alone(accepted[-1].trial.whole):
+        large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in accepted]
+    return _apart(start, bench, accepted, large)
+
+
+def _apart(start: Bench, bench: Bench, accepted: Sequence[Accepted], large: Sequence[bool]) -> Found:
+    """What a search has accepted, the large forms in a bench of their own."""
+    plain, named = (bench, list(accepted)) if all(large) else (start, [])
+    for a in (a for a, big in zip(accepted, large) if big and not all(large)):
+        plain, terms = adopt(plain, a.trial)
+        named.append(Accepted(a.trial, tuple(terms), a.trials))
+    small = tuple(a for a, big in zip(accepted, large) if not big)
+    return Found(bench, tuple(x for a in accepted for x in a.terms), plain, tuple(named), small)
+
+
+def _good(bench: Bench, terms: Sequence[Term], blocks: Blocks, base: Array, log: Callable[[str], None]) -> tuple[Trial, ...]:
+    """Trials that predict left-out blocks enough better than `base`, the best first; only those that matter if there are any."""
+    trials, wide = propose(bench, terms, log)
+    trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
+    trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
+    better = [t.blocks - base for t in trials]
+    for t, b in zip(trials, better):
+        log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
+    good = [t for t, b in zip(trials, better) if _accepted(t, b)]
+    good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
+    good = [t for t in good if _matters(t)] or good
+    return tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks))))
+
+
+def _hidden(t: Trial, small: Trial) -> bool:
+    """May a form elsewhere be large once a small one is in the model? Its force is; what it takes of the innovations is less while others are
+    in them, and the level of what wanders is theirs."""
+    return t.form.where != small.form.where and t.share >= WORTH
 
 
 def _matters(t: Trial) -> bool:
     """Is a form large, or, as small as it is, nearly all that is missed?"""
-    return _large(t, WORTH) or alone(t.taken)
+    return _large(t, WORTH) or alone(t.whole)
 
 
 def _large(t: Trial, least_share: float) -> bool:

@@ -22,7 +22,7 @@ from .terms import Term, Trial, free_of, with_forms
 from .worth import share
 
 Array = NDArray[np.float64]
-TRIED = 6  # forms that are fitted in a round, the best of each name and place first
+TRIED = 6  # forms that are fitted in a round, the best of each name and place first; and the best of every other place
 PROMISE = 3.0  # log likelihood that a form has to promise for it
 SMALL = 0.02  # of the force at a place: a force that is put on to see what it does, and a law's start
 LITTLE = 0.4  # of a unit, which is 0.05 of the force at the place
@@ -60,23 +60,30 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     forms += drives.sensors(bench.model, len(bench.noise))
     forms = [f for f in forms if not _taken(f, terms)]
     ranked = _screened(bench, probe, forms, moved)
-    holds = _holds(bench, list(_chosen(ranked).values()), terms)
+    holds = _holds(bench, _chosen(ranked), terms)
     cut = {t.form.where for t in terms if t.form.how == "clip"}
     ranked += [clipping.propose(bench, j) for j, s in enumerate(bench.model.sensors) if s.name not in cut]
     chosen = _chosen(sorted([*ranked, *holds], key=lambda pair: -pair[0].gain))
-    wide, made = with_forms(bench, [form for _, form in chosen.values()], moved, len(terms))
+    wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
-    trials = [_fitted(bench, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen.values())]
+    trials = [_fitted(bench, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen)]
     return sorted(trials, key=lambda t: -t.gain), wide
 
 
-def _chosen(ranked: Sequence[tuple[Score, Form]]) -> dict[tuple[str, str, str], tuple[Score, Form]]:
-    """The best TRIED that promise enough, of each name and place one."""
-    found: dict[tuple[str, str, str], tuple[Score, Form]] = {}
+def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
+    """The forms that are fitted: of each name and note the likeliest; as many as TRIED of those that promise most beyond PROMISE for each of
+    their sizes, and the first of every place that has none among them: what is left out where most acts promises more than a cause where
+    little does."""
+    best: dict[tuple[str, str, str], tuple[Score, Form]] = {}
     for score, form in ranked:
-        if score.gain > PROMISE and len(found) < TRIED:
-            found.setdefault((form.kind, form.where, form.note), (score, form))
-    return found
+        if score.gain > PROMISE:
+            best.setdefault((form.kind, form.where, form.note), (score, form))
+    plainest = sorted(best.values(), key=lambda pair: PROMISE * len(pair[0].sizes) - pair[0].gain)
+    chosen = plainest[:TRIED]
+    for score, form in plainest[TRIED:]:
+        if form.how == "force" and all(form.where != f.where for _, f in chosen):
+            chosen.append((score, form))
+    return chosen
 
 
 def _taken(form: Form, terms: Sequence[Term]) -> bool:
@@ -134,7 +141,8 @@ def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[
     same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
     level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
     taken = bench.fit.taken(best, problem.floor)
-    return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved), taken)
+    most, whole = float(np.max(taken)), 1.0 - float(np.prod(1.0 - taken) ** (1.0 / len(taken)))  # what acts at one place is seen by few sensors
+    return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved), most, whole)
 
 
 def _sized(term: Term, sizes: Array) -> list[Free]:

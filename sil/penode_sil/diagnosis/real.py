@@ -29,7 +29,7 @@ from .plant import Place
 from .result import Cause, Named, Value, place
 from .study import guessed
 from .terms import Term, Trial
-from .worth import SYSTEMATIC, WORTH, Z_95, least, share, shift
+from .worth import SYSTEMATIC, WORTH, Z_95, least, own, share, shift
 
 Array = NDArray[np.float64]
 INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
@@ -68,22 +68,22 @@ def answer(
     notes = []
     probe = Probe.of(plain)
     moved = motions(probe)
-    named = [a.term for a in found.named]
-    chances = {a.of: _weighed(a.trials) for a in found.named}
-    for a in found.named:
-        term, enough, chance = a.term, least(after.level.size, a.taken), chances[a.of]
+    named = [term for a in found.named for term in a.terms]
+    chances = {a.trial: _weighed(a.trials) for a in found.named}
+    for a, term in ((a, term) for a in found.named for term in a.terms):
+        enough, chance, first = least(after.level.size, a.trial.whole), chances[a.trial], term is a.terms[0]
         size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
-        rivals = _rivals(chance, term) if term.form.kind == a.of.kind else _loads(model, bench.places[term.form.index])
-        cause = _cause(model, plain, term, size, rivals, _sure(chance, a.of))
+        rivals = _rivals(chance, term) if first else _loads(model, bench.places[term.form.index])
+        cause = _cause(model, plain, term, size, rivals, _sure(chance, a.trial.form))
         log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")
         if size >= enough and not _unsized(cause):
             causes = _merged(causes, cause)
-        elif term.form.kind == a.of.kind:
+        elif first:
             why = f"is real but small: {size:.1%} of what acts there" if size < enough else "may be nothing: the 95 % interval of its size holds that"
             notes.append(_kept(term, why))
-    if t := found.small:
-        what = f"{t.taken:.0%} of the power of prediction errors" if t.taken < MIN_TAKEN else f"{t.share:.1%} of what acts there"
-        notes.append(_kept(found.terms[-1], f"is real but small: {what}"))
+    for a in found.small:
+        what = f"{a.trial.taken:.0%} of the power of prediction errors" if a.trial.taken < MIN_TAKEN else f"{a.trial.share:.1%} of what acts there"
+        notes.append(_kept(a.terms[0], f"is real but small: {what}"))
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
     biased, remarks = _offsets(model, plain, probe)
     notes += more + remarks + _fitted_values(model, plain)
@@ -91,8 +91,10 @@ def answer(
     none = {bias(s.name) for s in model.sensors if s.name not in offsets}
     run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 20)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
-    taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken(after.fit, bench.problem().floor))
-    return Answer((*wrong, *causes, *biased), tuple(notes), _explanations([(a.term, chances[a.of]) for a in found.named if a.term.form.kind == a.of.kind]), found, run, tuple(offsets), taken, after.model)
+    left = np.prod(1.0 - bench.fit.taken(after.fit, bench.problem().floor)) ** (1.0 / len(noise))
+    taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), 1.0 - float(left))
+    sets = _explanations([(a.terms[0], chances[a.trial]) for a in found.named])
+    return Answer((*wrong, *causes, *biased), tuple(notes), sets, found, run, tuple(offsets), taken, after.model)
 
 
 def _name(t: Term) -> tuple[str, str]:
@@ -258,12 +260,13 @@ def _fitted_values(model: Model, bench: Bench) -> list[str]:
 
 def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], list[str]]:
     """Offsets of sensors that the recordings show: causes where they are worth it, notes where they are small, or as large as what is
-    not in a model by intent: gravity, ride height."""
+    not in a model by intent: gravity, ride height. Nothing where starts do the same: a plant without a spring to ground has no zero."""
     causes, notes = [], []
+    alone = own(bench.model, bench.fit, {bias(s.name) for s in model.sensors})
     for j, s in enumerate(model.sensors):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
-        size = abs(value) / max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
-        if abs(value) <= 3.0 * sd:
+        size = alone * abs(value) / max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
+        if alone * abs(value) <= 3.0 * sd:
             continue
         if bench.places and WORTH <= size < INTENDED and abs(abs(value) / constants.g - 1.0) > WORTH:  # without places it may stand for any law
             causes.append(_load(model, bench, probe, s.name) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))

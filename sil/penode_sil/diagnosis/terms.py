@@ -37,7 +37,7 @@ class Term:
 @dataclass(frozen=True, eq=False)
 class Trial:
     """A form beside what was accepted already, fitted: `gain` of the criterion, its `share` of what acts (see `worth`), the share `taken` of
-    the power that innovations have beyond sensor noise, `blocks` [blocks] of predictive density."""
+    the power that the innovations of a sensor have beyond its noise, of that which shows it most, and the `whole` share over all of them, `blocks` [blocks] of predictive density."""
 
     form: Form
     term: Term
@@ -46,6 +46,7 @@ class Trial:
     level: Level
     share: float = 0.0
     taken: float = 0.0
+    whole: float = 0.0
     blocks: Array | None = None
 
 

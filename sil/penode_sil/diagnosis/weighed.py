@@ -135,7 +135,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     verdict = _verdict(found, causes, share, max(left, bench.level.size), quiet)
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
-    laws = sum(max(len(a.term.form.parts), 1) for a in found.found.named)
+    laws = sum(max(len(x.form.parts), 1) for a in found.found.named for x in a.terms)
     return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws, numbers, found.found.plain.fit.likelihood, bench.update)
 
 

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,7 @@ class Bench:
     level: Level
     fit: Fit
     nominal: tuple[Free, ...] = ()  # free values as the model file has them
+    linear: Mapping[str, float] = field(default_factory=dict)  # values of the model alone that follow best, once they are fitted: see `gains`
 
     @property
     def step(self) -> float:
@@ -57,10 +58,12 @@ class Bench:
         return Problem(predictor, self.noise**2 / self.update)
 
     def gains(self, fit: Fit | None = None, model: Model | None = None) -> Gains:
-        """The linear plant with the values of a fit; but for scales of sensors, see Predictor._scales."""
+        """The linear plant with the values of a fit of the model alone, but for scales of sensors, see Predictor._scales. With more in the model,
+        that stays the best line along the motion (Booton, IRE Trans. Circuit Theory 1, 1954), and forms that do the same are told apart by
+        no filter of their own."""
         model = model or self.model
         scales = {scale(s.name) for s in self.model.sensors}
-        values = {} if fit is None else {name: x for name, x in fit.values.items() if name not in scales}
+        values = {name: x for name, x in (self.linear or ({} if fit is None else fit.values)).items() if name not in scales}
         noise = np.array([i.noise for i in self.base.inputs])
         return Gains(self.base.states, model.states, linear(self.base, values), noise, self.forces, self.noise, self.update * self.step, self.update)
 
@@ -164,11 +167,11 @@ def fit_null(bench: Bench) -> Bench:
     """The bench with its free values fitted, first as a free run, then in turn with the level of the forces that wander."""
     problem = bench.problem()
     n_x = len(bench.model.states)
-    level = Level(0.0, 1.0)
     fit = problem.solve(bench.free, Filter.none(n_x, len(bench.noise)), 12)
+    level = Level(0.0, 1.0)
     for _ in range(TURNS):
         level, fit = fit_level(bench, problem, fit, level)
-    return replace(bench, free=fit.free, level=level, fit=fit)
+    return replace(bench, free=fit.free, level=level, fit=fit, linear=fit.values)
 
 
 def fit_level(bench: Bench, problem: Problem, fit: Fit, level: Level) -> tuple[Level, Fit]:

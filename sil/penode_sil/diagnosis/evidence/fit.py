@@ -58,13 +58,10 @@ class Fit:
         f = self.free[i]
         return float(np.sqrt(self.covariance()[i, i])) * (abs(f.value) if f.log else f.unit)
 
-    def taken(self, after: Fit, floor: Array) -> float:
-        """Share of the power of the innovations beyond that of sensor noise, `floor` [n_z], that another fit takes away, in the geometric mean
-        over all that is fitted."""
-        count = int(np.sum(self.used))
-        noise = float(np.sum(np.sum(self.used, axis=0) * np.minimum(floor / self.variance, 1.0))) / max(count, 1)
-        all_of_it = 1.0 - float(np.exp(-2.0 * max(after.likelihood - self.likelihood, 0.0) / max(count, 1)))
-        return min(all_of_it / max(1.0 - noise, 1e-12), 1.0)
+    def taken(self, after: Fit, floor: Array) -> Array:
+        """Share [n_z] of the power of each sensor's innovations beyond that of its noise, `floor` [n_z], that another fit takes away."""
+        noise = np.minimum(floor, self.variance)
+        return np.clip((self.variance - after.variance) / np.maximum(self.variance - noise, 1e-12 * self.variance), 0.0, 1.0)
 
     def criterion(self) -> float:
         """Log marginal likelihood by Laplace (Kass and Raftery 1995, eq. 6), but for constants that all fits of the same data share:
