@@ -11,8 +11,6 @@ from .evidence.screening import Probe
 from .propose import FOLLOWED, PROMISE, motions
 from .terms import Term, Trial, with_forms
 
-HALVINGS = 7  # of the width of an edge: from 0.02 of the rms rate down to 1e-4 of it
-
 
 def adopt(bench: Bench, t: Trial) -> tuple[Bench, list[Term]]:
     """The bench with a trial's form in its model, and the terms that it has become, one for each kind that its laws are of; of what else was
@@ -32,7 +30,7 @@ def steepened(bench: Bench, term: Term) -> Bench:
     """The bench with the edges of a term half as wide, as often as that promises more; with steps as much shorter, for a steep edge damps as much
     more."""
     edges = {f"{name}_{part.edge}" for name, part in zip(term.elements, term.form.parts) if part.edge}
-    for _ in range(HALVINGS if edges else 0):
+    while edges:
         free = tuple(replace(f, value=0.5 * f.value, low=0.5 * f.low) if f.target in edges else f for f in bench.fit.free)
         finer = replace(bench, fastest=2.0 * bench.fastest)
         fit = finer.problem().solve(free, bench.fit.by, FOLLOWED)

@@ -19,7 +19,6 @@ from .study import Study
 
 Array = NDArray[np.float64]
 FIRST = 50  # samples that a start is fitted to
-ITERATIONS = 20  # of its fit
 
 
 def start_of(model: Model, e: Experiment, study: Study, set_name: str = "") -> Array:
@@ -38,7 +37,7 @@ def start_of(model: Model, e: Experiment, study: Study, set_name: str = "") -> A
     noise = sample_noise([record], np.array([s.noise for s in model.sensors]))
     free = tuple(Free(("start", 0, i), start[i], 0.01 * size[model.states[i]], sigma=size[model.states[i]], origin=start[i]) for i in own)
     predictor = Predictor(wide, [few], 1, set_name or study.set_name, study.linear.fastest)
-    fit = Problem(predictor, noise**2).solve(free, Filter.none(len(wide.states), len(noise)), ITERATIONS)
+    fit = Problem(predictor, noise**2).solve(free, Filter.none(len(wide.states), len(noise)))
     for f in fit.free:
         start[f.target[2]] = f.value
     return start

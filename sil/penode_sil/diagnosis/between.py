@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 Array = NDArray[np.float64]
-DEGREE = 7  # of the spline: of 3.3 samples a period it shows an image of (0.3/0.7)^8, a cubic one of (0.3/0.7)^4 (Unser, IEEE Signal Process. Mag. 16, 1999)
 CLOSE = 1e-3  # [s] of samples through which parabolas are the inputs in between, and cubics have their rates
 
 
@@ -17,13 +16,14 @@ def parts(time: Array, u: Array, rate: Array, count: int) -> Array:
     """Signals u [..., n, n_u] at `time` [n] as `count` samples from each to before the next one, [..., n - 1, count, n_u], for a step that
     joins them by straight lines; 2 or 3, for a model that uses the `rate` [..., n, n_u] of an input.
 
-    At the samples they are what they are, for that is what sensors see. In between, the middle one is such that the
-    integral over each interval, which moves the plant, is that of the smooth input (a spline); and of 3, the last is such that the
-    line to the next sample has its rate, which sensors may see as well.
+    At the samples they are what they are, for that is what sensors see. In between, the middle one is such that the integral over each
+    interval, which moves the plant, is that of the smooth input: a spline of degree 7, which shows an image of 3.3 samples a period by
+    (0.3/0.7)^8, where a cubic one shows (0.3/0.7)^4 (Unser, IEEE Signal Process. Mag. 16, 1999). Of 3, the last is such that the line to the
+    next sample has its rate, which sensors may see as well.
     """
     h = float(time[1] - time[0])
     axis = u.ndim - 2
-    whole = np.diff(make_interp_spline(time, u, DEGREE, axis=axis).antiderivative()(time), axis=axis) / h
+    whole = np.diff(make_interp_spline(time, u, k=7, axis=axis).antiderivative()(time), axis=axis) / h
     first, last = u[..., :-1, :], u[..., 1:, :]
     found = np.empty((*first.shape[:-1], count, u.shape[-1]))
     found[..., 0, :] = first

@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from penode_gen.model import Model, Parameter
 
 from .catalogue.form import Form
-from .evidence.bench import Bench
+from .evidence.bench import FAR, Bench
 from .evidence.screening import Score, as_they_are
 from .fit import Free
 
 Array = NDArray[np.float64]
 KIND = "sensor_clipping"
 SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # of the samples, that lie within a limit: those that are tried
-SPAN = 2.0  # factor within which a fit moves a limit
-OPEN = 1e6  # times a limit: one that nothing reaches
 
 
 def propose(bench: Bench, index: int) -> tuple[Score, Form]:
@@ -44,14 +42,14 @@ def limited(model: Model, form: Form, name: str) -> tuple[Model, Free]:
     s = model.sensors[form.index]
     cut = replace(s, expression=f"min(max({s.expression}, -{name}), {name})")
     sensors = (*model.sensors[: form.index], cut, *model.sensors[form.index + 1 :])
-    parameters = {**model.parameters, name: Parameter(name, OPEN * form.limit, s.unit)}
-    free = Free(name, form.limit, form.limit, log=True, sigma=1.0, origin=form.limit, low=form.limit / SPAN, high=SPAN * form.limit)
+    parameters = {**model.parameters, name: Parameter(name, FAR * form.limit, s.unit)}
+    free = Free(name, form.limit, form.limit, log=True, sigma=1.0, origin=form.limit)
     return replace(model, parameters=parameters, sensors=sensors), free
 
 
 def share(bench: Bench, form: Form, limit: Free) -> float:
     """What a limit cuts off, as a share of what the sensor shows."""
-    whole = tuple(replace(f, value=OPEN * f.value, high=np.inf) if f.target == limit.target else f for f in bench.fit.free)
+    whole = tuple(replace(f, value=FAR * f.value) if f.target == limit.target else f for f in bench.fit.free)
     z = np.concatenate([x[:, form.index] for x in bench.problem().predictor.sensors(whole)])
     return float(np.sqrt(np.mean((z - np.clip(z, -limit.value, limit.value)) ** 2)) / max(np.std(z), 1e-300))
 

@@ -26,7 +26,6 @@ MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better,
 MIN_FORM = 0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
 MIN_TAKEN = 0.25  # of the power of a sensor's innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
 MIN_BLOCKS = 3  # of the blocks in which it does
-MOST = 0.5  # of what is missed: a small form that takes less ends the search
 LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
 
 
@@ -69,7 +68,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         accepted.append(Accepted(best, tuple(terms), good))
         large.append(_large(best, least(bench.level.size, best.whole)))
         hides = large[-1] or any(_hidden(t, best) for t in good)
-        if not hides and best.whole < MOST:
+        if not hides and best.whole < 1.0 - best.whole:  # it takes less than it leaves
             break
     if accepted and alone(accepted[-1].trial.whole):
         large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in accepted]

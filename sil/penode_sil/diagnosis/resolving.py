@@ -18,9 +18,7 @@ from .residual import rms
 from .study import Study
 
 Array = NDArray[np.float64]
-ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast
-COSTLY = 1.02  # times the error that the exact solution leaves: from there on a step is too long
-MOST = 16  # steps of a sample
+ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast; and of what is left, a step
 
 
 def resolved(study: Study, text: str) -> tuple[str, Model]:
@@ -45,7 +43,7 @@ def resolved(study: Study, text: str) -> tuple[str, Model]:
             break
         text, stepped = better, finer
     substeps = 2 * model.substeps
-    while left(stepped) > COSTLY * left(exact) and substeps <= MOST:
+    while left(stepped) > (1.0 + ROUGH) * left(exact):
         better = _with(text, "substeps", str(substeps))
         finer = deployed(_load(better), e, start, study.set_name)
         if left(finer) >= left(stepped):

@@ -19,7 +19,6 @@ BLOCKS = 4
 BURN_IN = 0.15  # of the first block of a recording, that stay in training: they carry its start
 REFIT = 3  # iterations from the fit of all blocks
 FREEDOM = 4.0  # degrees of freedom of what one update is off
-ROUNDS = 20  # of the iteration for its width
 DRAWS = 4000  # of the Bayesian bootstrap
 
 
@@ -76,10 +75,10 @@ def predictive(part: Fit, left: NDArray[np.bool_], floor: Array) -> float:
 
 def spread(x: Array, floor: float) -> float:
     """Square of the width of a Student's t with FREEDOM degrees that fits x best (Lange, Little and Taylor, JASA 84, 1989), at least floor."""
-    width = max(float(np.mean(x**2)), floor)
-    for _ in range(ROUNDS):
+    width, before = max(float(np.mean(x**2)), floor), 0.0
+    while abs(width - before) > 1e-5 * width:
         weight = (FREEDOM + 1.0) / (FREEDOM + x**2 / width)
-        width = max(float(np.mean(weight * x**2)), floor)
+        width, before = max(float(np.mean(weight * x**2)), floor), width
     return width
 
 

@@ -18,7 +18,6 @@ from .observer import WANDER, Filter
 
 Array = NDArray[np.float64]
 FORGETTING = 1e-6  # by which states decay at an update: one that no sensor shows then has a bounded variance
-DOUBLINGS = 30  # of the time for which the filter has run: 1e9 updates
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +102,7 @@ def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
     s, r = s / np.outer(size, deviation), r / np.outer(deviation, deviation)
     free = f - s @ np.linalg.solve(r, h)
     alpha, beta, gamma = free.T.copy(), h.T @ np.linalg.solve(r, h), q - s @ np.linalg.solve(r, s.T)
-    for _ in range(DOUBLINGS):
+    while True:  # of the time for which the filter has run; what is forgotten makes it end
         inner = np.linalg.inv(np.eye(len(f)) + beta @ gamma)
         after = alpha @ inner @ alpha
         beta, change = beta + alpha @ inner @ beta @ alpha.T, alpha.T @ gamma @ inner @ alpha

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy import signal
 
 Array = NDArray[np.float64]
-SEGMENT = 64  # samples of which a spectrum is taken; 92 dB below a line, eight of their bins away (Harris, Proc. IEEE 66, 1978, table I)
-BAND = 4  # bins of a spectrum that count together
+SEGMENT = 64  # samples of which a spectrum is taken
+LOBE = 4  # bins from a line to where its window is 92 dB below it (Harris, Proc. IEEE 66, 1978, table I); so many count together
 WINDOW = signal.windows.blackmanharris(SEGMENT)
 
 
@@ -21,8 +21,8 @@ def shown(series: Sequence[Array]) -> float:
     for motion is not in all of them; or in second differences, which have six times its variance, where there are no SEGMENT in a row."""
     powers = [p for x in series for p in _spectra(x)]
     if powers:
-        mean = np.mean(powers, axis=0)[BAND : SEGMENT // 2]
-        return float(np.sqrt(np.min(mean.reshape(-1, BAND).mean(axis=1))))
+        mean = np.mean(powers, axis=0)[LOBE : SEGMENT // 2]
+        return float(np.sqrt(np.min(mean.reshape(-1, LOBE).mean(axis=1))))
     bends = np.concatenate([np.diff(x, 2) for x in series])
     bends = bends[np.isfinite(bends)]
     return float(np.sqrt(np.mean(bends**2) / 6.0)) if bends.size else 0.0
