@@ -120,15 +120,15 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     bench = found.found.bench
     made = applied.apply(model, bench, found.run, found.found.terms, found.offsets)
     text, extended = resolved(study, made.text)
-    gain, more, held = measuring.measure(study, extended, unused) if unused else ({}, [], [])
+    measured = _measured(study, bench.noise)
+    gain, more, held = measuring.measure(measured, extended, unused) if unused else ({}, [], [])
     scale = np.array([s.noise or 1.0 for s in model.sensors])
     after = tuple(measuring.started(extended, e, study)[1] for e in study.experiments)
     fit = replace(study.null, simulated=after)
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
-    levels = tuple(np.tile(bench.noise**2, (len(x), 1)) for x in study.levels)  # those of the study have in them what the model misses
-    numbers, coarse = numerics.numerics(replace(study, model=fitted(model, found.run), levels=levels))
+    numbers, coarse = numerics.numerics(replace(measured, model=fitted(model, found.run)))
     causes += (coarse,) if coarse else ()
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
     quiet = _within(study, fit, np.where([s.noise > 0.0 for s in model.sensors], [s.noise for s in model.sensors], bench.noise))
@@ -137,6 +137,13 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     notes = (*notes, *found.notes, *made.left, *more)
     laws = sum(max(len(x.form.parts), 1) for a in found.found.named for x in a.terms)
     return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws, numbers, found.found.plain.fit.likelihood, bench.update)
+
+
+def _measured(study: Study, noise: Array) -> Study:
+    """The study with no more noise than samples have [n_z]: that of its null fit has in it what the model misses."""
+    levels = tuple(np.tile(noise**2, (len(x), 1)) for x in study.levels)
+    experiments = tuple(replace(e, quiet=np.full_like(e.quiet, np.nan)) for e in study.experiments)
+    return replace(study, levels=levels, experiments=experiments)
 
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float, quiet: bool) -> str:
