@@ -136,7 +136,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
     laws = sum(max(len(x.form.parts), 1) for a in found.found.named for x in a.terms)
-    return Weighed(study, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws, numbers, found.found.plain.fit.likelihood, bench.update)
+    return Weighed(measured, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws, numbers, found.found.plain.fit.likelihood, bench.update)
 
 
 def _measured(study: Study, noise: Array) -> Study:
