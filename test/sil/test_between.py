@@ -6,16 +6,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from penode_gen.model import Parameter
+from scipy import signal
 from test_innovations import swing
 
+import penode_gen
 from penode_sil.batch import Batch, Observer
 from penode_sil.diagnosis import adopting, applied, clipping, plant
 from penode_sil.diagnosis.between import joined, parts, straight
 from penode_sil.diagnosis.catalogue.form import Form, Part
-from penode_sil.diagnosis.evidence import samples
+from penode_sil.diagnosis.evidence import gain, samples
+from penode_sil.diagnosis.evidence.fit import Fit
 from penode_sil.diagnosis.evidence.observer import Filter, Predictor, Record, augmented, scale
 from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.terms import Term
@@ -54,8 +59,15 @@ def test_what_has_edges_stays_on_straight_lines():
     assert np.max(line) == 1.0 and np.min(line) == 0.0 and line[399] == 0.5
 
 
+def test_noise_of_an_input_is_not_louder_at_its_ends():
+    """Of white noise the middles have no more than 2 deviations in rms at the ends, as inside; a spline without ends turned round had 6."""
+    noise = np.random.default_rng(5).standard_normal((4000, 40, 1))
+    middles = parts(np.arange(40) * STEP, noise, noise, 2)[:, :, 1, 0]
+    assert np.all(np.sqrt(np.mean(middles**2, axis=0)) < 2.0)
+
+
 def test_noise_beside_a_motion_of_nine_samples_a_period():
-    """White noise of 1e-3 of the motion. 186 spectra half over one another, four bins each: the quietest of six bands is low by less than
+    """White noise of 1e-3 of the motion. 186 spectra half over one another, four bins each: the quietest of five bands is low by less than
     10 %, and the motion, 92 dB down, is 2.5e-5 of itself there."""
     rng = np.random.default_rng(4)
     y = np.sin(2.0 * math.pi * np.arange(6000) / 9.0) + 1e-3 * rng.standard_normal(6000)
@@ -65,18 +77,30 @@ def test_noise_beside_a_motion_of_nine_samples_a_period():
     assert samples.shown([np.full(100, np.nan)]) == 0.0
 
 
+def test_noise_that_is_low_passed_or_seldom_is_not_lost():
+    """What a file states holds unless neighbours are nearer; what is resampled to 0.4 of the rate keeps its noise below that; of a slow
+    sensor, whose samples have no neighbours, the file's word counts."""
+    white = np.random.default_rng(6).standard_normal(20000)
+    low = signal.filtfilt(*signal.butter(8, 0.8), white)
+    assert 0.85 < samples.noise([[low]], np.zeros(1))[0] < 1.05
+    assert samples.noise([[white]], np.array([0.5]))[0] == 0.5
+    assert abs(samples.noise([[white]], np.array([3.0]))[0] - 1.0) < 0.03
+    seldom = np.where(np.arange(20000) % 5, np.nan, white)
+    assert samples.noise([[seldom]], np.array([0.1]))[0] == 0.1
+
+
 def test_an_observer_counts_the_samples_that_are_kept(tmp_path):
     """Two steps of half a sample, of which one is kept, and two substeps of a whole one: the same but for rounding."""
     model, (e,) = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
-    gain, n = np.array([[0.3], [2.0]]), len(e.u)
-    whole = Batch(replace(model, substeps=2)).run(e.u, observer=Observer(4, e.y, gain))
+    follow, n = np.array([[0.3], [2.0]]), len(e.u)
+    whole = Batch(replace(model, substeps=2)).run(e.u, observer=Observer(4, e.y, follow))
     between = np.interp(np.arange(2 * n - 1) / 2.0, np.arange(n), e.u[:, 0])[:, None]
-    halves = Batch(replace(model, sample_time=0.5 * model.sample_time)).run(between, observer=Observer(4, e.y, gain), every=2)
+    halves = Batch(replace(model, sample_time=0.5 * model.sample_time)).run(between, observer=Observer(4, e.y, follow), every=2)
     assert halves.z.shape == whole.z.shape
     assert np.max(np.abs(halves.z - whole.z)) < 1e-13
     assert np.max(np.abs(whole.z - Batch(replace(model, substeps=2)).run(e.u).z)) > 1e-6  # it does follow
     with pytest.raises(ValueError, match=r"must be \[kept, n_z\] = \[100, 1\]"):
-        Batch(replace(model, sample_time=0.5 * model.sample_time)).run(between, observer=Observer(4, np.zeros((2 * n - 1, 1)), gain), every=2)
+        Batch(replace(model, sample_time=0.5 * model.sample_time)).run(between, observer=Observer(4, np.zeros((2 * n - 1, 1)), follow), every=2)
 
 
 def test_a_scale_of_a_sensor_does_not_tune_the_filter(tmp_path):
@@ -112,22 +136,63 @@ def test_a_constant_beside_a_friction_is_a_cause_of_its_own():
     assert adopting.apart(alone) == [alone]
 
 
+def term(how: str, where: str = "tau") -> Term:
+    return Term(Form(how, where, how, 0), (), (Free((how, 0), 0.0, 1.0),))
+
+
+class Values:
+    """Of a fit, as far as a file needs them."""
+
+    values: dict[str, float] = {}
+
+    @staticmethod
+    def value(target):
+        return {"input_gain": 0.2, "input_offset": 0.03, "input_delay": 0.0128}[target[0]]
+
+
 def test_what_is_wrong_with_one_input_stands_in_a_row(tmp_path):
-    """A hold goes before a gain, an offset behind both; each element is written once."""
+    """A delay goes before a gain, an offset behind both, but not into a rate; each element is written once, and no name is taken twice."""
     model, _ = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
+    seen = replace(model.sensors[0], expression="phi + 0.1*tau + 0.01*der(tau)")
+    model = replace(model, sensors=(seen,), parameters=model.parameters | {"tau_offset": Parameter("tau_offset", 0.5, "N*m")})
+    found = applied._driven(model, Values, [term("input_offset"), term("input_gain"), term("input_delay")], {"tau_offset", "tau_acts"})
+    assert found.left == ["input_delay of tau is 3.20 samples; the model file has 3"]
+    assert found.actuators == [
+        'tau_acts_2 = { input = "tau", law = "delay", samples = 3 }', 'tau_acts_3 = { input = "tau_acts_2", law = "gain", gain = "tau_gain" }',
+    ]  # fmt: skip
+    assert [x.split(" = ")[0] for x in found.parameters] == ["tau_offset_2", "tau_gain"]
+    assert found.through(seen.expression) == "phi + 0.1*(tau_acts_3 + tau_offset_2) + 0.01*der(tau_acts_3)"
+    (motor,) = applied._redirected(model, found)["elements"]
+    assert motor.startswith("motor = ") and '"-(tau_acts_3 + tau_offset_2)"' in motor
 
-    def term(how: str, **more) -> Term:
-        return Term(Form(how, "tau", how, 0, **more), (), (Free((how, 0), 0.0, 1.0),))
 
-    class Values:
-        values: dict[str, float] = {}
+def test_an_input_that_an_actuator_of_the_file_takes_is_left(tmp_path):
+    model, _ = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
+    for own in ('slow = { input = "tau", law = "lag", time = "5 ms" }', 'slow = { input = "tau", law = "delay", samples = 3 }'):
+        text = (tmp_path / "model.toml").read_text().replace("[elements]", f"[actuators]\n{own}\n[elements]").replace("-tau", "-slow")
+        (tmp_path / "slow.toml").write_text(text)
+        found = applied._driven(penode_gen.load(tmp_path / "slow.toml"), Values, [term("input_gain")], set())
+        assert not found.actuators and len(found.left) == 1 and "has to be corrected" in found.left[0]
 
-        @staticmethod
-        def value(target):
-            return {"input_gain": 0.2, "input_offset": 0.03, "input_delay": 0.012}[target[0]]
 
-    found, left = applied._driven(model, Values, [term("input_offset"), term("input_gain"), term("input_delay")])
-    assert not left
-    assert found["actuators"] == ['tau_acts = { input = "tau", law = "delay", samples = 3 }', 'tau_acts_acts = { input = "tau_acts", law = "gain", gain = "tau_gain" }']
-    assert [x.split(" = ")[0] for x in found["elements"]] == ["motor"] and '"-(tau_acts_acts + tau_offset)"' in found["elements"][0]
-    assert [x.split(" = ")[0] for x in found["parameters"]] == ["tau_gain", "tau_offset"]
+def test_two_sensors_have_a_limit_each(tmp_path):
+    """Forms that are adopted one after the other have names of their own, in any bench the same."""
+    model, (e,) = swing(tmp_path, lambda s, v: 0.0, seconds=2.0)
+    both = replace(model, sensors=(*model.sensors, replace(model.sensors[0], name="again")))
+    names = []
+    for number, index in enumerate((0, 1)):
+        form = Form(clipping.KIND, both.sensors[index].name, "clip", index, limit=0.1 * (index + 1))
+        both, free = clipping.limited(both, form, f"x{90 + number}_0_limit")
+        names.append(free.target)
+    assert names == ["x90_0_limit", "x91_0_limit"] and [s.expression.count("limit") for s in both.sensors] == [2, 2]
+
+
+def test_what_noise_cannot_move_has_a_filter():
+    """Without any noise of states the steady gain is nothing, and the doubling ends."""
+    assert np.all(gain.riccati(0.9 * np.eye(2), np.ones((1, 2)), np.zeros((2, 2)), np.zeros((2, 1)), np.eye(1)) == 0.0)
+
+
+def test_a_share_of_what_is_noise_already_is_none():
+    """A sensor 2 % above its noise, of 200 updates: all of that is within three deviations, 0.3, of an estimate."""
+    before, after = (SimpleNamespace(variance=np.array(v), used=np.ones((200, 2), bool)) for v in ([1.02, 100.0], [1.0, 100.0]))
+    assert np.all(Fit.taken(before, after, np.ones(2)) < 0.1)

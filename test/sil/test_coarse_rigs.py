@@ -85,7 +85,7 @@ def test_an_oscillator_with_nine_samples_a_period(tmp_path, penode):
         x = simulate(lambda x, v, u: (u - 0.6 - 40.0 * v - 1.2e5 * x - 4e11 * x**3) / 1.0, u, h)[:, 0]
         records.append((h, u, "x [m]", x + 2e-7 * rng.standard_normal(len(x))))
     found = diagnosed(tmp_path, penode, file(2, {"m": (0.8, "kg"), "d": (60, "N*s/m"), "k": (1e5, "N/m")}), records)
-    assert {"cubic_spring", "integration_error"} <= set(kinds(found)) and "sensor_scale" not in kinds(found)
+    assert sorted(kinds(found)) == ["cubic_spring", "integration_error"]
     gain = found["gain"]["x"]
     assert gain["after_rmse"] < 0.05 * gain["before_rmse"]  # the C knows no sample to come, so that waves of three samples stay 4 % off
     assert "substeps = " in (tmp_path / "out" / "model_extended.toml").read_text()
@@ -108,7 +108,7 @@ def test_a_carriage_with_an_encoder_of_a_micrometre(tmp_path, penode):
     found = diagnosed(tmp_path, penode, model, records)
     assert sorted(kinds(found)) == ["constant_force", "coulomb_friction"]
     sizes = {c["kind"]: c["parameters"]["force"]["value"] for c in found["causes"]}
-    assert abs(sizes["coulomb_friction"] - 15.0) < 0.3 and abs(abs(sizes["constant_force"]) - 3.0) < 0.06  # 2 %, of data exact to 1e-5
+    assert abs(sizes["coulomb_friction"] - 15.0) < 0.3 and abs(sizes["constant_force"] + 3.0) < 0.06  # 2 %, of data exact to 1e-5
 
 
 def test_a_model_that_is_right_but_guessed(tmp_path, penode):
@@ -139,7 +139,7 @@ def test_a_converter_that_holds_its_output_is_a_delay(tmp_path, penode):
     sensor = 'v = { value = "v", unit = "m/s", noise = 1e-3 }'
     model = file(10, {"m": (3, "kg"), "d": (5, "N*s/m")}, "", sensor).replace('x = { value = "x", unit = "m" }', 'v = { value = "v", unit = "m/s" }')
     found = diagnosed(tmp_path, penode, model, records)
-    assert kinds(found) in (["sensor_delay"], ["input_delay"], ["input_hold"])
+    assert kinds(found) in (["sensor_delay"], ["input_delay"])  # the same to a plant that does not change
     assert abs(found["causes"][0]["parameters"]["delay"]["value"] / 4.875e-3 - 1.0) < 0.01  # half a sample, less half a fine step: there the steps rise
 
 

@@ -11,12 +11,12 @@ from .evidence.screening import Probe
 from .propose import FOLLOWED, PROMISE, motions
 from .terms import Term, Trial, with_forms
 
-
-def adopt(bench: Bench, t: Trial) -> tuple[Bench, list[Term]]:
-    """The bench with a trial's form in its model, and the terms that it has become, one for each kind that its laws are of; of what else was
-    fitted with it what the bench has."""
+def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
+    """The bench with a trial's form in its model, and the terms that the form becomes there, one for each kind of law. Of the other values
+    that the trial fitted, only those that the bench has are kept. `number`: of the form in its search, for it has the same names in any
+    bench."""
     moved = motions(Probe.of(bench))
-    wide, (term,) = with_forms(bench, [t.form], moved, 90 + len(bench.model.elements))
+    wide, (term,) = with_forms(bench, [t.form], moved, 90 + number)  # more than a search has rounds, after which forms that are tried are named
     names = dict(zip([f.target for f in t.term.free], term.free))
     own = {f.target for f in bench.free}
     free = tuple(replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free if f.target in own | set(names))
@@ -27,10 +27,9 @@ def adopt(bench: Bench, t: Trial) -> tuple[Bench, list[Term]]:
 
 
 def steepened(bench: Bench, term: Term) -> Bench:
-    """The bench with the edges of a term half as wide, as often as that promises more; with steps as much shorter, for a steep edge damps as much
-    more."""
+    """Halves the width of a term's edges for as long as each halving gains PROMISE. Steps are halved with it, for a steeper edge damps more."""
     edges = {f"{name}_{part.edge}" for name, part in zip(term.elements, term.form.parts) if part.edge}
-    while edges:
+    for _ in range(8 if edges else 0):  # down to 1e-4 of the rms rate: no plant turns faster
         free = tuple(replace(f, value=0.5 * f.value, low=0.5 * f.low) if f.target in edges else f for f in bench.fit.free)
         finer = replace(bench, fastest=2.0 * bench.fastest)
         fit = finer.problem().solve(free, bench.fit.by, FOLLOWED)
@@ -41,7 +40,7 @@ def steepened(bench: Bench, term: Term) -> Bench:
 
 
 def apart(term: Term) -> list[Term]:
-    """A term as one for each kind that its laws are of; that of the form comes first."""
+    """Splits a term into one term for each kind of law in it, that of the form first."""
     kinds = dict.fromkeys([term.form.kind, *(p.kind for p in term.form.parts if p.kind)])
     if len(kinds) == 1:
         return [term]

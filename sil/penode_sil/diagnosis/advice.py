@@ -71,7 +71,7 @@ def advice(d: Diagnosis) -> tuple[str, ...]:
 
 def _of_verdict(d: Diagnosis) -> list[str]:
     if d.verdict == "no_discrepancy" and any(g.before_rmse > UNSEEN * g.noise_floor and g.after_rmse < g.before_rmse for g in d.gain.values()):
-        return ["use model_extended.toml: its parameters are those that the recordings show"]
+        return ["use model_extended.toml: it is the model as fitted to the recordings"]
     if d.verdict == "no_discrepancy":
         return ["keep the model; before you use it for faster or larger motion, record some"]
     if d.verdict == "not_identifiable":

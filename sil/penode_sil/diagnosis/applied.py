@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from penode_gen import units
 from penode_gen.laws import LAWS
@@ -32,7 +32,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     """The nominal model with the values of a fit and the terms of it; `offsets`: sensors whose
     offset goes into it."""
     forces = [t for t in terms if t.form.how == "force"]
-    taken = {*model.parameters, *model.states, *(x.name for x in model.elements), *(s.name for s in model.sensors)}
+    taken = _names(model)
     rename: dict[str, str] = {}
     for t in forces:
         for name in t.elements:
@@ -52,13 +52,16 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
                 for p in bench.model.parameters.values() if p.name.startswith(f"{name}_")
             ]  # fmt: skip
             elements.append(f"{named(name)} = {table(_element(own, named))}")
-    driven, left = _driven(model, fit, terms)
+    driven = _driven(model, fit, terms, {*taken, *rename.values()})
+    redirected = _redirected(model, driven)
     own = [(e, bench.places[t.form.index]) for t in forces for e in bench.model.elements if e.name in t.elements]
     grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
     limits = {t.form.index: values[t.free[0].target] for t in terms if t.form.how == "clip"}
-    sensors = [_sensor(model, j, named(grown.sensors[j].expression), values, offsets, limits, parameters) for j in range(len(model.sensors))]
+    texts = [driven.through(named(s.expression)) for s in grown.sensors]
+    sensors = [_sensor(model, j, text, values, offsets, limits, driven) for j, text in enumerate(texts)]
     units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
     outputs = [f"{s.name} = {table({**x, 'unit': units_of[s.name]})}" for s, x in zip(model.sensors, sensors) if x and s.name in units_of]
+    outputs += [x for x in redirected["outputs"] if x.split(" = ")[0] not in {o.split(" = ")[0] for o in outputs}]
     learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
     lines = [
         f"# What the recordings taught about {model.path.name}: {learnt or 'nothing but values'}.",
@@ -66,12 +69,19 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
         f"sample_time = {toml(f'{model.sample_time:.12g} s')}", "",
     ]  # fmt: skip
     for title, entries in (
-        ("parameters", [*parameters, *driven["parameters"]]), ("actuators", driven["actuators"]), ("elements", [*driven["elements"], *elements]),
-        ("equations", driven["equations"]), ("outputs", outputs), ("sensors", [f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}" for s, x in zip(model.sensors, sensors) if x]),
+        ("parameters", [*parameters, *driven.parameters]), ("actuators", driven.actuators), ("elements", [*redirected["elements"], *elements]),
+        ("equations", redirected["equations"]), ("outputs", outputs),
+        ("sensors", [f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}" for s, x in zip(model.sensors, sensors) if x]),
     ):  # fmt: skip
         if entries:
             lines += [f"[{title}]", *entries, ""]
-    return Applied("\n".join(lines), tuple(left))
+    return Applied("\n".join(lines), tuple(driven.left))
+
+
+def _names(model: Model) -> set[str]:
+    """All names of a model file."""
+    lists = (model.inputs, model.bodies, model.points, model.sampled, model.elements, model.variables, model.outputs, model.sensors)
+    return {*model.parameters, *model.states, *(x.name for some in lists for x in some)}
 
 
 def _changed(model: Model, name: str, value: float) -> str:
@@ -90,67 +100,105 @@ def _element(e: Element, named: Callable[[str], str]) -> dict[str, object]:
 
 
 def _sensor(
-    model: Model, j: int, expression: str, values: dict[str, float], offsets: Collection[str], limits: Mapping[int, float],
-    parameters: list[str],
-) -> dict[str, object]:  # fmt: skip
+    model: Model, j: int, expression: str, values: dict[str, float], offsets: Collection[str], limits: Mapping[int, float], driven: Driven
+) -> dict[str, object]:
     """What a sensor that measures otherwise has as its value and unit; nothing for one that does not."""
     s, unit = model.sensors[j], units.si(model.sensors[j].unit)
+
+    def added(stem: str, value: float, unit: str) -> str:
+        name = driven.name(f"{stem}_{s.name}")
+        driven.parameters.append(f"{name} = {table({'value': value, 'unit': unit})}")
+        return name
+
     if scale(s.name) in values:
-        parameters.append(f"gain_{s.name} = {table({'value': values[scale(s.name)], 'unit': '1'})}")
-        expression = f"gain_{s.name}*({expression})"
+        expression = f"{added('gain', values[scale(s.name)], '1')}*({expression})"
     if s.name in offsets:
-        parameters.append(f"bias_{s.name} = {table({'value': values[bias(s.name)], 'unit': unit})}")
-        expression = f"{expression} + bias_{s.name}"
+        expression = f"{expression} + {added('bias', values[bias(s.name)], unit)}"
     if j in limits:
-        parameters.append(f"limit_{s.name} = {table({'value': limits[j], 'unit': unit})}")
-        expression = f"min(max({expression}, -limit_{s.name}), limit_{s.name})"
+        most = added("limit", limits[j], unit)
+        expression = f"min(max({expression}, -{most}), {most})"
     if expression == s.expression:
         return {}
     return {"value": expression, "unit": s.unit}
 
 
-SAMPLED = ("input_delay", "input_added")  # laws of samples: gains and lags go behind them
+SAMPLED = ("input_delay", "input_added")  # act on samples, so they come before gains and lags
 
 
-def _driven(model: Model, fit: Fit, terms: Sequence[Term]) -> tuple[dict[str, list[str]], list[str]]:
-    """What terms of inputs add to a model file, those of one input in a row, and what they cannot."""
-    found: dict[str, list[str]] = {"parameters": [], "actuators": [], "elements": [], "equations": []}
-    left: list[str] = []
+@dataclass
+class Driven:
+    """What terms of inputs add to a model file: entries by section, what stands for an input now (`acts`), its offset, and notes on what the
+    file cannot express. `taken`: names that the file has."""
+
+    taken: set[str]
+    parameters: list[str] = field(default_factory=list)
+    actuators: list[str] = field(default_factory=list)
+    acts: dict[str, str] = field(default_factory=dict)
+    offsets: dict[str, str] = field(default_factory=dict)
+    left: list[str] = field(default_factory=list)
+
+    def name(self, stem: str) -> str:
+        """A name that is not taken, and is from now on."""
+        found = unlike(stem, self.taken)
+        self.taken.add(found)
+        return found
+
+    def through(self, text: str) -> str:
+        """An expression with what stands for its inputs now; an offset has no rate."""
+        for name, acts in self.acts.items():
+            text = re.sub(rf"\b{name}\b", acts, text)
+            if name in self.offsets:
+                text = re.sub(rf"(?<!der\()\b{acts}\b", f"({acts} + {self.offsets[name]})", text)
+        return text
+
+
+def _driven(model: Model, fit: Fit, terms: Sequence[Term], taken: set[str]) -> Driven:
+    """What terms of inputs add to a model file, several of one input in a row."""
+    found = Driven(taken)
     own = sorted((t for t in terms if t.form.how.startswith("input_")), key=lambda t: t.form.how not in SAMPLED)
     for name in dict.fromkeys(t.form.where for t in own):
-        acts = name
-        for t in (t for t in own if t.form.where == name and t.form.how != "input_offset"):
-            acts = _actuator(model, t, fit.value(t.free[0].target), acts, found, left)
-        offsets = [t for t in own if t.form.where == name and t.form.how == "input_offset"]
-        if offsets and _places(model, name):
-            left.append(_uncorrected(offsets[0]))
-        elif offsets:
-            value, unit = fit.value(offsets[0].free[0].target), units.si(next(i.unit for i in model.inputs if i.name == name))
-            found["parameters"].append(f"{name}_offset = {table({'value': value, 'unit': unit})}")
-            acts = f"({acts} + {name}_offset)"
-        if acts != name:
-            _redirected(model, name, acts, found)
-    return found, left
+        mine = [t for t in own if t.form.where == name]
+        if _bound(model, name):
+            found.left += [_uncorrected(t) for t in mine]
+            continue
+        found.acts[name] = name
+        for t in mine:
+            value = fit.value(t.free[0].target)
+            if t.form.how == "input_offset" and not any(name in e.ends for e in model.elements):
+                found.offsets[name] = found.name(f"{name}_offset")
+                unit = units.si(next(i.unit for i in model.inputs if i.name == name))
+                found.parameters.append(f"{found.offsets[name]} = {table({'value': value, 'unit': unit})}")
+            else:
+                found.acts[name] = _actuator(model, t, value, found.acts[name], found)
+    return found
 
 
-def _actuator(model: Model, t: Term, value: float, source: str, found: dict[str, list[str]], left: list[str]) -> str:
+def _bound(model: Model, name: str) -> bool:
+    """Does an actuator or a point of the file take an input, which a file that extends it cannot take elsewhere?"""
+    actuated = [q.text for q in model.equations if q.text.startswith(f"der({q.name})*")] + [p.text for p in model.points]
+    return any(s.source == name for s in model.sampled) or any(re.search(rf"\b{name}\b", text) for text in actuated)
+
+
+def _actuator(model: Model, t: Term, value: float, source: str, found: Driven) -> str:
     """Adds what a term makes of a signal; the name of that, or of the signal itself where the model file has no law for it."""
-    name, acts = t.form.where, f"{source}_acts"
-    samples = round((t.form.series.period if t.form.series else value) / model.sample_time)
+    name, samples = t.form.where, (t.form.series.period if t.form.series else value) / model.sample_time
     law: dict[str, object] = {}
     match t.form.how:
         case "input_gain":
-            law = {"law": "gain", "gain": f"{name}_gain"}
-            found["parameters"].append(f"{name}_gain = {table({'value': 1.0 + value, 'unit': '1'})}")
+            law = {"law": "gain", "gain": found.name(f"{name}_gain")}
+            found.parameters.append(f"{law['gain']} = {table({'value': 1.0 + value, 'unit': '1'})}")
         case "input_lag":
-            law = {"law": "lag", "time": f"{name}_lag"}
-            found["parameters"].append(f"{name}_lag = {table({'value': value, 'unit': 's'})}")
-        case "input_delay" if samples < 1:
-            left.append(_uncorrected(t))
-            return source
+            law = {"law": "lag", "time": found.name(f"{name}_lag")}
+            found.parameters.append(f"{law['time']} = {table({'value': value, 'unit': 's'})}")
+        case "input_delay" | "input_added" if round(samples) >= 1:
+            law = {"law": "held" if t.form.series else "delay", "samples": round(samples)}
+            if abs(samples - round(samples)) > 0.1:
+                found.left.append(f"{t.form.how} of {name} is {samples:.2f} samples; the model file has {round(samples)}")
         case _:
-            law = {"law": "held" if t.form.series else "delay", "samples": max(samples, 1)}
-    found["actuators"].append(f"{acts} = {table({'input': source, **law})}")
+            found.left.append(_uncorrected(t))
+            return source
+    acts = found.name(f"{name}_acts")
+    found.actuators.append(f"{acts} = {table({'input': source, **law})}")
     return acts
 
 
@@ -158,20 +206,19 @@ def _uncorrected(t: Term) -> str:
     return f"{t.form.how} of {t.form.where}: a recording has to be corrected, the model file has no law for it"
 
 
-def _places(model: Model, name: str) -> bool:
-    """Is an input a position to which elements are tied, rather than a part of expressions?"""
-    return any(name in e.ends for e in model.elements) or any(re.search(rf"\b{name}\b", p.text) for p in model.points)
-
-
-def _redirected(model: Model, name: str, acts: str, found: dict[str, list[str]]) -> None:
-    """Adds the elements and equations on which an input acts, with what an actuator makes of it instead."""
+def _redirected(model: Model, driven: Driven) -> dict[str, list[str]]:
+    """Elements, equations and outputs on which inputs act, with what stands for these now."""
+    found: dict[str, list[str]] = {"elements": [], "equations": [], "outputs": []}
     for e in model.elements:
-        ends = tuple(acts if x == name else x for x in e.ends)
-        text = re.sub(rf"\b{name}\b", acts, e.expression)
+        ends = tuple(driven.acts.get(x, x) for x in e.ends)
+        text = driven.through(e.expression)
         if ends != e.ends or text != e.expression:
             entry = _element(Element(e.name, ends, e.law, e.arguments, e.network, e.network_inputs, text), lambda x: x)
             found["elements"].append(f"{e.name} = {table(entry)}")
     for q in model.equations:
-        text = re.sub(rf"\b{name}\b", acts, q.text)
-        if text != q.text:
+        if (text := driven.through(q.text)) != q.text:
             found["equations"].append(f"{q.name} = {toml(text)}")
+    for o in model.outputs:
+        if (text := driven.through(o.expression)) != o.expression:
+            found["outputs"].append(f"{o.name} = {table({'value': text, 'unit': o.unit})}")
+    return found

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 Array = NDArray[np.float64]
-CLOSE = 1e-3  # [s] of samples through which parabolas are the inputs in between, and cubics have their rates
+CLOSE = 1e-3  # [s] sample time up to which parabolas between samples are close enough, and cubics where a model uses rates
 
 
 def parts(time: Array, u: Array, rate: Array, count: int) -> Array:
-    """Signals u [..., n, n_u] at `time` [n] as `count` samples from each to before the next one, [..., n - 1, count, n_u], for a step that
-    joins them by straight lines; 2 or 3, for a model that uses the `rate` [..., n, n_u] of an input.
+    """Splits each interval of signals u [..., n, n_u], sampled at `time` [n] in s, into `count` parts: 2, or 3 for a model that uses their
+    `rate` [..., n, n_u]. Returns samples [..., n - 1, count, n_u], each interval without its end, to be joined by straight lines.
 
     At the samples they are what they are, for that is what sensors see. In between, the middle one is such that the integral over each
     interval, which moves the plant, is that of the smooth input: a spline of degree 7, which shows an image of 3.3 samples a period by
@@ -22,8 +22,7 @@ def parts(time: Array, u: Array, rate: Array, count: int) -> Array:
     next sample has its rate, which sensors may see as well.
     """
     h = float(time[1] - time[0])
-    axis = u.ndim - 2
-    whole = np.diff(make_interp_spline(time, u, k=7, axis=axis).antiderivative()(time), axis=axis) / h
+    whole = _means(u)
     first, last = u[..., :-1, :], u[..., 1:, :]
     found = np.empty((*first.shape[:-1], count, u.shape[-1]))
     found[..., 0, :] = first
@@ -35,8 +34,18 @@ def parts(time: Array, u: Array, rate: Array, count: int) -> Array:
     return found
 
 
+def _means(u: Array) -> Array:
+    """Of the smooth signals [..., n - 1, n_u] over each interval. At their ends they go on turned by half about them, for there the noise of
+    samples would count six times."""
+    more, axis = min(16, u.shape[-2] - 1), u.ndim - 2
+    before, after = (2.0 * u[..., [end], :] - u[..., rows, :][..., ::-1, :] for end, rows in ((0, slice(1, more + 1)), (-1, slice(-more - 1, -1))))
+    at = np.arange(float(u.shape[-2] + 2 * more))
+    spline = make_interp_spline(at, np.concatenate([before, u, after], axis=-2), k=7, axis=axis)
+    return np.diff(spline.antiderivative()(at[more : len(at) - more]), axis=axis)
+
+
 def straight(u: Array, count: int) -> Array:
-    """The same [..., n - 1, count, n_u] on straight lines: what has edges."""
+    """The same shape on straight lines, for signals with edges."""
     share = np.arange(count)[:, None] / count
     return u[..., :-1, None, :] + share * np.diff(u, axis=-2)[..., None, :]
 

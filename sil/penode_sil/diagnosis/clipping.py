@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A sensor that is cut off beyond a limit, in front of what adds its noise: no sample repeats the limit, so only the motion shows it."""
+"""A sensor that saturates before its noise is added: no two samples show the same limit, so only the motion reveals it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,44 +18,44 @@ from .fit import Free
 
 Array = NDArray[np.float64]
 KIND = "sensor_clipping"
-SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # of the samples, that lie within a limit: those that are tried
+SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # quantiles of abs(y) that are tried as limits
 
 
-def propose(bench: Bench, index: int) -> tuple[Score, Form]:
-    """The limit of a sensor that promises most. Beside a free run, which no sample that is cut off corrects, it changes an innovation by what it
-    cuts off."""
-    sensor, y = bench.model.sensors[index], np.concatenate([r.y[:, index] for r in bench.records])
-    sizes = np.abs(y[np.isfinite(y)])
-    limits = [float(np.quantile(sizes, share)) for share in SHARES]
-    seen = bench.problem().predictor.sensors(bench.fit.free)
+def propose(bench: Bench, index: int, seen: Sequence[Array]) -> tuple[Score, Form] | None:
+    """The limit that gains most for a sensor; None for one that was not measured, or hardly moves. A free run, `seen` [n, n_z] for each
+    recording, stands for the signal that is not cut off; what a limit cuts off it is the change of the innovations."""
+    y = np.abs(np.concatenate([r.y[:, index] for r in bench.records]))
+    y = y[np.isfinite(y)]
+    limits = [float(x) for x in np.quantile(y, SHARES) if x > 0.0] if y.size else []
+    if not limits:
+        return None
     changes = []
     for limit in limits:
         change = np.zeros_like(bench.fit.nu)
-        change[:, index] = _means(bench, [z[:, index] - np.clip(z[:, index], -limit, limit) for z in seen], index)
+        change[:, index] = _means(bench.update, [z[:, index] - np.clip(z[:, index], -limit, limit) for z in seen])
         changes.append(change)
     tried = as_they_are(bench.fit, changes)
     best = int(np.argmax([s.gain for s in tried]))
-    return tried[best], Form(KIND, sensor.name, "clip", index, limit=limits[best])
+    return tried[best], Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[best])
 
 
 def limited(model: Model, form: Form, name: str) -> tuple[Model, Free]:
-    """The model with a limit of a sensor, as a parameter of that name, that nothing reaches yet; and the value of it."""
+    """The model with a limit of a sensor, as a parameter `name` so large that it has no effect, and the free value for it."""
     s = model.sensors[form.index]
     cut = replace(s, expression=f"min(max({s.expression}, -{name}), {name})")
     sensors = (*model.sensors[: form.index], cut, *model.sensors[form.index + 1 :])
-    parameters = {**model.parameters, name: Parameter(name, FAR * form.limit, s.unit)}
+    parameters = {**model.parameters, name: Parameter(name, FAR**2 * form.limit, s.unit)}
     free = Free(name, form.limit, form.limit, log=True, sigma=1.0, origin=form.limit)
     return replace(model, parameters=parameters, sensors=sensors), free
 
 
 def share(bench: Bench, form: Form, limit: Free) -> float:
     """What a limit cuts off, as a share of what the sensor shows."""
-    whole = tuple(replace(f, value=FAR * f.value) if f.target == limit.target else f for f in bench.fit.free)
+    whole = tuple(replace(f, value=FAR**2 * f.value) if f.target == limit.target else f for f in bench.fit.free)
     z = np.concatenate([x[:, form.index] for x in bench.problem().predictor.sensors(whole)])
     return float(np.sqrt(np.mean((z - np.clip(z, -limit.value, limit.value)) ** 2)) / max(np.std(z), 1e-300))
 
 
-def _means(bench: Bench, signals: list[Array], index: int) -> Array:
-    """Of signals [n] between updates, over all recordings in turn."""
-    k = bench.update
-    return np.concatenate([x[: len(x) // k * k].reshape(-1, k).mean(axis=1) for x in signals])
+def _means(update: int, signals: Sequence[Array]) -> Array:
+    """Means of signals [n] over the samples of each update, [updates], all recordings in turn."""
+    return np.concatenate([x[: len(x) // update * update].reshape(-1, update).mean(axis=1) for x in signals])

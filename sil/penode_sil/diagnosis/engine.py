@@ -59,7 +59,8 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     by sensor noise explains (`_decides`); else that search does. It ends early where more acts than any single cause explains and
     innovations explain it all, unless so much is left that more causes are to be expected. Where it finds no name, innovations may: for
     everything, or for a part if the rest wanders everywhere."""
-    if weighed.supports(study.model) and guessed(study.model) or not study.model.inputs and weighed.misfit(study, study.null, case.log).size > weighed.UNMODELLED:
+    vague = weighed.supports(study.model) and bool(guessed(study.model))
+    if vague or not study.model.inputs and weighed.misfit(study, study.null, case.log).size > weighed.UNMODELLED:
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
     case.tell(SEARCH[0], "looking for causes")
@@ -79,9 +80,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     answer = by_noise(case, study, explanations, faults, bursts)
     if answer.verdict in ("unexplained", "partly_explained") and w is None and best and weighed.supports(study.model):
         w = _weighed(case, study)
-        if not w.follows_better(beside):
-            return answer
-        return _by_innovations(case, best, w)
+        return _by_innovations(case, best, w) if w.follows_better(beside) else answer
     if w and answer.verdict == "unexplained" and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED):
         return _by_innovations(case, best, w)
     return answer

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.polynomial import Legendre, Polynomial
 from numpy.typing import NDArray
 
-import penode_gen
 from penode_gen import units
 from penode_gen.laws import LAWS
 from penode_gen.model import Model

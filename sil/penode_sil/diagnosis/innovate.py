@@ -42,7 +42,7 @@ class Accepted:
 @dataclass(frozen=True, eq=False)
 class Found:
     """What a search ends with: the bench with all accepted `terms` in it, and a `plain` one with those forms alone that are worth a name,
-    `named`, as they are in there; the others are `small`."""
+    `named`, with their terms in it; `small`: the others."""
 
     bench: Bench
     terms: tuple[Term, ...]
@@ -52,8 +52,9 @@ class Found:
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
-    """Causes one by one, each the one that predicts best, until none predicts enough better, or the best is not worth a name and hides none
-    that is. A small one that takes most of what was missed may hide one that is nearly all of the rest; beside that it is judged again."""
+    """Accepts causes one at a time, the best predictor first, until none predicts enough better, or the best is too small for a name and
+    cannot hide a larger one. A small one that takes most of what is missed may be all of it but for one other cause: if that is found, what
+    wanders beside both is little, and all are judged again by that."""
     accepted: list[Accepted] = []
     large: list[bool] = []
     blocks = Blocks.of([len(r) // bench.update for r in bench.records])
@@ -63,7 +64,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         best = _simplest(good, base, [x for a in accepted for x in a.terms])
         if not hides and not _matters(best):
             break
-        bench, terms = adopt(bench, best)
+        bench, terms = adopt(bench, best, len(accepted))
         bench, base = _based(bench, blocks)
         accepted.append(Accepted(best, tuple(terms), good))
         large.append(_large(best, least(bench.level.size, best.whole)))
@@ -77,9 +78,9 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
 
 def _apart(start: Bench, bench: Bench, accepted: Sequence[Accepted], large: Sequence[bool]) -> Found:
     """What a search has accepted, the large forms in a bench of their own."""
-    plain, named = (bench, list(accepted)) if all(large) else (start, [])
-    for a in (a for a, big in zip(accepted, large) if big and not all(large)):
-        plain, terms = adopt(plain, a.trial)
+    plain, named = start, []
+    for number, a in ((n, a) for n, (a, big) in enumerate(zip(accepted, large)) if big):
+        plain, terms = (bench, a.terms) if all(large) else adopt(plain, a.trial, number)
         named.append(Accepted(a.trial, tuple(terms), a.trials))
     small = tuple(a for a, big in zip(accepted, large) if not big)
     return Found(bench, tuple(x for a in accepted for x in a.terms), plain, tuple(named), small)
@@ -100,8 +101,8 @@ def _good(bench: Bench, terms: Sequence[Term], blocks: Blocks, base: Array, log:
 
 
 def _hidden(t: Trial, small: Trial) -> bool:
-    """May a form elsewhere be large once a small one is in the model? Its force is; what it takes of the innovations is less while others are
-    in them, and the level of what wanders is theirs."""
+    """May a form at another place prove large once a small one is in the model? Its force is large enough; its share of the innovations
+    rises when the small one is gone."""
     return t.form.where != small.form.where and t.share >= WORTH
 
 

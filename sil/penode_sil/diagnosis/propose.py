@@ -62,8 +62,10 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     ranked = _screened(bench, probe, forms, moved)
     holds = _holds(bench, _chosen(ranked), terms)
     cut = {t.form.where for t in terms if t.form.how == "clip"}
-    ranked += [clipping.propose(bench, j) for j, s in enumerate(bench.model.sensors) if s.name not in cut]
-    chosen = _chosen(sorted([*ranked, *holds], key=lambda pair: -pair[0].gain))
+    seen = bench.problem().predictor.sensors(bench.fit.free)
+    limits = [clipping.propose(bench, j, seen) for j, s in enumerate(bench.model.sensors) if s.name not in cut]
+    ranked = sorted([*ranked, *holds, *filter(None, limits)], key=lambda pair: -pair[0].gain)
+    chosen = _chosen(ranked)
     wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
     trials = [_fitted(bench, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen)]
@@ -71,9 +73,9 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
 
 
 def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
-    """The forms that are fitted: of each name and note the likeliest; as many as TRIED of those that promise most beyond PROMISE for each of
-    their sizes, and the first of every place that has none among them: what is left out where most acts promises more than a cause where
-    little does."""
+    """The forms that are fitted: of each kind, place and note the best; of these the TRIED with the largest gain beyond PROMISE for each of
+    their sizes, and the best force of every place that is not among them: small improvements where much acts would crowd out the cause
+    where little does."""
     best: dict[tuple[str, str, str], tuple[Score, Form]] = {}
     for score, form in ranked:
         if score.gain > PROMISE:
@@ -107,7 +109,7 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
 
 
 def _holds(bench: Bench, ranked: Sequence[tuple[Score, Form]], terms: Sequence[Term]) -> list[tuple[Score, Form]]:
-    """Holds of inputs that seem to act late, more than most that the model may have wrong."""
+    """Holds of those inputs whose delay is among the forms chosen."""
     taken = [t.form.where for t in terms if t.form.kind == holding.KIND]
     late = [(s, f) for s, f in ranked if f.how == "input_delay" and s.sizes[0] > 0.0 and f.where not in taken]
     found = [holding.propose(bench, f.index, float(s.sizes[0])) for s, f in late]
@@ -140,8 +142,8 @@ def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
     same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
     level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
-    taken = bench.fit.taken(best, problem.floor)
-    most, whole = float(np.max(taken)), 1.0 - float(np.prod(1.0 - taken) ** (1.0 / len(taken)))  # what acts at one place is seen by few sensors
+    most = float(np.max(bench.fit.taken(best, problem.floor)))  # what acts at one place is seen by few sensors
+    whole = bench.fit.taken_whole(best, problem.floor)
     return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved), most, whole)
 
 

@@ -29,7 +29,7 @@ from .plant import Place
 from .result import Cause, Named, Value, place
 from .study import guessed
 from .terms import Term, Trial
-from .worth import SYSTEMATIC, WORTH, Z_95, least, own, share, shift
+from .worth import SYSTEMATIC, WORTH, Z_95, least, own_of_sensors, share, shift
 
 Array = NDArray[np.float64]
 INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
@@ -91,8 +91,7 @@ def answer(
     none = {bias(s.name) for s in model.sensors if s.name not in offsets}
     run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 20)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
-    left = np.prod(1.0 - bench.fit.taken(after.fit, bench.problem().floor)) ** (1.0 / len(noise))
-    taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), 1.0 - float(left))
+    taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken_whole(after.fit, bench.problem().floor))
     sets = _explanations([(a.terms[0], chances[a.trial]) for a in found.named])
     return Answer((*wrong, *causes, *biased), tuple(notes), sets, found, run, tuple(offsets), taken, after.model)
 
@@ -207,7 +206,8 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
 
 def _wider(bench: Bench, term: Term, size: float) -> float:
     """Factor of the deviations of a term of this share of what acts: noise alone makes less of them than what the model leaves out."""
-    known = min(bench.fit.deviation(f.target) / max(abs(f.value - f.origin), 1e-300) for f in _values_of(bench, term) if not f.log or term.form.how == "clip")
+    cut = term.form.how == "clip"  # the size of which is its limit itself
+    known = min(bench.fit.deviation(f.target) / max(abs(f.value - (0.0 if cut else f.origin)), 1e-300) for f in _values_of(bench, term) if cut or not f.log)
     return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
 
 
@@ -262,8 +262,8 @@ def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], lis
     """Offsets of sensors that the recordings show: causes where they are worth it, notes where they are small, or as large as what is
     not in a model by intent: gravity, ride height. Nothing where starts do the same: a plant without a spring to ground has no zero."""
     causes, notes = [], []
-    alone = own(bench.model, bench.fit, {bias(s.name) for s in model.sensors})
-    for j, s in enumerate(model.sensors):
+    shares = own_of_sensors(bench.model, bench.fit, {bias(s.name) for s in model.sensors})
+    for j, (s, alone) in enumerate(zip(model.sensors, shares)):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         size = alone * abs(value) / max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
         if alone * abs(value) <= 3.0 * sd:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""An extended model whose own step is fine enough for what it describes."""
+"""Interpolation and substeps of an extended model, as fine as what it describes asks for."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .residual import rms
 from .study import Study
 
 Array = NDArray[np.float64]
-ROUGH = 0.02  # of a sensor's noise: what the way between samples may cost, for a hold-out may move several times as fast; and of what is left, a step
+ROUGH = 0.02  # of a sensor's noise: accepted error of the interpolation, for a hold-out may move several times as fast; and of the residual, that of a step
 
 
 def resolved(study: Study, text: str) -> tuple[str, Model]:
@@ -43,7 +43,7 @@ def resolved(study: Study, text: str) -> tuple[str, Model]:
             break
         text, stepped = better, finer
     substeps = 2 * model.substeps
-    while left(stepped) > (1.0 + ROUGH) * left(exact):
+    while substeps <= 1000 and left(stepped) > (1.0 + ROUGH) * left(exact):  # what a model file may have
         better = _with(text, "substeps", str(substeps))
         finer = deployed(_load(better), e, start, study.set_name)
         if left(finer) >= left(stepped):

@@ -138,7 +138,7 @@ def _fault(model: Model, kind: str, what: Fault, shown: float) -> Parameters:
             return {"scale": ("1", lambda p: 1.0 + p.get(("scale", j), 0.0))}
         case "sensor_delay":
             return {"delay": ("s", lambda p: p[("delay", j)])}
-        case "sensor_clipping":  # to which it goes however far it is driven, or has gone
+        case "sensor_clipping":  # limit of a smooth saturation, or the largest value shown where it has none
             return {"limit": (si, lambda p: 1.0 / p[("rail", j)] if ("rail", j) in p else shown)}
         case "clock_drift":
             return {"drift": ("1", lambda p: p[("clock", 0)])}

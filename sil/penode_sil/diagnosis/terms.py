@@ -37,7 +37,8 @@ class Term:
 @dataclass(frozen=True, eq=False)
 class Trial:
     """A form beside what was accepted already, fitted: `gain` of the criterion, its `share` of what acts (see `worth`), the share `taken` of
-    the power that the innovations of a sensor have beyond its noise, of that which shows it most, and the `whole` share over all of them, `blocks` [blocks] of predictive density."""
+    the power that the innovations of a sensor have beyond its noise, of that which shows it most, that share over all sensors together
+    (`whole`), `blocks` [blocks] of predictive density."""
 
     form: Form
     term: Term

@@ -62,8 +62,8 @@ class Weighed:
     level: float  # of what moves wanders beside all that was found
     laws: int  # of all causes named
     numerics: dict[str, object]  # of the step as the file has it, with parameters as they are fitted
-    likelihood: float  # of the innovations with what is named, in steps of
-    update: int  # samples
+    likelihood: float  # log likelihood of the innovations with the named causes
+    update: int  # samples for each innovation
 
     def follows_better(self, other: Misfit) -> bool:
         """Do its causes follow the recordings better than another explanation does?"""
@@ -76,7 +76,7 @@ def supports(model: Model) -> bool:
 
 
 def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> Misfit:
-    """Of an explanation."""
+    """The misfit of an explanation."""
     if not supports(study.model) or _is_noise(study, fit):
         return Misfit()
     values = {f.target: f.value for f in fit.free if isinstance(f.target, str)}
@@ -129,14 +129,19 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
     numbers, coarse = numerics.numerics(replace(measured, model=fitted(model, found.run)))
-    causes += (coarse,) if coarse else ()
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
-    quiet = _within(study, fit, np.where([s.noise > 0.0 for s in model.sensors], [s.noise for s in model.sensors], bench.noise))
+    stated = np.array([s.noise for s in model.sensors])
+    quiet = _within(study, fit, np.where(stated > 0.0, stated, bench.noise))
     verdict = _verdict(found, causes, share, max(left, bench.level.size), quiet)
+    if coarse and verdict != "unexplained":
+        causes, verdict = (*causes, coarse), "explained" if verdict == "no_discrepancy" else verdict
     explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
     laws = sum(max(len(x.form.parts), 1) for a in found.found.named for x in a.terms)
-    return Weighed(measured, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, found.found.bench.level.size, laws, numbers, found.found.plain.fit.likelihood, bench.update)
+    likelihood = found.found.plain.fit.likelihood
+    return Weighed(
+        measured, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, bench.level.size, laws, numbers, likelihood, bench.update,
+    )  # fmt: skip
 
 
 def _measured(study: Study, noise: Array) -> Study:

@@ -29,13 +29,13 @@ ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
 def least(level: float, taken: float = 0.0) -> float:
     """Share of what acts from which on a term is worth a name, where `level` of what moves wanders beside all that was found: WORTH, or
-    less where the model is else nearly right; never less than what keeps zero out of its interval. A term that has `taken` so much of the
-    power that innovations had beyond sensor noise is RATIO times all that it left."""
+    less where the model is else nearly right; never less than what keeps zero out of its interval. The level does not count for a term
+    that is `alone`, by the share `taken` of the power that innovations had beyond sensor noise."""
     return min(WORTH, max(0.0 if alone(taken) else RATIO * level, Z_95 * SYSTEMATIC))
 
 
 def alone(taken: float) -> bool:
-    """Is what takes so much of a power RATIO times all that it leaves?"""
+    """Has a term that took this share of the power RATIO times the rms of what is left?"""
     return taken > RATIO**2 / (1.0 + RATIO**2)
 
 
@@ -62,6 +62,11 @@ def _rms(x: Array) -> float:
 def own(model: Model, fit: Fit, targets: Collection[object]) -> float:
     """Share of what free values off their origins do to the innovations that no other one can do, 0 to 1. Masses stay as they are, for all
     forces together with them are a scale that a sensor of motion does not show."""
+    return float(own_of_sensors(model, fit, targets)[-1])
+
+
+def own_of_sensors(model: Model, fit: Fit, targets: Collection[object]) -> Array:
+    """The same [n_z + 1] in what each sensor shows, then in all."""
     masses = {b.mass for b in model.bodies} - set(targets)
     rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
     done, rest = np.zeros(len(rows)), []
@@ -72,7 +77,9 @@ def own(model: Model, fit: Fit, targets: Collection[object]) -> float:
             rest.append(column / np.linalg.norm(column))
     others = np.array(rest).T.reshape(len(rows), -1)
     left = done - others @ np.linalg.lstsq(others, done, rcond=1e-9)[0]
-    return float(np.linalg.norm(left) / max(float(np.linalg.norm(done)), 1e-300))
+    sensor = np.nonzero(fit.used)[1]
+    masks = [*(sensor == j for j in range(fit.used.shape[1])), np.ones(len(done), bool)]
+    return np.array([np.linalg.norm(left[m]) / max(float(np.linalg.norm(done[m])), 1e-300) for m in masks])
 
 
 def shift(model: Model, bench: Bench, moved: Sequence[Motion], name: str) -> float:

@@ -18,7 +18,7 @@ from penode_gen import laws
 from ...batch import Batch
 
 Array = NDArray[np.float64]
-PERIOD = 256  # steps of a period of the motion, at least: gas in a pocket of a tenth of the motion is 75 times as fast, of which Runge-Kutta bears 2.78 a step
+PERIOD = 256  # least steps in a period of the motion: gas in a pocket of a tenth of it is 75 times as fast, and Runge-Kutta is stable up to 2.78 a step
 MODEL = """[model]
 name = "memory"
 sample_time = "{step!r} s"
@@ -37,8 +37,8 @@ force = {{ value = "F_e", unit = "N" }}
 def force(law: str, values: Mapping[str, float], s: Array, step: float) -> Array:
     """Force [n] of a law between ends that move apart by s [n], `step` [s] apart, from rest at s[0]. A call costs one simulation."""
     parameters = {f"p_{k}": np.array([v]) for k, v in values.items()}
-    turn = 2.0 * np.pi * np.std(s) / max(float(np.std(np.diff(s))), 1e-300)  # samples in a period of the motion
-    substeps = 2 ** max(0, int(np.ceil(np.log2(PERIOD / max(turn, 1.0)))))
+    period = 2.0 * np.pi * np.std(s) / max(float(np.std(np.diff(s))), 1e-300)  # of the motion, in samples
+    substeps = 2 ** max(0, int(np.ceil(np.log2(PERIOD / max(period, 1.0))))) if np.isfinite(period) else 1
     return _batch(law, step, substeps).run((s - s[0])[:, None], parameters=parameters, outputs=("force",)).y[0, :, 0]
 
 

@@ -46,7 +46,7 @@ class Bench:
     level: Level
     fit: Fit
     nominal: tuple[Free, ...] = ()  # free values as the model file has them
-    linear: Mapping[str, float] = field(default_factory=dict)  # values of the model alone that follow best, once they are fitted: see `gains`
+    linear: Mapping[str, float] = field(default_factory=dict)  # values fitted to the model alone; empty before that fit
 
     @property
     def step(self) -> float:
@@ -58,9 +58,9 @@ class Bench:
         return Problem(predictor, self.noise**2 / self.update)
 
     def gains(self, fit: Fit | None = None, model: Model | None = None) -> Gains:
-        """The linear plant with the values of a fit of the model alone, but for scales of sensors, see Predictor._scales. With more in the model,
-        that stays the best line along the motion (Booton, IRE Trans. Circuit Theory 1, 1954), and forms that do the same are told apart by
-        no filter of their own."""
+        """The linearised plant with the values that a fit of the model alone found, scales of sensors left at 1 (see Predictor._scales). It
+        stays the same when forms are added: the best line along the motion (Booton, IRE Trans. Circuit Theory 1, 1954), so that forms
+        that do the same are compared under one filter."""
         model = model or self.model
         scales = {scale(s.name) for s in self.model.sensors}
         values = {name: x for name, x in (self.linear or ({} if fit is None else fit.values)).items() if name not in scales}
@@ -102,7 +102,7 @@ def build(model: Model, places: Sequence[Place], records: Sequence[Record], nois
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
     bench = Bench(wide, set_name, tuple(places), tuple(records), like.base if like else augmented(model, places), (), first, np.ones(len(wandering(wide.states))), noise, fastest, Level(0.0, 1.0), plain)
     if like:
-        bench = replace(bench, update=like.update, forces=like.forces)
+        bench = replace(bench, update=like.update, forces=like.forces, fastest=like.fastest)
         x = [np.where(np.abs(s) < np.inf, s, 0.0) for s in _followed(bench)]
     else:
         bench, x = _moved(bench, model, spans)
@@ -123,7 +123,10 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
         x = _followed(replace(bench, forces=scale))
         if not n_q and not bench.places:
             rates = np.concatenate([np.gradient(smooth(s, bench.update), bench.step, axis=0) for s in x])
-            bench = replace(bench, forces=np.maximum(np.sqrt(np.mean(rates**2, axis=0)), 1e-12))
+            moving = np.sqrt(np.mean(rates**2, axis=0))
+            if not np.isfinite(moving).all():  # it does not follow: what was guessed has to do
+                return replace(bench, forces=scale), [np.where(np.abs(s) < np.inf, s, 0.0) for s in x]
+            bench = replace(bench, forces=np.maximum(moving, 1e-12))
             continue
         if not n_q:
             rms = np.array([np.sqrt(np.nanmean(np.concatenate([r.y[:, j] for r in bench.records]) ** 2)) for j in range(len(spans))])

@@ -59,9 +59,18 @@ class Fit:
         return float(np.sqrt(self.covariance()[i, i])) * (abs(f.value) if f.log else f.unit)
 
     def taken(self, after: Fit, floor: Array) -> Array:
-        """Share [n_z] of the power of each sensor's innovations beyond that of its noise, `floor` [n_z], that another fit takes away."""
-        noise = np.minimum(floor, self.variance)
-        return np.clip((self.variance - after.variance) / np.maximum(self.variance - noise, 1e-12 * self.variance), 0.0, 1.0)
+        """Share [n_z] of the power of each sensor's innovations beyond that of its noise, `floor` [n_z], that another fit takes away; what is
+        within three deviations of an estimate of power from so many updates is noise."""
+        count = np.maximum(np.sum(self.used, axis=0), 1)
+        beyond = np.maximum(self.variance - floor, 3.0 * np.sqrt(2.0 / count) * self.variance)
+        return np.clip((self.variance - after.variance) / beyond, 0.0, 1.0)
+
+    def taken_whole(self, after: Fit, floor: Array) -> float:
+        """The same of all that is fitted, in the geometric mean."""
+        count = max(int(np.sum(self.used)), 1)
+        noise = float(np.sum(np.sum(self.used, axis=0) * np.minimum(floor / self.variance, 1.0))) / count
+        all_of_it = 1.0 - float(np.exp(-2.0 * max(after.likelihood - self.likelihood, 0.0) / count))
+        return min(all_of_it / max(1.0 - noise, 3.0 * float(np.sqrt(2.0 / count))), 1.0)
 
     def criterion(self) -> float:
         """Log marginal likelihood by Laplace (Kass and Raftery 1995, eq. 6), but for constants that all fits of the same data share:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,7 +24,7 @@ FORGETTING = 1e-6  # by which states decay at an update: one that no sensor show
 @dataclass(frozen=True, eq=False)
 class Level:
     """How much force wanders: `size` is its standard deviation at each place, in units of the force there; `tau` [s] how long it stays.
-    Of a model of states and equations alone the rates of its states wander, as white noise of the same density."""
+    In a model of states and equations alone the rates of the states wander instead, as white noise of the same spectral density at 0 Hz."""
 
     size: float
     tau: float
@@ -56,9 +57,11 @@ class Gains:
         a = self.plant.a.copy()
         drive = np.zeros((n_x, n_x))
         for i, force in zip(self._wanders, self.forces):
-            forces = self.names[i].startswith(WANDER)
-            a[i, i] = -1.0 / level.tau if forces else a[i, i]
-            drive[i, i] = 2.0 * (level.size * force) ** 2 * (1.0 / level.tau if forces else level.tau)
+            if is_force(self.names[i]):
+                a[i, i] = -1.0 / level.tau
+                drive[i, i] = 2.0 * (level.size * force) ** 2 / level.tau
+            else:
+                drive[i, i] = 2.0 * (level.size * force) ** 2 * level.tau
         step, q = sampled(a, drive, self.period / self.samples)
         # states, and means of the sensors at the samples since the last update, from one sample to the next
         n = n_x + n_z
@@ -77,9 +80,14 @@ class Gains:
         return Filter(whole, np.array([level.tau]))
 
 
+def is_force(state: str) -> bool:
+    """Is a state of an augmented model a force that wanders?"""
+    return re.fullmatch(rf"{WANDER}\d+_f", state) is not None
+
+
 def wandering(states: Sequence[str]) -> list[int]:
     """Which states wander: forces of an augmented model, or all where it has none."""
-    return [i for i, n in enumerate(states) if n.startswith(WANDER)] or list(range(len(states)))
+    return [i for i, n in enumerate(states) if is_force(n)] or list(range(len(states)))
 
 
 def sampled(a: Array, drive: Array, step: float) -> tuple[Array, Array]:
@@ -102,13 +110,13 @@ def riccati(f: Array, h: Array, q: Array, s: Array, r: Array) -> Array:
     s, r = s / np.outer(size, deviation), r / np.outer(deviation, deviation)
     free = f - s @ np.linalg.solve(r, h)
     alpha, beta, gamma = free.T.copy(), h.T @ np.linalg.solve(r, h), q - s @ np.linalg.solve(r, s.T)
-    while True:  # of the time for which the filter has run; what is forgotten makes it end
+    for _ in range(64):  # each doubles the time; FORGETTING makes it converge long before
         inner = np.linalg.inv(np.eye(len(f)) + beta @ gamma)
         after = alpha @ inner @ alpha
         beta, change = beta + alpha @ inner @ beta @ alpha.T, alpha.T @ gamma @ inner @ alpha
         alpha, gamma = after, gamma + change
         gamma = 0.5 * (gamma + gamma.T)
-        if not np.isfinite(gamma).all() or np.max(np.abs(change)) < 1e-12 * np.max(np.abs(gamma)):
+        if not np.isfinite(gamma).all() or np.max(np.abs(change)) <= 1e-12 * np.max(np.abs(gamma)):
             break
     gain = np.linalg.solve(h @ gamma @ h.T + r, (f @ gamma @ h.T + s).T).T
     return np.where(np.isfinite(gain), size[:, None] * gain / deviation, 0.0)

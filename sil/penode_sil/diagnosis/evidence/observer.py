@@ -31,8 +31,8 @@ MAX_INNOVATION = 1e15  # innovation of a run that left all bounds
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """A recording: inputs u [n, n_u], sensors y [n, n_z] (NaN: nothing measured), `step` [s] apart; `held`: inputs move in steps,
-    `smooth`: none of them does."""
+    """A recording: inputs u [n, n_u], sensors y [n, n_z] (NaN: nothing measured), `step` [s] apart; `held`: all inputs move in
+    steps, `smooth`: none does."""
 
     name: str
     step: float
@@ -184,7 +184,7 @@ class Predictor:
         return Lanes(nus, sane), seen, moved
 
     def sensors(self, free: Sequence[Free]) -> list[Array]:
-        """Sensors that were measured, as a free run has them, per recording [n, n_z]."""
+        """The measured sensors in a free run, [n, n_z] per recording."""
         found = []
         for e in range(len(self.records)):
             start, parameters, u, _ = self._given(e, free, np.zeros((1, len(free))))
@@ -193,7 +193,7 @@ class Predictor:
         return found
 
     def _scales(self, parameters: Mapping[str, Array]) -> Array:
-        """Scales of sensors, [1, n_z] or [runs, 1, n_z]: a filter's gain is for sensors of scale 1, else a scale would tune it."""
+        """Scales of sensors, [1, n_z] or [runs, 1, n_z]. Filters are for sensors of scale 1: without this a fitted scale would tune them."""
         known = [parameters.get(scale(s.name), np.ones(1)) for s in self.model.sensors[: self.n_z]]
         return np.stack(np.broadcast_arrays(*known), axis=-1)[:, None, :] if any(len(k) > 1 for k in known) else np.array(known).T
 
