@@ -23,7 +23,8 @@ from .study import Study, begin, loss, refit
 
 
 def experiment(m: Measured, model: Model, smooth: bool = False) -> Experiment:
-    """A recording as the diagnosis sees it; sensors that it does not have count as not good. `smooth`: no input is held."""
+    """A recording as the diagnosis sees it; sensors that it does not have count as not good. `smooth`: no input is held, unless the model
+    file says so."""
     n, names = len(m.time), [s.name for s in model.sensors]
     y = np.column_stack([m.z.get(k, np.zeros(n)) for k in names])
     good = np.column_stack([m.mask.get(k, np.zeros(n, bool)) for k in names])
@@ -31,7 +32,9 @@ def experiment(m: Measured, model: Model, smooth: bool = False) -> Experiment:
     laws = [channels[k].noise if k in channels else None for k in names]
     declared = np.array([i.noise for i in model.inputs])
     slow = [channels[k].interval if k in channels else 0.0 for k in names]
-    held = np.array([channels[i.name].interval if not smooth and _is_held(m, i.name) else 0.0 for i in model.inputs])
+    least = model.sample_time if model.interpolation == "held" else 0.0
+    smooth = smooth and not least
+    held = np.array([max(channels[i.name].interval if not smooth and _is_held(m, i.name) else 0.0, least) for i in model.inputs])
     u = m.u if m.smooth is None or not smooth else m.smooth
     return noise.prepare(m.title, m.time, u, np.where(good, y, 0.0), good, declared, laws, slow, held)
 
@@ -44,6 +47,8 @@ def settled(
     model: Model, train: Sequence[Measured], holdout: Sequence[Measured], set_name: str
 ) -> tuple[list[Experiment], list[Experiment], list[str]]:
     """Training and hold-out with held inputs as the training's sensors are likelier to have met them, in steps or smooth, and a note."""
+    if model.interpolation == "held":
+        return [experiment(m, model) for m in train], [experiment(m, model) for m in holdout], []
     names = [i.name for i in model.inputs if any(_is_held(m, i.name) for m in (*train, *holdout))]
     smooth = [[experiment(m, model, smooth=True) for m in ms] for ms in (train, holdout)]
     if not names:

@@ -80,7 +80,9 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     answer = by_noise(case, study, explanations, faults, bursts)
     if answer.verdict in ("unexplained", "partly_explained") and w is None and best and weighed.supports(study.model):
         w = _weighed(case, study)
-        return _by_innovations(case, best, w) if w.follows_better(beside) else answer
+        if w.follows_better(beside) or {(c.kind, c.where) for c in w.causes} == set(best.groups):  # both find the same
+            return _by_innovations(case, best, w)
+        return answer
     if w and answer.verdict == "unexplained" and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED):
         return _by_innovations(case, best, w)
     return answer

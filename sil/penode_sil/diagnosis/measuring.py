@@ -114,4 +114,4 @@ def followed(model: Model, e: Experiment, start: Array, study: Study) -> Array:
     wide = widened(e, 2 * len(study.places))
     problem = Problem(watched(model, study.places), [wide], study.metrics[:1], study.set_name, study.linear.fastest)
     free = tuple(Free(("start", 0, i), x, 1.0) for i, x in enumerate(start))
-    return np.array(problem.simulate(0, free, np.zeros((1, len(free))))[0][0][:, -2 * len(study.places) :])
+    return np.array(problem.simulate(0, free, np.zeros((1, len(free))))[0][0][:, len(model.sensors) :])
