@@ -8,8 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from penode_gen.model import Model
+
 from .by_noise import FARTHER
 from .catalogue import separating
+from .catalogue.drives import alike
 from .noise import UNSEEN
 from .reliability import reliability
 from .result import OUTSIDE, Cause, Diagnosis, Named, place
@@ -56,11 +59,20 @@ def _posterior(d: Diagnosis, a: Named) -> float | None:
     return max((float(x["posterior"]) for x in own if x in likely(d)), default=0.0)
 
 
-def advised(d: Diagnosis) -> Diagnosis:
-    """A diagnosis with what follows from it: what would tell its causes from others, how often such causes are right, what to do next."""
-    causes = tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives])) for c in d.causes)
+def advised(d: Diagnosis, model: Model) -> Diagnosis:
+    """A diagnosis of a model with what follows from it: what would tell its causes from others, how often such causes are right, what to do next."""
+    causes = tuple(_with_alike(model, c) for c in d.causes)
+    causes = tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives])) for c in causes)
     d = replace(d, causes=causes)
     return replace(d, reliability=reliability(causes), advice=advice(d))
+
+
+def _with_alike(model: Model, c: Cause) -> Cause:
+    """A cause with the alternative that nothing in these recordings could tell from it."""
+    other = alike(model, c.kind, c.where)
+    if other is None or Named(*other) in c.alternatives:
+        return c
+    return replace(c, alternatives=(Named(*other), *c.alternatives)[:3])
 
 
 def advice(d: Diagnosis) -> tuple[str, ...]:

@@ -4,12 +4,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 Array = NDArray[np.float64]
 CLOSE = 1e-3  # [s] sample time up to which parabolas between samples are close enough, and cubics where a model uses rates
+
+
+def far(step: float, signals: Sequence[Array]) -> bool:
+    """Are samples `step` [s] apart too far for straight lines between them? More than CLOSE, or with fewer than 32 in a period of a signal [n, n_u],
+    whose rms a line misses by (2 pi/32)^2/12 = 0.3 %."""
+    rms, change = (np.sqrt(np.mean(np.concatenate(x) ** 2, axis=0)) for x in ([s - np.mean(s, axis=0) for s in signals], [np.diff(s, axis=0) for s in signals]))
+    return step > CLOSE or bool(np.any(32.0 * change > 2.0 * np.pi * rms))
 
 
 def parts(time: Array, u: Array, rate: Array, count: int) -> Array:

@@ -51,7 +51,7 @@ def diagnose(
         raise UserError(*problems)
     case = Case(model, train, holdout, unused, remarks, output, log, tell)
     answer = _answer(case, *unburst(widened, experiments, set_name))
-    return advised(replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started))
+    return advised(replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started), model)
 
 
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
@@ -78,10 +78,13 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
         if _decides(w, beside.size, study, best, bool(faults)):
             return _by_innovations(case, best, w)
     answer = by_noise(case, study, explanations, faults, bursts)
-    if answer.verdict in ("unexplained", "partly_explained") and w is None and best and weighed.supports(study.model):
+    if answer.verdict in ("unexplained", "partly_explained") and w is None and weighed.supports(study.model):
         w = _weighed(case, study)
-        if w.follows_better(beside) or {(c.kind, c.where) for c in w.causes} == set(best.groups):  # both find the same
+        same = {(c.kind, c.where) for c in w.causes} == set(best.groups if best else ()) != set()
+        if same or w.follows_better(beside) or w.of_inputs:
             return _by_innovations(case, best, w)
+        if answer.verdict == "unexplained" and not answer.explained and w.mends():  # nothing has a name, but parameters are nearer
+            return _by_innovations(case, best, replace(w, verdict="unexplained", causes=(), explanations=(), explained=0.0))
         return answer
     if w and answer.verdict == "unexplained" and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED):
         return _by_innovations(case, best, w)

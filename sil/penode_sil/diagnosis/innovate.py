@@ -18,7 +18,7 @@ from .evidence.fit import Problem
 from .evidence.prior import stated
 from .propose import PROMISE, propose
 from .terms import Term, Trial
-from .worth import WORTH, Z_95, alone, least
+from .worth import WORTH, Z_95, alone, least, undetermined
 
 Array = NDArray[np.float64]
 SCORED = 4  # of the promising trials, how many are scored on held-out blocks
@@ -94,7 +94,7 @@ def _good(bench: Bench, terms: Sequence[Term], blocks: Blocks, base: Array, log:
     better = [t.blocks - base for t in trials]
     for t, b in zip(trials, better):
         log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
-    good = [t for t, b in zip(trials, better) if _accepted(t, b)]
+    good = [t for t, b in zip(trials, better) if _accepted(bench, t, b)]
     good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
     good = [t for t in good if _matters(t)] or good
     return tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks))))
@@ -156,8 +156,9 @@ def _is_enough(part: Trial, t: Trial) -> bool:
     return within and float(np.sum(t.blocks) - np.sum(part.blocks)) <= MIN_GAIN
 
 
-def _accepted(t: Trial, better: Array) -> bool:
+def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
     """Is a form enough better, with a size that is not zero?"""
     if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN):
         return False
-    return all(abs(t.fit.value(f.target) - f.origin) > Z_95 * t.fit.deviation(f.target) for f in t.term.free if not f.log)
+    known = undetermined(bench.model, t.fit)
+    return all(abs(t.fit.value(f.target) - f.origin) > Z_95 * t.fit.deviation(f.target, known) for f in t.term.free if not f.log)

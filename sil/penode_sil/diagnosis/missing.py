@@ -114,7 +114,8 @@ class Walk:
 
 def _riccati(f: Array, noise: Array, h: Array) -> Array:
     """Covariance of stationary predictions. States are counted in their deviations, which differ by many powers of ten. Raises LinAlgError."""
-    p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
+    with np.errstate(invalid="ignore"):  # balancing of states that differ by more than doubles can
+        p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
     size = np.sqrt(np.maximum(np.diag(p), 1e-300))
     f, h, noise = f * size / size[:, None], h * size, noise / np.outer(size, size)
     p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
@@ -221,7 +222,7 @@ class _Recording:
         sigma = np.where(declared > 0.0, declared, quiet)[list(own)]
         driven = e if force is None else replace(
             e, u=_beside(e.u, force), drive=_beside(e.drive, force), rate=_beside(e.rate, np.gradient(force, e.step)),
-            unsure=_beside(e.unsure, np.zeros(len(e.unsure))),
+            unsure=_beside(e.unsure, np.zeros(len(e.unsure))), held=None if e.held is None else np.append(e.held, False),
         )  # fmt: skip
         problem = Problem(acting or study.model, [driven], (), study.set_name, study.linear.fastest, study.null.faults)
         moves = np.vstack([np.zeros(len(free)), EFFORT.shift * np.eye(len(free))])

@@ -29,7 +29,7 @@ from .plant import Place
 from .result import Cause, Named, Value, place
 from .study import guessed
 from .terms import Term, Trial
-from .worth import SYSTEMATIC, WORTH, Z_95, least, own_of_sensors, share, shift
+from .worth import SYSTEMATIC, WORTH, Z_95, least, own_of_sensors, share, shift, undetermined
 
 Array = NDArray[np.float64]
 INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
@@ -185,7 +185,8 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
 
     values = {f.target: f.value for f in bench.fit.free}
     found = sizes(values)
-    covariance = bench.fit.covariance()
+    ratios = undetermined(model, bench.fit)
+    covariance = bench.fit.covariance(ratios)
     slopes = {key: np.zeros(len(bench.fit.free)) for key in found}
     for i, f in enumerate(bench.fit.free):
         if isinstance(f.target, str) or f.target in own:
@@ -199,7 +200,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
         sd = wider * float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
         if not slopes[key].any():  # looked for, not fitted: known as well as the size that goes with it
             alone = term.free[0].target
-            sd = wider * abs(value) * bench.fit.deviation(alone) / max(abs(bench.fit.value(alone)), 1e-300)
+            sd = wider * abs(value) * bench.fit.deviation(alone, ratios) / max(abs(bench.fit.value(alone)), 1e-300)
         parameters[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
     return Cause(form.kind, form.where, parameters, RIGHT * min(max(sure, 0.0), 1.0), rivals)
 
@@ -207,7 +208,8 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
 def _wider(bench: Bench, term: Term, size: float) -> float:
     """Factor of the deviations of a term of this share of what acts: noise alone makes less of them than what the model leaves out."""
     cut = term.form.how == "clip"  # the size of which is its limit itself
-    known = min(bench.fit.deviation(f.target) / max(abs(f.value - (0.0 if cut else f.origin)), 1e-300) for f in _values_of(bench, term) if cut or not f.log)
+    ratios = undetermined(bench.model, bench.fit)
+    known = min(bench.fit.deviation(f.target, ratios) / max(abs(f.value - (0.0 if cut else f.origin)), 1e-300) for f in _values_of(bench, term) if cut or not f.log)
     return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
 
 
@@ -251,11 +253,13 @@ def _parameters(model: Model, bench: Bench, moved: Sequence[Motion], shared: Col
 
 def _fitted_values(model: Model, bench: Bench) -> list[str]:
     """A note on parameters that the file only guesses."""
-    found = []
+    found, ratios = [], undetermined(model, bench.fit)
     for name in guessed(model):
         if any(f.target == name for f in bench.fit.free):
-            found.append(f"{name} = {bench.fit.value(name):.4g} {units.si(model.parameters[name].unit)} +- {Z_95 * bench.fit.deviation(name):.2g}")
-    return [f"as fitted, for the file only guesses: {', '.join(found)}"] if found else []
+            sure = "" if name in ratios else f" +- {Z_95 * bench.fit.deviation(name, ratios):.2g}"
+            found.append(f"{name} = {bench.fit.value(name):.4g} {units.si(model.parameters[name].unit)}{sure}")
+    only = f"; the recordings show forces as ratios to {', '.join(sorted(ratios))} only" if ratios else ""
+    return [f"as fitted, for the file only guesses: {', '.join(found)}{only}"] if found else []
 
 
 def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], list[str]]:

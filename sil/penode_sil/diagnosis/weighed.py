@@ -13,6 +13,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from . import applied, measuring, numerics, real
+from .catalogue.drives import INPUTS
 from .evidence.bench import UNSTATED, build
 from .evidence.gain import Level
 from .evidence.observer import Record, sample_noise
@@ -64,6 +65,15 @@ class Weighed:
     numerics: dict[str, object]  # of the step as the file has it, with parameters as they are fitted
     likelihood: float  # log likelihood of the innovations with the named causes
     update: int  # samples for each innovation
+
+    @property
+    def of_inputs(self) -> bool:
+        """Do they explain it by inputs that are not what drove the plant? The search by sensor noise does not know of these."""
+        return self.verdict == "explained" and any(c.kind in INPUTS for c in self.causes)
+
+    def mends(self) -> bool:
+        """Does its model predict the hold-out better than the file's, with every sensor?"""
+        return bool(self.gain) and all(g.after_rmse < g.before_rmse for g in self.gain.values())
 
     def follows_better(self, other: Misfit) -> bool:
         """Do its causes follow the recordings better than another explanation does?"""

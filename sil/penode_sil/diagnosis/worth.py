@@ -59,6 +59,12 @@ def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2)))
 
 
+def undetermined(model: Model, fit: Fit) -> set[str]:
+    """Masses that deviate by more than they are: the recordings show forces as ratios to them only."""
+    masses = {b.mass for b in model.bodies} & {f.target for f in fit.free if isinstance(f.target, str)}
+    return {m for m in masses if fit.deviation(m) > abs(fit.value(m))}
+
+
 def own(model: Model, fit: Fit, targets: Collection[object]) -> float:
     """Share of what free values off their origins do to the innovations that no other one can do, 0 to 1. Masses stay as they are, for all
     forces together with them are a scale that a sensor of motion does not show."""

@@ -9,6 +9,7 @@ from penode_gen.model import Model
 from .form import Form, Sizes
 
 KINDS = ("input_gain", "input_offset", "input_delay", "input_lag", "input_hold", "sensor_scale", "sensor_delay")
+INPUTS = KINDS[:5]
 MEANING = {
     "input_gain": "The plant is driven by more, or less, than the recording of the input says.",
     "input_offset": "A constant acts on top of the recorded input.",
@@ -20,15 +21,28 @@ MEANING = {
 }
 RIVALS = {
     ("sensor_scale", "wrong_parameter"): "record acceleration and deflection of other parts too, or weigh a body",
+    ("input_delay", "sensor_delay"): "a second sensor, of another make: a late input makes both late",
+    ("input_gain", "sensor_scale"): "measure the force of the actuator, or show the sensor a known size",
     ("sensor_delay", "sensor_scale"): "excitation up to higher frequencies: a delay turns the phase, a scale does not",
     ("input_gain", "wrong_parameter"): "weigh a body, or measure the force of the actuator: motion alone shows only ratios of force to mass",
 }
 
 
+ALIKE = {"input_delay": "sensor_delay", "sensor_delay": "input_delay", "input_gain": "sensor_scale", "sensor_scale": "input_gain"}
+
+
+def alike(model: Model, kind: str, where: str) -> tuple[str, str] | None:
+    """The kind and place that does the same as what is wrong with the only input, or the only sensor, of a model that does not change: a
+    delay of one is a delay of the other; so is a gain where nothing is bent."""
+    if kind not in ALIKE or len(model.inputs) != 1 or len(model.sensors) != 1:
+        return None
+    return ALIKE[kind], (model.sensors if kind.startswith("input_") else model.inputs)[0].name
+
+
 def inputs(model: Model, count: int) -> Iterable[Form]:
     """Forms of the first `count` inputs. That of a hold is for `holding`, which has to look for its period."""
     for j, i in enumerate(model.inputs[:count]):
-        for kind in KINDS[:4]:
+        for kind in INPUTS[:4]:
             yield Form(kind, i.name, kind, j)
 
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,17 +46,19 @@ class Fit:
         rows = (self.slopes / np.sqrt(self.variance)[None, :, None])[self.used]
         return rows.T @ rows + np.diag(precisions(self.free) ** 2)
 
-    def covariance(self) -> Array:
-        """Of the free values, in their units (log: relative)."""
+    def covariance(self, known: Collection[object] = ()) -> Array:
+        """Of the free values, in their units (log: relative), where some targets are `known`."""
         c = self.curvature()
+        at = [f.target in known for f in self.free]
+        c[at, :] = c[:, at] = 0.0
         size = 1.0 / np.sqrt(np.maximum(np.diag(c), 1e-300))
         return np.linalg.pinv(c * np.outer(size, size), rcond=1e-12, hermitian=True) * np.outer(size, size)
 
-    def deviation(self, target: object) -> float:
-        """Standard deviation of a value, in its own unit."""
+    def deviation(self, target: object, known: Collection[object] = ()) -> float:
+        """Standard deviation of a value, in its own unit, where some targets are `known`."""
         i = [f.target for f in self.free].index(target)
         f = self.free[i]
-        return float(np.sqrt(self.covariance()[i, i])) * (abs(f.value) if f.log else f.unit)
+        return float(np.sqrt(self.covariance(known)[i, i])) * (abs(f.value) if f.log else f.unit)
 
     def taken(self, after: Fit, floor: Array) -> Array:
         """Share [n_z] of the power of each sensor's innovations beyond that of its noise, `floor` [n_z], that another fit takes away; what is

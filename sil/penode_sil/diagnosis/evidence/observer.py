@@ -14,7 +14,7 @@ from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter,
 from scipy.interpolate import CubicSpline
 
 from ...batch import Observer
-from ..between import CLOSE, joined, parts, straight
+from ..between import far, joined, parts, straight
 from ..compiling import compiled, ordered
 from ..fit import Free
 from ..hypotheses import lag
@@ -144,11 +144,11 @@ class Predictor:
     def __init__(self, model: Model, records: Sequence[Record], update: int, set_name: str = "default", fastest: float = 0.0):
         self.model, self.records, self.update, self.set_name = model, tuple(records), update, set_name
         causal, moves = ordered(model)
-        far = model.sample_time > CLOSE and bool(model.inputs) and all(r.smooth for r in records)
-        self.fine = (3 if moves else 2) if far else 1  # samples of an input in one of a recording, see `between`
+        smooth = bool(model.inputs) and all(r.smooth for r in records) and far(model.sample_time, [r.u for r in records])
+        self.fine = (3 if moves else 2) if smooth else 1  # samples of an input in one of a recording, see `between`
         step = model.sample_time / self.fine
         substeps = max(1, int(np.ceil(step * fastest / MAX_TURN)), -(-MIN_STEPS // (update * self.fine)), -(-model.substeps // self.fine))
-        way = "linear" if far else "cubic" if moves else "held" if any(r.held for r in records) else "linear"
+        way = "linear" if smooth else "cubic" if moves else "held" if any(r.held for r in records) else "linear"
         self.batch = compiled(anonymous(replace(model, method="rk4", interpolation=way, substeps=substeps, sample_time=step)), causal)
         self.n_z = len(records[0].y[0])  # sensors that were measured; the model may have more
 
