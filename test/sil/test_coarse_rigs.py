@@ -143,6 +143,21 @@ def test_a_converter_that_holds_its_output_is_a_delay(tmp_path, penode):
     assert abs(found["causes"][0]["parameters"]["delay"]["value"] / 4.875e-3 - 1.0) < 0.01  # half a sample, less half a fine step: there the steps rise
 
 
+def test_a_converter_that_the_model_file_knows_of(tmp_path, penode):
+    """With `input = "held"` the model is right: nothing has a name, and the hold-out is met to its noise; but for the fine step in which an
+    input rises here, an eightieth of a sample, of 0.2 m/s at most."""
+    records = []
+    for seed in (13, 14):
+        rng = np.random.default_rng(seed)
+        u = np.repeat((10.0 * waves(rng, 8, 0.2, 1.2, 3000, 10e-3))[::FINE], FINE)
+        v = simulate(lambda x, v, u: (u - 12.0 * v) / 2.0, u, 10e-3)[:, 1]
+        records.append((10e-3, u, "v [m/s]", v + 5e-3 * rng.standard_normal(len(v))))
+    model = file(10, {"m": (3, "kg"), "d": (5, "N*s/m")}, "", 'v = { value = "v", unit = "m/s", noise = 5e-3 }')
+    model = model.replace('x = { value = "x", unit = "m" }', 'v = { value = "v", unit = "m/s" }').replace('"10 ms"', '"10 ms"\ninput = "held"')
+    found = diagnosed(tmp_path, penode, model, records)
+    assert found["verdict"] == "no_discrepancy" and found["gain"]["v"]["after_rmse"] < 1.1 * 5e-3
+
+
 TANKS = """
 [model]
 name = "tanks"

@@ -107,10 +107,11 @@ class Problem:
 
     def at(self, free: Sequence[Free], by: Filter) -> Fit:
         """The fit that ends at these free values."""
-        shifts = np.vstack([np.zeros(len(free)), MOVE * np.eye(len(free))])
+        small = np.array([MOVE * MOVE if f.log else MOVE for f in free])  # else a common scale of all forces would seem to bend what is seen
+        shifts = np.vstack([np.zeros(len(free)), np.diag(small)])
         for i, f in enumerate(free):
-            if f.at(MOVE) == f.value:
-                shifts[i + 1, i] = -MOVE
+            if f.at(small[i]) == f.value:
+                shifts[i + 1, i] = -small[i]
         nu = self.nu(free, shifts, by)
         used = np.isfinite(nu[0])
         moves = np.array([shifts[i + 1, i] for i in range(len(free))])
