@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import engine, innovate, real
+from penode_sil.diagnosis import engine, innovate, propose, real
 from penode_sil.diagnosis.catalogue import springs
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
 from penode_sil.diagnosis.result import Cause, Value
@@ -41,6 +41,17 @@ def test_another_law_of_a_name_goes_before_a_new_name_that_is_hardly_better():
     assert innovate._simplest([bushing, play], BASE, []) is bushing
     far = trial("backlash", 70.0, LOOSE, note="of a damper")  # 120 nats of 400 are more than a fifth
     assert innovate._simplest([bushing, far], BASE, named) is bushing
+
+
+def test_of_curves_that_predict_equally_well_the_one_with_fewer_values_is_named():
+    stop, cube = trial("bump_stop", 100.0, LATE, free=2), trial("cubic_spring", 98.0, LOOSE)
+    assert innovate._simplest([stop, cube], BASE, []) is cube  # 8 nats less, of 10 that a value has to gain
+    assert innovate._simplest([stop, trial("cubic_spring", 97.0, LOOSE)], BASE, []) is stop
+
+
+def test_what_is_a_part_of_a_form_is_tried_too():
+    both, alone = (trial("coulomb_friction", 1.0, *parts).form for parts in ((SLIDES, PUSHES), (SLIDES,)))
+    assert propose._is_part(alone, both) and not propose._is_part(both, alone) and not propose._is_part(alone, alone)
 
 
 @pytest.mark.parametrize(

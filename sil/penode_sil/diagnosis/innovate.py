@@ -133,13 +133,15 @@ def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
 
 def _simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Trial:
     """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
-    them by MIN_FORM of what it gains. A new name, too, has to gain that much more than another law of a name already accepted."""
+    them by MIN_FORM of what it gains. Curves that predict equally well, to MIN_GAIN, also rank by their values. A new name has to gain
+    as much more than another law of a name already accepted as a form has."""
 
     def more_than(other: Trial) -> float:
         return max(MIN_GAIN, MIN_FORM * float(np.sum(other.blocks - base)))
 
     named = {(t.form.kind, t.form.where) for t in terms}
-    best = next((t for t in trials if (t.form.kind, t.form.where) in named and np.sum(trials[0].blocks - t.blocks) <= more_than(trials[0])), trials[0])
+    first = min((t for t in trials if np.sum(trials[0].blocks - t.blocks) <= MIN_GAIN), key=lambda t: (len(t.term.free), -np.sum(t.blocks)))
+    best = next((t for t in trials if (t.form.kind, t.form.where) in named and np.sum(trials[0].blocks - t.blocks) <= more_than(trials[0])), first)
     same = [t for t in trials if t.form.where == best.form.where and curve(t.form.kind) == curve(best.form.kind)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
     for t in more:
