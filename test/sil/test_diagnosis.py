@@ -739,7 +739,7 @@ def test_what_is_foretold_is_as_good_as_the_true_law(tmp_path, model):
 
 def test_a_sensor_that_lags_more_than_the_signal_is_late(tmp_path):
     """A pole of 20 ms at the force of spring and damper. A mount of the damper explains as much if the damper is weaker than it was; as a
-    dead time, from which no small step leads to a pole, the sensor explains less."""
+    dead time, from which no small step leads to a pole, the sensor explains less. A late input does the same as the late sensor."""
     z, rate = road(5), CubicSpline(np.arange(SAMPLES) * STEP, road(5))(np.arange(SAMPLES) * STEP, 1)
     late = lfilter([1.0, 1.0], np.array([1.0, 1.0]) + 2.0 * 0.02 / STEP * np.array([1.0, -1.0]), C * z + D * rate)
     model, path = moved(tmp_path, z, late + 2.0 * np.random.default_rng(6).standard_normal(SAMPLES))
@@ -749,7 +749,7 @@ def test_a_sensor_that_lags_more_than_the_signal_is_late(tmp_path):
     model = penode_gen.load(model.path)
     found = diagnosis.diagnose(model, load([path], model))
     assert [(c.kind, c.where) for c in found.causes] == [("sensor_delay", "force")]
-    assert [(a.kind, a.where) for a in found.causes[0].alternatives] == [("maxwell_bushing", "spring")]
+    assert [(a.kind, a.where) for a in found.causes[0].alternatives] == [("input_delay", "z_road"), ("maxwell_bushing", "spring")]
     assert found.causes[0].parameters["delay"].value == pytest.approx(0.02, rel=0.02)
 
 

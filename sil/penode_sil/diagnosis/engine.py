@@ -81,7 +81,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     if answer.verdict in ("unexplained", "partly_explained") and w is None and weighed.supports(study.model):
         w = _weighed(case, study)
         same = {(c.kind, c.where) for c in w.causes} == set(best.groups if best else ()) != set()
-        if same or w.follows_better(beside) or w.of_inputs:
+        if (same or w.follows_better(beside) or w.of_inputs) and not w.worsens():
             return _by_innovations(case, best, w)
         if answer.verdict == "unexplained" and not answer.explained and w.mends():  # nothing has a name, but parameters are nearer
             return _by_innovations(case, best, replace(w, verdict="unexplained", causes=(), explanations=(), explained=0.0))

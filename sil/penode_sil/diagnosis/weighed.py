@@ -71,6 +71,10 @@ class Weighed:
         """Do they explain it by inputs that are not what drove the plant? The search by sensor noise does not know of these."""
         return self.verdict == "explained" and any(c.kind in INPUTS for c in self.causes)
 
+    def worsens(self) -> bool:
+        """Does its model predict the hold-out worse than the file's, with a sensor? Less than 5 % may be chance."""
+        return any(g.after_rmse > 1.05 * g.before_rmse for g in self.gain.values())
+
     def mends(self) -> bool:
         """Does its model predict the hold-out better than the file's, with every sensor?"""
         return bool(self.gain) and all(g.after_rmse < g.before_rmse for g in self.gain.values())
