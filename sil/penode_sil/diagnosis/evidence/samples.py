@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 SEGMENT = 64  # samples of which a spectrum is taken
 LOBE = 4  # half width in bins of the window's main lobe (Harris, Proc. IEEE 66, 1978, table I: 92 dB down); so many bins count together
 WINDOW = signal.windows.blackmanharris(SEGMENT)
-QUIETEST = slice(LOBE, 3 * SEGMENT // 8)  # bins to look at: what is resampled shows none of its noise above 0.4 of the rate
+QUIETEST = slice(LOBE, 7 * SEGMENT // 16)  # bins to look at: what is resampled shows little of its noise above 0.4 of the rate
 
 
 def shown(series: Sequence[Array]) -> float:
