@@ -51,7 +51,7 @@ def test_of_curves_that_predict_equally_well_the_one_with_fewer_values_is_named(
 
 def test_what_is_a_part_of_a_form_is_tried_too():
     both, alone = (trial("coulomb_friction", 1.0, *parts).form for parts in ((SLIDES, PUSHES), (SLIDES,)))
-    assert propose._is_part(alone, both) and not propose._is_part(both, alone) and not propose._is_part(alone, alone)
+    assert propose.is_part(alone, both) and not propose.is_part(both, alone) and not propose.is_part(alone, alone)
 
 
 @pytest.mark.parametrize(

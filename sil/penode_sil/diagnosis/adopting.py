@@ -11,12 +11,13 @@ from .evidence.screening import Probe
 from .propose import FOLLOWED, PROMISE, motions
 from .terms import Term, Trial, with_forms
 
+
 def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
     """The bench with a trial's form in its model, and the terms that the form becomes there, one for each kind of law. Of the other values
     that the trial fitted, only those that the bench has are kept. `number`: of the form in its search, for it has the same names in any
     bench."""
     moved = motions(Probe.of(bench))
-    wide, (term,) = with_forms(bench, [t.form], moved, 90 + number)  # more than a search has rounds, after which forms that are tried are named
+    wide, (term,) = with_forms(bench, [t.form], moved, 90 + number)  # forms that are only tried have the number of their round, far below
     names = dict(zip([f.target for f in t.term.free], term.free))
     own = {f.target for f in bench.free}
     free = tuple(replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free if f.target in own | set(names))

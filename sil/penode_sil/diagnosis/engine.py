@@ -57,8 +57,9 @@ def diagnose(
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
     """Innovations decide where the file only guesses a parameter, on a free motion that the model misses, or where more acts than the search
     by sensor noise explains (`_decides`); else that search does. It ends early where more acts than any single cause explains and
-    innovations explain it all, unless so much is left that more causes are to be expected. Where it finds no name, innovations may: for
-    everything, or for a part if the rest wanders everywhere."""
+    innovations explain it all, unless so much is left that more causes are to be expected. Where it explains nothing, or a part, innovations
+    answer if they follow the recordings better, name the same, or find an input at fault, and for a part if the rest wanders everywhere;
+    where neither has a name, parameters that predict the hold-out better stay."""
     vague = weighed.supports(study.model) and bool(guessed(study.model))
     if vague or not study.model.inputs and weighed.misfit(study, study.null, case.log).size > weighed.UNMODELLED:
         return _by_innovations(case, None, _weighed(case, study))

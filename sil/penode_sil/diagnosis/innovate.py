@@ -16,7 +16,7 @@ from .evidence.bench import SIZES, Bench
 from .evidence.blocks import Blocks
 from .evidence.fit import Problem
 from .evidence.prior import stated
-from .propose import PROMISE, propose
+from .propose import PROMISE, is_part, propose
 from .terms import Term, Trial
 from .worth import WORTH, Z_95, alone, least, undetermined
 
@@ -153,9 +153,7 @@ def _simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Tr
 
 def _is_enough(part: Trial, t: Trial) -> bool:
     """Does a form with some of the laws of another one, a constant beside a friction, predict about as well alone?"""
-    laws, more = ([p.law for p in x.form.parts] for x in (part, t))
-    within = part.form.index == t.form.index and 0 < len(laws) < len(more) and set(laws) < set(more)
-    return within and float(np.sum(t.blocks) - np.sum(part.blocks)) <= MIN_GAIN
+    return is_part(part.form, t.form) and float(np.sum(t.blocks) - np.sum(part.blocks)) <= MIN_GAIN
 
 
 def _accepted(bench: Bench, t: Trial, better: Array) -> bool:

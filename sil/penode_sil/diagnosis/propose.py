@@ -83,15 +83,15 @@ def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
     plainest = sorted(best.values(), key=lambda pair: PROMISE * len(pair[0].sizes) - pair[0].gain)
     chosen = plainest[:TRIED]
     for score, form in plainest[TRIED:]:
-        if form.how == "force" and (all(form.where != f.where for _, f in chosen) or any(_is_part(form, f) for _, f in chosen)):
+        if form.how == "force" and (all(form.where != f.where for _, f in chosen) or any(is_part(form, f) for _, f in chosen)):
             chosen.append((score, form))
     return chosen
 
 
-def _is_part(form: Form, whole: Form) -> bool:
+def is_part(form: Form, whole: Form) -> bool:
     """Has a form some of the laws of another one at its place? It may do alone where the rest turns out to be nothing."""
     own, all_of_it = ({p.law for p in f.parts} for f in (form, whole))
-    return form.index == whole.index and whole.how == "force" and own < all_of_it
+    return form.index == whole.index and form.how == whole.how == "force" and own < all_of_it
 
 
 def _taken(form: Form, terms: Sequence[Term]) -> bool:

@@ -17,6 +17,7 @@ from .naming import DAMPERS, straight
 from .pursuit import TERMS, pools, pursue, terms_of
 from .score import Candidate, where
 from .study import Study, look, regression
+from .worth import LINEAR
 
 SHARP = 3.0  # of a sensor's limits, to begin with
 BENT = 0.1  # more of a signal at its largest, to begin with
@@ -37,7 +38,6 @@ TAKING = {  # laws that take an element away: its law and argument
     **dict.fromkeys(HALVES, ("linear_spring", "stiffness")),
 }
 LINES = {"linear_spring": ("stiffness", "N/m"), "linear_damper": ("damping", "N*s/m")}  # laws and their gains
-ALONG = {"linear_spring": "s", "linear_damper": "v"}
 LINES_OF = {"spring": "linear_spring", "damper": "linear_damper"}
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 
@@ -110,7 +110,7 @@ def joined(study: Study, e: Explanation, log) -> Explanation:
             what = t.candidate.what
             law = LINES_OF[CURVES[t.candidate.kind]]
             if linear.get(law) in {name for name, _ in study.places[what.place].elements} and group in e.groups:
-                along = tuple(getattr(s.motions[what.place], ALONG[law]) for s in look(study, e.fit))
+                along = tuple(getattr(s.motions[what.place], LINEAR[law]) for s in look(study, e.fit))
                 line = replace(what, law=law, gain=LINES[law], shapes={}, sign=0, series=along, companion=True, fixed={}, least={})
                 more = e.fit.value(group[1]) - study.model.parameters[group[1]].value
                 term = Term(replace(t.candidate, sign=0, companion=True, what=line), more)
