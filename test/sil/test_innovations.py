@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -188,6 +189,22 @@ def test_forms_are_linear_in_their_gains(tmp_path):
                     assert force.shape == t.shape and np.isfinite(force).all() and np.any(force != 0.0), form
     assert kinds == {k for file in FILES for k in file.KINDS}
     assert {f.kind for f in drives.inputs(model, 1)} | {f.kind for f in drives.sensors(model, 1)} == set(drives.KINDS) - {holding.KIND}
+
+
+def test_forces_follow_their_shapes(tmp_path):
+    """The force of a part is that of its shapes as they are, not as they were proposed: each free shape changes it."""
+    model, _ = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
+    t = np.arange(4000) * 0.004
+    s = 0.4 * np.sin(3.0 * t) + 0.1 * np.sin(11.0 * t)
+    motion = Motion.of([Moved(s, np.gradient(s, t), t)], 1.0)
+    place = plant.Place(("arm", "ground"), (("spring", 1),), "force")
+    parts = [p for file in FILES for form in file.forms(model, 0, place, motion) for p in form.parts]
+    assert any(p.force for p in parts)
+    for part in parts:
+        for name in set(part.shapes) - set(part.fixed):
+            value, unit = part.shapes[name]
+            other = replace(part, shapes={**part.shapes, name: (0.7 * value, unit)}).along(motion.parts[0])
+            assert np.std(other - part.along(motion.parts[0])) > 1e-3 * np.std(other), (part.law, name)
 
 
 def test_nothing_wanders_where_nothing_is_missing(tmp_path):

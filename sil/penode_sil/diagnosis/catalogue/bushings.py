@@ -3,7 +3,6 @@
 """Rubber: a spring behind a damper, beside what is there."""
 
 from collections.abc import Iterable
-from functools import partial
 
 from penode_gen.model import Model
 
@@ -28,12 +27,12 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     for share in TIMES:
         tau = share * motion.s_rms / motion.v_rms
-        part = Part("maxwell_bushing", ("stiffness", "N/m"), {"relaxation": (tau, "s")}, 1, (), partial(_pull, tau=tau))
+        part = Part("maxwell_bushing", ("stiffness", "N/m"), {"relaxation": (tau, "s")}, 1, (), _pull)
         yield Form(KINDS[0], place.name, "force", index, (part,))
 
 
-def _pull(m: Moved, tau: float):
-    return m.s - lag(m.s, tau, m.step)
+def _pull(m: Moved, relaxation: float):
+    return m.s - lag(m.s, relaxation, m.step)
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

@@ -3,7 +3,6 @@
 """Dampers that are no straight lines: other to one side, bent, weaker with time."""
 
 from collections.abc import Iterable
-from functools import partial
 
 import numpy as np
 from penode_gen.model import GROUND, Model
@@ -43,7 +42,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         yield Form(KINDS[1], place.name, "force", index, (bent,))
     yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2")),))
     time = 0.5 * motion.longest
-    faded = Part("fading_damper", ("damping", "N*s/m"), {"time": (time, "s")}, -1, (), partial(_faded, time=time))
+    faded = Part("fading_damper", ("damping", "N*s/m"), {"time": (time, "s")}, -1, (), _faded)
     yield Form(KINDS[3], place.name, "force", index, (faded,))
 
 

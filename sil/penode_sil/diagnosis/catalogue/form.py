@@ -63,7 +63,7 @@ class Motion:
 class Part:
     """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies
     it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values.
-    `force` gives its force [n] for gain 1 along a motion, where that is quicker than a simulation. A shape stays within a factor of
+    `force` gives its force [n] for gain 1 along a motion from all shapes by name, where that is quicker than a simulation. A shape stays within a factor of
     `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump, and may become
     as small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another cause."""
 
@@ -72,20 +72,21 @@ class Part:
     shapes: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     sign: int = 0
     fixed: tuple[str, ...] = ()
-    force: Callable[[Moved], Array] | None = None
+    force: Callable[..., Array] | None = None
     span: float = 30.0
     edge: str = ""
     kind: str = ""
 
     def along(self, m: Moved) -> Array:
         """Force [n] for gain 1."""
+        shapes = {name: value for name, (value, _) in self.shapes.items()}
         if self.force is not None:
-            return self.force(m)
+            return self.force(m, **shapes)
         known = laws.LAWS.get(self.law)
         if known and known.states:
-            return memory.force(self.law, {self.gain[0]: 1.0, **{k: v for k, (v, _) in self.shapes.items()}}, m.s, m.step)
+            return memory.force(self.law, {self.gain[0]: 1.0, **shapes}, m.s, m.step)
         text = known.force if known else self.law
-        values = {self.gain[0]: 1.0, **{k: v for k, (v, _) in self.shapes.items()}, "s": m.s, "v": m.v}
+        values = {self.gain[0]: 1.0, **shapes, "s": m.s, "v": m.v}
         return np.broadcast_to(along(text, tuple(values))(*values.values()), m.s.shape)
 
 

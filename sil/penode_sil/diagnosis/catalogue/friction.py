@@ -4,7 +4,6 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 
 from penode_gen.model import GROUND, Model
 
@@ -51,11 +50,11 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     for share in WAYS:
         way = share * motion.s_rms
-        yield Form(KINDS[2], place.name, "force", index, (Part("bouc_wen", ("force", "N"), {"presliding": (way, "m")}, 1, (), partial(_slip, way=way)),))
+        yield Form(KINDS[2], place.name, "force", index, (Part("bouc_wen", ("force", "N"), {"presliding": (way, "m")}, 1, (), _slip),))
 
 
-def _slip(m: Moved, way: float):
-    return slips(m.s, [way])[0]
+def _slip(m: Moved, presliding: float):
+    return slips(m.s, [presliding])[0]
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

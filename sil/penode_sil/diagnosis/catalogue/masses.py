@@ -3,7 +3,6 @@
 """A mass that hangs on a body by rubber and is not in the model."""
 
 from collections.abc import Iterable
-from functools import partial
 
 import numpy as np
 from penode_gen.model import GROUND, Model
@@ -26,15 +25,15 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     for ratio in RATIOS:
         omega = ratio * motion.v_rms / motion.s_rms
-        part = Part("tuned_mass", ("mass", "kg"), {"omega": (omega, "1/s"), "loss": (LOSS, "1")}, 1, (), partial(_hung, omega=omega))
+        part = Part("tuned_mass", ("mass", "kg"), {"omega": (omega, "1/s"), "loss": (LOSS, "1")}, 1, (), _hung)
         yield Form(KINDS[0], place.name, "force", index, (part,))
 
 
-def _hung(m: Moved, omega: float):
+def _hung(m: Moved, omega: float, loss: float):
     """Force for a mass of 1: omega^2 (s - p) + 2 loss omega (v - p'), p'' = that."""
-    b, a, _ = signal.cont2discrete(([2 * LOSS * omega, omega**2], [1.0, 2 * LOSS * omega, omega**2]), m.step, "bilinear")
+    b, a, _ = signal.cont2discrete(([2 * loss * omega, omega**2], [1.0, 2 * loss * omega, omega**2]), m.step, "bilinear")
     own = signal.lfilter(np.squeeze(b), a, m.s)
-    return omega**2 * (m.s - own) + 2.0 * LOSS * omega * (m.v - np.gradient(own, m.step))
+    return omega**2 * (m.s - own) + 2.0 * loss * omega * (m.v - np.gradient(own, m.step))
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

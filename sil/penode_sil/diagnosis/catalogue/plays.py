@@ -3,7 +3,6 @@
 """Play in series with a spring, a damper, or friction."""
 
 from collections.abc import Iterable
-from functools import partial
 
 from penode_gen.model import Model
 
@@ -27,21 +26,21 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         gap = share * motion.s_rms
         yield Form(KINDS[0], place.name, "force", index, (Part("backlash", ("stiffness", "N/m"), {"gap": (gap, "m")}, 1),))
         shapes = {"gap": (gap, "m"), "relaxation": (max(2e-3, 2.0 * motion.parts[0].step), "s")}
-        loose = Part("loose_damper", ("damping", "N*s/m"), shapes, 1, ("relaxation",), partial(_loose, gap=gap, tau=shapes["relaxation"][0]))
+        loose = Part("loose_damper", ("damping", "N*s/m"), shapes, 1, ("relaxation",), _loose)
         yield Form(KINDS[0], place.name, "force", index, (loose,), "of a damper")
     if not model.bodies:  # a play shows in series with friction where no mass is in between
         for share in GAPS:
             way = share * motion.s_rms
-            slack = Part("slack_friction", ("force", "N"), {"presliding": (way, "m")}, 1, (), partial(_slack, way=way))
+            slack = Part("slack_friction", ("force", "N"), {"presliding": (way, "m")}, 1, (), _slack)
             yield Form(KINDS[0], place.name, "force", index, (slack,), "of a friction")
 
 
-def _loose(m: Moved, gap: float, tau: float):
-    return losses(m.s, m.step, [gap], [tau])[0]
+def _loose(m: Moved, gap: float, relaxation: float):
+    return losses(m.s, m.step, [gap], [relaxation])[0]
 
 
-def _slack(m: Moved, way: float):
-    return slips(m.s, [way])[0] ** 5
+def _slack(m: Moved, presliding: float):
+    return slips(m.s, [presliding])[0] ** 5
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
