@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from one_mass import STEP, model
 from scipy.signal import StateSpace, lsim
 
+from penode_sil.batch import Batch
 from penode_sil.diagnosis import applied, driven, plant, real
 from penode_sil.diagnosis.holding import held
 from penode_sil.diagnosis.noise import Experiment
@@ -24,23 +26,25 @@ a_mass = { value = "der(v)", unit = "m/s^2", noise = 1e-3 }'''
 MODEL = model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS)
 
 
-def recording(path: Path, how: str, period: float, seed: int) -> Path:
-    """A rig under a random force that acts late, or in steps, of a period [s]; a sine in its spring and in its damper makes it a little
-    wrong everywhere. Simulated in steps of a quarter millisecond, written every 2 ms."""
+def recording(path: Path, how: str, period: float, seed: int, top: float) -> Path:
+    """A rig under a random force up to `top` [Hz] that acts late, or in steps, of a period [s], or whose first sensor is late; a sine in its
+    spring and in its damper makes it a little wrong everywhere. Simulated in steps of a quarter millisecond, written every 2 ms."""
     rng = np.random.default_rng(seed)
     step, n = STEP / FINE, SAMPLES * FINE
     t = np.arange(n) * step
     f = np.fft.rfftfreq(n, step)
-    shape = np.where((f > 0.2) & (f < 6.0), 1.0, 0.0)
+    shape = np.where((f > 0.2) & (f < top), 1.0, 0.0)
     u = np.fft.irfft(shape * np.exp(2j * np.pi * rng.random(f.size)), n)
     u *= 10.0 / np.std(u)
     late = round(period / step)
-    acts = {"delay": np.interp(t - 0.5 * period, t, u), "hold": u[np.arange(n) // late * late]}[how]
+    acts = {"delay": np.interp(t - 0.5 * period, t, u), "hold": u[np.arange(n) // late * late], "sensor": u}[how]
     linear = StateSpace([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]], [[0.0], [1.0 / MASS]], [[1.0, 0.0], [0.0, 1.0]], [[0.0], [0.0]])
     for _ in range(3):  # the waves act along the motion that they make: a fixed point
         x, v = lsim(linear, acts if _ == 0 else acts + waves, t, interp=False)[1].T
         waves = 0.03 * (STIFFNESS * np.std(x) * np.sin(3.0 * x / np.std(x)) + DAMPING * np.std(v) * np.sin(2.5 * v / np.std(v)))
     a = (acts + waves - STIFFNESS * x - DAMPING * v) / MASS
+    if how == "sensor":
+        x = np.interp(t - 0.5 * period, t, x)
     noise = rng.standard_normal((2, n)) * [[1e-6], [1e-3]]
     columns = np.column_stack([t, u, x + noise[0], a + noise[1]])[::FINE]
     np.savetxt(path, columns, delimiter=",", header="time [s],push [N],x_mass [m],a_mass [m/s^2]", comments="", fmt="%.9g")
@@ -52,8 +56,8 @@ def answer(tmp_path: Path):
     (tmp_path / "rig.toml").write_text(MODEL)
     rig = penode_gen.load(tmp_path / "rig.toml")
 
-    def search(how: str, period: float, seed: int) -> real.Answer:
-        (m,) = load([recording(tmp_path / "r.csv", how, period, seed)], rig)
+    def search(how: str, period: float, seed: int, top: float = 6.0) -> real.Answer:
+        (m,) = load([recording(tmp_path / "r.csv", how, period, seed, top)], rig)
         e: Experiment = driven.experiment(m, rig)
         places = plant.places(rig)
         fastest = plant.linearise(rig, places, np.array([rig.start]), e.u[:1]).fastest
@@ -84,6 +88,28 @@ def test_a_hold_is_named_with_its_period_and_written_down(answer, tmp_path):
     (tmp_path / "extended.toml").write_text(applied.apply(nominal, found.found.bench, found.run, found.found.terms, set()).text)
     (held,) = penode_gen.load(tmp_path / "extended.toml").sampled
     assert (held.source, held.law, held.time) == ("push", "held", 0.024)  # the nearest whole number of samples
+
+
+@pytest.mark.parametrize("top", (1.0, 2.0))
+def test_a_hold_of_a_slow_force(answer, top):
+    """Innovations are means over about half of a period: in them a hold is hardly more than a delay."""
+    (cause,) = answer("hold", 0.04325, 2, top).causes
+    assert cause.kind == "input_hold" and cause.parameters["period"].value == pytest.approx(0.04325, abs=5e-5)  # looked at in steps of 8e-5 s
+
+
+def test_a_late_sensor_is_late_in_the_extended_model(answer, tmp_path):
+    found = answer("sensor", 0.0235, 1)
+    (cause,) = found.causes
+    assert (cause.kind, cause.where) == ("sensor_delay", "x_mass")
+    rig = penode_gen.load(tmp_path / "rig.toml")
+    (tmp_path / "extended.toml").write_text(applied.apply(rig, found.found.bench, found.run, found.found.terms, set()).text)
+    extended = penode_gen.load(tmp_path / "extended.toml")
+    record, start = found.found.bench.records[0], [found.run.value(("start", 0, i)) for i in range(2)]
+    z = Batch(extended).run(record.u, x0=np.array([[*start, start[0], 0.0]])).z[0, :, 0]
+    plain = replace(extended, sensors=rig.sensors)
+    before = Batch(plain).run(record.u, x0=np.array([[*start, start[0], 0.0]])).z[0, :, 0]
+    left, late = (np.std((record.y[:, 0] - seen)[500:]) for seen in (z, before))
+    assert left < 0.3 * late
 
 
 def test_a_delay_is_no_hold(answer):

@@ -12,10 +12,11 @@ from penode_gen import units
 from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 
+from . import late
+from .entries import extends, table, toml, unlike
 from .evidence.bench import Bench
 from .evidence.fit import Fit
 from .evidence.observer import bias, scale
-from .extension import extends, table, toml, unlike
 from .plant import extend
 from .terms import Term
 
@@ -58,7 +59,9 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
     limits = {t.form.index: values[t.free[0].target] for t in terms if t.form.how == "clip"}
     texts = [driven.through(named(s.expression)) for s in grown.sensors]
-    sensors = [_sensor(model, j, text, values, offsets, limits, driven) for j, text in enumerate(texts)]
+    delays = {t.form.index: fit.value(t.free[0].target) for t in terms if t.form.how == "late"}
+    delays = {j: d for j, d in delays.items() if d > late.SHORT * model.sample_time}
+    sensors = [_sensor(model, j, text, values, offsets, limits, delays, driven) for j, text in enumerate(texts)]
     units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
     outputs = [f"{s.name} = {table({**x, 'unit': units_of[s.name]})}" for s, x in zip(model.sensors, sensors) if x and s.name in units_of]
     outputs += [x for x in redirected["outputs"] if x.split(" = ")[0] not in {o.split(" = ")[0] for o in outputs}]
@@ -68,9 +71,11 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
         "", "[model]", extends(model.path.resolve()), f"name = {toml(model.name + '_extended')}",
         f"sample_time = {toml(f'{model.sample_time:.12g} s')}", "",
     ]  # fmt: skip
+    substeps = max([model.substeps, *(late.substeps(d, 0.0, model.sample_time) for d in delays.values())])
+    lines[-1:] = [f"substeps = {substeps}", ""] if substeps > model.substeps else [""]
     for title, entries in (
         ("parameters", [*parameters, *driven.parameters]), ("actuators", driven.actuators), ("elements", [*redirected["elements"], *elements]),
-        ("equations", redirected["equations"]), ("outputs", outputs),
+        ("states", driven.states), ("equations", [*redirected["equations"], *driven.equations]), ("outputs", outputs),
         ("sensors", [f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}" for s, x in zip(model.sensors, sensors) if x]),
     ):  # fmt: skip
         if entries:
@@ -100,8 +105,9 @@ def _element(e: Element, named: Callable[[str], str]) -> dict[str, object]:
 
 
 def _sensor(
-    model: Model, j: int, expression: str, values: dict[str, float], offsets: Collection[str], limits: Mapping[int, float], driven: Driven
-) -> dict[str, object]:
+    model: Model, j: int, expression: str, values: dict[str, float], offsets: Collection[str], limits: Mapping[int, float],
+    delays: Mapping[int, float], driven: Driven,
+) -> dict[str, object]:  # fmt: skip
     """What a sensor that measures otherwise has as its value and unit; nothing for one that does not."""
     s, unit = model.sensors[j], units.si(model.sensors[j].unit)
 
@@ -110,6 +116,12 @@ def _sensor(
         driven.parameters.append(f"{name} = {table({'value': value, 'unit': unit})}")
         return name
 
+    if j in delays:
+        found = late.written(expression, [driven.name(f"{what}_{s.name}") for what in ("delay", "late", "late_rate")], unit, delays[j])
+        driven.parameters.append(found.parameter)
+        driven.states += found.states
+        driven.equations += found.equations
+        expression = found.expression
     if scale(s.name) in values:
         expression = f"{added('gain', values[scale(s.name)], '1')}*({expression})"
     if s.name in offsets:
@@ -127,12 +139,14 @@ SAMPLED = ("input_delay", "input_added")  # act on samples, so they come before 
 
 @dataclass
 class Driven:
-    """What terms of inputs add to a model file: entries by section, what stands for an input now (`acts`), its offset, and notes on what the
-    file cannot express. `taken`: names that the file has."""
+    """What terms of inputs and late sensors add to a model file: entries by section, what stands for an input now (`acts`), its offset, and
+    notes on what the file cannot express. `taken`: names that the file has."""
 
     taken: set[str]
     parameters: list[str] = field(default_factory=list)
     actuators: list[str] = field(default_factory=list)
+    states: list[str] = field(default_factory=list)
+    equations: list[str] = field(default_factory=list)
     acts: dict[str, str] = field(default_factory=dict)
     offsets: dict[str, str] = field(default_factory=dict)
     left: list[str] = field(default_factory=list)

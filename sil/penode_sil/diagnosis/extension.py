@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from itertools import chain, count
-from pathlib import Path
 
 import numpy as np
 from numpy.polynomial import Legendre, Polynomial
@@ -17,41 +15,18 @@ from penode_gen import units
 from penode_gen.laws import LAWS
 from penode_gen.model import Model
 
+from . import late
 from .build import Term
+from .entries import extends, table, toml, unlike
 from .explanation import Explanation
 from .faulty import BLUNT
 from .hypotheses import VALUED, Basis, Fault, size
+from .late import SHORT
 from .resolving import resolved
 from .result import Cause
 from .study import Study
 
 Array = NDArray[np.float64]
-
-
-def table(values: dict[str, object]) -> str:
-    return "{ " + ", ".join(f"{k} = {toml(v)}" for k, v in values.items()) + " }"
-
-
-def toml(value: object) -> str:
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(toml, value)) + "]"
-    if isinstance(value, int):
-        return str(value)
-    return repr(float(f"{value:.7g}"))
-
-
-def unlike(stem: str, taken: Collection[str]) -> str:
-    """A name that is not taken: the stem, or the stem with a number."""
-    return next(name for name in chain([stem], (f"{stem}_{n}" for n in count(2))) if name not in taken)
-
-
-def extends(path: Path) -> str:
-    """The line that names the nominal model file."""
-    return f"extends = {toml(path.as_posix())}"
 
 
 def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> tuple[str, Model]:
@@ -86,8 +61,8 @@ def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[
     if e is not None:
         substeps = max([1, *(_fine(study, t, n, e) for t, n in zip(e.terms, e.built.names))])
         values = {f.target: f.value for f in e.fit.free}
-        delays = [(d, _late(_rolled(values, k[1]))) for k, d in values.items() if k[0] == "delay" and d > SHORT * model.sample_time]
-        substeps = max([substeps, *(int(np.ceil(_fastest(stiff, drag) * model.sample_time / d)) for d, (stiff, drag, _, _) in delays)])
+        delays = [(k[1], d) for k, d in values.items() if k[0] == "delay" and d > SHORT * model.sample_time]
+        substeps = max([substeps, *(late.substeps(d, _rolled(values, j), model.sample_time) for j, d in delays)])
         if substeps > model.substeps:
             lines.insert(-1, f"substeps = {substeps}")
     return lines
@@ -175,17 +150,12 @@ class _Written:
     def _delayed(self, expression: str, j: int) -> str:
         """An expression as late as sensor j is."""
         name, unit = self.e.built.model.sensors[j].name, units.si(self.e.built.model.sensors[j].unit)
-        delay, late, rate = (f"{what}_{name}" for what in ("delay", "late", "late_rate"))
-        self.parameters.append(f"{delay} = {table({'value': max(self.values[('delay', j)], 1e-9), 'unit': 's'})}")
-        stiff, drag, direct, own = _late(_rolled(self.values, j))
-        slope = rate if stiff else f"{expression} - {late}"
-        self.equations.append(f"{late} = {toml(f'der({late})*{delay} = {slope}')}")
-        if stiff:
-            self.equations.append(f"{rate} = {toml(f'der({rate})*{delay} = {stiff:.7g}*({expression} - {late}) - {drag:.7g}*{rate}')}")
-        self.states += [f"{state} = {table({'unit': unit})}" for state in ((late, rate) if stiff else (late,))]
-        if direct == 1.0:
-            return f"{expression} - {rate}"
-        return f"{late} + {direct:.7g}*({expression} - {late}) - {own:.7g}*{rate}" if direct else late
+        names = [f"{what}_{name}" for what in ("delay", "late", "late_rate")]
+        found = late.written(expression, names, unit, max(self.values[("delay", j)], 1e-9), _rolled(self.values, j))
+        self.parameters.append(found.parameter)
+        self.states += found.states
+        self.equations += found.equations
+        return found.expression
 
     def clock(self) -> None:
         """The time since the start, where a sensor asks for it."""
@@ -207,8 +177,6 @@ class _Written:
         )  # fmt: skip
 
 
-SHORT = 0.02  # of a sample: a delay that is left out
-ONE_POLE = 0.48  # of a delay squared: beyond that the second pole of a filter is 50 times as fast as the first
 def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
     """Steps a sample, so that none jumps over the presliding of a friction, a relaxation, or the motion of a small mass."""
     what, step = term.candidate.what, study.model.sample_time
@@ -235,26 +203,6 @@ def _series(e: Explanation, values: dict[object, float], sensor: int) -> list[tu
 def _rolled(values: dict[object, float], sensor: int) -> float:
     """The roll-off of a sensor's signal, of the square of its delay."""
     return values.get(("roll_off", sensor), 0.0) / values[("delay", sensor)] ** 2
-
-
-def _late(roll_off: float) -> tuple[float, float, float, float]:
-    """A delay with a roll-off (of its square, see `delayed`) in two states, x*late = rate and x*rate = stiff*(u - late) - drag*rate
-    with x = s*delay: late + direct*(u - late) - own*rate. Two poles are themselves; one of them alone (all 0: x*late = u - late) if
-    the other is far faster. With less roll-off, Pade's fraction of order 2 of exp(-x) (1 + roll_off x^2): 12, 6, 1, 1 without any."""
-    if roll_off > ONE_POLE:
-        return 0.0, 0.0, 0.0, 0.0
-    if roll_off > 1.0 / 6.0:
-        stiff = 1.0 / (0.5 - roll_off)
-        return stiff, stiff, 0.0, 0.0
-    x2, x3, x4 = 1.0 / 2.0 + roll_off, -1.0 / 6.0 - roll_off, 1.0 / 24.0 + roll_off / 2.0
-    d1, d2 = np.linalg.solve([[x2, -1.0], [x3, x2]], [-x3, -x4])
-    direct = (x2 - d1 + d2) / d2
-    return 1.0 / d2, d1 / d2, float(np.round(direct, 12)), 1.0 - d1 + direct * d1
-
-
-def _fastest(stiff: float, drag: float) -> float:
-    """The faster pole of a delay's states, or the one of one, times the delay."""
-    return float(np.max(np.abs(np.roots([1.0, drag, stiff])))) if stiff else 1.0
 
 
 def _bent(
