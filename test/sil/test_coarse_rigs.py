@@ -220,3 +220,22 @@ def test_a_sensor_cut_off_in_front_of_its_noise(tmp_path, penode):
     found = diagnosed(tmp_path, penode, model.replace('tolerance = "unknown"', "tolerance = 0.03"), records)
     assert kinds(found) == ["sensor_clipping"]
     assert abs(found["causes"][0]["parameters"]["limit"]["value"] / 0.016 - 1.0) < 0.01
+
+
+def test_a_limit_that_bends_the_fit(tmp_path, penode):
+    """A limit at 1.3 of the rms, in a file without tolerances: the parameters that fit it best are far off, and their motion stays below it."""
+    records = []
+    for seed in (11, 12):
+        rng = np.random.default_rng(seed)
+        u = 10.0 * waves(rng, 20, 0.2, 4.0, 5000, 2e-3)
+        states = simulate(lambda x, v, u: (u - 12.0 * v - 900.0 * (x + 6e-4 * math.sin(x / 3e-3))) / 2.0, u, 2e-3)
+        x, v = states.T[:2]
+        a = (u[::FINE] - 12.0 * v - 900.0 * (x + 6e-4 * np.sin(x / 3e-3))) / 2.0
+        limit = 1.3 * np.std(x) if not records else limit
+        seen = np.column_stack([np.clip(x, -limit, limit) + 2e-5 * rng.standard_normal(len(x)), a + 0.02 * rng.standard_normal(len(x))])
+        records.append((2e-3, u, "x [m],a [m/s^2]", seen))
+    sensor = 'x = { value = "x", unit = "m", noise = 2e-5 }\na = { value = "der(v)", unit = "m/s^2", noise = 0.02 }'
+    model = file(2, {"m": (2, "kg"), "d": (12, "N*s/m"), "k": (900, "N/m")}, sensor=sensor)
+    found = diagnosed(tmp_path, penode, model.replace(', tolerance = "unknown"', ""), records)
+    assert kinds(found) == ["sensor_clipping"]
+    assert abs(found["causes"][0]["parameters"]["limit"]["value"] / limit - 1.0) < 0.01

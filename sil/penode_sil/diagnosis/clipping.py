@@ -13,6 +13,7 @@ from penode_gen.model import Model, Parameter
 
 from .catalogue.form import Form
 from .evidence.bench import FAR, Bench
+from .evidence.fit import likelihood
 from .evidence.screening import Score, as_they_are
 from .fit import Free
 
@@ -23,7 +24,8 @@ SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # quantiles of abs(y) that are tried as l
 
 def propose(bench: Bench, index: int, seen: Sequence[Array]) -> tuple[Score, Form] | None:
     """The limit that gains most for a sensor; None for one that was not measured, or hardly moves. A free run, `seen` [n, n_z] for each
-    recording, stands for the signal that is not cut off; what a limit cuts off it is the change of the innovations."""
+    recording, stands for the signal that is not cut off; what a limit cuts off it is the change of the innovations. Where the largest
+    samples lie within noise, before anything else is found, the run of the model file is tried as well."""
     y = np.abs(np.concatenate([r.y[:, index] for r in bench.records]))
     y = y[np.isfinite(y)]
     limits = [float(x) for x in np.quantile(y, SHARES) if x > 0.0] if y.size else []
@@ -34,9 +36,22 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> tuple[Score, For
         change = np.zeros_like(bench.fit.nu)
         change[:, index] = _means(bench.update, [z[:, index] - np.clip(z[:, index], -limit, limit) for z in seen])
         changes.append(change)
-    tried = as_they_are(bench.fit, changes)
-    best = int(np.argmax([s.gain for s in tried]))
-    return tried[best], Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[best])
+    gains = [s.gain for s in as_they_are(bench.fit, changes)]
+    if len(bench.nominal) == len(bench.fit.free) and np.quantile(y, 0.998) - np.quantile(y, SHARES[0]) < 3.0 * bench.noise[index]:
+        gains = [max(pair) for pair in zip(gains, _gains_of_nominal(bench, index, limits))]
+    best = int(np.argmax(gains))
+    return Score(gains[best], np.ones(1)), Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[best])
+
+
+def _gains_of_nominal(bench: Bench, index: int, limits: Sequence[float]) -> list[float]:
+    """Log likelihood that limits of a sensor gain with the values of the model file: those fitted to what is cut off move too little."""
+    form = Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[0])
+    model, limit = limited(bench.model, form, "limit")
+    problem, free = bench.problem(model), (*bench.nominal, limit)
+    shifts = np.zeros((len(limits), len(free)))
+    shifts[:, -1] = np.log(np.array(limits) / limits[0])
+    nu = problem.nu(free, shifts, bench.fit.by)
+    return [likelihood(n, np.isfinite(n), problem.floor)[1] - bench.fit.likelihood for n in nu]
 
 
 def limited(model: Model, form: Form, name: str) -> tuple[Model, Free]:

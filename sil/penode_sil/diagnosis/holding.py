@@ -8,23 +8,29 @@ the error of the model's input is, to first order in P,
     held - u = -u' (P/2 + saw(t)),    saw(t) = ((t - phase) mod P) - P/2 = -(P/pi) (sin(w (t - phase)) + ...),    w = 2 pi/P.
 
 So a delay of P/2, and a sine and a cosine of 1/P times u' of the amplitude P/pi, find period and phases without a start: phases follow
-from sums of squares. The best of these are then compared as true steps.
+from sums of squares. The best of these are then compared as true steps. Innovations that are means over longer than P show the delay
+alone, so a hold is looked for, and compared with a delay, by innovations of four updates a period.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from penode_gen.model import Model
 
 from .catalogue.form import Form, Series
-from .evidence.bench import Bench
-from .evidence.screening import AT_ONCE, Beside, Score, as_they_are
+from .evidence.bench import AGAIN, CORRELATION, Bench, fit_level
+from .evidence.blocks import Blocks
+from .evidence.gain import Level
+from .evidence.screening import AT_ONCE, Beside, as_they_are
 from .fit import Free
+from .terms import Trial
 
 Array = NDArray[np.float64]
-SPREAD = 0.75, 1.35  # times twice the delay that a score promises: periods that are tried
+SPREAD = 0.75, 1.35  # times twice the delay that fits best: periods that are tried
 FINER = 3.0  # frequencies tried, of the widths of one, 1/(length of the recordings)
 MOST = 1200  # of them: the finest periods of long recordings are left out
 KIND = "input_hold"
@@ -40,12 +46,49 @@ def held(u: Array, period: float, phase: float) -> Array:
     return np.diff(np.interp(np.arange(n + 1) - 0.5, edges, area))
 
 
-def propose(bench: Bench, index: int, delay: float) -> tuple[Score, Form] | None:
-    """The hold of an input that promises most, where one of `delay` [s] does; None if it cannot be longer than two samples."""
-    step, about = bench.step, 2.0 * delay / bench.step
+def propose(bench: Bench, index: int, delay: float) -> Form | None:
+    """The likeliest hold of an input that seems late by `delay` [s]; None if it cannot be longer than two samples."""
+    about = 2.0 * delay / bench.step
     if about * SPREAD[1] <= 2.0:
         return None
-    wide = 1.0 / (FINER * max(len(r) for r in bench.records))
+    steps = _likeliest(_finer(bench, about), index, about)
+    return Form(KIND, bench.model.inputs[index].name, "input_added", index, series=steps)
+
+
+def told_apart(bench: Bench, model: Model, trials: Sequence[Trial]) -> list[Trial]:
+    """Trials of a round in a `model` with all of them; a hold with the scores of the delay that it looks like, and what a bench that sees its
+    steps makes of the difference. Only these two are compared there: of a late sensor, samples are taken between those that were measured,
+    which have less noise."""
+    hold = next((t for t in trials if t.form.kind == KIND), None)
+    delay = next((t for t in trials if hold and t.form.how == "input_delay" and t.form.index == hold.form.index), None)
+    fine = _finer(bench, hold.form.series.period / bench.step) if hold and delay else bench
+    if fine is bench:
+        return list(trials)
+    blocks, problem = Blocks.of([len(r) // fine.update for r in fine.records]), fine.problem(model)
+
+    def scores(t: Trial) -> Array:
+        fit = problem.solve(t.fit.free, fine.gains(fine.fit, model).at(fine.level), AGAIN)
+        return blocks.scores(problem, fit_level(replace(fine, model=model), problem, fit, fine.level)[1])
+
+    better = scores(hold) - scores(delay)
+    return [replace(t, blocks=delay.blocks + better) if t is hold else t for t in trials]
+
+
+def _finer(bench: Bench, period: float) -> Bench:
+    """A bench that sees steps of so many samples: four updates in each show their first wave by sin(pi/4)/(pi/4) = 90 %."""
+    update = max(1, int(0.25 * period))
+    if update >= bench.update:
+        return bench
+    fine = replace(bench, update=update)
+    problem, level = fine.problem(), Level(bench.level.size, CORRELATION * update * bench.step)
+    fit = problem.solve(bench.fit.free, fine.gains(bench.fit).at(level), AGAIN)
+    level, fit = fit_level(fine, problem, fit, level)
+    return replace(fine, level=level, fit=fit)
+
+
+def _likeliest(bench: Bench, index: int, about: float) -> Series:
+    """The steps of about so many samples that promise most."""
+    step, wide = bench.step, 1.0 / (FINER * max(len(r) for r in bench.records))
     frequencies = np.arange(1.0 / (SPREAD[1] * about), min(0.5, 1.0 / (SPREAD[0] * about)), wide)[:MOST]
     slopes = [np.gradient(r.u[:, index]) for r in bench.records]
     series = [Series([s * wave(2.0 * np.pi * f * np.arange(len(s))) for s in slopes]) for f in frequencies for wave in (np.sin, np.cos)]
@@ -55,8 +98,7 @@ def propose(bench: Bench, index: int, delay: float) -> tuple[Score, Form] | None
     looks = [_look(beside, 1.0 / f, step, late, pair) for f, pair in zip(frequencies, pairs)]
     steps = [_steps(bench, index, 1.0 / frequencies[k], looks[k][1]) for k in np.argsort([left for left, _ in looks])[:AT_ONCE]]
     tried = as_they_are(bench.fit, list(changes(bench, index, steps)))
-    best = int(np.argmax([s.gain for s in tried]))
-    return tried[best], Form(KIND, bench.model.inputs[index].name, "input_added", index, series=steps[best])
+    return steps[int(np.argmax([s.gain for s in tried]))]
 
 
 def _look(beside: Beside, period: float, step: float, late: Array, waves: Sequence[Sequence[Array]]) -> tuple[float, Array]:

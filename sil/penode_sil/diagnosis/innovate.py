@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from . import holding
 from .adopting import adopt
 from .catalogue import curve
 from .evidence.bench import SIZES, Bench
@@ -87,16 +88,19 @@ def _apart(start: Bench, bench: Bench, accepted: Sequence[Accepted], large: Sequ
 
 
 def _good(bench: Bench, terms: Sequence[Term], blocks: Blocks, base: Array, log: Callable[[str], None]) -> tuple[Trial, ...]:
-    """Trials that predict left-out blocks enough better than `base`, the best first; only those that matter if there are any."""
+    """Trials that predict left-out blocks enough better than `base`, the best first; only those that matter if one of them predicts as well as
+    any: a large form that predicts less well than a small one stands for it."""
     trials, wide = propose(bench, terms, log)
     trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
-    trials = [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]]
+    trials = holding.told_apart(bench, wide, [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]])
     better = [t.blocks - base for t in trials]
     for t, b in zip(trials, better):
         log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
     good = [t for t, b in zip(trials, better) if _accepted(bench, t, b)]
     good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
-    good = [t for t in good if _matters(t)] or good
+    matter = [t for t in good if _matters(t)]
+    if matter and max(np.sum(t.blocks) for t in good) - max(np.sum(t.blocks) for t in matter) <= MIN_GAIN:
+        good = matter
     return tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks))))
 
 

@@ -60,15 +60,15 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     forms += drives.sensors(bench.model, len(bench.noise))
     forms = [f for f in forms if not _taken(f, terms)]
     ranked = _screened(bench, probe, forms, moved)
-    holds = _holds(bench, _chosen(ranked), terms)
     cut = {t.form.where for t in terms if t.form.how == "clip"}
     seen = bench.problem().predictor.sensors(bench.fit.free)
     limits = [clipping.propose(bench, j, seen) for j, s in enumerate(bench.model.sensors) if s.name not in cut]
-    ranked = sorted([*ranked, *holds, *filter(None, limits)], key=lambda pair: -pair[0].gain)
+    ranked = sorted([*ranked, *filter(None, limits)], key=lambda pair: -pair[0].gain)
     chosen = _chosen(ranked)
     wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
     trials = [_fitted(bench, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen)]
+    trials += [_fitted(bench, wide, moved, terms, t, np.ones(1)) for t in _holds(bench, trials, terms)]
     return sorted(trials, key=lambda t: -t.gain), wide
 
 
@@ -114,12 +114,14 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
     return sorted(zip(scores(bench.fit, hypotheses), forms), key=lambda pair: -pair[0].gain)
 
 
-def _holds(bench: Bench, ranked: Sequence[tuple[Score, Form]], terms: Sequence[Term]) -> list[tuple[Score, Form]]:
-    """Holds of those inputs whose delay is among the forms chosen."""
+def _holds(bench: Bench, trials: Sequence[Trial], terms: Sequence[Term]) -> list[Term]:
+    """Holds of the inputs that are late in one of the trials, of about twice its delay; of those that gain half of what the best trial does,
+    for a delay is the larger part of a hold."""
     taken = [t.form.where for t in terms if t.form.kind == holding.KIND]
-    late = [(s, f) for s, f in ranked if f.how == "input_delay" and s.sizes[0] > 0.0 and f.where not in taken]
-    found = [holding.propose(bench, f.index, float(s.sizes[0])) for s, f in late]
-    return [pair for pair in found if pair]
+    most = max((t.gain for t in trials), default=0.0)
+    late = [t for t in trials if t.form.how == "input_delay" and t.form.where not in taken and t.gain > max(0.5 * most, PROMISE)]
+    found = [holding.propose(bench, t.form.index, t.fit.value(t.term.free[0].target)) for t in late]
+    return [Term(form, (), free_of(bench, form)) for form in found if form]
 
 
 def _slope(bench: Bench, form: Form) -> Array:
@@ -134,13 +136,13 @@ def _slope(bench: Bench, form: Form) -> Array:
 
 
 def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], term: Term, sizes: Array) -> Trial:
-    """A term beside all that was accepted: from the best so far with the sizes that its score promises; where parameters are hardly known
-    also from the nominal ones, and from its own free run, for the motion of a wrong plant promises little."""
+    """A term beside all that was accepted: from the best so far with the sizes that its score promises; where parameters are hardly known,
+    and for a limit that has bent them, also from the nominal ones, and from its own free run, for the motion of a wrong plant promises little."""
     problem = bench.problem(wide)
     n_x = len(wide.states)
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
     starts = [(*bench.fit.free, *_sized(term, sizes))]
-    if any(f.log and f.sigma > VAGUE for f in bench.nominal):
+    if term.form.how == "clip" or any(f.log and f.sigma > VAGUE for f in bench.nominal):
         little = np.clip(sizes, *np.outer((-1.0, 1.0), [LITTLE * f.unit for f in term.free if not f.log]))
         starts += [(*bench.nominal, *_sized(term, little)), (*bench.fit.free, *_sized(term, little))]
         runs = [problem.solve(f, still, FREE_RUN) for f in starts[1:]]
