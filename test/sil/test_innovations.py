@@ -207,6 +207,18 @@ def test_forces_follow_their_shapes(tmp_path):
             assert np.std(other - part.along(motion.parts[0])) > 1e-3 * np.std(other), (part.law, name)
 
 
+@pytest.mark.parametrize("share, named", ((0.1, True), (0.03, False)))
+def test_a_constant_torque_is_worth_a_name(tmp_path, share, named, show):
+    """A constant of this share of what the spring reaches beside waves in it: above 7 %, but for what waves of 3 % may make of it."""
+    model, experiments = swing(tmp_path, lambda s, v: share * 0.64 * 0.5 + BENT * math.sin(11.0 * s), 5)
+    found = answered(model, experiments)
+    show([(c.kind, {k: (v.value, v.ci95) for k, v in c.parameters.items()}) for c in found.causes])
+    assert [c.kind for c in found.causes] == ["constant_force"] * named
+    if named:
+        low, high = found.causes[0].parameters["force"].ci95
+        assert low < -share * 0.64 * 0.5 < high
+
+
 def test_nothing_wanders_where_nothing_is_missing(tmp_path):
     """Made-up data of the model itself: a free run is the likeliest observer, and sensor noise alone may judge."""
     model, experiments = swing(tmp_path, lambda s, v: 0.0)

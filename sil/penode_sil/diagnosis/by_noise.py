@@ -24,7 +24,7 @@ from .explanation import Explanation
 from .hypotheses import CLOCK
 from .judging import cause, damped, judge, pitching, resized, worth
 from .noise import UNSEEN, Experiment
-from .result import OUTSIDE, Cause, Diagnosis, Gain
+from .result import OUTSIDE, Cause, Diagnosis, Gain, place
 from .study import Study, look
 
 CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
@@ -136,7 +136,11 @@ def _sized(case: Case, study: Study, best: Explanation | None, judged: Judged) -
     if not any(c.kind == OUTSIDE for c in causes):
         idle = explaining.explain(study, []) if best is None or not causes else None
         sized, named = refining.mended(study, best, case.log) if idle is None else (idle, idle)
-        causes = tuple(resized(study, sized, c) for c in causes)
+        whole = [resized(study, sized, c) for c in causes]
+        causes = tuple(c for c in whole if not c.may_be_nothing)
+        notes += [f"{place(c.kind, c.where)} may be nothing: the 95 % interval of its size holds that; not named" for c in whole if c.may_be_nothing]
+        if whole and not causes:
+            judged, causes, named = replace(judged, verdict="unexplained"), SURELY_NOT, None
     if judged.verdict == "unexplained" and not judged.doubt and not judged.drift:
         unnamed = nameless.fitted(study, best)
     if unnamed is not None and case.unused:

@@ -61,7 +61,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     answer if they follow the recordings better, name the same, or find an input at fault, and for a part if the rest wanders everywhere;
     where neither has a name, parameters that predict the hold-out better stay."""
     vague = weighed.supports(study.model) and bool(guessed(study.model))
-    if vague or not study.model.inputs and weighed.misfit(study, study.null, case.log).size > weighed.UNMODELLED:
+    if vague or not study.model.inputs and weighed.misfit(study, study.null, case.log).size:
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
     case.tell(SEARCH[0], "looking for causes")

@@ -14,7 +14,7 @@ from penode_gen.model import GROUND, Model
 from scipy import constants
 
 from . import catalogue, innovate
-from .catalogue import drives
+from .catalogue import drives, loads
 from .catalogue.form import Form, Motion, Sizes
 from .evidence.bench import UNSTATED, Bench, build
 from .evidence.blocks import posterior
@@ -76,7 +76,7 @@ def answer(
         rivals = _rivals(chance, term) if first else _loads(model, bench.places[term.form.index])
         cause = _cause(model, plain, term, size, rivals, _sure(chance, a.trial.form))
         log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")
-        if size >= enough and not _unsized(cause):
+        if size >= enough and not cause.may_be_nothing:
             causes = _merged(causes, cause)
         elif first:
             why = f"is real but small: {size:.1%} of what acts there" if size < enough else "may be nothing: the 95 % interval of its size holds that"
@@ -85,7 +85,7 @@ def answer(
         what = f"{a.trial.taken:.0%} of the power of prediction errors" if a.trial.taken < MIN_TAKEN else f"{a.trial.share:.1%} of what acts there"
         notes.append(_kept(a.terms[0], f"is real but small: {what}"))
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
-    biased, remarks = _offsets(model, plain, probe)
+    biased, remarks = _offsets(model, plain, probe, any(c.kind in loads.KINDS for c in causes))
     notes += more + remarks + _fitted_values(model, plain)
     offsets = [s.name for s in model.sensors if abs(after.fit.value(bias(s.name))) > Z_95 * after.fit.deviation(bias(s.name))]
     none = {bias(s.name) for s in model.sensors if s.name not in offsets}
@@ -103,12 +103,6 @@ def _name(t: Term) -> tuple[str, str]:
 def _kept(t: Term, why: str) -> str:
     """A note on a term without a name."""
     return f"{place(*_name(t))} {why}; not named, but in model_extended.toml"
-
-
-def _unsized(c: Cause) -> bool:
-    """Does the interval of its one size hold what the model has without it?"""
-    nothing = {"scale": 1.0, "gain": 1.0}
-    return len(c.parameters) == 1 and all(v.ci95[0] <= nothing.get(name, 0.0) <= v.ci95[1] for name, v in c.parameters.items())
 
 
 def _merged(causes: list[Cause], new: Cause) -> list[Cause]:
@@ -262,18 +256,21 @@ def _fitted_values(model: Model, bench: Bench) -> list[str]:
     return [f"as fitted, for the file only guesses: {', '.join(found)}{only}"] if found else []
 
 
-def _offsets(model: Model, bench: Bench, probe: Probe) -> tuple[list[Cause], list[str]]:
+def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[list[Cause], list[str]]:
     """Offsets of sensors that the recordings show: causes where they are worth it, notes where they are small, or as large as what is
-    not in a model by intent: gravity, ride height. Nothing where starts do the same: a plant without a spring to ground has no zero."""
+    not in a model by intent: gravity, ride height, or where a constant force has been found, of which they are a part (`loaded`). Nothing
+    where starts do the same: a plant without a spring to ground has no zero."""
     causes, notes = [], []
     shares = own_of_sensors(bench.model, bench.fit, {bias(s.name) for s in model.sensors})
     for j, (s, alone) in enumerate(zip(model.sensors, shares)):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
-        size = alone * abs(value) / max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
+        shown = max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
         if alone * abs(value) <= 3.0 * sd:
             continue
-        if bench.places and WORTH <= size < INTENDED and abs(abs(value) / constants.g - 1.0) > WORTH:  # without places it may stand for any law
-            causes.append(_load(model, bench, probe, s.name) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
+        sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # others that do nearly the same make more of what the model leaves out
+        large = WORTH <= abs(value) / shown < INTENDED and abs(abs(value) / constants.g - 1.0) > WORTH
+        if bench.places and not loaded and large and abs(value) > Z_95 * sd:  # without places it may stand for any law
+            causes.append(_load(model, bench, probe, s.name, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
         else:
             notes.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
     return causes, notes
@@ -283,9 +280,9 @@ def _constant(kind: str, where: str, name: str, value: float, sd: float, unit: s
     return Cause(kind, where, {name: Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))}, RIGHT, alike)
 
 
-def _load(model: Model, bench: Bench, probe: Probe, sensor: str) -> Cause | None:
-    """The constant force on a body that does to all sensors what the offset of one does, if there is one: the simpler cause, and what an
-    input or the sensor itself may be off by as well."""
+def _load(model: Model, bench: Bench, probe: Probe, sensor: str, deviation: float) -> Cause | None:
+    """The constant force on a body that does to all sensors what the offset of one, with its `deviation`, does, if there is one: the simpler
+    cause, and what an input or the sensor itself may be off by as well."""
     i = [f.target for f in bench.fit.free].index(bias(sensor))
     f = bench.fit.free[i]
     seen = bench.fit.slopes[:, :, i][bench.fit.used] / f.unit
@@ -299,7 +296,7 @@ def _load(model: Model, bench: Bench, probe: Probe, sensor: str) -> Cause | None
         sizes = np.linalg.lstsq(columns, seen, rcond=1e-9)[0]
         if np.linalg.norm(seen - columns @ sizes) < WORTH * np.linalg.norm(seen):
             factor = float(sizes[0]) / float(np.linalg.norm(column[bench.fit.used]))
-            value, sd = -factor * f.value, abs(factor) * bench.fit.deviation(bias(sensor))
+            value, sd = -factor * f.value, abs(factor) * deviation
             alike = (Named("sensor_bias", sensor), *_loads(model, p))
             return _constant("constant_force", p.name, "force", value, sd, p.unit("N"), alike)
     return None

@@ -24,7 +24,7 @@ from .noise import UNSEEN, Experiment
 from .residual import Channel, rms
 from .resolving import resolved
 from .result import Cause, Gain, Named, Value
-from .study import Study, fitted, look
+from .study import Study, fitted, guessed, look
 from .worth import WORTH
 
 Array = NDArray[np.float64]
@@ -142,7 +142,8 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
-    numbers, coarse = numerics.numerics(replace(measured, model=fitted(model, found.run)))
+    known = replace(found.run, free=tuple(f for f in found.run.free if f.target in guessed(model)))  # the others are near the file, or share with laws
+    numbers, coarse = numerics.numerics(replace(measured, model=fitted(model, known)))
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
     stated = np.array([s.noise for s in model.sensors])
     quiet = _within(study, fit, np.where(stated > 0.0, stated, bench.noise))

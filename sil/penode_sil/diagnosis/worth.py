@@ -27,10 +27,12 @@ LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of th
 ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
 
-def least(level: float, taken: float = 0.0) -> float:
-    """Share of what acts from which on a term is worth a name, where `level` of what moves wanders beside all that was found: WORTH, or
-    less where the model is else nearly right; never less than what keeps zero out of its interval. The level does not count for a term
-    that is `alone`, by the share `taken` of the power that innovations had beyond sensor noise."""
+def least(level: float, taken: float) -> float:
+    """Share of what acts from which on a term is worth a name: WORTH, or less for one that takes more than it leaves, by the share `taken` of
+    the power that innovations had beyond sensor noise, where the model is else nearly right: `level` of what moves wanders beside all that
+    was found. Never less than what keeps zero out of its interval. The level does not count for a term that is `alone`."""
+    if taken < 0.5:
+        return WORTH
     return min(WORTH, max(0.0 if alone(taken) else RATIO * level, Z_95 * SYSTEMATIC))
 
 
