@@ -323,10 +323,11 @@ def _tell(
     edges = " and ".join(f"{e * scale / per:.6g} {unit}" for e in (faults.low, faults.high) if e is not None)
     left = "they are bridged" if driving else "they are left out"
     stays = "it is used as it is: check the sensor" if driving else left
+    held = 'it is used as it is: check the sensor; if a controller holds it, write input = "held" in the model file' if driving else left
     for flags, what, done in (
         (faults.missing, "has no value", f"up to {BRIDGE} in a row are bridged" if driving else left),
         (faults.saturated, f"is cut off at {edges}", stays),
-        (faults.held, "repeats a value while the signal goes on", stays),
+        (faults.held, "repeats a value while the signal goes on", held),
         (faults.spikes, "has a spike", left),
     ):
         if flags.any():

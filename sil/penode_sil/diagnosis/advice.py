@@ -90,7 +90,7 @@ def _of_verdict(d: Diagnosis) -> list[str]:
         return ["record again with more excitation: larger motion, more frequencies, all sensors of the model file"]
     if d.verdict == "unexplained":
         return _where_to_look(d)
-    worse = [name for name, g in d.gain.items() if g.after_rmse > 1.05 * g.before_rmse]  # less may be chance
+    worse = [name for name, g in d.gain.items() if g.worsened]
     found = [f"do not use model_extended.toml yet: on the hold-out its error of {', '.join(worse)} is larger than that of the model as it is"] if worse else _take_over(d)
     if d.verdict == "partly_explained":
         found.append(f"look for the rest: {1.0 - d.explained:.0%} of the avoidable residual is unexplained; the report shows where and when it occurs")
@@ -101,8 +101,8 @@ def _take_over(d: Diagnosis) -> list[str]:
     """Mend what is not the model's, and take over what is."""
     faults = [c for c in d.causes if c.kind.startswith("sensor_")]
     channels = [c for c in d.causes if c.kind.startswith("input_")]
-    found = [f"check {', '.join(c.where for c in faults)}: the sensor is at fault, not the model"] if faults else []
-    found += [f"check actuator and channel of {', '.join(c.where for c in channels)}"] if channels else []
+    found = [f"check {', '.join(dict.fromkeys(c.where for c in faults))}: the sensor is at fault, not the model"] if faults else []
+    found += [f"check actuator and channel of {', '.join(dict.fromkeys(c.where for c in channels))}"] if channels else []
     if len(faults) < len([c for c in d.causes if c.kind != OUTSIDE]):
         found.append("use model_extended.toml; penode generate makes its C")
     return found

@@ -165,7 +165,7 @@ def _measured(
     case.tell(0.85, "measuring the gain")
     lost = {c.where for c in judged.causes if c.kind == "sensor_dropout"}
     gain, more, held = measuring.measure(study, extended, case.unused, lost)
-    worse = [s for s, g in gain.items() if g.after_rmse > 1.05 * g.before_rmse]
+    worse = [s for s, g in gain.items() if g.worsened]
     fitted = [c for c in judged.causes if c not in faults]  # the others are seen in the samples, not by a simulation
     if fitted and any(gain[s].after_rmse > UNSEEN * gain[s].noise_floor and gain[s].outside < FARTHER for s in worse):
         names = " and ".join(f"{c.kind} at {c.where}" for c in fitted)

@@ -65,6 +65,11 @@ class Gain:
     outside: float
     share_ci95: tuple[float, float] | None = None
 
+    @property
+    def worsened(self) -> bool:
+        """Is the extended model worse? Less than 5 % may be chance."""
+        return self.after_rmse > 1.05 * self.before_rmse
+
 
 @dataclass(frozen=True)
 class Recorded:

@@ -72,8 +72,8 @@ class Weighed:
         return self.verdict == "explained" and any(c.kind in INPUTS for c in self.causes)
 
     def worsens(self) -> bool:
-        """Does its model predict the hold-out worse than the file's, with a sensor? Less than 5 % may be chance."""
-        return any(g.after_rmse > 1.05 * g.before_rmse for g in self.gain.values())
+        """Does its model predict the hold-out worse than the file's, with a sensor?"""
+        return any(g.worsened for g in self.gain.values())
 
     def mends(self) -> bool:
         """Does its model predict the hold-out better than the file's, with every sensor?"""
