@@ -27,6 +27,7 @@ from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.compiling import longest
 from penode_sil.diagnosis.fit import Problem
 from penode_sil.diagnosis.faulty import delayed, railed
+from penode_sil.diagnosis.late import fastest, poles
 from penode_sil.measured import load
 from penode_sil.targets import Sil
 
@@ -837,7 +838,7 @@ def test_a_delay_is_written_as_it_was_fitted(roll_off):
     two poles not at all, and one pole leaves out the (1/2 - r) x^2 of the other."""
     n, delay, step = 4000, 0.02, 1e-3
     x = 0.1j
-    stiff, drag, direct, own = extension._late(roll_off)
+    stiff, drag, direct, own = poles(roll_off)
     late = stiff / (x * x + drag * x + stiff) if stiff else 1.0 / (1.0 + x)
     written = late + direct * (1.0 - late) - own * x * late
     t = step * np.arange(n)
@@ -883,8 +884,7 @@ def test_a_delay_beyond_the_recording_leaves_its_start():
 def test_a_delay_is_written_in_steps_that_it_is_stable_in(roll_off):
     """Steps of 1 of the faster pole; Runge-Kutta of order 4 is stable to 2.785. Pade's poles are at sqrt(12), those of 1/(1 + x + x^2/5)
     at 5/2 (1 +- sqrt(1/5)), that of one pole at 1."""
-    stiff, drag, *_ = extension._late(roll_off)
-    assert extension._fastest(stiff, drag) == pytest.approx({0.0: 12.0**0.5, 0.3: 2.5 * (1.0 + 0.2**0.5), 0.5: 1.0}[roll_off])
+    assert fastest(roll_off) == pytest.approx({0.0: 12.0**0.5, 0.3: 2.5 * (1.0 + 0.2**0.5), 0.5: 1.0}[roll_off])
 
 
 @pytest.mark.parametrize("fault", sample(FAULTS, "late", "drifting gain", "near its limits"))

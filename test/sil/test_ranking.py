@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import engine, innovate, propose
+from penode_sil.diagnosis import by_noise, engine, innovate, propose
 from penode_sil.diagnosis.catalogue import springs
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
 from penode_sil.diagnosis.result import Cause, Value
@@ -76,7 +75,17 @@ def test_a_cause_whose_interval_holds_0_has_no_size(low, high, unsized):
     gap = Value(0.5 * (low + high), "m", (low, high))
     assert Cause("backlash", "spring", {"gap": gap}, 0.9).may_be_nothing is unsized
     assert not Cause("bump_stop", "spring", {"gap": gap, "stiffness": Value(1e4, "N/m", (9e3, 1.1e4))}, 0.9).may_be_nothing
-    assert Cause("bump_stop", "spring", {"gap": gap, "stiffness": replace(gap, unit="N/m")}, 0.9).may_be_nothing is unsized
+
+
+def test_what_may_be_nothing_is_not_named_beside_other_causes():
+    """Fitted sizes only: not the share of lost samples, which is counted, nor a parameter of the file; and not the only cause."""
+    wide = (-1e-5, 3e-4)
+    play, lost = Cause("backlash", "spring", {"gap": Value(1e-4, "m", wide)}, 0.9), Cause("sensor_dropout", "x", {"share": Value(1e-4, "1", (0.0, 3e-4))}, 0.9)
+    own = Cause("wrong_parameter", "k", {"k": Value(1e-4, "N/m", wide)}, 0.9)
+    study = SimpleNamespace(model=SimpleNamespace(parameters={"k": None}))
+    best = SimpleNamespace(groups=(("backlash", "spring"), ("wrong_parameter", "k")))
+    assert by_noise._with_a_size(study, best, (play, lost, own)) == ((lost, own), [play])
+    assert by_noise._with_a_size(study, best, (play,)) == ((play,), [])
 
 
 def test_a_stop_stays_away_from_the_middle():

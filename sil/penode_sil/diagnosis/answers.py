@@ -13,7 +13,8 @@ import penode_gen
 from penode_gen.model import Model
 
 from ..measured import Measured
-from . import explanation, extension, plausible, residual, weighed
+from . import explanation, plausible, residual, weighed
+from .entries import extends
 from .result import OUTSIDE, Cause, Diagnosis, Recorded
 from .explanation import Explanation
 
@@ -23,7 +24,7 @@ def write_extended(text: str, model: Model, output: Path) -> Model:
     output.mkdir(parents=True, exist_ok=True)
     nominal = model.path.resolve()
     beside = Path(os.path.relpath(nominal, output.resolve()))
-    (output / "model_extended.toml").write_text(text.replace(extension.extends(nominal), extension.extends(beside), 1))
+    (output / "model_extended.toml").write_text(text.replace(extends(nominal), extends(beside), 1))
     return penode_gen.load(output / "model_extended.toml")
 
 

@@ -24,7 +24,7 @@ from .explanation import Explanation
 from .hypotheses import CLOCK
 from .judging import cause, damped, judge, pitching, resized, worth
 from .noise import UNSEEN, Experiment
-from .result import OUTSIDE, Cause, Diagnosis, Gain, place
+from .result import MAY_BE_NOTHING, OUTSIDE, Cause, Diagnosis, Gain, place
 from .study import Study, look
 
 CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
@@ -136,11 +136,9 @@ def _sized(case: Case, study: Study, best: Explanation | None, judged: Judged) -
     if not any(c.kind == OUTSIDE for c in causes):
         idle = explaining.explain(study, []) if best is None or not causes else None
         sized, named = refining.mended(study, best, case.log) if idle is None else (idle, idle)
-        whole = [resized(study, sized, c) for c in causes]
-        causes = tuple(c for c in whole if not c.may_be_nothing)
-        notes += [f"{place(c.kind, c.where)} may be nothing: the 95 % interval of its size holds that; not named" for c in whole if c.may_be_nothing]
-        if whole and not causes:
-            judged, causes, named = replace(judged, verdict="unexplained"), SURELY_NOT, None
+        causes = tuple(resized(study, sized, c) for c in causes)
+        causes, nothing = _with_a_size(study, best, causes)
+        notes += [f"{place(c.kind, c.where)} {MAY_BE_NOTHING}" for c in nothing]
     if judged.verdict == "unexplained" and not judged.doubt and not judged.drift:
         unnamed = nameless.fitted(study, best)
     if unnamed is not None and case.unused:
@@ -153,6 +151,15 @@ def _sized(case: Case, study: Study, best: Explanation | None, judged: Judged) -
     elif judged.verdict == "unexplained":
         explained = 0.0
     return replace(judged, causes=causes, explained=explained, notes=tuple(notes), named=named or unnamed, unnamed=unnamed)
+
+
+def _with_a_size(study: Study, best: Explanation | None, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[Cause]]:
+    """Causes, and those left out because their size may be nothing; all of them, if nothing else were named. What was counted, not fitted, and
+    values of the file's own parameters have no such size."""
+    fitted = set(best.groups) if best else set()
+    nothing = [c for c in causes if (c.kind, c.where) in fitted and c.may_be_nothing and not c.parameters.keys() & study.model.parameters.keys()]
+    kept = tuple(c for c in causes if c not in nothing)
+    return (kept, nothing) if kept else (causes, [])
 
 
 def _measured(

@@ -24,8 +24,9 @@ SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # quantiles of abs(y) that are tried as l
 
 def propose(bench: Bench, index: int, seen: Sequence[Array]) -> tuple[Score, Form] | None:
     """The limit that gains most for a sensor; None for one that was not measured, or hardly moves. A free run, `seen` [n, n_z] for each
-    recording, stands for the signal that is not cut off; what a limit cuts off it is the change of the innovations. Where the largest
-    samples lie within noise, before anything else is found, the run of the model file is tried as well."""
+    recording, stands for the signal that is not cut off; what a limit cuts off it is the change of the innovations. Before any
+    form is accepted, and if the largest 2 % of the samples agree within three standard deviations of noise, limits are also tried with the
+    nominal parameters."""
     y = np.abs(np.concatenate([r.y[:, index] for r in bench.records]))
     y = y[np.isfinite(y)]
     limits = [float(x) for x in np.quantile(y, SHARES) if x > 0.0] if y.size else []
@@ -44,9 +45,9 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> tuple[Score, For
 
 
 def _gains_of_nominal(bench: Bench, index: int, limits: Sequence[float]) -> list[float]:
-    """Log likelihood that limits of a sensor gain with the values of the model file: those fitted to what is cut off move too little."""
+    """Log likelihood gained by each limit of a sensor with nominal parameters: those fitted to clipped data give too little motion."""
     form = Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[0])
-    model, limit = limited(bench.model, form, "limit")
+    model, limit = limited(bench.model, form, "x0_0_limit")
     problem, free = bench.problem(model), (*bench.nominal, limit)
     shifts = np.zeros((len(limits), len(free)))
     shifts[:, -1] = np.log(np.array(limits) / limits[0])

@@ -21,7 +21,6 @@ from .entries import extends, table, toml, unlike
 from .explanation import Explanation
 from .faulty import BLUNT
 from .hypotheses import VALUED, Basis, Fault, size
-from .late import SHORT
 from .resolving import resolved
 from .result import Cause
 from .study import Study
@@ -35,7 +34,7 @@ def extend_file(study: Study, e: Explanation | None, causes: Sequence[Cause]) ->
     if e is None:
         return resolved(study, "\n".join(lines))
     taken = {*study.model.parameters, *study.model.states, *(x.name for x in study.model.elements), *(s.name for s in study.model.sensors)}
-    written = _Written(study, e, causes, _renaming(e, taken), unlike("age", taken), unlike("recorded", taken))
+    written = _Written(study, e, causes, taken)
     for j in range(len(study.model.sensors)):
         written.sensor(j)
     written.clock()
@@ -61,7 +60,7 @@ def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[
     if e is not None:
         substeps = max([1, *(_fine(study, t, n, e) for t, n in zip(e.terms, e.built.names))])
         values = {f.target: f.value for f in e.fit.free}
-        delays = [(k[1], d) for k, d in values.items() if k[0] == "delay" and d > SHORT * model.sample_time]
+        delays = [(k[1], d) for k, d in values.items() if k[0] == "delay" and d > late.SHORT * model.sample_time]
         substeps = max([substeps, *(late.substeps(d, _rolled(values, j), model.sample_time) for j, d in delays)])
         if substeps > model.substeps:
             lines.insert(-1, f"substeps = {substeps}")
@@ -78,11 +77,12 @@ def _renaming(e: Explanation, taken: Collection[str]) -> dict[str, str]:
 
 
 class _Written:
-    """Entries of the extended file, section by section: `rename` gives names of elements, `age` and `recorded` those of the time since the
-    start and of the longest recording."""
+    """Entries of the extended file, section by section. `taken`: names of the model file; `rename` gives those of added elements, `age` and
+    `recorded` those of the time since the start and of the longest recording."""
 
-    def __init__(self, study: Study, e: Explanation, causes: Sequence[Cause], rename: Mapping[str, str], age: str, recorded: str) -> None:
-        self.study, self.e, self.causes, self.rename, self.age, self.recorded = study, e, causes, rename, age, recorded
+    def __init__(self, study: Study, e: Explanation, causes: Sequence[Cause], taken: Collection[str]) -> None:
+        self.study, self.e, self.causes, self.taken = study, e, causes, taken
+        self.rename, self.age, self.recorded = _renaming(e, taken), unlike("age", taken), unlike("recorded", taken)
         self.values = {f.target: f.value for f in e.fit.free}
         self.parameters = self._parameters()
         self.sensors: list[str] = []
@@ -126,7 +126,7 @@ class _Written:
         bent = _bent(self.e, values, j, f"({expression})", s.name, unit, share, self.parameters)
         if bent:
             expression = f"{expression} + {bent}"
-        if values.get(("delay", j), 0.0) > SHORT * self.study.model.sample_time:
+        if values.get(("delay", j), 0.0) > late.SHORT * self.study.model.sample_time:
             expression = self._delayed(expression, j)
         if ("scale", j) in values:
             self.parameters.append(f"gain_{s.name} = {table({'value': 1.0 + values[('scale', j)], 'unit': '1'})}")
@@ -150,7 +150,7 @@ class _Written:
     def _delayed(self, expression: str, j: int) -> str:
         """An expression as late as sensor j is."""
         name, unit = self.e.built.model.sensors[j].name, units.si(self.e.built.model.sensors[j].unit)
-        names = [f"{what}_{name}" for what in ("delay", "late", "late_rate")]
+        names = [unlike(f"{what}_{name}", self.taken) for what in ("delay", "late", "late_rate")]
         found = late.written(expression, names, unit, max(self.values[("delay", j)], 1e-9), _rolled(self.values, j))
         self.parameters.append(found.parameter)
         self.states += found.states

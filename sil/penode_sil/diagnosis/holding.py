@@ -8,8 +8,8 @@ the error of the model's input is, to first order in P,
     held - u = -u' (P/2 + saw(t)),    saw(t) = ((t - phase) mod P) - P/2 = -(P/pi) (sin(w (t - phase)) + ...),    w = 2 pi/P.
 
 So a delay of P/2, and a sine and a cosine of 1/P times u' of the amplitude P/pi, find period and phases without a start: phases follow
-from sums of squares. The best of these are then compared as true steps. Innovations that are means over longer than P show the delay
-alone, so a hold is looked for, and compared with a delay, by innovations of four updates a period.
+from sums of squares. The best of these are then compared as true steps. Innovations averaged over more than P show
+only the delay. The search for a hold, and its comparison with a delay, therefore use four updates per period.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ from .catalogue.form import Form, Series
 from .evidence.bench import AGAIN, CORRELATION, Bench, fit_level
 from .evidence.blocks import Blocks
 from .evidence.gain import Level
+from .evidence.prior import stated
 from .evidence.screening import AT_ONCE, Beside, as_they_are
 from .fit import Free
 from .terms import Trial
 
 Array = NDArray[np.float64]
-SPREAD = 0.75, 1.35  # times twice the delay that fits best: periods that are tried
+SPREAD = 0.75, 1.35  # bounds of the search for a period, in units of twice the fitted delay
 FINER = 3.0  # frequencies tried, of the widths of one, 1/(length of the recordings)
 MOST = 1200  # of them: the finest periods of long recordings are left out
 KIND = "input_hold"
@@ -56,26 +57,31 @@ def propose(bench: Bench, index: int, delay: float) -> Form | None:
 
 
 def told_apart(bench: Bench, model: Model, trials: Sequence[Trial]) -> list[Trial]:
-    """Trials of a round in a `model` with all of them; a hold with the scores of the delay that it looks like, and what a bench that sees its
-    steps makes of the difference. Only these two are compared there: of a late sensor, samples are taken between those that were measured,
-    which have less noise."""
-    hold = next((t for t in trials if t.form.kind == KIND), None)
-    delay = next((t for t in trials if hold and t.form.how == "input_delay" and t.form.index == hold.form.index), None)
-    fine = _finer(bench, hold.form.series.period / bench.step) if hold and delay else bench
+    """The trials of a round (`model` contains all of them), with each hold scored against the delay of the same input at an update rate that
+    resolves its steps. Other trials keep their scores: interpolating between the samples of a late sensor lowers its noise, which would
+    bias the comparison."""
+    delays = {t.form.index: t for t in trials if t.form.how == "input_delay"}
+    return [_against(bench, model, t, delays[t.form.index]) if t.form.kind == KIND and t.form.index in delays else t for t in trials]
+
+
+def _against(bench: Bench, model: Model, hold: Trial, delay: Trial) -> Trial:
+    """A hold with the scores of a delay, and what it predicts better with updates that resolve its steps."""
+    fine = _finer(bench, hold.form.series.period / bench.step)
     if fine is bench:
-        return list(trials)
+        return hold
     blocks, problem = Blocks.of([len(r) // fine.update for r in fine.records]), fine.problem(model)
 
     def scores(t: Trial) -> Array:
         fit = problem.solve(t.fit.free, fine.gains(fine.fit, model).at(fine.level), AGAIN)
         return blocks.scores(problem, fit_level(replace(fine, model=model), problem, fit, fine.level)[1])
 
-    better = scores(hold) - scores(delay)
-    return [replace(t, blocks=delay.blocks + better) if t is hold else t for t in trials]
+    relief = stated(delay.fit.free) - stated(hold.fit.free)
+    return replace(hold, blocks=delay.blocks + scores(hold) - scores(delay) + relief / len(delay.blocks))
 
 
 def _finer(bench: Bench, period: float) -> Bench:
-    """A bench that sees steps of so many samples: four updates in each show their first wave by sin(pi/4)/(pi/4) = 90 %."""
+    """The bench with at least four updates per `period` [samples]: averaging then keeps sin(pi/4)/(pi/4) = 90 % of the fundamental of the
+    steps. The same bench if it is fine enough."""
     update = max(1, int(0.25 * period))
     if update >= bench.update:
         return bench
@@ -87,7 +93,7 @@ def _finer(bench: Bench, period: float) -> Bench:
 
 
 def _likeliest(bench: Bench, index: int, about: float) -> Series:
-    """The steps of about so many samples that promise most."""
+    """The hold with a period near `about` [samples] that gains most."""
     step, wide = bench.step, 1.0 / (FINER * max(len(r) for r in bench.records))
     frequencies = np.arange(1.0 / (SPREAD[1] * about), min(0.5, 1.0 / (SPREAD[0] * about)), wide)[:MOST]
     slopes = [np.gradient(r.u[:, index]) for r in bench.records]

@@ -19,7 +19,7 @@ from .evidence.fit import Problem
 from .evidence.prior import stated
 from .propose import PROMISE, is_part, propose
 from .terms import Term, Trial
-from .worth import WORTH, Z_95, alone, least, undetermined
+from .worth import WORTH, Z_95, alone, least, mostly, undetermined
 
 Array = NDArray[np.float64]
 SCORED = 4  # of the promising trials, how many are scored on held-out blocks
@@ -70,7 +70,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         accepted.append(Accepted(best, tuple(terms), good))
         large.append(_large(best, least(bench.level.size, best.whole)))
         hides = large[-1] or any(_hidden(t, best) for t in good)
-        if not hides and best.whole < 1.0 - best.whole:  # it takes less than it leaves
+        if not hides and not mostly(best.whole):
             break
     if accepted and alone(accepted[-1].trial.whole):
         large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in accepted]
@@ -88,8 +88,8 @@ def _apart(start: Bench, bench: Bench, accepted: Sequence[Accepted], large: Sequ
 
 
 def _good(bench: Bench, terms: Sequence[Term], blocks: Blocks, base: Array, log: Callable[[str], None]) -> tuple[Trial, ...]:
-    """Trials that predict left-out blocks enough better than `base`, the best first; only those that matter if one of them predicts as well as
-    any: a large form that predicts less well than a small one stands for it."""
+    """Trials that predict left-out blocks better than `base` by MIN_GAIN, the best first. If a large form predicts as well as the best, to MIN_GAIN,
+    only large ones; otherwise the large form only imitates a smaller one."""
     trials, wide = propose(bench, terms, log)
     trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
     trials = holding.told_apart(bench, wide, [_scored(bench, bench.problem(wide), blocks, t) for t in trials[:SCORED]])

@@ -11,7 +11,7 @@ import numpy as np
 
 from .entries import table, toml
 
-SHORT = 0.02  # of a sample: a delay that is left out
+SHORT = 0.02  # of a sample: shorter delays are not written
 ONE_POLE = 0.48  # of a delay squared: beyond that the second pole of a filter is 50 times as fast as the first
 
 
@@ -26,8 +26,8 @@ class Late:
 
 
 def written(expression: str, names: Sequence[str], unit: str, delay: float, roll_off: float = 0.0) -> Late:
-    """An expression in `unit`, late by `delay` [s] with a `roll_off` of its square (see `poles`). `names`: of the delay, of the late signal,
-    of the rate of that times the delay."""
+    """An expression in `unit`, delayed by `delay` [s]. `roll_off`: second-order attenuation, in units of delay^2 (see `poles`). `names`: of the
+    delay, the delayed signal, and its rate times the delay."""
     time, late, rate = names
     stiff, drag, direct, own = poles(roll_off)
     slope = rate if stiff else f"{expression} - {late}"
@@ -43,13 +43,18 @@ def written(expression: str, names: Sequence[str], unit: str, delay: float, roll
 
 
 def substeps(delay: float, roll_off: float, step: float) -> int:
-    """Steps a sample of `step` [s] such that the fastest pole of a delay [s] decays by at most 1/e in one."""
+    """Substeps per sample of `step` [s] for which the fastest pole of a delay [s] times the substep is at most 1."""
+    return int(np.ceil(fastest(roll_off) * step / delay))
+
+
+def fastest(roll_off: float) -> float:
+    """The faster pole of a delay's states, or the one of one, times the delay."""
     stiff, drag, _, _ = poles(roll_off)
-    return int(np.ceil((float(np.max(np.abs(np.roots([1.0, drag, stiff])))) if stiff else 1.0) * step / delay))
+    return float(np.max(np.abs(np.roots([1.0, drag, stiff])))) if stiff else 1.0
 
 
 def poles(roll_off: float) -> tuple[float, float, float, float]:
-    """A delay with a roll-off (of its square, see `delayed`) in two states, x*late = rate and x*rate = stiff*(u - late) - drag*rate
+    """A delay with a roll-off (of its square, see faulty.delayed) in two states, x*late = rate and x*rate = stiff*(u - late) - drag*rate
     with x = s*delay: late + direct*(u - late) - own*rate. Two poles are themselves; one of them alone (all 0: x*late = u - late) if
     the other is far faster. With less roll-off, Pade's fraction of order 2 of exp(-x) (1 + roll_off x^2): 12, 6, 1, 1 without any."""
     if roll_off > ONE_POLE:

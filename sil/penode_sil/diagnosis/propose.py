@@ -115,8 +115,7 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
 
 
 def _holds(bench: Bench, trials: Sequence[Trial], terms: Sequence[Term]) -> list[Term]:
-    """Holds of the inputs that are late in one of the trials, of about twice its delay; of those that gain half of what the best trial does,
-    for a delay is the larger part of a hold."""
+    """Hold terms for inputs of which a delay gained at least half as much as the best trial: the delay is the main effect of a hold."""
     taken = [t.form.where for t in terms if t.form.kind == holding.KIND]
     most = max((t.gain for t in trials), default=0.0)
     late = [t for t in trials if t.form.how == "input_delay" and t.form.where not in taken and t.gain > max(0.5 * most, PROMISE)]
@@ -136,15 +135,18 @@ def _slope(bench: Bench, form: Form) -> Array:
 
 
 def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], term: Term, sizes: Array) -> Trial:
-    """A term beside all that was accepted: from the best so far with the sizes that its score promises; where parameters are hardly known,
-    and for a limit that has bent them, also from the nominal ones, and from its own free run, for the motion of a wrong plant promises little."""
+    """Fits a term beside those accepted, from the best fit so far with the sizes that its score promises. Where parameters are hardly known,
+    and for a limit, which may have bent them, it also starts from the nominal values, and from a free run of these: the motion of a wrong plant
+    promises little."""
     problem = bench.problem(wide)
     n_x = len(wide.states)
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
     starts = [(*bench.fit.free, *_sized(term, sizes))]
     if term.form.how == "clip" or any(f.log and f.sigma > VAGUE for f in bench.nominal):
         little = np.clip(sizes, *np.outer((-1.0, 1.0), [LITTLE * f.unit for f in term.free if not f.log]))
-        starts += [(*bench.nominal, *_sized(term, little)), (*bench.fit.free, *_sized(term, little))]
+        own = {f.target for f in bench.nominal}
+        nominal = (*bench.nominal, *(f for f in bench.fit.free if f.target not in own))
+        starts += [(*nominal, *_sized(term, little)), (*bench.fit.free, *_sized(term, little))]
         runs = [problem.solve(f, still, FREE_RUN) for f in starts[1:]]
         starts.append(max(runs, key=lambda f: f.cost).free)
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)

@@ -14,7 +14,7 @@ from penode_gen.model import GROUND, Model
 from scipy import constants
 
 from . import catalogue, innovate
-from .catalogue import drives, loads
+from .catalogue import drives, friction, loads
 from .catalogue.form import Form, Motion, Sizes
 from .evidence.bench import UNSTATED, Bench, build
 from .evidence.blocks import posterior
@@ -26,14 +26,14 @@ from .innovate import MIN_TAKEN, Found
 from .noise import Experiment
 from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
-from .result import Cause, Named, Value, place
+from .result import MAY_BE_NOTHING, Cause, Named, Value, place
 from .study import guessed
 from .terms import Term, Trial
 from .worth import SYSTEMATIC, WORTH, Z_95, least, own_of_sensors, share, shift, undetermined
 
 Array = NDArray[np.float64]
 INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
-RIGHT = 0.93  # share of the causes named in wrong worlds that are right (seed 20261206, 58 of 62); others stand for what is not in the catalogue, or look like it
+RIGHT = 0.93  # share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
 RIVAL = (1.0 - RIGHT) / RIGHT  # posterior, RIGHT of which is as much as what is not in the catalogue has: from there on an explanation is listed
 
 
@@ -79,13 +79,13 @@ def answer(
         if size >= enough and not cause.may_be_nothing:
             causes = _merged(causes, cause)
         elif first:
-            why = f"is real but small: {size:.1%} of what acts there" if size < enough else "may be nothing: the 95 % interval of its size holds that"
-            notes.append(_kept(term, why))
+            notes.append(_small(term, f"{size:.1%} of what acts there") if size < enough else f"{place(*_name(term))} {MAY_BE_NOTHING}")
     for a in found.small:
         what = f"{a.trial.taken:.0%} of the power of prediction errors" if a.trial.taken < MIN_TAKEN else f"{a.trial.share:.1%} of what acts there"
-        notes.append(_kept(a.terms[0], f"is real but small: {what}"))
+        notes.append(_small(a.terms[0], what))
     wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
-    biased, remarks = _offsets(model, plain, probe, any(c.kind in loads.KINDS for c in causes))
+    stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
+    biased, remarks = _offsets(model, plain, probe, any(c.kind in (*loads.KINDS, *stopped) for c in causes))
     notes += more + remarks + _fitted_values(model, plain)
     offsets = [s.name for s in model.sensors if abs(after.fit.value(bias(s.name))) > Z_95 * after.fit.deviation(bias(s.name))]
     none = {bias(s.name) for s in model.sensors if s.name not in offsets}
@@ -100,9 +100,9 @@ def _name(t: Term) -> tuple[str, str]:
     return t.form.kind, t.form.where
 
 
-def _kept(t: Term, why: str) -> str:
-    """A note on a term without a name."""
-    return f"{place(*_name(t))} {why}; not named, but in model_extended.toml"
+def _small(t: Term, what: str) -> str:
+    """A note on a term that is too small for a name."""
+    return f"{place(*_name(t))} is real but small: {what}; not named, but in model_extended.toml"
 
 
 def _merged(causes: list[Cause], new: Cause) -> list[Cause]:
@@ -257,9 +257,9 @@ def _fitted_values(model: Model, bench: Bench) -> list[str]:
 
 
 def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[list[Cause], list[str]]:
-    """Offsets of sensors that the recordings show: causes where they are worth it, notes where they are small, or as large as what is
-    not in a model by intent: gravity, ride height, or where a constant force has been found, of which they are a part (`loaded`). Nothing
-    where starts do the same: a plant without a spring to ground has no zero."""
+    """Sensor offsets that the recordings show. Those of 7 to 100 % of the signal's rms are causes. Notes are smaller and larger ones, about 1 g,
+    and all of them if what was named moves the position of rest too (`loaded`): they may be intended, or part of that. Nothing where start
+    states have the same effect: a plant without a spring to ground has no zero."""
     causes, notes = [], []
     shares = own_of_sensors(bench.model, bench.fit, {bias(s.name) for s in model.sensors})
     for j, (s, alone) in enumerate(zip(model.sensors, shares)):
@@ -267,7 +267,7 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
         shown = max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
         if alone * abs(value) <= 3.0 * sd:
             continue
-        sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # others that do nearly the same make more of what the model leaves out
+        sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # collinearity with other free values amplifies the effect of model error
         large = WORTH <= abs(value) / shown < INTENDED and abs(abs(value) / constants.g - 1.0) > WORTH
         if bench.places and not loaded and large and abs(value) > Z_95 * sd:  # without places it may stand for any law
             causes.append(_load(model, bench, probe, s.name, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))

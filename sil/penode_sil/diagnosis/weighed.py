@@ -36,7 +36,8 @@ UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be
 class Misfit:
     """How much more acts than an explanation has, beyond the noise of sensors: `size`, as a share of what moves; 0 if that may be chance,
     infinite if it follows the measurement worse than the model as it is: its curves hold along its own way alone, and bend away beside it.
-    Beyond UNMODELLED innovations have to decide; less than that, only a simpler answer of theirs counts. `likelihood`: log likelihood of its
+    Beyond UNMODELLED innovations have to decide; less than that, only a simpler answer of theirs counts, and all of them for a model without
+    inputs. `likelihood`: log likelihood of its
     innovations, in steps of `update` samples; infinite where sensor noise is all that is left."""
 
     size: float = 0.0
@@ -62,7 +63,7 @@ class Weighed:
     explained: float  # share taken of the residual in a free run, or of the power of the innovations, whichever is larger
     level: float  # of what moves wanders beside all that was found
     laws: int  # of all causes named
-    numerics: dict[str, object]  # of the step as the file has it, with parameters as they are fitted
+    numerics: dict[str, object]  # error of the deployed step; parameters that the file only guesses are at their fitted values
     likelihood: float  # log likelihood of the innovations with the named causes
     update: int  # samples for each innovation
 
@@ -142,7 +143,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after))
     powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
     causes, notes = _plausible(model, found.causes)
-    known = replace(found.run, free=tuple(f for f in found.run.free if f.target in guessed(model)))  # the others are near the file, or share with laws
+    known = replace(found.run, free=tuple(f for f in found.run.free if f.target in guessed(model)))  # the others may compensate for laws that were added
     numbers, coarse = numerics.numerics(replace(measured, model=fitted(model, known)))
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
     stated = np.array([s.noise for s in model.sensors])

@@ -28,12 +28,17 @@ ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
 
 def least(level: float, taken: float) -> float:
-    """Share of what acts from which on a term is worth a name: WORTH, or less for one that takes more than it leaves, by the share `taken` of
-    the power that innovations had beyond sensor noise, where the model is else nearly right: `level` of what moves wanders beside all that
-    was found. Never less than what keeps zero out of its interval. The level does not count for a term that is `alone`."""
-    if taken < 0.5:
+    """Smallest share of the acting force that is named. WORTH, unless the term takes at least half of the power of the innovations beyond
+    sensor noise (`taken`). Then it is less where little wanders beside all that was found (RATIO * `level`), or whatever wanders if the
+    term is `alone`, but not below Z_95 * SYSTEMATIC, where its interval would include zero."""
+    if not mostly(taken):
         return WORTH
     return min(WORTH, max(0.0 if alone(taken) else RATIO * level, Z_95 * SYSTEMATIC))
+
+
+def mostly(taken: float) -> bool:
+    """Does a term that takes this share of the power take more than it leaves?"""
+    return taken > 0.5
 
 
 def alone(taken: float) -> bool:

@@ -63,7 +63,7 @@ class Motion:
 class Part:
     """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies
     it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values.
-    `force` gives its force [n] for gain 1 along a motion from all shapes by name, where that is quicker than a simulation. A shape stays within a factor of
+    `force(motion, **shapes)` returns the force [n] for gain 1; given where that is faster than a simulation. A shape stays within a factor of
     `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump, and may become
     as small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another cause."""
 
