@@ -58,6 +58,13 @@ def test_stated_ratio_by_another_way(index):
     assert world.rms(left[0]) / world.rms(left[1]) == pytest.approx(truth["ratio"], rel=0.01)
 
 
+@pytest.mark.parametrize("index", range(4))
+def test_no_damper_drives(index):
+    """Of asymmetric dampers, those of a lightly damped swing would have to: they are drawn again."""
+    effects = [e for i in range(12 * index, 12 * index + 12) for e in world.make(20261203, i).effects if e.kind == "asymmetric_damper"]
+    assert all(min(e.parameters.values()) >= 0.0 for e in effects)
+
+
 def test_solver_against_an_exact_swing():
     """A damped oscillator from 1 rad: closed form. Order 4 at 0.25 ms and 10 rad/s errs by (w h)^4/120 a radian, 1e-12; 1e-9 is allowed."""
     plant = solver.Plant([2.0], [], {"pivot": [1.0]}, np.zeros((1, 0)), [solver.Law("pivot", "linear", [200.0, 0.8])])

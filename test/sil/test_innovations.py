@@ -14,11 +14,12 @@ import pytest
 from scipy import linalg, stats
 
 import penode_gen
+from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
 from penode_sil.diagnosis import driven, holding, plant, real, weighed
 from penode_sil.diagnosis.catalogue import FILES, drives
 from penode_sil.diagnosis.catalogue.form import Motion, Moved
-from penode_sil.diagnosis.evidence import blocks
+from penode_sil.diagnosis.evidence import bench, blocks
 from penode_sil.diagnosis.evidence.bench import with_tolerances
 from penode_sil.diagnosis.evidence.gain import Gains, Level, riccati
 from penode_sil.diagnosis.evidence.observer import Record, augmented, sample_noise
@@ -250,6 +251,12 @@ def test_friction_in_a_wrong_world(tmp_path, seed, show):
 def test_small_deviations_have_no_name(tmp_path):
     model, experiments = swing(tmp_path, lambda s, v: BENT * math.sin(11.0 * s), 3)
     assert answered(model, experiments).causes == ()
+
+
+@pytest.mark.parametrize("value, tolerance", ((0.3, 0.0), (0.3, 0.1), (-2.0, 0.1)))
+def test_a_parameter_keeps_its_sign(value, tolerance):
+    f = bench.parameter(Parameter("d", value, "N*s/m", tolerance=tolerance))
+    assert f.low <= f.value <= f.high and f.low * f.high <= 0.0 and (f.low == 0.0) is (value > 0.0)
 
 
 def test_parameter_without_a_tolerance(tmp_path, penode):

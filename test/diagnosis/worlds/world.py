@@ -303,6 +303,8 @@ class World:
         self.runs = {**self.runs, **{k: self._simulate(k) for k in self.records}}
         for i, e in enumerate(self.effects):
             e.ratio, e.share = self.effect_size(i)
+            if e.kind == "asymmetric_damper" and min(e.parameters.values()) < 0.0:
+                raise Runaway  # it would drive
 
     def _plain(self) -> Run:
         hidden, self.effects = self.effects, []

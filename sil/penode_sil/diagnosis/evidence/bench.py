@@ -69,14 +69,14 @@ class Bench:
 
 
 def parameter(p: Parameter) -> Free | None:
-    """A parameter with its prior; None for one that is known."""
+    """A parameter with its prior; None for one that is known. It keeps its sign: a mass, a stiffness, a damping below zero is none."""
     if p.exact or p.value == 0.0:
         return None
     size = abs(p.value)
-    if 0.0 < p.tolerance <= 1.0:
-        return Stated(p.name, p.value, size * p.tolerance * SHARE, sigma=size * p.tolerance * SHARE, origin=p.value)
-    if p.tolerance == 0.0:
-        return Stated(p.name, p.value, size * UNSTATED * SHARE, sigma=size * UNSTATED * SHARE, origin=p.value)
+    if p.tolerance <= 1.0:
+        sigma = size * (p.tolerance or UNSTATED) * SHARE
+        low, high = (0.0, np.inf) if p.value > 0.0 else (-np.inf, 0.0)
+        return Stated(p.name, p.value, sigma, sigma=sigma, origin=p.value, low=low, high=high)
     sigma = np.log1p(p.tolerance) * SHARE  # infinite for one that is unknown
     ends = sorted((p.value / FAR, p.value * FAR))
     return Free(p.name, p.value, size, log=True, sigma=sigma, origin=p.value, low=ends[0], high=ends[1])
