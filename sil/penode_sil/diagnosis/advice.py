@@ -100,8 +100,11 @@ def _of_verdict(d: Diagnosis) -> list[str]:
 def _take_over(d: Diagnosis) -> list[str]:
     """Mend what is not the model's, and take over what is."""
     faults = [c for c in d.causes if c.kind.startswith("sensor_")]
+    doubtful = [(c, a.where) for c in faults for a in c.alternatives if a.kind.startswith("input_")]
+    sure = [c for c in faults if all(c is not x for x, _ in doubtful)]
     channels = [c for c in d.causes if c.kind.startswith("input_")]
-    found = [f"check {', '.join(dict.fromkeys(c.where for c in faults))}: the sensor is at fault, not the model"] if faults else []
+    found = [f"check {', '.join(dict.fromkeys(c.where for c in sure))}: the sensor is at fault, not the model"] if sure else []
+    found += [f"check {c.where} and the channel of {where}: the recordings do not tell which of them is at fault" for c, where in doubtful]
     found += [f"check actuator and channel of {', '.join(dict.fromkeys(c.where for c in channels))}"] if channels else []
     if len(faults) < len([c for c in d.causes if c.kind != OUTSIDE]):
         found.append("use model_extended.toml; penode generate makes its C")

@@ -41,9 +41,10 @@ def alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
     sure = float(np.prod([c.confidence for c in causes]))
     sets = [{"causes": own, "posterior": sure}]
     for k, c in enumerate(causes):
+        others = float(np.prod([x.confidence for x in causes if x is not c]))
         for a in c.alternatives:
             other = [*own[:k], {"kind": a.kind, "where": a.where}, *own[k + 1 :]]
-            sets.append({"causes": other, "posterior": (1.0 - c.confidence) / len(c.alternatives)})
+            sets.append({"causes": other, "posterior": others * (1.0 - c.confidence) / len(c.alternatives)})
     return tuple(sets)
 
 

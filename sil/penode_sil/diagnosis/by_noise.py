@@ -17,14 +17,14 @@ import penode_gen
 from penode_gen.model import Model
 
 from ..measured import Measured
-from . import absorb, echo, explaining, extension, measuring, nameless, noise, numerics, plant, plausible, refining, residual, steady, tones
+from . import absorb, echo, explaining, extension, measuring, nameless, noise, numerics, plant, plausible, refining, residual, steady, straight, tones
 from .answers import alternatives, write_extended
 from .broken import broken_sensors, still_wild
 from .explanation import Explanation
 from .hypotheses import CLOCK
 from .judging import cause, damped, judge, pitching, resized, worth
 from .noise import UNSEEN, Experiment
-from .result import MAY_BE_NOTHING, OUTSIDE, Cause, Diagnosis, Gain, place
+from .result import MAY_BE_NOTHING, OUTSIDE, Cause, Diagnosis, Gain, Named, place
 from .study import Study, look
 
 CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
@@ -138,6 +138,9 @@ def _sized(case: Case, study: Study, best: Explanation | None, judged: Judged) -
         sized, named = refining.mended(study, best, case.log) if idle is None else (idle, idle)
         causes = tuple(resized(study, sized, c) for c in causes)
         causes, nothing = _with_a_size(study, best, causes)
+        missed = straight.missed(study, sized, causes)
+        first = {Named(c.kind, c.where) for c in missed}  # which are no alternatives to the others then
+        causes = (*missed, *(replace(c, alternatives=tuple(a for a in c.alternatives if a not in first)) for c in causes))
         notes += [f"{place(c.kind, c.where)} {MAY_BE_NOTHING}" for c in nothing]
     if judged.verdict == "unexplained" and not judged.doubt and not judged.drift:
         unnamed = nameless.fitted(study, best)

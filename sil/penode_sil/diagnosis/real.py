@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from penode_gen import units
 from penode_gen.model import GROUND, Model
 from scipy import constants
 
-from . import catalogue, innovate
+from . import catalogue, innovate, straight
 from .catalogue import drives, friction, loads
 from .catalogue.form import Form, Motion, Sizes
 from .evidence.bench import UNSTATED, Bench, build
@@ -83,13 +83,15 @@ def answer(
     for a in found.small:
         what = f"{a.trial.taken:.0%} of the power of prediction errors" if a.trial.taken < MIN_TAKEN else f"{a.trial.share:.1%} of what acts there"
         notes.append(_small(a.terms[0], what))
-    wrong, more = _parameters(model, plain, moved, _shared(model, plain, named), log)
+    share_lines = [t for t in named if t.form.how == "force" and t.form.kind in getattr(catalogue.OF[t.form.kind], "STRAIGHT", ())]
+    wrong, more = _parameters(model, plain, moved, straight.beside(model, plain, share_lines, moved), log)
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
     biased, remarks = _offsets(model, plain, probe, any(c.kind in (*loads.KINDS, *stopped) for c in causes))
-    notes += more + remarks + _fitted_values(model, plain)
+    notes += more + remarks
     offsets = [s.name for s in model.sensors if abs(after.fit.value(bias(s.name))) > Z_95 * after.fit.deviation(bias(s.name))]
     none = {bias(s.name) for s in model.sensors if s.name not in offsets}
     run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 20)
+    notes += _fitted_values(model, run)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
     taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken_whole(after.fit, bench.problem().floor))
     sets = _explanations([(a.terms[0], chances[a.trial]) for a in found.named])
@@ -150,7 +152,8 @@ def _explanations(named: Sequence[tuple[Term, Sequence[tuple[Form, float]]]]) ->
         for r in _rivals(options, term):
             p = next(p for f, p in options if (f.kind, f.where) == (r.kind, r.where))
             sets.append((tuple(r if n == Named(*_name(term)) else n for n in own), others * p))
-    return tuple(sets)
+    whole = max(sum(p for _, p in sets) / RIGHT, 1.0)  # forms of one curve count for the simplest of them, and each for itself
+    return tuple((names, p / whole) for names, p in sets)
 
 
 def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Named, ...], sure: float) -> Cause:
@@ -212,16 +215,11 @@ def _values_of(bench: Bench, term: Term) -> list[Free]:
     return [f for f in bench.fit.free if f.target in {t.target for t in term.free}]
 
 
-def _shared(model: Model, bench: Bench, terms: Sequence[Term]) -> set[str]:
-    """Parameters of straight lines at places where a law of the catalogue has a straight part of its own: how much of the line is whose
-    is a matter of writing it down."""
-    places = {t.form.index for t in terms if t.form.how == "force" and t.form.kind in getattr(catalogue.OF[t.form.kind], "STRAIGHT", ())}
-    names = {name for k in places for name, _ in bench.places[k].elements}
-    return {p for e in model.elements if e.name in names for p in e.arguments.values()}
-
-
-def _parameters(model: Model, bench: Bench, moved: Sequence[Motion], shared: Collection[str], log: Callable[[str], None]) -> tuple[list[Cause], list[str]]:
-    """Parameters that are not what the file says, beyond what it vouches for, and a note on those that are shared with a law."""
+def _parameters(
+    model: Model, bench: Bench, moved: Sequence[Motion], shared: Mapping[str, straight.Slopes], log: Callable[[str], None]
+) -> tuple[list[Cause], list[str]]:
+    """Parameters that are not what the file says, beyond what it vouches for, and a note on those that a law at their place may have taken, by
+    the slopes that it has (`shared`)."""
     fit, causes, notes = bench.fit, [], []
     for name, p in model.parameters.items():
         f = next((f for f in fit.free if f.target == name), None)
@@ -235,23 +233,25 @@ def _parameters(model: Model, bench: Bench, moved: Sequence[Motion], shared: Col
         low, high = f.value - Z_95 * sd, f.value + Z_95 * sd
         log(f"{name}: {f.value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of what acts there")
         if off > limit and not low <= p.value * (1.0 + limit * np.sign(f.value / p.value - 1.0)) <= high and not low <= p.value <= high:
-            if name in shared:
+            if name in shared and not straight.off(p.value, f.value, shared[name], limit):
                 notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)} beside what was found at its place, which shares its straight part")
                 continue
             if size < WORTH:
                 notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)}, which changes {size:.1%} of what acts there: as much as anything that the model leaves out might")
                 continue
-            causes.append(Cause("wrong_parameter", name, {name: Value(f.value, units.si(p.unit), (low, high))}, RIGHT))
+            least, most = shared.get(name, (0.0, 0.0))
+            value = Value(f.value + 0.5 * (least + most), units.si(p.unit), (low + least, high + most))
+            causes.append(Cause("wrong_parameter", name, {name: value}, RIGHT))
     return causes, notes
 
 
-def _fitted_values(model: Model, bench: Bench) -> list[str]:
-    """A note on parameters that the file only guesses."""
-    found, ratios = [], undetermined(model, bench.fit)
+def _fitted_values(model: Model, fit: Fit) -> list[str]:
+    """A note on parameters that the file only guesses, as the extended model has them."""
+    found, ratios = [], undetermined(model, fit)
     for name in guessed(model):
-        if any(f.target == name for f in bench.fit.free):
-            sure = "" if name in ratios else f" +- {Z_95 * bench.fit.deviation(name, ratios):.2g}"
-            found.append(f"{name} = {bench.fit.value(name):.4g} {units.si(model.parameters[name].unit)}{sure}")
+        if any(f.target == name for f in fit.free):
+            sure = "" if name in ratios else f" +- {Z_95 * fit.deviation(name, ratios):.2g}"
+            found.append(f"{name} = {fit.value(name):.4g} {units.si(model.parameters[name].unit)}{sure}")
     only = f"; the recordings show forces as ratios to {', '.join(sorted(ratios))} only" if ratios else ""
     return [f"as fitted, for the file only guesses: {', '.join(found)}{only}"] if found else []
 

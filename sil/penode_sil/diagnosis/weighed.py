@@ -151,7 +151,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     verdict = _verdict(found, causes, share, max(left, bench.level.size), quiet)
     if coarse and verdict != "unexplained":
         causes, verdict = (*causes, coarse), "explained" if verdict == "no_discrepancy" else verdict
-    explanations = tuple({"causes": [{"kind": n.kind, "where": n.where} for n in names], "posterior": p} for names, p in found.explanations)
+    explanations = _explanations(causes, found.explanations)
     notes = (*notes, *found.notes, *made.left, *more)
     laws = sum(max(len(x.form.parts), 1) for a in found.found.named for x in a.terms)
     likelihood = found.found.plain.fit.likelihood
@@ -165,6 +165,20 @@ def _measured(study: Study, noise: Array) -> Study:
     levels = tuple(np.tile(noise**2, (len(x), 1)) for x in study.levels)
     experiments = tuple(replace(e, quiet=np.full_like(e.quiet, np.nan)) for e in study.experiments)
     return replace(study, levels=levels, experiments=experiments)
+
+
+def _explanations(causes: Sequence[Cause], sets: Sequence[tuple[tuple[Named, ...], float]]) -> tuple[dict[str, object], ...]:
+    """Sets of causes with their posterior, each with all causes that are named beside those that the sets exchange."""
+    first = sets[0][0] if sets else ()
+    named = [Named(c.kind, c.where) for c in causes]
+    always = [n for n in named if n not in first]
+    if not named:
+        return ()
+    found = []
+    for names, posterior in sets or [((), min(c.confidence for c in causes))]:
+        whole = [*always, *(n for n in names if n in named or n not in first)]
+        found.append({"causes": [{"kind": n.kind, "where": n.where} for n in whole], "posterior": posterior})
+    return tuple(found)
 
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float, quiet: bool) -> str:

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The straight line that laws found at a place share with its linear element: what of it is a parameter that is off.
+
+How much of a line is whose, of two elements in parallel, is a matter of writing it down: an asymmetric spring beside a stiffness k may be
+that of either side, or of their mean. So a parameter is compared with all slopes that its element and the laws beside it have together: it
+is off where none of these is within its tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from penode_gen import laws, units
+from penode_gen.model import Model
+
+from .catalogue.form import Motion, Moved
+from .evidence.bench import Bench
+from .explanation import Explanation
+from .hypotheses import Basis, size
+from .naming import Curve
+from .plant import Place
+from .result import Cause, Value
+from .study import Study
+from .terms import Term
+
+Array = NDArray[np.float64]
+Slopes = tuple[float, float]  # the least and the greatest
+LINES = {"linear_spring": ("stiffness", "s"), "linear_damper": ("damping", "v")}  # argument, and of what it is the slope
+
+
+def off(nominal: float, own: float, slopes: Slopes, limit: float) -> bool:
+    """Is a parameter, `own` as it is fitted, farther from its nominal value than its relative `limit`, with any of the slopes beside it?"""
+    far = limit * abs(nominal)
+    return not own + slopes[0] - far <= nominal <= own + slopes[1] + far
+
+
+def beside(model: Model, bench: Bench, terms: Sequence[Term], moved: Sequence[Motion]) -> dict[str, Slopes]:
+    """Of each parameter of a straight line beside `terms` at its place: the slopes that these have, as they are fitted."""
+    found: dict[str, Slopes] = {}
+    for k in {t.form.index for t in terms}:
+        own, motion = [t for t in terms if t.form.index == k], moved[k]
+        for parameter, quantity in _lines(model, bench.places[k]):
+            reach = motion.s_reach if quantity == "s" else motion.v_reach
+            found[parameter] = _slopes(own, bench, quantity, _grid(reach))
+    return found
+
+
+def missed(study: Study, e: Explanation, causes: Sequence[Cause]) -> list[Cause]:
+    """Parameters of straight lines that are off with what an explanation has beside them, as causes of their own; the interval of each is from
+    the least to the greatest slope."""
+    values = {f.target: f.value for f in e.fit.free}
+    known = {x for c in causes for x in c.parameters}
+    found = []
+    for k, place in enumerate(study.places):
+        pairs = [(t, n) for t, n in zip(e.terms, e.built.names) if isinstance(t.candidate.what, Basis) and t.candidate.what.place == k]
+        sure = [c.confidence for c in causes if (c.kind, c.where) in {t.group for t, _ in pairs}]
+        if not sure:
+            continue
+        curve, reaches = Curve(*zip(*pairs)), size([s.motions[k] for s in study.seen])
+        for name, quantity in _lines(study.model, place):
+            x = _grid(reaches["sv".index(quantity)])
+            force = curve(x, 0.0 * x, values) if quantity == "s" else curve(0.0 * x, x, values)
+            p, slopes = study.model.parameters[name], _range(force, x)
+            own = values.get(name, p.value)
+            if name not in known and not p.exact and off(p.value, own, slopes, p.tolerance):
+                value = Value(own + 0.5 * sum(slopes), units.si(p.unit), (own + slopes[0], own + slopes[1]))
+                found.append(Cause("wrong_parameter", name, {name: value}, max(sure)))
+    return found
+
+
+def _grid(reach: float) -> Array:
+    return np.linspace(-reach, reach, 401)
+
+
+def _lines(model: Model, place: Place) -> list[tuple[str, str]]:
+    """Parameters of the linear elements of a place, each with what it is the slope of."""
+    names = {n for n, _ in place.elements}
+    return [(e.arguments[LINES[e.law][0]], LINES[e.law][1]) for e in model.elements if e.name in names and e.law in LINES]
+
+
+def _slopes(terms: Sequence[Term], bench: Bench, quantity: str, x: Array) -> Slopes:
+    """Of the laws of terms over deflection or rate. One with memory has any slope from 0 to its gain."""
+    values: Mapping[str, float] = bench.fit.values
+    zeros, force, low, high = np.zeros_like(x), np.zeros_like(x), 0.0, 0.0
+    along = Moved(x, zeros, np.arange(len(x)) * bench.step) if quantity == "s" else Moved(zeros, x, np.arange(len(x)) * bench.step)
+    for term in terms:
+        for name, part in zip(term.elements, term.form.parts):
+            gain = values.get(f"{name}_{part.gain[0]}", 0.0)
+            known = laws.LAWS.get(part.law)
+            if part.force is not None or known and known.states:
+                low, high = low + min(gain, 0.0), high + max(gain, 0.0)
+            else:
+                shapes = {k: (values.get(f"{name}_{k}", v), u) for k, (v, u) in part.shapes.items()}
+                force = force + gain * replace(part, shapes=shapes).along(along)
+    least, most = _range(force, x)
+    return least + low, most + high
+
+
+def _range(force: Array, x: Array) -> Slopes:
+    slopes = np.gradient(force, x)
+    return float(np.min(slopes)), float(np.max(slopes))

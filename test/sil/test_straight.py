@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A stiffness that is off behind an asymmetric spring: which slopes its parameter may be, and what a diagnosis names. Data come from an
+integrator of this file."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from one_mass import STEP, model
+
+from penode_sil.diagnosis import straight
+
+MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 12.0
+SENSORS = 'x = { value = "x", unit = "m", noise = 1e-5 }'
+
+
+@pytest.mark.parametrize(
+    "own, slopes, off",
+    [
+        (60.0, (0.0, 0.0), False),
+        (63.5, (0.0, 0.0), True),  # 6 % where 5 % is allowed
+        (63.5, (-2.0, 2.0), False),  # one side is within
+        (75.0, (-2.0, 2.0), True),
+        (45.0, (0.0, 20.0), False),  # the nominal value is that of some deflection
+        (60.0, (14.0, 16.0), True),
+    ],
+)
+def test_a_parameter_is_off_where_no_slope_is_that_of_the_file(own, slopes, off):
+    assert straight.off(60.0, own, slopes, 0.05) is off
+
+
+def recording(path, stiffness: float, difference: float, waves: float) -> None:
+    """A mass on a spring that is softer in rebound by `difference`, with a sine of `waves` of its force, under random tones up to 8 Hz: Heun in
+    twentieths of a sample, whose error is (30/s 1e-4 s)^2/12, below 1e-6."""
+    rng, n, fine = np.random.default_rng(3), 6000, 20
+    tones, phases = rng.uniform(0.3, 8.0, 30), rng.uniform(0.0, 7.0, 30)
+    t = np.arange(n * fine + 1) * STEP / fine
+    u = 4.0 * np.sum(np.sin(2.0 * np.pi * tones[:, None] * t + phases[:, None]), axis=0)
+    h, x, v, seen = STEP / fine, 0.0, 0.0, []
+
+    def rate(x, v, force):
+        spring = stiffness * x + 0.5 * difference * (x - abs(x)) - 0.5 * difference * x + waves * stiffness * 0.01 * np.sin(x / 0.004)
+        return (force - DAMPING * v - spring) / MASS
+
+    for i in range(n * fine):
+        if i % fine == 0:
+            seen.append(x)
+        a = rate(x, v, u[i])
+        w = v + h * a
+        x, v = x + 0.5 * h * (v + w), v + 0.5 * h * (a + rate(x + h * v, w, u[i + 1]))
+    rows = np.column_stack([t[::fine][:n], u[::fine][:n], np.array(seen) + 1e-5 * rng.standard_normal(n)])
+    np.savetxt(path, rows, delimiter=",", header="time [s],push [N],x [m]", comments="", fmt="%.9g")
+
+
+@pytest.mark.parametrize("waves", (0.0, 0.03))
+def test_a_stiffness_behind_an_asymmetric_spring_is_named(tmp_path, penode, waves):
+    """25 % more stiffness beside a difference of its sides: both are named, also where nothing else is missed, and innovations do not decide."""
+    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.03, SENSORS))
+    recording(tmp_path / "train.csv", 1.25 * STIFFNESS, 0.3 * STIFFNESS, waves)
+    penode("diagnose", tmp_path / "rig.toml", "--data", tmp_path / "train.csv", "-o", tmp_path / "out")
+    causes = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["causes"]
+    (found,) = (c for c in causes if c["kind"] == "wrong_parameter")
+    value = found["parameters"]["k"]
+    assert found is causes[0] and value["value"] == pytest.approx(1.25 * STIFFNESS, rel=0.06)
+    assert "asymmetric_spring" in [c["kind"] for c in causes]
+
+
+def test_an_asymmetric_spring_about_the_stiffness_of_the_file(tmp_path, penode):
+    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.03, SENSORS))
+    recording(tmp_path / "train.csv", STIFFNESS, 0.3 * STIFFNESS, 0.0)
+    penode("diagnose", tmp_path / "rig.toml", "--data", tmp_path / "train.csv", "-o", tmp_path / "out")
+    causes = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["causes"]
+    assert [c["kind"] for c in causes] == ["asymmetric_spring"]
