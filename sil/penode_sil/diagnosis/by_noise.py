@@ -17,7 +17,7 @@ import penode_gen
 from penode_gen.model import Model
 
 from ..measured import Measured
-from . import absorb, echo, explaining, extension, measuring, nameless, noise, numerics, plant, plausible, refining, residual, steady, straight, tones
+from . import absorb, echo, explaining, extension, measuring, nameless, noise, numerics, plant, plausible, refining, residual, small, steady, straight, tones
 from .answers import alternatives, write_extended
 from .broken import broken_sensors, still_wild
 from .explanation import Explanation
@@ -138,6 +138,7 @@ def _sized(case: Case, study: Study, best: Explanation | None, judged: Judged) -
         sized, named = refining.mended(study, best, case.log) if idle is None else (idle, idle)
         causes = tuple(resized(study, sized, c) for c in causes)
         causes, nothing = _with_a_size(study, best, causes)
+        notes += small.notes(study, sized, causes)
         missed = straight.missed(study, sized, causes)
         first = {Named(c.kind, c.where) for c in missed}  # which are no alternatives to the others then
         causes = (*missed, *(replace(c, alternatives=tuple(a for a in c.alternatives if a not in first)) for c in causes))
