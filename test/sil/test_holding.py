@@ -27,7 +27,7 @@ MODEL = model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS)
 
 
 def recording(path: Path, how: str, period: float, seed: int, top: float) -> Path:
-    """A rig under a random force up to `top` [Hz] that acts late, or in steps, of a period [s], or whose first sensor is late; a sine in its
+    """A rig under a random force up to `top` [Hz] that acts late, or in steps, of a period [s], or whose first sensor is late, or whose second has an offset; a sine in its
     spring and in its damper makes it a little wrong everywhere. Simulated in steps of a quarter millisecond, written every 2 ms."""
     rng = np.random.default_rng(seed)
     step, n = STEP / FINE, SAMPLES * FINE
@@ -36,8 +36,8 @@ def recording(path: Path, how: str, period: float, seed: int, top: float) -> Pat
     shape = np.where((f > 0.2) & (f < top), 1.0, 0.0)
     u = np.fft.irfft(shape * np.exp(2j * np.pi * rng.random(f.size)), n)
     u *= 10.0 / np.std(u)
-    late = round(period / step)
-    acts = {"delay": np.interp(t - 0.5 * period, t, u), "hold": u[np.arange(n) // late * late], "sensor": u}[how]
+    late = max(round(period / step), 1)
+    acts = {"delay": np.interp(t - 0.5 * period, t, u), "hold": u[np.arange(n) // late * late]}.get(how, u)
     linear = StateSpace([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]], [[0.0], [1.0 / MASS]], [[1.0, 0.0], [0.0, 1.0]], [[0.0], [0.0]])
     for _ in range(3):  # the waves act along the motion that they make: a fixed point
         x, v = lsim(linear, acts if _ == 0 else acts + waves, t, interp=False)[1].T
@@ -45,6 +45,8 @@ def recording(path: Path, how: str, period: float, seed: int, top: float) -> Pat
     a = (acts + waves - STIFFNESS * x - DAMPING * v) / MASS
     if how == "sensor":
         x = np.interp(t - 0.5 * period, t, x)
+    if how == "offset":
+        a = a + 0.2 * np.std(a)
     noise = rng.standard_normal((2, n)) * [[1e-6], [1e-3]]
     columns = np.column_stack([t, u, x + noise[0], a + noise[1]])[::FINE]
     np.savetxt(path, columns, delimiter=",", header="time [s],push [N],x_mass [m],a_mass [m/s^2]", comments="", fmt="%.9g")
@@ -110,6 +112,12 @@ def test_a_late_sensor_is_late_in_the_extended_model(answer, tmp_path):
     before = Batch(plain).run(record.u, x0=np.array([[*start, start[0], 0.0]])).z[0, :, 0]
     left, late = (np.std((record.y[:, 0] - seen)[500:]) for seen in (z, before))
     assert left < 0.3 * late
+
+
+def test_an_offset_of_an_accelerometer_is_no_load(answer):
+    """In metres and m/s^2 together a load, which the deflection would show, looks the same."""
+    (cause,) = answer("offset", 0.0, 1).causes
+    assert (cause.kind, cause.where) == ("sensor_bias", "a_mass")
 
 
 def test_a_delay_is_no_hold(answer):

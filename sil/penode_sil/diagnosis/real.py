@@ -257,7 +257,7 @@ def _fitted_values(model: Model, fit: Fit) -> list[str]:
 
 
 def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[list[Cause], list[str]]:
-    """Sensor offsets that the recordings show. Those of 7 to 100 % of the signal's rms are causes. Notes are smaller and larger ones, about 1 g,
+    """Sensor offsets that the recordings show. Those that are surely 7 % of the signal's rms, at most 100 %, are causes. Notes are smaller and larger ones, about 1 g,
     and all of them if what was named moves the position of rest too (`loaded`): they may be intended, or part of that. Nothing where start
     states have the same effect: a plant without a spring to ground has no zero."""
     causes, notes = [], []
@@ -268,8 +268,8 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
         if alone * abs(value) <= 3.0 * sd:
             continue
         sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # collinearity with other free values amplifies the effect of model error
-        large = WORTH <= abs(value) / shown < INTENDED and abs(abs(value) / constants.g - 1.0) > WORTH
-        if bench.places and not loaded and large and abs(value) > Z_95 * sd:  # without places it may stand for any law
+        large = WORTH * shown < abs(value) - Z_95 * sd and abs(value) < INTENDED * shown and abs(abs(value) / constants.g - 1.0) > WORTH
+        if bench.places and not loaded and large:  # without places it may stand for any law
             causes.append(_load(model, bench, probe, s.name, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
         else:
             notes.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
@@ -285,17 +285,19 @@ def _load(model: Model, bench: Bench, probe: Probe, sensor: str, deviation: floa
     cause, and what an input or the sensor itself may be off by as well."""
     i = [f.target for f in bench.fit.free].index(bias(sensor))
     f = bench.fit.free[i]
-    seen = bench.fit.slopes[:, :, i][bench.fit.used] / f.unit
-    starts = bench.fit.slopes[bench.fit.used][:, [not isinstance(x.target, str) and x.target[0] == "start" for x in bench.fit.free]]
+    used, white = bench.fit.used, 1.0 / np.sqrt(bench.fit.variance)
+    seen = (bench.fit.slopes[:, :, i] * white)[used] / f.unit
+    starts = (bench.fit.slopes * white[None, :, None])[used][:, [not isinstance(x.target, str) and x.target[0] == "start" for x in bench.fit.free]]
     for k, p in enumerate(bench.places):
         if GROUND not in p.ends or p.role == "tyre":
             continue
         (column,) = probe.columns([(k, [np.ones(len(r)) for r in bench.records])], SMALL * float(np.min(bench.forces)))
-        columns = np.column_stack([column[bench.fit.used], starts])
+        force = (column * white)[used]
+        columns = np.column_stack([force, starts])
         columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
         sizes = np.linalg.lstsq(columns, seen, rcond=1e-9)[0]
         if np.linalg.norm(seen - columns @ sizes) < WORTH * np.linalg.norm(seen):
-            factor = float(sizes[0]) / float(np.linalg.norm(column[bench.fit.used]))
+            factor = float(sizes[0]) / float(np.linalg.norm(force))
             value, sd = -factor * f.value, abs(factor) * deviation
             alike = (Named("sensor_bias", sensor), *_loads(model, p))
             return _constant("constant_force", p.name, "force", value, sd, p.unit("N"), alike)
