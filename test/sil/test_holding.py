@@ -27,8 +27,9 @@ MODEL = model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS)
 
 
 def recording(path: Path, how: str, period: float, seed: int, top: float) -> Path:
-    """A rig under a random force up to `top` [Hz] that acts late, or in steps, of a period [s], or whose first sensor is late, or whose second has an offset; a sine in its
-    spring and in its damper makes it a little wrong everywhere. Simulated in steps of a quarter millisecond, written every 2 ms."""
+    """A rig under a random force up to `top` [Hz] that acts late, or in steps, of a period [s], or whose first sensor is late, or whose second
+    has an offset; a sine in its spring and in its damper makes it a little wrong everywhere. Simulated in steps of a quarter millisecond,
+    written every 2 ms."""
     rng = np.random.default_rng(seed)
     step, n = STEP / FINE, SAMPLES * FINE
     t = np.arange(n) * step

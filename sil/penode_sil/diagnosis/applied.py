@@ -65,14 +65,13 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
     outputs = [f"{s.name} = {table({**x, 'unit': units_of[s.name]})}" for s, x in zip(model.sensors, sensors) if x and s.name in units_of]
     outputs += [x for x in redirected["outputs"] if x.split(" = ")[0] not in {o.split(" = ")[0] for o in outputs}]
+    substeps = max((late.substeps(d, 0.0, model.sample_time) for d in delays.values()), default=1)
     learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
     lines = [
         f"# What the recordings taught about {model.path.name}: {learnt or 'nothing but values'}.",
         "", "[model]", extends(model.path.resolve()), f"name = {toml(model.name + '_extended')}",
-        f"sample_time = {toml(f'{model.sample_time:.12g} s')}", "",
+        f"sample_time = {toml(f'{model.sample_time:.12g} s')}", *[f"substeps = {substeps}"] * (substeps > model.substeps), "",
     ]  # fmt: skip
-    substeps = max([model.substeps, *(late.substeps(d, 0.0, model.sample_time) for d in delays.values())])
-    lines[-1:] = [f"substeps = {substeps}", ""] if substeps > model.substeps else [""]
     for title, entries in (
         ("parameters", [*parameters, *driven.parameters]), ("actuators", driven.actuators), ("elements", [*redirected["elements"], *elements]),
         ("states", driven.states), ("equations", [*redirected["equations"], *driven.equations]), ("outputs", outputs),

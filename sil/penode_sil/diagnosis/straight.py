@@ -9,8 +9,7 @@ is off where none of these is within its tolerance.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +25,11 @@ from .plant import Place
 from .result import Cause, Value
 from .study import Study
 from .terms import Term
+from .worth import LINEAR
 
 Array = NDArray[np.float64]
 Slopes = tuple[float, float]  # the least and the greatest
 SIDES = {"difference", "rebound"}  # values of laws that are straight on either side
-LINES = {"linear_spring": ("stiffness", "s"), "linear_damper": ("damping", "v")}  # argument, and of what it is the slope
 
 
 def off(nominal: float, own: float, slopes: Slopes, limit: float) -> bool:
@@ -80,23 +79,19 @@ def _grid(reach: float) -> Array:
 def _lines(model: Model, place: Place) -> list[tuple[str, str]]:
     """Parameters of the linear elements of a place, each with what it is the slope of."""
     names = {n for n, _ in place.elements}
-    return [(e.arguments[LINES[e.law][0]], LINES[e.law][1]) for e in model.elements if e.name in names and e.law in LINES]
+    return [(p, LINEAR[e.law]) for e in model.elements if e.name in names and e.law in LINEAR for p in e.arguments.values()]
 
 
 def _slopes(terms: Sequence[Term], bench: Bench, quantity: str, x: Array) -> Slopes:
     """Of the laws of terms over deflection or rate. One with memory has any slope from 0 to its gain."""
-    values: Mapping[str, float] = bench.fit.values
     zeros, force, low, high = np.zeros_like(x), np.zeros_like(x), 0.0, 0.0
     along = Moved(x, zeros, np.arange(len(x)) * bench.step) if quantity == "s" else Moved(zeros, x, np.arange(len(x)) * bench.step)
-    for term in terms:
-        for name, part in zip(term.elements, term.form.parts):
-            gain = values.get(f"{name}_{part.gain[0]}", 0.0)
-            known = laws.LAWS.get(part.law)
-            if part.force is not None or known and known.states:
-                low, high = low + min(gain, 0.0), high + max(gain, 0.0)
-            else:
-                shapes = {k: (values.get(f"{name}_{k}", v), u) for k, (v, u) in part.shapes.items()}
-                force = force + gain * replace(part, shapes=shapes).along(along)
+    for gain, part in (pair for term in terms for pair in term.laws(bench.fit.values)):
+        known = laws.LAWS.get(part.law)
+        if part.force is not None or known and known.states:
+            low, high = low + min(gain, 0.0), high + max(gain, 0.0)
+        else:
+            force = force + gain * part.along(along)
     least, most = _range(force, x)
     return least + low, most + high
 

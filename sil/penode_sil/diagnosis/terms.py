@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,14 @@ class Term:
     form: Form
     elements: tuple[str, ...]
     free: tuple[Free, ...]
+
+    def laws(self, values: Mapping[str, float]) -> list[tuple[float, Part]]:
+        """Its laws as they are fitted, each with its gain."""
+        found = []
+        for name, part in zip(self.elements, self.form.parts):
+            shapes = {k: (values.get(f"{name}_{k}", v), unit) for k, (v, unit) in part.shapes.items()}
+            found.append((values.get(f"{name}_{part.gain[0]}", 0.0), replace(part, shapes=shapes)))
+        return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,9 +36,8 @@ UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be
 class Misfit:
     """How much more acts than an explanation has, beyond the noise of sensors: `size`, as a share of what moves; 0 if that may be chance,
     infinite if it follows the measurement worse than the model as it is: its curves hold along its own way alone, and bend away beside it.
-    Beyond UNMODELLED innovations have to decide; less than that, only a simpler answer of theirs counts, and all of them for a model without
-    inputs. `likelihood`: log likelihood of its
-    innovations, in steps of `update` samples; infinite where sensor noise is all that is left."""
+    Beyond UNMODELLED innovations have to decide, without inputs at any size; else only a simpler answer of theirs counts. `likelihood`: log
+    likelihood of its innovations, in steps of `update` samples; infinite where sensor noise is all that is left."""
 
     size: float = 0.0
     likelihood: float = np.inf

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -121,11 +121,9 @@ def _beside(bench: Bench, place: int, motion: Motion, force: Array) -> Array:
 
 def _force(term: Term, fit: Fit, motion: Motion) -> list[Array]:
     """Of all parts of a term along every recording."""
-    values: Mapping[str, float] = fit.values
     total = [np.zeros(len(m.s)) for m in motion.parts]
-    for name, part in zip(term.elements, term.form.parts):
-        now = replace(part, shapes={k: (values.get(f"{name}_{k}", v), u) for k, (v, u) in part.shapes.items()})
-        total = [x + fit.value(f"{name}_{part.gain[0]}") * now.along(m) for x, m in zip(total, motion.parts)]
+    for gain, part in term.laws(fit.values):
+        total = [x + gain * part.along(m) for x, m in zip(total, motion.parts)]
     return total
 
 
