@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_sil.diagnosis import driven, innovate, plant, propose, real
+from penode_sil.diagnosis import driven, plant, propose, real, rounds
 from penode_sil.diagnosis.catalogue.form import Form
 from penode_sil.diagnosis.evidence.bench import build
 from penode_sil.diagnosis.evidence.fit import Fit, likelihood
@@ -183,6 +183,6 @@ def test_what_a_small_form_hides():
         return Trial(_form("k", where), None, None, 50.0, None, share, taken)
 
     small = trial("shaft", 0.03, 0.4)
-    assert innovate._hidden(trial("bearing", 0.2, 0.1), small)
-    assert not innovate._hidden(trial("bearing", 0.04, 0.2), small)  # as small
-    assert not innovate._hidden(trial("shaft", 0.2, 0.2), small)  # of the same
+    assert rounds._hidden(trial("bearing", 0.2, 0.1), small)
+    assert not rounds._hidden(trial("bearing", 0.04, 0.2), small)  # as small
+    assert not rounds._hidden(trial("shaft", 0.2, 0.2), small)  # of the same

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import by_noise, engine, innovate, propose
+from penode_sil.diagnosis import by_noise, engine, propose, rounds
 from penode_sil.diagnosis.catalogue import springs
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
 from penode_sil.diagnosis.result import Cause, Value
@@ -28,25 +28,25 @@ def trial(kind: str, blocks: float, *parts: Part, note: str = "", where: str = "
 def test_a_form_has_to_predict_better_than_a_part_of_it():
     constant = trial("constant_force", 20.0, PUSHES)
     both = trial("coulomb_friction", 22.0, SLIDES, PUSHES, note="with a constant")
-    assert innovate._is_enough(constant, both)  # 8 nats more, of 10 that a law has to gain
-    assert not innovate._is_enough(constant, trial("coulomb_friction", 30.0, SLIDES, PUSHES, note="with a constant"))
-    assert not innovate._is_enough(both, constant)
-    assert not innovate._is_enough(trial("constant_force", 20.0, PUSHES, where="tyre"), trial("coulomb_friction", 1.0, SLIDES))
+    assert rounds._is_enough(constant, both)  # 8 nats more, of 10 that a law has to gain
+    assert not rounds._is_enough(constant, trial("coulomb_friction", 30.0, SLIDES, PUSHES, note="with a constant"))
+    assert not rounds._is_enough(both, constant)
+    assert not rounds._is_enough(trial("constant_force", 20.0, PUSHES, where="tyre"), trial("coulomb_friction", 1.0, SLIDES))
 
 
 def test_another_law_of_a_name_goes_before_a_new_name_that_is_hardly_better():
     bushing, play = trial("maxwell_bushing", 100.0, LATE), trial("backlash", 97.0, LOOSE, note="of a damper")
     named = [SimpleNamespace(form=Form("backlash", "spring", "force", 0, ()))]
-    assert innovate._simplest([bushing, play], BASE, named) is play
-    assert innovate._simplest([bushing, play], BASE, []) is bushing
+    assert rounds.simplest([bushing, play], BASE, named) is play
+    assert rounds.simplest([bushing, play], BASE, []) is bushing
     far = trial("backlash", 70.0, LOOSE, note="of a damper")  # 120 nats of 400 are more than a fifth
-    assert innovate._simplest([bushing, far], BASE, named) is bushing
+    assert rounds.simplest([bushing, far], BASE, named) is bushing
 
 
 def test_of_curves_that_predict_equally_well_the_one_with_fewer_values_is_named():
     stop, cube = trial("bump_stop", 100.0, LATE, free=2), trial("cubic_spring", 98.0, LOOSE)
-    assert innovate._simplest([stop, cube], BASE, []) is cube  # 8 nats less, of 10 that a value has to gain
-    assert innovate._simplest([stop, trial("cubic_spring", 97.0, LOOSE)], BASE, []) is stop
+    assert rounds.simplest([stop, cube], BASE, []) is cube  # 8 nats less, of 10 that a value has to gain
+    assert rounds.simplest([stop, trial("cubic_spring", 97.0, LOOSE)], BASE, []) is stop
 
 
 def test_what_is_a_part_of_a_form_is_tried_too():

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from .evidence.bench import Bench
+from .evidence.observer import MOST_STEPS
 from .evidence.screening import Probe
 from .propose import FOLLOWED, PROMISE, motions
 from .terms import Term, Trial, with_forms
@@ -19,8 +20,9 @@ def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
     moved = motions(Probe.of(bench))
     wide, (term,) = with_forms(bench, [t.form], moved, 90 + number)  # forms that are only tried have the number of their round, far below
     names = dict(zip([f.target for f in t.term.free], term.free))
-    own = {f.target for f in bench.free}
-    free = tuple(replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free if f.target in own | set(names))
+    own = {f.target: f for f in bench.fit.free}
+    fitted = [replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free if f.target in own or f.target in names]
+    free = (*fitted, *(f for f in own.values() if f.target not in {x.target for x in fitted}))  # the trial need not know all of the bench
     fresh = replace(bench, model=wide, free=free, level=t.level)
     problem = fresh.problem()
     fresh = replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(wide.states)), FOLLOWED))
@@ -28,11 +30,14 @@ def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
 
 
 def steepened(bench: Bench, term: Term) -> Bench:
-    """Halves the width of a term's edges for as long as each halving gains PROMISE. Steps are halved with it, for a steeper edge damps more."""
+    """Halves the width of a term's edges for as long as each halving gains PROMISE. Steps are halved with it, for a steeper edge damps more,
+    and all that is tried later has to take them: at most MOST_STEPS."""
     edges = {f"{name}_{part.edge}" for name, part in zip(term.elements, term.form.parts) if part.edge}
     for _ in range(8 if edges else 0):  # down to 1e-4 of the rms rate: no plant turns faster
         free = tuple(replace(f, value=0.5 * f.value, low=0.5 * f.low) if f.target in edges else f for f in bench.fit.free)
         finer = replace(bench, fastest=2.0 * bench.fastest)
+        if finer.problem().predictor.steps > MOST_STEPS:
+            break
         fit = finer.problem().solve(free, bench.fit.by, FOLLOWED)
         if not fit.cost > bench.fit.cost + PROMISE:
             break
@@ -42,11 +47,10 @@ def steepened(bench: Bench, term: Term) -> Bench:
 
 def apart(term: Term) -> list[Term]:
     """Splits a term into one term for each kind of law in it, that of the form first."""
-    kinds = dict.fromkeys([term.form.kind, *(p.kind for p in term.form.parts if p.kind)])
-    if len(kinds) == 1:
+    if len(term.form.kinds) == 1:
         return [term]
     found = []
-    for kind in kinds:
+    for kind in term.form.kinds:
         own = [(n, p) for n, p in zip(term.elements, term.form.parts) if (p.kind or term.form.kind) == kind]
         names = tuple(n for n, _ in own)
         form = replace(term.form, kind=kind, parts=tuple(p for _, p in own), note="")

@@ -22,17 +22,17 @@ from .evidence.fit import Fit
 from .evidence.observer import Filter, Record, bias, sample_noise
 from .evidence.screening import Probe
 from .fit import Free
-from .innovate import MIN_TAKEN, Found
+from .innovate import Found
 from .noise import Experiment
 from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
+from .rounds import MIN_TAKEN
 from .study import guessed
 from .terms import Term, Trial
 from .worth import SYSTEMATIC, WORTH, Z_95, least, own_of_sensors, share, shift, undetermined
 
 Array = NDArray[np.float64]
-INTENDED = 1.0  # of the rms of what a sensor shows about its mean: a larger offset is there by intent
 RIGHT = 0.93  # share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
 RIVAL = (1.0 - RIGHT) / RIGHT  # posterior, RIGHT of which is as much as what is not in the catalogue has: from there on an explanation is listed
 
@@ -86,7 +86,7 @@ def answer(
     share_lines = [t for t in named if t.form.how == "force" and t.form.kind in getattr(catalogue.OF[t.form.kind], "STRAIGHT", ())]
     wrong, more = _parameters(model, plain, moved, straight.beside(model, plain, share_lines, moved), log)
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
-    biased, remarks = _offsets(model, plain, probe, any(c.kind in (*loads.KINDS, *stopped) for c in causes))
+    biased, remarks = _offsets(model, after, Probe.of(after), any(c.kind in (*loads.KINDS, *stopped) for c in causes))
     notes += more + remarks
     offsets = [s.name for s in model.sensors if abs(after.fit.value(bias(s.name))) > Z_95 * after.fit.deviation(bias(s.name))]
     none = {bias(s.name) for s in model.sensors if s.name not in offsets}
@@ -268,7 +268,7 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
         if alone * abs(value) <= 3.0 * sd:
             continue
         sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # collinearity with other free values amplifies the effect of model error
-        large = WORTH * shown < abs(value) - Z_95 * sd and abs(value) < INTENDED * shown and abs(abs(value) / constants.g - 1.0) > WORTH
+        large = WORTH * shown < abs(value) - Z_95 * sd and abs(value) < shown and abs(abs(value) / constants.g - 1.0) > WORTH
         if bench.places and not loaded and large:  # without places it may stand for any law
             causes.append(_load(model, bench, probe, s.name, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
         else:

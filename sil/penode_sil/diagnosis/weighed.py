@@ -18,12 +18,12 @@ from .evidence.bench import UNSTATED, build
 from .evidence.gain import Level
 from .evidence.observer import Record, sample_noise
 from .fit import Fit, Problem
-from .innovate import MIN_GAIN
 from .judging import ENOUGH
 from .noise import UNSEEN, Experiment
 from .residual import Channel, rms
 from .resolving import resolved
 from .result import Cause, Gain, Named, Value
+from .rounds import MIN_GAIN
 from .study import Study, fitted, guessed, look
 from .worth import WORTH
 

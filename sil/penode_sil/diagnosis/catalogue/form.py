@@ -112,6 +112,11 @@ class Form:
     series: Series | None = None
     limit: float = 0.0
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Its own, and those of laws in it that are another cause by themselves."""
+        return tuple(dict.fromkeys([self.kind, *(p.kind for p in self.parts if p.kind)]))
+
 
 @dataclass(frozen=True, eq=False)
 class Sizes:

@@ -25,6 +25,7 @@ from ..plant import Place, anonymous, extend, rotational_unit
 Array = NDArray[np.float64]
 WANDER = "wander"  # stem of the forces that wander, and of their states
 MAX_TURN = 0.15  # of a period of the fastest mode, in one step of the integration: Runge-Kutta of order 4 then errs by 1e-4 of it a step
+MOST_STEPS = 100_000  # of the integration in all recordings that a steeper edge may ask for: every later fit of a form takes about a second
 MIN_STEPS = 5  # steps between updates: the edge of a friction, 0.02 of the rms rate wide, then damps less than Runge-Kutta bears
 MAX_INNOVATION = 1e15  # innovation of a run that left all bounds
 
@@ -150,6 +151,7 @@ class Predictor:
         substeps = max(1, int(np.ceil(step * fastest / MAX_TURN)), -(-MIN_STEPS // (update * self.fine)), -(-model.substeps // self.fine))
         way = "linear" if smooth else "cubic" if moves else "held" if any(r.held for r in records) else "linear"
         self.batch = compiled(anonymous(replace(model, method="rk4", interpolation=way, substeps=substeps, sample_time=step)), causal)
+        self.steps = sum(map(len, records)) * self.fine * substeps  # of the integration in all recordings
         self.n_z = len(records[0].y[0])  # sensors that were measured; the model may have more
 
     def predict(

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Rounds of the search: propose by a score test, fit to innovations, compare on held-out blocks, accept the best, until none is good."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import holding
+from .adopting import adopt
+from .catalogue import curve
+from .evidence.bench import SIZES, Bench
+from .evidence.blocks import Blocks
+from .evidence.fit import Problem
+from .evidence.prior import stated
+from .evidence.screening import Probe
+from .propose import PROMISE, is_part, motions, propose
+from .terms import Term, Trial
+from .worth import WORTH, Z_95, alone, least, mostly, share, undetermined
+
+Array = NDArray[np.float64]
+SCORED = 4  # of the promising trials, how many are scored on held-out blocks
+MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
+MIN_FORM = 0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
+MIN_TAKEN = 0.25  # of the power of a sensor's innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
+MIN_BLOCKS = 3  # of the blocks in which it does
+LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """A form that was accepted: its trial, the `number` that its names have, what it is in the bench, one term for each kind of its laws, and
+    the `trials` compared in its round, the best first."""
+
+    trial: Trial
+    number: int
+    terms: tuple[Term, ...]
+    trials: tuple[Trial, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """A bench with the forms accepted, what it `scores` on held-out blocks [blocks], which forms are `large`, and the good trials that are
+    left."""
+
+    bench: Bench
+    scores: Array
+    accepted: tuple[Accepted, ...]
+    large: tuple[bool, ...]
+    rest: tuple[Trial, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Rounds:
+    """Rounds of a search that starts from a bench without any cause."""
+
+    start: Bench
+    blocks: Blocks
+    log: Callable[[str], None]
+
+    def grow(self, accepted: Sequence[Accepted] = ()) -> Grown:
+        """Accepts causes beside those accepted already, one at a time, the best predictor first, until none predicts enough better, or the
+        best is too small for a name and cannot hide a larger one. A small one that takes most of what is missed may be all of it but for one
+        other cause: if that is found, what wanders beside both is little, and all are judged again by that."""
+        bench, scores, found = self.beside(accepted)
+        large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
+        hides = True
+        while good := self.good(bench, scores, found):
+            best = simplest(good, scores, terms_of(found))
+            if not hides and not _matters(best):
+                break
+            number = 1 + max((a.number for a in found), default=-1)
+            bench, terms = adopt(bench, best, number)
+            bench, scores = _based(bench, self.blocks)
+            found.append(Accepted(best, number, tuple(terms), good))
+            large.append(_large(best, least(bench.level.size, best.whole)))
+            hides = large[-1] or any(_hidden(t, best) for t in good)
+            if not hides and not mostly(best.whole):
+                good = ()
+                break
+        if found and alone(found[-1].trial.whole):
+            large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
+        return Grown(bench, scores, tuple(found), tuple(large), good)
+
+    def beside(self, accepted: Sequence[Accepted]) -> tuple[Bench, Array, list[Accepted]]:
+        """A bench with forms that were accepted in others, its scores, and the forms with the share that they have in it."""
+        bench, found = with_accepted(self.start, accepted)
+        return *_based(bench, self.blocks), found
+
+    def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
+        """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the best, to
+        MIN_GAIN, only large ones; otherwise the large form only imitates a smaller one."""
+        trials, wide = propose(bench, terms_of(accepted), self.log)
+        trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
+        trials = holding.told_apart(bench, wide, [_scored(bench, bench.problem(wide), self.blocks, t) for t in trials[:SCORED]])
+        better = [t.blocks - scores for t in trials]
+        for t, b in zip(trials, better):
+            self.log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
+        good = [t for t, b in zip(trials, better) if _accepted(bench, t, b)]
+        good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
+        matter = [t for t in good if _matters(t)]
+        if matter and max(np.sum(t.blocks) for t in good) - max(np.sum(t.blocks) for t in matter) <= MIN_GAIN:
+            good = matter
+        return tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks))))
+
+
+def terms_of(accepted: Sequence[Accepted]) -> list[Term]:
+    """All terms of accepted forms."""
+    return [x for a in accepted for x in a.terms]
+
+
+def with_accepted(bench: Bench, accepted: Sequence[Accepted]) -> tuple[Bench, list[Accepted]]:
+    """A bench with forms that were accepted in others, and these with the share that they have in it."""
+    found = []
+    for a in accepted:
+        bench, terms = adopt(bench, a.trial, a.number)
+        found.append(replace(a, terms=tuple(terms)))
+    moved = motions(Probe.of(bench)) if found else []
+    return bench, [replace(a, trial=replace(a.trial, share=share(bench, a.terms, bench.fit, moved))) for a in found]
+
+
+def _hidden(t: Trial, small: Trial) -> bool:
+    """May a form at another place prove large once a small one is in the model? Its force is large enough; its share of the innovations
+    rises when the small one is gone."""
+    return t.form.where != small.form.where and t.share >= WORTH
+
+
+def _matters(t: Trial) -> bool:
+    """Is a form large, or, as small as it is, nearly all that is missed?"""
+    return _large(t, WORTH) or alone(t.whole)
+
+
+def _large(t: Trial, least_share: float) -> bool:
+    """Is a form more than one of many small deviations? A large force that changes little stands for what others do as well."""
+    return t.share >= least_share and t.taken >= MIN_TAKEN
+
+
+def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
+    """The bench with the level that predicts best, and its scores [blocks]."""
+    sizes = [max(bench.level.size, SIZES[1]) * factor for factor in LEVEL_FACTORS]
+    level, fit, scores = blocks.fit_level(bench, bench.problem(), bench.fit, bench.level, sizes)
+    return replace(bench, level=level, fit=fit), scores
+
+
+def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
+    """A trial with how it predicts left-out blocks, and lets parameters be what the file states."""
+    own = [] if t.level == bench.level else [bench.level.size]
+    level, fit, scores = blocks.fit_level(replace(bench, model=problem.predictor.model), problem, t.fit, t.level, own)
+    relief = stated(bench.fit.free) - stated(fit.free)
+    return replace(t, level=level, fit=fit, blocks=scores + relief / len(scores))
+
+
+def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Trial:
+    """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
+    them by MIN_FORM of what it gains. Curves that predict equally well, to MIN_GAIN, also rank by their values. A new name has to gain
+    as much more than another law of a name already accepted as a form has."""
+
+    def more_than(other: Trial) -> float:
+        return max(MIN_GAIN, MIN_FORM * float(np.sum(other.blocks - base)))
+
+    named = {(t.form.kind, t.form.where) for t in terms}
+    first = min((t for t in trials if np.sum(trials[0].blocks - t.blocks) <= MIN_GAIN), key=lambda t: (len(t.term.free), -np.sum(t.blocks)))
+    best = next((t for t in trials if (t.form.kind, t.form.where) in named and np.sum(trials[0].blocks - t.blocks) <= more_than(trials[0])), first)
+    same = [t for t in trials if of_curve(t) == of_curve(best)]
+    found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
+    for t in more:
+        better = t.blocks - found.blocks
+        if np.all(better > 0.0) and np.sum(better) > more_than(found):
+            found = t
+    return found
+
+
+def _is_enough(part: Trial, t: Trial) -> bool:
+    """Does a form with some of the laws of another one, a constant beside a friction, predict about as well alone?"""
+    return is_part(part.form, t.form) and float(np.sum(t.blocks) - np.sum(part.blocks)) <= MIN_GAIN
+
+
+def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
+    """Is a form enough better, with a size that is not zero?"""
+    if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN):
+        return False
+    known = undetermined(bench.model, t.fit)
+    return all(abs(t.fit.value(f.target) - f.origin) > Z_95 * t.fit.deviation(f.target, known) for f in t.term.free if not f.log)
+
+
+def of_curve(t: Trial) -> tuple[object, str]:
+    return curve(t.form.kind), t.form.where
+
+
+def name_of(t: Trial) -> tuple[str, str]:
+    return t.form.kind, t.form.where

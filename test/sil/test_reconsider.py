@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What a search by innovations makes of its early choices once it knows the others: made-up rounds, no simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from penode_sil.diagnosis.catalogue.form import Form, Part
+from penode_sil.diagnosis.fit import Free
+from penode_sil.diagnosis.reconsider import reconsidered
+from penode_sil.diagnosis.rounds import Accepted, Grown
+from penode_sil.diagnosis.terms import Term, Trial
+
+NAMES = {"friction": "coulomb_friction", "stribeck": "stribeck_friction", "asymmetric": "asymmetric_damper", "degressive": "degressive_damper",
+         "constant": "constant_force", "cubic": "cubic_spring", "stop": "bump_stop", "both": "coulomb_friction"}  # fmt: skip
+VALUES = {"stribeck": 3, "degressive": 2, "stop": 2, "both": 2}
+
+
+def trial(name: str, nats: float, whole: float = 0.0) -> Trial:
+    """A form that brings all blocks together to so many nats, and takes a share of what is missed."""
+    parts = (Part("coulomb_friction", ("force", "N")), Part("constant_force", ("force", "N"), kind="constant_force")) if name == "both" else ()
+    form = Form(NAMES[name], "spring", "force", 0, parts)
+    free = tuple(Free(f"{name}_{k}", 1.0, 1.0) for k in range(VALUES.get(name, 1)))
+    return Trial(form, Term(form, (), free), None, 0.0, None, whole=whole, blocks=np.full(4, nats / 4.0))
+
+
+def accepted(number: int, t: Trial, trials: Sequence[Trial] = ()) -> Accepted:
+    return Accepted(t, number, tuple(Term(t.form, (), ()) for _ in t.form.kinds), (t, *trials))
+
+
+def kinds(forms: Sequence[Accepted]) -> tuple[str, ...]:
+    return tuple(a.trial.form.kind for a in forms)
+
+
+class Rounds:
+    """What each set of causes scores, and what is good beside it, instead of simulations."""
+
+    def __init__(self, scores: dict[tuple[str, ...], float], good: dict[tuple[str, ...], Sequence[Trial]], grow: Callable[[list[Accepted]], list[Accepted]] = lambda forms: forms):
+        self.scores, self.beside_good, self.more, self.log = scores, good, grow, lambda text: None
+
+    def beside(self, forms: Sequence[Accepted]) -> tuple[tuple[str, ...], np.ndarray, list[Accepted]]:
+        return kinds(forms), np.full(4, self.scores[kinds(forms)] / 4.0), list(forms)
+
+    def good(self, bench: tuple[str, ...], scores: np.ndarray, forms: Sequence[Accepted]) -> tuple[Trial, ...]:
+        return tuple(self.beside_good.get(bench, ()))
+
+    def grow(self, forms: Sequence[Accepted] = ()) -> Grown:
+        return grown(self.more(list(forms)), self.scores)
+
+
+def grown(forms: Sequence[Accepted], scores: dict[tuple[str, ...], float], rest: Sequence[Trial] = ()) -> Grown:
+    return Grown(None, np.full(4, scores[kinds(forms)] / 4.0), tuple(forms), (True,) * len(forms), tuple(rest))
+
+
+def test_a_first_choice_that_stood_in_for_two_is_exchanged():
+    """Friction and an asymmetric damper look like a degressive one, until the asymmetry is known; then friction takes most of what is left."""
+    first, second = accepted(0, trial("degressive", 600.0)), accepted(1, trial("asymmetric", 1300.0))
+    scores = {("degressive_damper", "asymmetric_damper"): 1300.0, ("asymmetric_damper",): 100.0, ("coulomb_friction", "asymmetric_damper"): 1700.0, ("coulomb_friction",): 600.0}
+    good = {("asymmetric_damper",): [trial("friction", 1700.0), trial("degressive", 1300.0)], ("coulomb_friction",): [trial("asymmetric", 1700.0)]}
+    rounds = Rounds(scores, good)
+    end = reconsidered(rounds, grown([first, second], scores, [trial("friction", 1700.0, whole=0.8)]))
+    assert kinds(end.accepted) == ("coulomb_friction", "asymmetric_damper")
+    assert len({a.number for a in end.accepted} | {0}) == 3  # names of the first one are in the fit of the second
+
+
+def test_what_the_others_do_as_well_is_left_out():
+    first, second = accepted(0, trial("constant", 600.0)), accepted(1, trial("asymmetric", 1300.0))
+    scores = {("constant_force", "asymmetric_damper"): 1300.0, ("asymmetric_damper",): 1295.0}  # 5 nats, of 10 that a cause has to gain
+    assert kinds(reconsidered(Rounds(scores, {}), grown([first, second], scores, [trial("cubic", 1500.0, whole=0.8)])).accepted) == ("asymmetric_damper",)
+
+
+def test_nothing_is_tried_again_where_nothing_is_in_doubt():
+    first, second = accepted(0, trial("degressive", 600.0)), accepted(1, trial("asymmetric", 1300.0))
+    scores = {("degressive_damper", "asymmetric_damper"): 1300.0}  # any other set would be a KeyError
+    end = grown([first, second], scores, [trial("cubic", 1400.0, whole=0.3)])
+    assert reconsidered(Rounds(scores, {}), end) is end
+
+
+def test_a_shape_chosen_before_the_others_were_known_goes_and_the_last_choice_with_it():
+    """Coulomb friction and a cubic spring: alone, a Stribeck curve follows better, and beside it a stop."""
+    first, second = accepted(0, trial("stribeck", 600.0), [trial("friction", 560.0)]), accepted(1, trial("stop", 1300.0))
+    scores = {("stribeck_friction", "bump_stop"): 1300.0, ("bump_stop",): 300.0, ("coulomb_friction",): 560.0, ("coulomb_friction", "cubic_spring"): 1500.0}
+    good = {("bump_stop",): [trial("friction", 1296.0), trial("stribeck", 1300.0)], ("coulomb_friction",): [trial("cubic", 1500.0), trial("stop", 1400.0)]}
+    end = reconsidered(Rounds(scores, good), grown([first, second], scores))
+    assert kinds(end.accepted) == ("coulomb_friction", "cubic_spring")
+
+
+def test_a_constant_beside_a_friction_is_left_for_a_law_that_pulls_to_one_side():
+    both = accepted(0, trial("both", 1190.0), [trial("stribeck", 930.0)])
+    scores = {("coulomb_friction",): 1190.0, ("stribeck_friction", "cubic_spring"): 1270.0}
+    rounds = Rounds(scores, {}, lambda forms: [*forms, accepted(1, trial("cubic", 1270.0))])
+    assert kinds(reconsidered(rounds, grown([both], scores)).accepted) == ("stribeck_friction", "cubic_spring")
+    scores["stribeck_friction", "cubic_spring"] = 1195.0
+    assert kinds(reconsidered(rounds, grown([both], scores)).accepted) == ("coulomb_friction",)  # with its constant: 5 nats are not enough
