@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,7 +165,7 @@ class Predictor:
         for e in range(len(self.records)):
             start, parameters, u, y = self._given(e, free, shifts)
             parameters[f"{WANDER}_tau"] = by.tau
-            u = self._finer(u)
+            u = self._finer(e, u)
             if e in extra:
                 more = joined(straight(extra[e], self.fine), extra[e])
                 u = np.concatenate([np.broadcast_to(u, (len(more), *u.shape[-2:])), more], axis=-1)
@@ -190,7 +190,7 @@ class Predictor:
         found = []
         for e in range(len(self.records)):
             start, parameters, u, _ = self._given(e, free, np.zeros((1, len(free))))
-            run = self.batch.run(self._finer(u), x0=start, parameters=parameters, set_name=self.set_name, every=self.fine)
+            run = self.batch.run(self._finer(e, u), x0=start, parameters=parameters, set_name=self.set_name, every=self.fine)
             found.append(run.z[0, :, : self.n_z])
         return found
 
@@ -199,13 +199,12 @@ class Predictor:
         known = [parameters.get(scale(s.name), np.ones(1)) for s in self.model.sensors[: self.n_z]]
         return np.stack(np.broadcast_arrays(*known), axis=-1)[:, None, :] if any(len(k) > 1 for k in known) else np.array(known).T
 
-    def _finer(self, u: Array) -> Array:
-        """Inputs [n, n_u] or [runs, n, n_u] with samples in between."""
+    def _finer(self, e: int, u: Array) -> Array:
+        """Inputs [n, n_u] or [runs, n, n_u] of a recording with samples in between."""
         if self.fine == 1:
             return u
-        time = np.arange(u.shape[-2]) * (self.fine * self.batch.model.sample_time)
-        rate = CubicSpline(time, u, axis=-2)(time, 1) if self.fine == 3 else u
-        return joined(parts(time, u, rate, self.fine), u)
+        record = self.records[e]
+        return _finer_as_recorded(record, self.fine) if u is record.u else _finer(u, record.step, self.fine)
 
     def _beyond(self, e: int, y: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Means [runs, updates, n_z] of what was measured, y [n, n_z] or [runs, n, n_z], beyond what was predicted, z [runs, n, n_z]; and
@@ -289,3 +288,16 @@ def driven(how: str, u: Array, values: Array, step: float) -> Array:
         case "input_lag":
             return np.array([x[0] + lag(x - x[0], max(tau, 1e-3 * step), step) for x, tau in zip(u, values)])
     raise ValueError(how)
+
+
+def _finer(u: Array, step: float, fine: int) -> Array:
+    """Inputs [..., n, n_u], `step` [s] apart, with samples in between, `fine` times as many."""
+    time = np.arange(u.shape[-2]) * step
+    rate = CubicSpline(time, u, axis=-2)(time, 1) if fine == 3 else u
+    return joined(parts(time, u, rate, fine), u)
+
+
+@lru_cache(maxsize=16)
+def _finer_as_recorded(record: Record, fine: int) -> Array:
+    """The same of a recording as it is, which takes part in hundreds of fits."""
+    return _finer(record.u, record.step, fine)
