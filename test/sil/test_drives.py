@@ -7,18 +7,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import penode_gen
-from penode_sil.diagnosis import driven, plant, propose, real, rounds
+from penode_sil.diagnosis import driven, plant, propose, real, rounds, worth
 from penode_sil.diagnosis.catalogue.form import Form
 from penode_sil.diagnosis.evidence.bench import build
 from penode_sil.diagnosis.evidence.fit import Fit, likelihood
 from penode_sil.diagnosis.evidence.gain import Level
 from penode_sil.diagnosis.evidence.observer import Record, sample_noise
 from penode_sil.diagnosis.evidence.screening import Score
+from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.terms import Trial
 from penode_sil.measured import load
 
@@ -186,3 +188,16 @@ def test_what_a_small_form_hides():
     assert rounds._hidden(trial("bearing", 0.2, 0.1), small)
     assert not rounds._hidden(trial("bearing", 0.04, 0.2), small)  # as small
     assert not rounds._hidden(trial("shaft", 0.2, 0.2), small)  # of the same
+
+
+def test_angles_that_are_off_by_the_same_are_another_start():
+    """Two sensors off by 6 and 5 mrad, beside a start that moves both: all that they show together is half a milliradian each, against the other."""
+    rng = np.random.default_rng(8)
+    first, second = rng.standard_normal((2, 300))
+    slopes = np.stack([first, second, first + second], axis=-1)[:, None, :]
+    free = (Free("a_bias", 6e-3, 1e-3), Free("b_bias", 5e-3, 1e-3), Free(("start", 0, 0), 0.0, 1e-3))
+    fit = replace(_fit(rng.standard_normal((300, 1)), np.ones(1)), free=free, slopes=slopes)
+    model = SimpleNamespace(bodies=())
+    np.testing.assert_allclose(worth.determined(model, fit, ["b_bias", "a_bias"]), [-5e-4, 5e-4], rtol=1e-6)
+    held = replace(fit, free=free[:2], slopes=slopes[:, :, :2])  # where a spring holds the shaft, no start does that
+    np.testing.assert_allclose(worth.determined(model, held, ["b_bias", "a_bias"]), [5e-3, 6e-3], rtol=1e-6)

@@ -30,7 +30,7 @@ from .result import MAY_BE_NOTHING, Cause, Named, Value, place
 from .rounds import MIN_TAKEN
 from .study import guessed
 from .terms import Term, Trial
-from .worth import SYSTEMATIC, WORTH, Z_95, least, own_of_sensors, share, shift, undetermined
+from .worth import SYSTEMATIC, WORTH, Z_95, determined, least, own_of_sensors, share, shift, undetermined
 
 Array = NDArray[np.float64]
 RIGHT = 0.93  # share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
@@ -261,16 +261,17 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
     and all of them if what was named moves the position of rest too (`loaded`): they may be intended, or part of that. Nothing where start
     states have the same effect: a plant without a spring to ground has no zero."""
     causes, notes = [], []
-    shares = own_of_sensors(bench.model, bench.fit, {bias(s.name) for s in model.sensors})
-    for j, (s, alone) in enumerate(zip(model.sensors, shares)):
-        value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
+    biases = [bias(s.name) for s in model.sensors]
+    shares, values = own_of_sensors(bench.model, bench.fit, biases), determined(bench.model, bench.fit, biases)
+    for j, (s, alone, value) in enumerate(zip(model.sensors, shares, values)):
+        sd = bench.fit.deviation(bias(s.name))
         shown = max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
         if alone * abs(value) <= 3.0 * sd:
             continue
         sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # collinearity with other free values amplifies the effect of model error
         large = WORTH * shown < abs(value) - Z_95 * sd and abs(value) < shown and abs(abs(value) / constants.g - 1.0) > WORTH
         if bench.places and not loaded and large:  # without places it may stand for any law
-            causes.append(_load(model, bench, probe, s.name, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
+            causes.append(_load(model, bench, probe, s.name, value, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
         else:
             notes.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
     return causes, notes
@@ -280,8 +281,8 @@ def _constant(kind: str, where: str, name: str, value: float, sd: float, unit: s
     return Cause(kind, where, {name: Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))}, RIGHT, alike)
 
 
-def _load(model: Model, bench: Bench, probe: Probe, sensor: str, deviation: float) -> Cause | None:
-    """The constant force on a body that does to all sensors what the offset of one, with its `deviation`, does, if there is one: the simpler
+def _load(model: Model, bench: Bench, probe: Probe, sensor: str, offset: float, deviation: float) -> Cause | None:
+    """The constant force on a body that does to all sensors what the `offset` of one, with its `deviation`, does, if there is one: the simpler
     cause, and what an input or the sensor itself may be off by as well."""
     i = [f.target for f in bench.fit.free].index(bias(sensor))
     f = bench.fit.free[i]
@@ -298,7 +299,7 @@ def _load(model: Model, bench: Bench, probe: Probe, sensor: str, deviation: floa
         sizes = np.linalg.lstsq(columns, seen, rcond=1e-9)[0]
         if np.linalg.norm(seen - columns @ sizes) < WORTH * np.linalg.norm(seen):
             factor = float(sizes[0]) / float(np.linalg.norm(force))
-            value, sd = -factor * f.value, abs(factor) * deviation
+            value, sd = -factor * offset, abs(factor) * deviation
             alike = (Named("sensor_bias", sensor), *_loads(model, p))
             return _constant("constant_force", p.name, "force", value, sd, p.unit("N"), alike)
     return None

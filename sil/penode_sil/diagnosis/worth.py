@@ -80,19 +80,33 @@ def own(model: Model, fit: Fit, targets: Collection[object]) -> float:
 
 def own_of_sensors(model: Model, fit: Fit, targets: Collection[object]) -> Array:
     """The same [n_z + 1] in what each sensor shows, then in all."""
-    masses = {b.mass for b in model.bodies} - set(targets)
-    rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
-    done, rest = np.zeros(len(rows)), []
-    for f, column in zip(fit.free, rows.T):
-        if f.target in targets:
-            done = done + (0.0 if f.log else (f.value - f.origin) / f.unit) * column
-        elif f.target not in masses and column.any():
-            rest.append(column / np.linalg.norm(column))
-    others = np.array(rest).T.reshape(len(rows), -1)
+    columns, others = _columns(model, fit, targets)
+    done = columns @ np.array([(f.value - f.origin) / f.unit for f in fit.free if f.target in targets])
     left = done - others @ np.linalg.lstsq(others, done, rcond=1e-9)[0]
     sensor = np.nonzero(fit.used)[1]
     masks = [*(sensor == j for j in range(fit.used.shape[1])), np.ones(len(done), bool)]
     return np.array([np.linalg.norm(left[m]) / max(float(np.linalg.norm(done[m])), 1e-300) for m in masks])
+
+
+def determined(model: Model, fit: Fit, targets: Collection[object]) -> Array:
+    """The least values, in the order of `targets`, that do the same as those fitted: without what they do together that others do as
+    well. Angles that are all off by the same are only another start, where no spring holds any of them."""
+    columns, others = _columns(model, fit, targets)
+    left = columns - others @ np.linalg.lstsq(others, columns, rcond=1e-9)[0]
+    free = [f for f in fit.free if f.target in targets]
+    least_values = np.linalg.lstsq(left, left @ np.array([(f.value - f.origin) / f.unit for f in free]), rcond=SYSTEMATIC)[0]
+    values = {f.target: f.origin + f.unit * x for f, x in zip(free, least_values)}
+    return np.array([values[t] for t in targets])
+
+
+def _columns(model: Model, fit: Fit, targets: Collection[object]) -> tuple[Array, Array]:
+    """What the innovations [used, .], in their deviations, change by with the units of free `targets` (none, of a logarithm), and with the
+    others, scaled to 1; masses stay as they are."""
+    masses = {b.mass for b in model.bodies} - set(targets)
+    rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
+    own = [column * (not f.log) for f, column in zip(fit.free, rows.T) if f.target in targets]
+    rest = [column / np.linalg.norm(column) for f, column in zip(fit.free, rows.T) if f.target not in targets and f.target not in masses and column.any()]
+    return np.array(own).T.reshape(len(rows), -1), np.array(rest).T.reshape(len(rows), -1)
 
 
 def shift(model: Model, bench: Bench, moved: Sequence[Motion], name: str) -> float:
