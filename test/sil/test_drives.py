@@ -190,14 +190,18 @@ def test_what_a_small_form_hides():
     assert not rounds._hidden(trial("shaft", 0.2, 0.2), small)  # of the same
 
 
-def test_angles_that_are_off_by_the_same_are_another_start():
-    """Two sensors off by 6 and 5 mrad, beside a start that moves both: all that they show together is half a milliradian each, against the other."""
+@pytest.mark.parametrize("scale", (1.0, 500.0))
+def test_angles_that_are_off_by_the_same_are_another_start(scale):
+    """Two sensors off by 6 and 5 mrad, of which a start that moves both does all but 1 mrad: which of them is off is not seen. Another sensor
+    is off by itself, however much noisier it is."""
     rng = np.random.default_rng(8)
-    first, second = rng.standard_normal((2, 300))
-    slopes = np.stack([first, second, first + second], axis=-1)[:, None, :]
-    free = (Free("a_bias", 6e-3, 1e-3), Free("b_bias", 5e-3, 1e-3), Free(("start", 0, 0), 0.0, 1e-3))
+    first, second, third = rng.standard_normal((3, 300))
+    slopes = np.stack([first, second, third / scale, first + second], axis=-1)[:, None, :]
+    free = (Free("a_bias", 6e-3, 1e-3), Free("b_bias", 5e-3, 1e-3), Free("c_bias", 2e-3, 1e-3), Free(("start", 0, 0), 0.0, 1e-3))
     fit = replace(_fit(rng.standard_normal((300, 1)), np.ones(1)), free=free, slopes=slopes)
-    model = SimpleNamespace(bodies=())
-    np.testing.assert_allclose(worth.determined(model, fit, ["b_bias", "a_bias"]), [-5e-4, 5e-4], rtol=1e-6)
-    held = replace(fit, free=free[:2], slopes=slopes[:, :, :2])  # where a spring holds the shaft, no start does that
-    np.testing.assert_allclose(worth.determined(model, held, ["b_bias", "a_bias"]), [5e-3, 6e-3], rtol=1e-6)
+    model, biases = SimpleNamespace(bodies=()), ["b_bias", "a_bias", "c_bias"]
+    mixed, effect = worth.confounded(model, fit, biases)
+    assert set(mixed) == {"a_bias", "b_bias"}
+    assert effect == pytest.approx(np.linalg.norm(0.5 * (first - second)) / np.sqrt(fit.variance[0]), rel=0.1)
+    held = replace(fit, free=free[:3], slopes=slopes[:, :, :3])  # where a spring holds the shaft, no start does that
+    assert worth.confounded(model, held, biases) == ([], 0.0)

@@ -14,15 +14,14 @@ from .terms import Term, Trial, with_forms
 
 
 def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
-    """The bench with a trial's form in its model, and the terms that the form becomes there, one for each kind of law. Of the other values
-    that the trial fitted, only those that the bench has are kept. `number`: of the form in its search, for it has the same names in any
-    bench."""
+    """The bench with a trial's form in its model, and the terms that the form becomes there, one for each kind of law. Takes over the trial's
+    values for parameters that the bench has, and ignores the others. `number` makes the form's parameter names the same in every bench."""
     moved = motions(Probe.of(bench))
     wide, (term,) = with_forms(bench, [t.form], moved, 90 + number)  # forms that are only tried have the number of their round, far below
     names = dict(zip([f.target for f in t.term.free], term.free))
     own = {f.target: f for f in bench.fit.free}
     fitted = [replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free if f.target in own or f.target in names]
-    free = (*fitted, *(f for f in own.values() if f.target not in {x.target for x in fitted}))  # the trial need not know all of the bench
+    free = (*fitted, *(f for f in own.values() if f.target not in {x.target for x in fitted}))  # the bench may have parameters that the trial did not fit
     fresh = replace(bench, model=wide, free=free, level=t.level)
     problem = fresh.problem()
     fresh = replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(wide.states)), FOLLOWED))
@@ -30,15 +29,16 @@ def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
 
 
 def steepened(bench: Bench, term: Term) -> Bench:
-    """Halves the width of a term's edges for as long as each halving gains PROMISE. Steps are halved with it, for a steeper edge damps more,
-    and all that is tried later has to take them: at most MOST_STEPS."""
+    """Halves the width of a term's edges for as long as each halving gains PROMISE. The integration step is halved too, because a steeper edge is
+    stiffer. Later fits pay for these steps, so it stops where there would be more of them, and more than MOST_STEPS."""
     edges = {f"{name}_{part.edge}" for name, part in zip(term.elements, term.form.parts) if part.edge}
     for _ in range(8 if edges else 0):  # down to 1e-4 of the rms rate: no plant turns faster
         free = tuple(replace(f, value=0.5 * f.value, low=0.5 * f.low) if f.target in edges else f for f in bench.fit.free)
         finer = replace(bench, fastest=2.0 * bench.fastest)
-        if finer.problem().predictor.steps > MOST_STEPS:
+        problem = finer.problem()
+        if problem.predictor.steps > max(MOST_STEPS, bench.problem().predictor.steps):
             break
-        fit = finer.problem().solve(free, bench.fit.by, FOLLOWED)
+        fit = problem.solve(free, bench.fit.by, FOLLOWED)
         if not fit.cost > bench.fit.cost + PROMISE:
             break
         bench = replace(finer, free=fit.free, fit=fit)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 Array = NDArray[np.float64]
 CLOSE = 1e-3  # [s] sample time up to which parabolas between samples are close enough, and cubics where a model uses rates
@@ -19,6 +19,12 @@ def far(step: float, signals: Sequence[Array]) -> bool:
     whose rms a line misses by (2 pi/32)^2/12 = 0.3 %."""
     rms, change = (np.sqrt(np.mean(np.concatenate(x) ** 2, axis=0)) for x in ([s - np.mean(s, axis=0) for s in signals], [np.diff(s, axis=0) for s in signals]))
     return step > CLOSE or bool(np.any(32.0 * change > 2.0 * np.pi * rms))
+
+
+def finer(u: Array, step: float, count: int) -> Array:
+    """Smooth signals [..., n, n_u], `step` [s] apart, with `count` intervals for each: 2, or 3 for a model that uses their rates."""
+    time = np.arange(u.shape[-2]) * step
+    return joined(parts(time, u, CubicSpline(time, u, axis=-2)(time, 1) if count == 3 else u, count), u)
 
 
 def parts(time: Array, u: Array, rate: Array, count: int) -> Array:

@@ -27,6 +27,7 @@ from .judging import ENOUGH, share
 from .noise import Experiment
 from .resting import resting
 from .result import Diagnosis
+from .shaken import with_noise_of_inputs
 from .study import Study, begin, guessed
 from .worth import WORTH
 
@@ -45,11 +46,12 @@ def diagnose(
     tell(0.0, "fitting the model as it is")
     both = with_shared_rails([*train, *holdout])
     train, holdout = both[: len(train)], both[len(train) :]
+    model, noisy = with_noise_of_inputs(model, train, set_name)
     widened = with_tolerances(model)
     experiments, unused, remarks = settled(widened, train, holdout, set_name)
     if problems := plausible.misfits(widened, [*experiments, *unused], set_name):
         raise UserError(*problems)
-    case = Case(model, train, holdout, unused, remarks, output, log, tell)
+    case = Case(model, train, holdout, unused, [*noisy, *remarks], output, log, tell)
     answer = _answer(case, *unburst(widened, experiments, set_name))
     return advised(replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started), model)
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The search for what is missing by innovations: what it accepts, and which of that is worth a name."""
+"""The search by innovations for what a model lacks: the forms accepted, and those large enough to be named."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from .evidence.bench import Bench
 from .evidence.blocks import Blocks
 from .reconsider import reconsidered
-from .rounds import Accepted, Grown, Rounds, terms_of, with_accepted
+from .rounds import Accepted, Rounds, terms_of
 from .terms import Term
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends with: the bench with all accepted `terms` in it, and a `plain` one with those forms alone that are worth a name,
-    `named`, with their terms in it; `small`: the others."""
+    """What a search ends with: the bench with all accepted `terms` in it; `plain`, a bench with only the forms worth naming (`named`, with their
+    terms there); and `small`, the other forms."""
 
     bench: Bench
     terms: tuple[Term, ...]
@@ -27,14 +27,10 @@ class Found:
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
-    """Causes accepted round by round; early choices are reconsidered when the others are known."""
+    """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own."""
     rounds = Rounds(bench, Blocks.of([len(r) // bench.update for r in bench.records]), log)
-    return _apart(bench, reconsidered(rounds, rounds.grow()))
-
-
-def _apart(start: Bench, grown: Grown) -> Found:
-    """What a search has accepted, the large forms in a bench of their own."""
-    large = [a for a, big in zip(grown.accepted, grown.large) if big]
-    small = tuple(a for a, big in zip(grown.accepted, grown.large) if not big)
-    plain, named = with_accepted(start, large) if small else (grown.bench, large)
-    return Found(grown.bench, tuple(terms_of(grown.accepted)), plain, tuple(named), small)
+    end = reconsidered(rounds, rounds.grow())
+    large = [a for a, big in zip(end.accepted, end.large) if big]
+    small = tuple(a for a, big in zip(end.accepted, end.large) if not big)
+    plain, _, named = rounds.beside(large) if small else (end.bench, end.scores, large)
+    return Found(end.bench, tuple(terms_of(end.accepted)), plain, tuple(named), small)

@@ -27,10 +27,10 @@ from .noise import Experiment
 from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
-from .rounds import MIN_TAKEN
+from .rounds import MIN_TAKEN, name_of
 from .study import guessed
 from .terms import Term, Trial
-from .worth import SYSTEMATIC, WORTH, Z_95, determined, least, own_of_sensors, share, shift, undetermined
+from .worth import SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, shift, undetermined
 
 Array = NDArray[np.float64]
 RIGHT = 0.93  # share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
@@ -69,7 +69,8 @@ def answer(
     probe = Probe.of(plain)
     moved = motions(probe)
     named = [term for a in found.named for term in a.terms]
-    chances = {a.trial: _weighed(a.trials) for a in found.named}
+    names = {name_of(a.trial) for a in found.named}
+    chances = {a.trial: _weighed([t for t in a.trials if name_of(t) not in names - {name_of(a.trial)}]) for a in found.named}
     for a, term in ((a, term) for a in found.named for term in a.terms):
         enough, chance, first = least(after.level.size, a.trial.whole), chances[a.trial], term is a.terms[0]
         size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
@@ -257,16 +258,18 @@ def _fitted_values(model: Model, fit: Fit) -> list[str]:
 
 
 def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[list[Cause], list[str]]:
-    """Sensor offsets that the recordings show. Those that are surely 7 % of the signal's rms, at most 100 %, are causes. Notes are smaller and larger ones, about 1 g,
-    and all of them if what was named moves the position of rest too (`loaded`): they may be intended, or part of that. Nothing where start
-    states have the same effect: a plant without a spring to ground has no zero."""
+    """Sensor offsets that the recordings show. An offset is a cause if it is surely above 7 % of the signal's rms and below 100 %. Smaller ones,
+    larger ones and those near 1 g become notes, as do all if a named cause also shifts the rest position (`loaded`). Nothing where start
+    states have the same effect: a plant without a spring to ground has no zero, and its sensors are off against each other at most."""
     causes, notes = [], []
     biases = [bias(s.name) for s in model.sensors]
-    shares, values = own_of_sensors(bench.model, bench.fit, biases), determined(bench.model, bench.fit, biases)
-    for j, (s, alone, value) in enumerate(zip(model.sensors, shares, values)):
-        sd = bench.fit.deviation(bias(s.name))
+    shares, (mixed, effect) = own_of_sensors(bench.model, bench.fit, biases), confounded(bench.model, bench.fit, biases)
+    if effect > 3.0:
+        notes.append(f"{', '.join(s.name for s in model.sensors if bias(s.name) in mixed)} have offsets against each other; the recordings do not tell which is off")
+    for j, (s, alone) in enumerate(zip(model.sensors, shares)):
+        value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         shown = max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
-        if alone * abs(value) <= 3.0 * sd:
+        if alone * abs(value) <= 3.0 * sd or bias(s.name) in mixed:
             continue
         sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # collinearity with other free values amplifies the effect of model error
         large = WORTH * shown < abs(value) - Z_95 * sd and abs(value) < shown and abs(abs(value) / constants.g - 1.0) > WORTH
@@ -282,8 +285,8 @@ def _constant(kind: str, where: str, name: str, value: float, sd: float, unit: s
 
 
 def _load(model: Model, bench: Bench, probe: Probe, sensor: str, offset: float, deviation: float) -> Cause | None:
-    """The constant force on a body that does to all sensors what the `offset` of one, with its `deviation`, does, if there is one: the simpler
-    cause, and what an input or the sensor itself may be off by as well."""
+    """The constant force on a body, if any, with the same effect on all sensors as this `offset` (+- `deviation`) of one: the simpler cause, and
+    what an input or the sensor itself may be off by as well."""
     i = [f.target for f in bench.fit.free].index(bias(sensor))
     f = bench.fit.free[i]
     used, white = bench.fit.used, 1.0 / np.sqrt(bench.fit.variance)

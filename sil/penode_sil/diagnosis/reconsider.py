@@ -1,39 +1,42 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Causes that were accepted before others were known: kept, left out, or exchanged."""
+"""A second look at early choices: once later causes are known, each is kept, dropped, or exchanged."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from .rounds import MIN_GAIN, Accepted, Grown, Rounds, name_of, of_curve, simplest, terms_of
+from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, name_of, of_curve, simplest, terms_of
+from .terms import Trial
 from .worth import mostly
 
 
 def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
-    """Where a search ended, or a better end (floating search; Pudil, Novovicova and Kittler 1994). A form of two laws, a friction with a
-    constant, is also left for the best of one law and what that lets be found."""
+    """Returns the end of a search, or a better one (floating search; Pudil, Novovicova and Kittler 1994). For each form of two laws, such as a
+    friction with a constant, it also tries the best single law instead, and searches on from there."""
     best = _exchanged(rounds, grown)
-    for k, a in enumerate(grown.accepted):
+    for k, a in enumerate(best.accepted):
         single = [t for t in a.trials if len(t.form.kinds) == 1]
-        if len(a.terms) > 1 and single:
-            first = Accepted(max(single, key=lambda t: float(np.sum(t.blocks))), a.number, (), tuple(single))
-            other = _exchanged(rounds, rounds.grow([*grown.accepted[:k], first]))
+        if len(a.trial.form.kinds) > 1 and single:
+            first = Accepted(max(single, key=_score), a.number, (), a.trials)
+            other = _exchanged(rounds, rounds.grow([*best.accepted[:k], first]))
             more = max(len(terms_of(other.accepted)) - len(terms_of(best.accepted)), 0)
-            gain = float(np.sum(other.scores) - np.sum(best.scores))
-            rounds.log(f"instead of {name_of(a.trial)} and a second law {[name_of(x.trial) for x in other.accepted]}: {gain:.0f} nats")
+            gain = _total(other) - _total(best)
+            rounds.log(f"replacing the two-law form {name_of(a.trial)} by {[name_of(x.trial) for x in other.accepted]}: {gain:.0f} nats")
             if gain > MIN_GAIN * (1 + more):
-                best = other
+                return other
     return best
 
 
 def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
-    """Each form in doubt left out if it is not needed, or exchanged for one that is simpler or predicts better beside all others; then the search
-    goes on. In doubt is what was chosen before others were known: every large form, if a good one that is left takes most of what is
-    missed, or else one that was preferred to a simpler form of its curve; and the last one, if another was exchanged."""
-    found, whole = list(grown.accepted), float(np.sum(grown.scores))
+    """Drops each doubtful form that the others make unnecessary, or exchanges it for one that is simpler or predicts better beside them; then
+    resumes the search, and keeps the new end if that loses no more than what was dropped or simplified may. Doubtful are large forms
+    other than the last: all of them if a trial that was not accepted would take most of what is still missed, else those preferred to a
+    simpler form of the same curve. After an exchange the last form is checked too."""
+    found, whole, loss = list(grown.accepted), _total(grown), 0.0
     missed = any(mostly(t.whole) for t in grown.rest)
     doubted = [a for a, big in zip(found[:-1], grown.large) if big and (missed or _has_simpler(a))]
     last = found[-1:] if found and grown.large[-1] else []
@@ -43,20 +46,36 @@ def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
         bench, scores, within = rounds.beside(others)
         if whole - float(np.sum(scores)) <= MIN_GAIN:
             rounds.log(f"{name_of(a.trial)} is not needed")
-            found, whole = others, float(np.sum(scores))
+            found, whole, loss = others, float(np.sum(scores)), loss + MIN_GAIN
             continue
         good = rounds.good(bench, scores, within)
+        own = max((_score(t) for t in good if name_of(t) == name_of(a.trial)), default=whole)
+        margin = max(MIN_GAIN, MIN_FORM * (own - float(np.sum(scores))))
         best = simplest(good, scores, terms_of(within)) if good else a.trial
-        own = max((float(np.sum(t.blocks)) for t in good if name_of(t) == name_of(a.trial)), default=whole)
-        simpler = len(best.term.free) < len(a.trial.term.free)
-        if name_of(best) != name_of(a.trial) and (simpler or float(np.sum(best.blocks)) - own > MIN_GAIN):
+        simpler = len(best.term.free) < len(a.trial.term.free) and _score(best) >= own - margin
+        if name_of(best) != name_of(a.trial) and (simpler or _score(best) - own > MIN_GAIN):
             rounds.log(f"{name_of(best)} for {name_of(a.trial)}")
-            number = 1 + max(x.number for x in found)  # the names of the former are in the fits of others
+            number = 1 + max(x.number for x in found)  # a fresh one: fits of other forms still hold parameters named after the old one
             found[found.index(a)] = Accepted(best, number, (), good)
+            whole, loss = float(np.sum(rounds.beside(found)[1])), loss + margin * simpler
             doubted, last = [*doubted, *last], []
-    return grown if found == list(grown.accepted) else rounds.grow(found)
+        elif any(name_of(t) == name_of(a.trial) for t in good):
+            found[found.index(a)] = replace(a, trials=good)  # its rivals are those beside all others
+    if [a.number for a in found] == [a.number for a in grown.accepted]:
+        return replace(grown, accepted=tuple(found))
+    end = rounds.grow(found)
+    return end if _total(end) >= _total(grown) - loss else grown
 
 
 def _has_simpler(a: Accepted) -> bool:
-    """Was a form preferred to another one of its curve with fewer values?"""
-    return any(of_curve(t) == of_curve(a.trial) and len(t.term.free) < len(a.trial.term.free) for t in a.trials)
+    """Was a form preferred to one of another name, of the same curve, with fewer values?"""
+    others = [t for t in a.trials if of_curve(t) == of_curve(a.trial) and name_of(t) != name_of(a.trial)]
+    return any(len(t.term.free) < len(a.trial.term.free) for t in others)
+
+
+def _score(t: Trial) -> float:
+    return float(np.sum(t.blocks))
+
+
+def _total(grown: Grown) -> float:
+    return float(np.sum(grown.scores))

@@ -33,8 +33,8 @@ LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """A form that was accepted: its trial, the `number` that its names have, what it is in the bench, one term for each kind of its laws, and
-    the `trials` compared in its round, the best first."""
+    """An accepted form: its `trial`; the `number` in its parameter names; its `terms` in the bench, one for each kind of law; and the `trials`
+    it was compared with, best first."""
 
     trial: Trial
     number: int
@@ -44,8 +44,8 @@ class Accepted:
 
 @dataclass(frozen=True, eq=False)
 class Grown:
-    """A bench with the forms accepted, what it `scores` on held-out blocks [blocks], which forms are `large`, and the good trials that are
-    left."""
+    """The state of a search: the bench with all accepted forms, its `scores` [blocks] on held-out blocks, which forms are `large`, and `rest`,
+    the good trials not accepted."""
 
     bench: Bench
     scores: Array
@@ -64,11 +64,11 @@ class Rounds:
 
     def grow(self, accepted: Sequence[Accepted] = ()) -> Grown:
         """Accepts causes beside those accepted already, one at a time, the best predictor first, until none predicts enough better, or the
-        best is too small for a name and cannot hide a larger one. A small one that takes most of what is missed may be all of it but for one
-        other cause: if that is found, what wanders beside both is little, and all are judged again by that."""
+        best is too small for a name and cannot hide a larger one. The search goes on after a small form that takes most of the misfit, because
+        one more cause may explain the rest. If it does, all forms are judged again by the smaller level that remains."""
         bench, scores, found = self.beside(accepted)
         large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
-        hides = True
+        hides = not found or large[-1] or any(_hidden(t, found[-1].trial) for t in found[-1].trials)
         while good := self.good(bench, scores, found):
             best = simplest(good, scores, terms_of(found))
             if not hides and not _matters(best):
@@ -87,7 +87,7 @@ class Rounds:
         return Grown(bench, scores, tuple(found), tuple(large), good)
 
     def beside(self, accepted: Sequence[Accepted]) -> tuple[Bench, Array, list[Accepted]]:
-        """A bench with forms that were accepted in others, its scores, and the forms with the share that they have in it."""
+        """Rebuilds the bench with these forms; returns it, its scores, and the forms with their shares recomputed in it."""
         bench, found = with_accepted(self.start, accepted)
         return *_based(bench, self.blocks), found
 
@@ -114,13 +114,15 @@ def terms_of(accepted: Sequence[Accepted]) -> list[Term]:
 
 
 def with_accepted(bench: Bench, accepted: Sequence[Accepted]) -> tuple[Bench, list[Accepted]]:
-    """A bench with forms that were accepted in others, and these with the share that they have in it."""
+    """Adopts forms one after another, then recomputes the share of each name in the final bench. What a form took of the misfit stays that of
+    its round."""
     found = []
     for a in accepted:
         bench, terms = adopt(bench, a.trial, a.number)
         found.append(replace(a, terms=tuple(terms)))
     moved = motions(Probe.of(bench)) if found else []
-    return bench, [replace(a, trial=replace(a.trial, share=share(bench, a.terms, bench.fit, moved))) for a in found]
+    same = [[x for o in found if name_of(o.trial) == name_of(a.trial) for x in o.terms] for a in found]
+    return bench, [replace(a, trial=replace(a.trial, share=share(bench, x, bench.fit, moved))) for a, x in zip(found, same)]
 
 
 def _hidden(t: Trial, small: Trial) -> bool:
@@ -140,18 +142,17 @@ def _large(t: Trial, least_share: float) -> bool:
 
 
 def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
-    """The bench with the level that predicts best, and its scores [blocks]."""
+    """The bench with the level that predicts best, and its scores [blocks], less what parameters cost that are not what the file states."""
     sizes = [max(bench.level.size, SIZES[1]) * factor for factor in LEVEL_FACTORS]
     level, fit, scores = blocks.fit_level(bench, bench.problem(), bench.fit, bench.level, sizes)
-    return replace(bench, level=level, fit=fit), scores
+    return replace(bench, level=level, fit=fit), scores - stated(fit.free) / len(scores)
 
 
 def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
-    """A trial with how it predicts left-out blocks, and lets parameters be what the file states."""
+    """A trial with its scores, as those of a bench."""
     own = [] if t.level == bench.level else [bench.level.size]
     level, fit, scores = blocks.fit_level(replace(bench, model=problem.predictor.model), problem, t.fit, t.level, own)
-    relief = stated(bench.fit.free) - stated(fit.free)
-    return replace(t, level=level, fit=fit, blocks=scores + relief / len(scores))
+    return replace(t, level=level, fit=fit, blocks=scores - stated(fit.free) / len(scores))
 
 
 def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Trial:

@@ -88,20 +88,25 @@ def own_of_sensors(model: Model, fit: Fit, targets: Collection[object]) -> Array
     return np.array([np.linalg.norm(left[m]) / max(float(np.linalg.norm(done[m])), 1e-300) for m in masks])
 
 
-def determined(model: Model, fit: Fit, targets: Collection[object]) -> Array:
-    """The least values, in the order of `targets`, that do the same as those fitted: without what they do together that others do as
-    well. Angles that are all off by the same are only another start, where no spring holds any of them."""
+def confounded(model: Model, fit: Fit, targets: Collection[object]) -> tuple[list[object], float]:
+    """Those of `targets` whose effect others of them share in part, because the other free values reproduce what they do together; and the effect
+    beyond that, in standard deviations. Without a spring to ground, an equal offset of all angle sensors is only another start."""
     columns, others = _columns(model, fit, targets)
-    left = columns - others @ np.linalg.lstsq(others, columns, rcond=1e-9)[0]
     free = [f for f in fit.free if f.target in targets]
-    least_values = np.linalg.lstsq(left, left @ np.array([(f.value - f.origin) / f.unit for f in free]), rcond=SYSTEMATIC)[0]
-    values = {f.target: f.origin + f.unit * x for f, x in zip(free, least_values)}
-    return np.array([values[t] for t in targets])
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    left = columns / size
+    left = left - others @ np.linalg.lstsq(others, left, rcond=1e-9)[0]
+    _, seen, ways = np.linalg.svd(left, full_matrices=False)
+    ways = ways[seen > SYSTEMATIC]
+    sole = np.sum(ways**2, axis=0)  # diagonal of the resolution matrix: 1 for what is seen by itself, 0 for what is not seen
+    mixed = [j for j, x in enumerate(sole) if SYSTEMATIC < x < 1.0 - SYSTEMATIC]
+    done = left[:, mixed] @ np.array([size[j] * (free[j].value - free[j].origin) / free[j].unit for j in mixed])
+    return [free[j].target for j in mixed], float(np.linalg.norm(done))
 
 
 def _columns(model: Model, fit: Fit, targets: Collection[object]) -> tuple[Array, Array]:
-    """What the innovations [used, .], in their deviations, change by with the units of free `targets` (none, of a logarithm), and with the
-    others, scaled to 1; masses stay as they are."""
+    """Whitened sensitivities [used, .] of the innovations: columns of `targets` per unit (0 for the logarithm of a parameter), and normalised
+    columns of all other free values except masses."""
     masses = {b.mass for b in model.bodies} - set(targets)
     rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
     own = [column * (not f.log) for f, column in zip(fit.free, rows.T) if f.target in targets]

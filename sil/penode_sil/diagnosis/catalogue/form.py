@@ -114,7 +114,7 @@ class Form:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Its own, and those of laws in it that are another cause by themselves."""
+        """The form's own kind, then the kinds of those of its laws that count as separate causes."""
         return tuple(dict.fromkeys([self.kind, *(p.kind for p in self.parts if p.kind)]))
 
 

@@ -6,15 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter, Signal, State
-from scipy.interpolate import CubicSpline
 
 from ...batch import Observer
-from ..between import far, joined, parts, straight
+from ..between import far, finer, joined, straight
 from ..compiling import compiled, ordered
 from ..fit import Free
 from ..hypotheses import lag
@@ -25,7 +24,7 @@ from ..plant import Place, anonymous, extend, rotational_unit
 Array = NDArray[np.float64]
 WANDER = "wander"  # stem of the forces that wander, and of their states
 MAX_TURN = 0.15  # of a period of the fastest mode, in one step of the integration: Runge-Kutta of order 4 then errs by 1e-4 of it a step
-MOST_STEPS = 100_000  # of the integration in all recordings that a steeper edge may ask for: every later fit of a form takes about a second
+MOST_STEPS = 50_000  # integration steps, over all recordings, up to which edges are steepened; a fit of a form then takes half a second
 MIN_STEPS = 5  # steps between updates: the edge of a friction, 0.02 of the rms rate wide, then damps less than Runge-Kutta bears
 MAX_INNOVATION = 1e15  # innovation of a run that left all bounds
 
@@ -46,6 +45,11 @@ class Record:
     def of(e: Experiment) -> Record:
         held = e.held is not None and bool(e.held.all())
         return Record(e.name, e.step, e.drive if e.held is None else e.u, np.where(e.good, e.y, np.nan), held, e.held is None)
+
+    @cached_property
+    def between(self) -> dict[int, Array]:
+        """Inputs with the samples between rows filled in, by how many times finer they are; hundreds of fits need them."""
+        return {}
 
     def __len__(self) -> int:
         return len(self.y)
@@ -200,11 +204,15 @@ class Predictor:
         return np.stack(np.broadcast_arrays(*known), axis=-1)[:, None, :] if any(len(k) > 1 for k in known) else np.array(known).T
 
     def _finer(self, e: int, u: Array) -> Array:
-        """Inputs [n, n_u] or [runs, n, n_u] of a recording with samples in between."""
+        """Inputs [n, n_u] or [runs, n, n_u] of recording `e`, with the samples between its rows filled in."""
+        record = self.records[e]
         if self.fine == 1:
             return u
-        record = self.records[e]
-        return _finer_as_recorded(record, self.fine) if u is record.u else _finer(u, record.step, self.fine)
+        if u is not record.u:
+            return finer(u, record.step, self.fine)
+        if self.fine not in record.between:
+            record.between[self.fine] = finer(u, record.step, self.fine)
+        return record.between[self.fine]
 
     def _beyond(self, e: int, y: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Means [runs, updates, n_z] of what was measured, y [n, n_z] or [runs, n, n_z], beyond what was predicted, z [runs, n, n_z]; and
@@ -288,16 +296,3 @@ def driven(how: str, u: Array, values: Array, step: float) -> Array:
         case "input_lag":
             return np.array([x[0] + lag(x - x[0], max(tau, 1e-3 * step), step) for x, tau in zip(u, values)])
     raise ValueError(how)
-
-
-def _finer(u: Array, step: float, fine: int) -> Array:
-    """Inputs [..., n, n_u], `step` [s] apart, with samples in between, `fine` times as many."""
-    time = np.arange(u.shape[-2]) * step
-    rate = CubicSpline(time, u, axis=-2)(time, 1) if fine == 3 else u
-    return joined(parts(time, u, rate, fine), u)
-
-
-@lru_cache(maxsize=16)
-def _finer_as_recorded(record: Record, fine: int) -> Array:
-    """The same of a recording as it is, which takes part in hundreds of fits."""
-    return _finer(record.u, record.step, fine)
