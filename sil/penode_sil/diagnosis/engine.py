@@ -59,7 +59,8 @@ def diagnose(
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
     """Innovations decide where the file only guesses a parameter, on a free motion that the model misses, or where more acts than the search
     by sensor noise explains (`_decides`); else that search does. It ends early where more acts than any single cause explains and
-    innovations explain it all, unless so much is left that more causes are to be expected. Where it explains nothing, or a part, innovations
+    innovations explain it all, unless so much is left that more causes are to be expected; or where innovations name nothing, and more acts
+    than several causes explain. Where it explains nothing, or a part, innovations
     answer if they follow the recordings better, name the same, or find an input at fault, and for a part if the rest wanders everywhere;
     where neither has a name, parameters that predict the hold-out better stay."""
     vague = weighed.supports(study.model) and bool(guessed(study.model))
@@ -73,7 +74,9 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
         w = _weighed(case, study)
         if w.verdict == "explained" and weighed.UNMODELLED < w.level < 2.0 * WORTH:
             return _by_innovations(case, beam[0], w)
-    study, explanations = resting(other, *search.grow(study, beam, case.log), case.log)
+    study, explanations = search.grow(study, beam, case.log)
+    if w is None or w.causes or not explanations or weighed.misfit(study, explanations[0].fit, case.log).size <= weighed.UNMODELLED:
+        study, explanations = resting(other, study, explanations, case.log)
     best = explanations[0] if explanations else None
     beside = weighed.misfit(study, best.fit if best else study.null, case.log)
     if beside.size:
