@@ -68,7 +68,7 @@ install() # PART COMMAND: the Debian packages that COMMAND prints
         echo "setup: installing $missing"
         root=$(as_root) || give_up "cannot install packages here; run as root: apt-get install $missing"
         { $root apt-get update -qq &&
-            $root DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $missing; } \
+            $root DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=300 install -qq -y --no-install-recommends $missing; } \
             >"build/setup/$1.log" 2>&1 || give_up "apt-get failed, see build/setup/$1.log; needed: $missing"
         missing=$($2 | tr '\n' ' ')
         [ -z "$missing" ] || give_up "still missing after apt-get: $missing"
