@@ -371,3 +371,13 @@ def test_two_diagnoses_of_the_same_cases():
     even = dict.fromkeys(cases, True) | {cases[0]: False}
     assert frozen.mcnemar(even, even | {cases[0]: True, cases[1]: False}) == ([cases[1]], [cases[0]], 1.0)
     assert frozen.mcnemar(right, right) == ([], [], 1.0)
+
+
+def test_rows_of_single_cases_are_compared_with_the_frozen_draw(tmp_path, capsys):
+    """A campaign that runs single cases again has a seed of its own in its head; those of its cases count."""
+    draw = json.loads((frozen.HERE / "frozen.json").read_text())
+    rows = [{"seed": 1, "code": "now"}, *({"case": f"{draw['seed']}:{i}", "right": draw["right"][i]} for i in ("35", "36"))]
+    (tmp_path / "rows.jsonl").write_text("".join(json.dumps(r) + "\n" for r in rows))
+    assert frozen.main([str(tmp_path / "rows.jsonl")]) == 0 and "lost none; won none" in capsys.readouterr().out
+    (tmp_path / "rows.jsonl").write_text(json.dumps(rows[0]) + "\n" + json.dumps({"case": "1:35", "right": True}) + "\n")
+    assert frozen.main([str(tmp_path / "rows.jsonl")]) == 2 and f"--seed {draw['seed']}" in capsys.readouterr().err
