@@ -226,7 +226,8 @@ def shape(law: str, s: Array, v: Array, a: Mapping[str, float]) -> Array:
             return np.sign(v) / (1.0 + (v / a["stribeck"]) ** 2)
         case "fading_damper" | "heating_damper":
             return v
-    words = {"softplus": lambda x: np.logaddexp(0.0, x)} | {"s": s, "v": v, "k": 1.0, "force": 1.0, "abs": np.abs, "exp": np.exp, "tanh": np.tanh, "max": np.maximum, "min": np.minimum} | dict(a)
+    functions = {"abs": np.abs, "exp": np.exp, "tanh": np.tanh, "max": np.maximum, "min": np.minimum, "softplus": lambda x: np.logaddexp(0.0, x)}
+    words = functions | {"s": s, "v": v, "k": 1.0, "force": 1.0} | dict(a)
     return eval(law.replace("^", "**"), {"__builtins__": {}}, words)  # one of our own texts
 
 

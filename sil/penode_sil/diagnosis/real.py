@@ -39,9 +39,9 @@ RIVAL = (1.0 - RIGHT) / RIGHT  # posterior, RIGHT of which is as much as what is
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Causes, notes on what is small, the sets of explanations that held-out blocks cannot tell apart with their posterior, and where
-    the search ended; the free `run` that fits best, sensors whose `offsets` it has, and the share `taken` of what the file's own model leaves: by it in a free run, or of the power of
-    the innovations, whichever is more, for a free run that drifts shows little else."""
+    """Causes; notes on what is small; the sets of explanations that held-out blocks cannot tell apart, with their posterior; where the search
+    ended; the free `run` that fits best, and sensors whose `offsets` it has; and the share `taken` of what the file's own model leaves: by the
+    free run, or of the power of the innovations, whichever is more, for a free run that drifts shows little else."""
 
     causes: tuple[Cause, ...]
     notes: tuple[str, ...]
@@ -238,7 +238,8 @@ def _parameters(
                 notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)} beside what was found at its place, which shares its straight part")
                 continue
             if size < WORTH:
-                notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)}, which changes {size:.1%} of what acts there: as much as anything that the model leaves out might")
+                notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)}, which changes {size:.1%} of what acts there: as much as anything that the "
+                             "model leaves out might")  # fmt: skip
                 continue
             least, most = shared.get(name, (0.0, 0.0))
             value = Value(f.value + 0.5 * (least + most), units.si(p.unit), (low + least, high + most))
@@ -265,7 +266,8 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
     biases = [bias(s.name) for s in model.sensors]
     shares, (mixed, effect) = own_of_sensors(bench.model, bench.fit, biases), confounded(bench.model, bench.fit, biases)
     if effect > 3.0:
-        notes.append(f"{', '.join(s.name for s in model.sensors if bias(s.name) in mixed)} have offsets against each other; the recordings do not tell which is off")
+        off = ", ".join(s.name for s in model.sensors if bias(s.name) in mixed)
+        notes.append(f"{off} have offsets against each other; the recordings do not tell which is off")
     for j, (s, alone) in enumerate(zip(model.sensors, shares)):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         shown = max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)

@@ -107,8 +107,9 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
     bench = build(model, study.places, records, noise, study.linear.fastest, study.set_name, nominal)
     still = bench.problem().solve(bench.fit.free, bench.gains(bench.fit).at(Level(0.0, 1.0)), 12)
     gained = bench.fit.likelihood - still.likelihood
-    log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats; it follows better than the nominal model by {bench.fit.likelihood - nominal.fit.likelihood:.0f}")
-    if bench.fit.likelihood < nominal.fit.likelihood - MIN_GAIN * len(nominal.free):
+    better = bench.fit.likelihood - nominal.fit.likelihood
+    log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats; it follows better than the nominal model by {better:.0f}")
+    if better < -MIN_GAIN * len(nominal.free):
         return Misfit(np.inf, bench.fit.likelihood, bench.update)
     return Misfit(bench.level.size if gained > MIN_GAIN and bench.level.size > MIN_UNMODELLED else 0.0, bench.fit.likelihood, bench.update)
 

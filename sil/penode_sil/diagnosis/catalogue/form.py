@@ -137,9 +137,9 @@ class Sizes:
 
 
 class Kind(Protocol):
-    """A file of the catalogue, for kinds of one curve. `forms` that may be at a place, given the motion of it; `MEANING` of each in a sentence; `sizes`: what a report gives
-    of a form, name to unit and value (SI); `ONE`: only one of them is at a place, another one is but a form of it; `STRAIGHT`:
-    kinds with a straight part, which a place shares with its linear elements."""
+    """A file of the catalogue, for kinds of one curve. `forms` that may be at a place, given the motion of it; `MEANING` of each in a sentence;
+    `sizes`: what a report gives of a form, name to unit and value (SI); `ONE`: only one of them is at a place, another one is but a form
+    of it; `STRAIGHT`: kinds with a straight part, which a place shares with its linear elements."""
 
     KINDS: tuple[str, ...]
     MEANING: dict[str, str]

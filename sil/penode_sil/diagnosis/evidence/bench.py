@@ -88,7 +88,10 @@ def with_tolerances(model: Model) -> Model:
     return replace(model, parameters=known)
 
 
-def build(model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default", like: Bench | None = None) -> Bench:  # fmt: skip
+def build(
+    model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default",
+    like: Bench | None = None,
+) -> Bench:  # fmt: skip
     """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]. `like`: the bench of
     the nominal model if `model` is another one; base, updates and forces are taken from it."""
     wide = augmented(model, places)
@@ -100,7 +103,8 @@ def build(model: Model, places: Sequence[Place], records: Sequence[Record], nois
     plain = Fit((), Filter.none(0, 0), *(np.zeros(0),) * 2, np.zeros(0, bool), np.zeros(0), 0.0, 0.0)
     longest = sum(map(len, records)) * records[0].step
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
-    bench = Bench(wide, set_name, tuple(places), tuple(records), like.base if like else augmented(model, places), (), first, np.ones(len(wandering(wide.states))), noise, fastest, Level(0.0, 1.0), plain)
+    base, forces = like.base if like else augmented(model, places), np.ones(len(wandering(wide.states)))
+    bench = Bench(wide, set_name, tuple(places), tuple(records), base, (), first, forces, noise, fastest, Level(0.0, 1.0), plain)
     if like:
         bench = replace(bench, update=like.update, forces=like.forces, fastest=like.fastest)
         x = [np.where(np.abs(s) < np.inf, s, 0.0) for s in _followed(bench)]
