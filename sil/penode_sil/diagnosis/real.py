@@ -264,13 +264,13 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
     states have the same effect: a plant without a spring to ground has no zero, and its sensors are off against each other at most."""
     causes, notes = [], []
     biases = [bias(s.name) for s in model.sensors]
-    shares, (mixed, effect) = own_of_sensors(bench.model, bench.fit, biases), confounded(bench.model, bench.fit, biases)
-    if effect > 3.0:
+    shares, mixed = own_of_sensors(bench.model, bench.fit, biases), confounded(bench.model, bench.fit, biases)
+    rms = [max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300) for j in range(len(biases))]
+    if any(abs(mixed.get(b, 0.0)) > WORTH * shown for b, shown in zip(biases, rms)):
         off = ", ".join(s.name for s in model.sensors if bias(s.name) in mixed)
         notes.append(f"{off} have offsets against each other; the recordings do not tell which is off")
-    for j, (s, alone) in enumerate(zip(model.sensors, shares)):
+    for s, alone, shown in zip(model.sensors, shares, rms):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
-        shown = max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300)
         if alone * abs(value) <= 3.0 * sd or bias(s.name) in mixed:
             continue
         sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # collinearity with other free values amplifies the effect of model error

@@ -88,20 +88,18 @@ def own_of_sensors(model: Model, fit: Fit, targets: Collection[object]) -> Array
     return np.array([np.linalg.norm(left[m]) / max(float(np.linalg.norm(done[m])), 1e-300) for m in masks])
 
 
-def confounded(model: Model, fit: Fit, targets: Collection[object]) -> tuple[list[object], float]:
-    """Those of `targets` whose effect others of them share in part, because the other free values reproduce what they do together; and the effect
-    beyond that, in standard deviations. Without a spring to ground, an equal offset of all angle sensors is only another start."""
+def confounded(model: Model, fit: Fit, targets: Collection[object]) -> dict[object, float]:
+    """Those of `targets` whose effect others of them share in part, because the other free values reproduce what they do together; with the least
+    values that have the rest of the effect. Without a spring to ground, an equal offset of all angle sensors is only another start."""
     columns, others = _columns(model, fit, targets)
     free = [f for f in fit.free if f.target in targets]
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     left = columns / size
     left = left - others @ np.linalg.lstsq(others, left, rcond=1e-9)[0]
     _, seen, ways = np.linalg.svd(left, full_matrices=False)
-    ways = ways[seen > SYSTEMATIC]
-    sole = np.sum(ways**2, axis=0)  # diagonal of the resolution matrix: 1 for what is seen by itself, 0 for what is not seen
-    mixed = [j for j, x in enumerate(sole) if SYSTEMATIC < x < 1.0 - SYSTEMATIC]
-    done = left[:, mixed] @ np.array([size[j] * (free[j].value - free[j].origin) / free[j].unit for j in mixed])
-    return [free[j].target for j in mixed], float(np.linalg.norm(done))
+    resolution = ways[seen > SYSTEMATIC].T @ ways[seen > SYSTEMATIC]  # of the fit: identity for what is seen by itself, 0 for what is not seen
+    values = resolution @ (size * np.array([(f.value - f.origin) / f.unit for f in free])) / size
+    return {f.target: float(f.origin + f.unit * x) for f, x, sole in zip(free, values, np.diag(resolution)) if SYSTEMATIC < sole < 1.0 - SYSTEMATIC}
 
 
 def _columns(model: Model, fit: Fit, targets: Collection[object]) -> tuple[Array, Array]:
