@@ -9,7 +9,7 @@ import numpy as np
 import penode_gen
 import pytest
 from penode_sil.diagnosis import engine
-from penode_sil.diagnosis.shaken import with_noise_of_inputs
+from penode_sil.diagnosis.input_noise import with_noise_of_inputs
 from penode_sil.measured import load
 from scipy import signal
 

@@ -36,7 +36,7 @@ def steepened(bench: Bench, term: Term) -> Bench:
         free = tuple(replace(f, value=0.5 * f.value, low=0.5 * f.low) if f.target in edges else f for f in bench.fit.free)
         finer = replace(bench, fastest=2.0 * bench.fastest)
         problem = finer.problem()
-        if problem.predictor.steps > max(MOST_STEPS, bench.problem().predictor.steps):
+        if problem.predictor.steps > MOST_STEPS and problem.predictor.steps > bench.problem().predictor.steps:
             break
         fit = problem.solve(free, bench.fit.by, FOLLOWED)
         if not fit.cost > bench.fit.cost + PROMISE:

@@ -23,11 +23,11 @@ from .by_noise import SEARCH, Case, by_noise
 from .driven import settled
 from .evidence.bench import with_tolerances
 from .explanation import Explanation
+from .input_noise import with_noise_of_inputs
 from .judging import ENOUGH, share
 from .noise import Experiment
 from .resting import resting
 from .result import Diagnosis
-from .shaken import with_noise_of_inputs
 from .study import Study, begin, guessed
 from .worth import WORTH
 
@@ -60,9 +60,9 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     """Innovations decide where the file only guesses a parameter, on a free motion that the model misses, or where more acts than the search
     by sensor noise explains (`_decides`); else that search does. It ends early where more acts than any single cause explains and
     innovations explain it all, unless so much is left that more causes are to be expected; or where innovations name nothing, and more acts
-    than several causes explain. Where it explains nothing, or a part, innovations
-    answer if they follow the recordings better, name the same, or find an input at fault, and for a part if the rest wanders everywhere;
-    where neither has a name, parameters that predict the hold-out better stay."""
+    than several causes explain. Where it explains nothing, or a part, innovations answer if they follow the recordings better, name the same,
+    or find an input at fault, and for a part if the rest wanders everywhere; where neither has a name, parameters that predict the hold-out
+    better stay."""
     vague = weighed.supports(study.model) and bool(guessed(study.model))
     if vague or not study.model.inputs and weighed.misfit(study, study.null, case.log).size:
         return _by_innovations(case, None, _weighed(case, study))
@@ -75,10 +75,11 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
         if w.verdict == "explained" and weighed.UNMODELLED < w.level < 2.0 * WORTH:
             return _by_innovations(case, beam[0], w)
     study, explanations = search.grow(study, beam, case.log)
-    if w is None or w.causes or not explanations or weighed.misfit(study, explanations[0].fit, case.log).size <= weighed.UNMODELLED:
+    beside = weighed.misfit(study, explanations[0].fit, case.log) if w and not w.causes and explanations else None
+    if beside is None or beside.size <= weighed.UNMODELLED:
         study, explanations = resting(other, study, explanations, case.log)
+        beside = weighed.misfit(study, explanations[0].fit if explanations else study.null, case.log)
     best = explanations[0] if explanations else None
-    beside = weighed.misfit(study, best.fit if best else study.null, case.log)
     if beside.size:
         w = w or _weighed(case, study)
         if _decides(w, beside.size, study, best, bool(faults)):

@@ -73,14 +73,14 @@ def answer(
     chances = {a.trial: _weighed([t for t in a.trials if name_of(t) not in names - {name_of(a.trial)}]) for a in found.named}
     for a, term in ((a, term) for a in found.named for term in a.terms):
         enough, chance, first = least(after.level.size, a.trial.whole), chances[a.trial], term is a.terms[0]
-        size = share(plain, [t for t in named if _name(t) == _name(term)], plain.fit, moved)
+        size = share(plain, [t for t in named if name_of(t) == name_of(term)], plain.fit, moved)
         rivals = _rivals(chance, term) if first else _loads(model, bench.places[term.form.index])
         cause = _cause(model, plain, term, size, rivals, _sure(chance, a.trial.form))
         log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")
         if size >= enough and not cause.may_be_nothing:
             causes = _merged(causes, cause)
         elif first:
-            notes.append(_small(term, f"{size:.1%} of what acts there") if size < enough else f"{place(*_name(term))} {MAY_BE_NOTHING}")
+            notes.append(_small(term, f"{size:.1%} of what acts there") if size < enough else f"{place(*name_of(term))} {MAY_BE_NOTHING}")
     for a in found.small:
         what = f"{a.trial.taken:.0%} of the power of prediction errors" if a.trial.taken < MIN_TAKEN else f"{a.trial.share:.1%} of what acts there"
         notes.append(_small(a.terms[0], what))
@@ -99,13 +99,9 @@ def answer(
     return Answer((*wrong, *causes, *biased), tuple(notes), sets, found, run, tuple(offsets), taken, after.model)
 
 
-def _name(t: Term) -> tuple[str, str]:
-    return t.form.kind, t.form.where
-
-
 def _small(t: Term, what: str) -> str:
     """A note on a term that is too small for a name."""
-    return f"{place(*_name(t))} is real but small: {what}; not named, but in model_extended.toml"
+    return f"{place(*name_of(t))} is real but small: {what}; not named, but in model_extended.toml"
 
 
 def _merged(causes: list[Cause], new: Cause) -> list[Cause]:
@@ -124,14 +120,14 @@ def _weighed(trials: Sequence[Trial]) -> list[tuple[Form, float]]:
     total: dict[tuple[str, str], float] = {}
     forms: dict[tuple[str, str], Form] = {}
     for t, p in zip(trials, chance):
-        name = (t.form.kind, t.form.where)
+        name = name_of(t)
         total[name] = total.get(name, 0.0) + float(p)
         forms.setdefault(name, t.form)
     return sorted(((forms[n], p) for n, p in total.items()), key=lambda pair: -pair[1])
 
 
 def _rivals(names: Sequence[tuple[Form, float]], term: Term) -> tuple[Named, ...]:
-    own = (term.form.kind, term.form.where)
+    own = name_of(term)
     return tuple(Named(f.kind, f.where) for f, p in names if (f.kind, f.where) != own and p > RIVAL)[:3]
 
 
@@ -143,7 +139,7 @@ def _sure(names: Sequence[tuple[Form, float]], form: Form) -> float:
 
 def _explanations(named: Sequence[tuple[Term, Sequence[tuple[Form, float]]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
     """Sets of causes with their posterior: the one found, and it with one cause exchanged for a rival; what is not in the catalogue has the rest."""
-    own = tuple(dict.fromkeys(Named(*_name(t)) for t, _ in named))
+    own = tuple(dict.fromkeys(Named(*name_of(t)) for t, _ in named))
     if not own:
         return ()
     sure = [_sure(options, t.form) for t, options in named]
@@ -152,7 +148,7 @@ def _explanations(named: Sequence[tuple[Term, Sequence[tuple[Form, float]]]]) ->
         others = RIGHT * float(np.prod(sure[:k] + sure[k + 1 :]))
         for r in _rivals(options, term):
             p = next(p for f, p in options if (f.kind, f.where) == (r.kind, r.where))
-            sets.append((tuple(r if n == Named(*_name(term)) else n for n in own), others * p))
+            sets.append((tuple(r if n == Named(*name_of(term)) else n for n in own), others * p))
     whole = max(sum(p for _, p in sets) / RIGHT, 1.0)  # forms of one curve count for the simplest of them, and each for itself
     return tuple((names, p / whole) for names, p in sets)
 
@@ -268,7 +264,7 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
     rms = [max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300) for j in range(len(biases))]
     if any(abs(mixed.get(b, 0.0)) > WORTH * shown for b, shown in zip(biases, rms)):
         off = ", ".join(s.name for s in model.sensors if bias(s.name) in mixed)
-        notes.append(f"{off} have offsets against each other; the recordings do not tell which is off")
+        notes.append(f"the offsets of {off} differ; the recordings do not tell which is wrong")
     for s, alone, shown in zip(model.sensors, shares, rms):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         if alone * abs(value) <= 3.0 * sd or bias(s.name) in mixed:

@@ -87,8 +87,16 @@ class Rounds:
         return Grown(bench, scores, tuple(found), tuple(large), good)
 
     def beside(self, accepted: Sequence[Accepted]) -> tuple[Bench, Array, list[Accepted]]:
-        """Rebuilds the bench with these forms; returns it, its scores, and the forms with their shares recomputed in it."""
-        bench, found = with_accepted(self.start, accepted)
+        """Rebuilds the bench with these forms; returns it, its scores, and the forms with the share of their name in it. What a form took of the
+        misfit stays that of its round."""
+        bench, found = self.start, []
+        for a in accepted:
+            bench, terms = adopt(bench, a.trial, a.number)
+            found.append(replace(a, terms=tuple(terms)))
+        moved = motions(Probe.of(bench)) if found else []
+        same = [[x for o in found if name_of(o.trial) == name_of(a.trial) for x in o.terms] for a in found]
+        shares = [share(bench, terms, bench.fit, moved) for terms in same]
+        found = [replace(a, trial=replace(a.trial, share=x)) for a, x in zip(found, shares)]
         return *_based(bench, self.blocks), found
 
     def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
@@ -111,18 +119,6 @@ class Rounds:
 def terms_of(accepted: Sequence[Accepted]) -> list[Term]:
     """All terms of accepted forms."""
     return [x for a in accepted for x in a.terms]
-
-
-def with_accepted(bench: Bench, accepted: Sequence[Accepted]) -> tuple[Bench, list[Accepted]]:
-    """Adopts forms one after another, then recomputes the share of each name in the final bench. What a form took of the misfit stays that of
-    its round."""
-    found = []
-    for a in accepted:
-        bench, terms = adopt(bench, a.trial, a.number)
-        found.append(replace(a, terms=tuple(terms)))
-    moved = motions(Probe.of(bench)) if found else []
-    same = [[x for o in found if name_of(o.trial) == name_of(a.trial) for x in o.terms] for a in found]
-    return bench, [replace(a, trial=replace(a.trial, share=share(bench, x, bench.fit, moved))) for a, x in zip(found, same)]
 
 
 def _hidden(t: Trial, small: Trial) -> bool:
@@ -163,9 +159,9 @@ def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Tri
     def more_than(other: Trial) -> float:
         return max(MIN_GAIN, MIN_FORM * float(np.sum(other.blocks - base)))
 
-    named = {(t.form.kind, t.form.where) for t in terms}
+    named = {name_of(t) for t in terms}
     first = min((t for t in trials if np.sum(trials[0].blocks - t.blocks) <= MIN_GAIN), key=lambda t: (len(t.term.free), -np.sum(t.blocks)))
-    best = next((t for t in trials if (t.form.kind, t.form.where) in named and np.sum(trials[0].blocks - t.blocks) <= more_than(trials[0])), first)
+    best = next((t for t in trials if name_of(t) in named and np.sum(trials[0].blocks - t.blocks) <= more_than(trials[0])), first)
     same = [t for t in trials if of_curve(t) == of_curve(best)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
     for t in more:
@@ -192,5 +188,5 @@ def of_curve(t: Trial) -> tuple[object, str]:
     return curve(t.form.kind), t.form.where
 
 
-def name_of(t: Trial) -> tuple[str, str]:
+def name_of(t: Term | Trial) -> tuple[str, str]:
     return t.form.kind, t.form.where
