@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import sympy as sp
 
@@ -46,7 +46,7 @@ class Derivatives:
             target, i = self._slope_of[symbol]
             for second, argument in zip(self.seconds.get(target, [[]] * (i + 1))[i], self._steps[target].arguments):
                 found += expr.diff(symbol) * second * self.total(argument, variable)
-        return sp.factor_terms(found) if found.is_Add else found
+        return _factored(found) if found.is_Add else found
 
     def curvature(
         self, results: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...], drive: tuple[sp.Symbol, ...]
@@ -81,6 +81,12 @@ class Derivatives:
             else:
                 self._known[key] = self.total(step.value, variable)
         return self._known[key]
+
+
+@lru_cache(maxsize=4096)  # a half-car has 700 such sums
+def _factored(expr: sp.Expr) -> sp.Expr:
+    """Factors out what the terms of a sum share. Kept, because models that differ in an option or one law have most sums in common."""
+    return sp.factor_terms(expr)
 
 
 def _tidy(expr: sp.Expr) -> sp.Expr:
