@@ -38,7 +38,7 @@ BUDGETS = ("thresholds of innovations", "settings of training", "runtime lines",
 ELEMENTARY = {"pen_elementary.h", "pen_parts.h", "pen_trig.c", "pen_atan.c", "pen_log.c", "pen_root.c"}
 
 NEWER, TABLE = BUDGETS[:2]
-ROOMS = re.compile(r"sil/penode_sil/diagnosis/(evidence|catalogue)/|sil/penode_sil/diagnosis/(propose|terms|worth|rounds|reconsider|innovate|real|weighed|beginning)\.py")
+ROOMS = re.compile(r"sil/penode_sil/diagnosis/(evidence|catalogue)/|sil/penode_sil/diagnosis/(propose|terms|worth|rounds|reconsider|innovate|parameters|real|weighed|beginning)\.py")
 
 Found = dict[str, list[str]]
 

@@ -4,33 +4,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from .evidence.bench import Bench
 from .evidence.blocks import Blocks
 from .reconsider import reconsidered
-from .rounds import Accepted, Rounds, terms_of
+from .rounds import Accepted, Grown, Rounds, terms_of
 from .terms import Term
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends with: the bench with all accepted `terms` in it; `plain`, a bench with only the forms worth naming (`named`, with their
-    terms there); and `small`, the other forms."""
+    """What a search has found: its `rounds` and their `end`; `plain`, a bench with only the forms worth naming (`named`, with their terms
+    there); and `small`, the other forms."""
 
-    bench: Bench
-    terms: tuple[Term, ...]
+    rounds: Rounds
+    end: Grown
     plain: Bench
     named: tuple[Accepted, ...]
     small: tuple[Accepted, ...]
+
+    @property
+    def bench(self) -> Bench:
+        """With all accepted forms."""
+        return self.end.bench
+
+    @property
+    def terms(self) -> list[Term]:
+        """All terms in it."""
+        return terms_of(self.end.accepted)
+
+    def naming(self, more: Sequence[Accepted]) -> Found:
+        """The same with some of the small forms named too."""
+        numbers = {a.number for a in (*self.named, *more)}
+        return _found(self.rounds, self.end, [a.number in numbers for a in self.end.accepted])
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own."""
     rounds = Rounds(bench, Blocks.of([len(r) // bench.update for r in bench.records]), log)
     end = reconsidered(rounds, rounds.grow())
-    large = [a for a, big in zip(end.accepted, end.large) if big]
-    small = tuple(a for a, big in zip(end.accepted, end.large) if not big)
-    plain, _, named = rounds.beside(large) if small else (end.bench, end.scores, large)
-    return Found(end.bench, tuple(terms_of(end.accepted)), plain, tuple(named), small)
+    return _found(rounds, end, end.large)
+
+
+def _found(rounds: Rounds, end: Grown, worth_naming: Sequence[bool]) -> Found:
+    named = [a for a, worth in zip(end.accepted, worth_naming) if worth]
+    small = tuple(a for a, worth in zip(end.accepted, worth_naming) if not worth)
+    plain, _, named = rounds.beside(named) if small else (end.bench, end.scores, named)
+    return Found(rounds, end, plain, tuple(named), small)

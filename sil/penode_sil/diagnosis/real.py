@@ -13,10 +13,10 @@ from penode_gen import units
 from penode_gen.model import GROUND, Model
 from scipy import constants
 
-from . import catalogue, innovate, straight
+from . import catalogue, innovate, parameters
 from .catalogue import drives, friction, loads
 from .catalogue.form import Form, Motion, Sizes
-from .evidence.bench import UNSTATED, Bench, build
+from .evidence.bench import Bench, build
 from .evidence.blocks import posterior
 from .evidence.fit import Fit
 from .evidence.observer import Filter, Record, bias, sample_noise
@@ -27,10 +27,9 @@ from .noise import Experiment
 from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
-from .rounds import MIN_TAKEN, name_of
-from .study import guessed
+from .rounds import MIN_TAKEN, name_of, terms_of
 from .terms import Term, Trial
-from .worth import SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, shift, undetermined
+from .worth import SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, undetermined
 
 Array = NDArray[np.float64]
 RIGHT = 0.93  # share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
@@ -62,13 +61,11 @@ def answer(
     bench = build(model, places, records, noise, fastest, set_name)
     log(f"corrected every {bench.update} samples; {bench.level.size:.3g} of what moves wanders, for {bench.level.tau:.3g} s")
     alone = bench.problem().solve(bench.fit.free, Filter.none(*bench.fit.by.gain.shape), FREE_RUN)
-    found = innovate.search(bench, log)
+    found, moved, judged = _searched(model, bench, log)
     plain, after = found.plain, found.bench
     causes: list[Cause] = []
     notes = []
-    probe = Probe.of(plain)
-    moved = motions(probe)
-    named = [term for a in found.named for term in a.terms]
+    named = terms_of(found.named)
     names = {name_of(a.trial) for a in found.named}
     chances = {a.trial: _weighed([t for t in a.trials if name_of(t) not in names - {name_of(a.trial)}]) for a in found.named}
     for a, term in ((a, term) for a in found.named for term in a.terms):
@@ -84,19 +81,34 @@ def answer(
     for a in found.small:
         what = f"{a.trial.taken:.0%} of the power of prediction errors" if a.trial.taken < MIN_TAKEN else f"{a.trial.share:.1%} of what acts there"
         notes.append(_small(a.terms[0], what))
-    share_lines = [t for t in named if t.form.how == "force" and t.form.kind in getattr(catalogue.OF[t.form.kind], "STRAIGHT", ())]
-    wrong, more = _parameters(model, plain, moved, straight.beside(model, plain, share_lines, moved), log)
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
     biased, remarks = _offsets(model, after, Probe.of(after), any(c.kind in (*loads.KINDS, *stopped) for c in causes))
-    notes += more + remarks
+    notes += [*judged.notes, *remarks]
     offsets = [s.name for s in model.sensors if abs(after.fit.value(bias(s.name))) > Z_95 * after.fit.deviation(bias(s.name))]
     none = {bias(s.name) for s in model.sensors if s.name not in offsets}
     run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 20)
-    notes += _fitted_values(model, run)
+    notes += parameters.notes_on_guessed(model, run)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
     taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken_whole(after.fit, bench.problem().floor))
     sets = _explanations([(a.terms[0], chances[a.trial]) for a in found.named])
-    return Answer((*wrong, *causes, *biased), tuple(notes), sets, found, run, tuple(offsets), taken, after.model)
+    return Answer((*judged.causes, *causes, *biased), tuple(notes), sets, found, run, tuple(offsets), taken, after.model)
+
+
+def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[Found, list[Motion], parameters.Judged]:
+    """What the search finds, the motion with it, and its parameters. Where one of these only makes up for a form that is small beside it, small
+    forms of at least WORTH of what acts are named too: they took little of the misfit because the parameter had taken the rest."""
+
+    def judged(found: Found) -> tuple[Found, list[Motion], parameters.Judged]:
+        moved = motions(Probe.of(found.plain))
+        return found, moved, parameters.judge(model, found, moved, RIGHT, log)
+
+    first = judged(innovate.search(bench, log))
+    large = [a for a in first[0].small if a.trial.share >= WORTH]
+    if not first[2].absorbed or not large:
+        return first
+    wider = judged(first[0].naming(large))
+    log(f"{', '.join(first[2].absorbed)} may have made up for {', '.join(' at '.join(name_of(a.trial)) for a in large)}; still does {wider[2].absorbed}")
+    return wider if set(wider[2].absorbed) < set(first[2].absorbed) else first
 
 
 def _small(t: Term, what: str) -> str:
@@ -189,14 +201,14 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
             for key in found:
                 slopes[key][i] = (moved[key][1] - found[key][1]) / step
     wider = _wider(bench, term, size)
-    parameters = {}
+    given = {}
     for key, (unit, value) in found.items():
         sd = wider * float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
         if not slopes[key].any():  # looked for, not fitted: known as well as the size that goes with it
             alone = term.free[0].target
             sd = wider * abs(value) * bench.fit.deviation(alone, ratios) / max(abs(bench.fit.value(alone)), 1e-300)
-        parameters[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
-    return Cause(form.kind, form.where, parameters, RIGHT * min(max(sure, 0.0), 1.0), rivals)
+        given[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
+    return Cause(form.kind, form.where, given, RIGHT * min(max(sure, 0.0), 1.0), rivals)
 
 
 def _wider(bench: Bench, term: Term, size: float) -> float:
@@ -210,48 +222,6 @@ def _wider(bench: Bench, term: Term, size: float) -> float:
 def _values_of(bench: Bench, term: Term) -> list[Free]:
     """The free values of a term as they are in the bench."""
     return [f for f in bench.fit.free if f.target in {t.target for t in term.free}]
-
-
-def _parameters(
-    model: Model, bench: Bench, moved: Sequence[Motion], shared: Mapping[str, straight.Slopes], log: Callable[[str], None]
-) -> tuple[list[Cause], list[str]]:
-    """Parameters that are not what the file says, beyond what it vouches for, and a note on those that a law at their place may have taken, by
-    the slopes that it has (`shared`)."""
-    fit, causes, notes = bench.fit, [], []
-    for name, p in model.parameters.items():
-        f = next((f for f in fit.free if f.target == name), None)
-        if f is None or np.isinf(p.tolerance):
-            continue
-        sd = fit.deviation(name)
-        limit = p.tolerance if p.tolerance > 0.0 else UNSTATED
-        off = abs(f.value / p.value - 1.0)
-        size = shift(model, bench, moved, name)
-        sd = float(np.hypot(sd, SYSTEMATIC / max(size, SYSTEMATIC) * abs(f.value - p.value)))
-        low, high = f.value - Z_95 * sd, f.value + Z_95 * sd
-        log(f"{name}: {f.value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of what acts there")
-        if off > limit and not low <= p.value * (1.0 + limit * np.sign(f.value / p.value - 1.0)) <= high and not low <= p.value <= high:
-            if name in shared and not straight.off(p.value, f.value, shared[name], limit):
-                notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)} beside what was found at its place, which shares its straight part")
-                continue
-            if size < WORTH:
-                notes.append(f"{name} is {f.value:.4g} {units.si(p.unit)}, which changes {size:.1%} of what acts there: as much as anything that the "
-                             "model leaves out might")  # fmt: skip
-                continue
-            least, most = shared.get(name, (0.0, 0.0))
-            value = Value(f.value + 0.5 * (least + most), units.si(p.unit), (low + least, high + most))
-            causes.append(Cause("wrong_parameter", name, {name: value}, RIGHT))
-    return causes, notes
-
-
-def _fitted_values(model: Model, fit: Fit) -> list[str]:
-    """A note on parameters that the file only guesses, as the extended model has them."""
-    found, ratios = [], undetermined(model, fit)
-    for name in guessed(model):
-        if any(f.target == name for f in fit.free):
-            sure = "" if name in ratios else f" +- {Z_95 * fit.deviation(name, ratios):.2g}"
-            found.append(f"{name} = {fit.value(name):.4g} {units.si(model.parameters[name].unit)}{sure}")
-    only = f"; the recordings show forces as ratios to {', '.join(sorted(ratios))} only" if ratios else ""
-    return [f"as fitted, for the file only guesses: {', '.join(found)}{only}"] if found else []
 
 
 def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[list[Cause], list[str]]:
