@@ -18,7 +18,6 @@ from penode_sil.diagnosis.explaining import acting, heavy
 from penode_sil.diagnosis.explanation import COST, NEW, Explanation, distinct, only_noise, spared
 from penode_sil.diagnosis.pursuit import PART, elsewhere, pursue, strongest, terms_of
 from penode_sil.diagnosis.refining import called
-from penode_sil.diagnosis.search import hopeful
 from penode_sil.diagnosis.singles import rigid, sufficient
 from penode_sil.diagnosis.textbook import halved, weak, whole
 
@@ -182,13 +181,6 @@ def test_what_mends_a_form_may_take_away():
     assert pursue(r, [0]) == (0.0, []) and pursue(r.unsigned(), [0])[1] == [0]
     (term,) = terms_of(r.unsigned(), [0])
     assert term.gain == pytest.approx(-30.0, rel=1e-4) and term.candidate.what.sign == 0 and r.candidates[0].sign == 1
-
-
-@pytest.mark.parametrize("null, left, so", [(31_000, 14_000, True), (31_000, 24_000, False), (14_000, 11_000, False), (10_000, 9_900, False)])
-def test_a_cause_that_takes_most_is_not_given_up(null, left, so):
-    """In 10 000 samples: most of what is more than noise; less than most; and what may be noise of a colour."""
-    study = SimpleNamespace(null=SimpleNamespace(cost=null, residual=np.zeros(10_000)), experiments=[SimpleNamespace(good=np.ones(10_000, bool))])
-    assert hopeful(study, SimpleNamespace(fit=SimpleNamespace(cost=left))) == so
 
 
 @pytest.mark.parametrize("chi2, so", [(10_400.0, True), (10_500.0, False)])

@@ -51,7 +51,8 @@ class Case:
 @dataclass(frozen=True, eq=False)
 class Judged:
     """What explanations amount to. `named`: the explanation that goes into the extended model, None if nothing does; `unnamed`: the same
-    where it is a network without a name; `doubt`: why all of it may be something else, empty if not."""
+    where it is a network without a name; `faults`: of sensors, seen in the samples, not fitted; `doubt`: why all of it may be
+    something else, empty if not."""
 
     causes: tuple[Cause, ...]
     verdict: str
@@ -62,6 +63,7 @@ class Judged:
     drift: float
     numbers: object
     notes: tuple[str, ...]
+    faults: tuple[Cause, ...]
     named: Explanation | None = None
     unnamed: Explanation | None = None
 
@@ -70,16 +72,23 @@ class Judged:
         return replace(self, causes=SURELY_NOT, verdict="unexplained", explained=0.0, named=None, unnamed=None, notes=(*self.notes, note))
 
 
-def by_noise(case: Case, study: Study, explanations: Sequence[Explanation], faults: list[Cause], bursts: Sequence[np.ndarray]) -> Diagnosis:
-    """The diagnosis, without recordings and time, which the caller has."""
+def judge_explanations(
+    case: Case, study: Study, explanations: Sequence[Explanation], faults: list[Cause], bursts: Sequence[np.ndarray]
+) -> tuple[Study, Judged]:
+    """Judges explanations; returns the study with the smoothed motion of the best one, and the judgement."""
     best = explanations[0] if explanations else None
     if best is not None:  # bursts and spikes that a cause explains were none
         faults = _still_broken(case, study, best, faults, bursts)
     case.tell(SEARCH[1], "weighing them against numerics")
     study = replace(study, seen=look(study, best.fit if best else study.null))
-    judged = _sized(case, study, best, _weighed(case, study, explanations, faults))
+    return study, _weighed(case, study, explanations, faults)
+
+
+def by_noise(case: Case, study: Study, best: Explanation | None, judged: Judged) -> Diagnosis:
+    """The diagnosis with sizes, extended model, gain and pictures; without recordings and time, which the caller has."""
+    judged = _sized(case, study, best, judged)
     study = replace(study, model=case.model)  # what the file does not state is not written down
-    judged, text, extended, gain, held = _measured(case, study, judged, faults)
+    judged, text, extended, gain, held = _measured(case, study, judged)
     if case.output is not None:
         extended = write_extended(text, case.model, case.output)
     absorbed: dict[str, object] = {}
@@ -126,7 +135,7 @@ def _weighed(case: Case, study: Study, explanations: Sequence[Explanation], faul
     drift = sum(t.gain for t in best.terms if t.candidate.kind == CLOCK) if best else 0.0
     notes = [*case.remarks, *filter(None, [plant.placeless(study.places)])]
     notes += hints(study, explanations, verdict, bool(behind), change if changed else None, tone, drift)
-    return Judged(causes, verdict, explained, evidence, alike, doubt, drift, numbers, tuple(notes))
+    return Judged(causes, verdict, explained, evidence, alike, doubt, drift, numbers, tuple(notes), tuple(faults))
 
 
 def _sized(case: Case, study: Study, best: Explanation | None, judged: Judged) -> Judged:
@@ -166,9 +175,7 @@ def _with_a_size(study: Study, best: Explanation | None, causes: tuple[Cause, ..
     return (kept, nothing) if kept else (causes, [])
 
 
-def _measured(
-    case: Case, study: Study, judged: Judged, faults: Sequence[Cause]
-) -> tuple[Judged, str, Model, dict[str, Gain], list[residual.Channel]]:
+def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, Model, dict[str, Gain], list[residual.Channel]]:
     """What the hold-out says: the judgement after it, text and model of the extended file, gain, and channels of the hold-out."""
     text, extended = extension.extend_file(study, judged.named, judged.causes)
     if not case.holdout:
@@ -177,7 +184,7 @@ def _measured(
     lost = {c.where for c in judged.causes if c.kind == "sensor_dropout"}
     gain, more, held = measuring.measure(study, extended, case.unused, lost)
     worse = [s for s, g in gain.items() if g.worsened]
-    fitted = [c for c in judged.causes if c not in faults]  # the others are seen in the samples, not by a simulation
+    fitted = [c for c in judged.causes if c not in judged.faults]
     if fitted and any(gain[s].after_rmse > UNSEEN * gain[s].noise_floor and gain[s].outside < FARTHER for s in worse):
         names = " and ".join(f"{c.kind} at {c.where}" for c in fitted)
         judged = judged.nothing(f"{names} would explain the training, but makes {', '.join(worse)} of the hold-out worse: train with more excitations")

@@ -19,7 +19,7 @@ from . import dropouts, plausible, search, weighed
 from .advice import advised
 from .answers import by_innovations, recorded
 from .broken import broken_sensors
-from .by_noise import SEARCH, Case, by_noise
+from .by_noise import SEARCH, Case, by_noise, judge_explanations
 from .driven import settled
 from .evidence.bench import with_tolerances
 from .explanation import Explanation
@@ -57,12 +57,11 @@ def diagnose(
 
 
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
-    """Innovations decide where the file only guesses a parameter, on a free motion that the model misses, or where more acts than the search
-    by sensor noise explains (`_decides`); else that search does. It ends early where more acts than any single cause explains and
-    innovations explain it all, unless so much is left that more causes are to be expected; or where innovations name nothing, and more acts
-    than several causes explain. Where it explains nothing, or a part, innovations answer if they follow the recordings better, name the same,
-    or find an input at fault, and for a part if the rest wanders everywhere; where neither has a name, parameters that predict the hold-out
-    better stay."""
+    """Innovations answer where the file only guesses a parameter, on a free motion that the model misses, or where `_decides`. They are asked
+    first if more than UNMODELLED acts beside the best single cause, and answer at once if they explain it and little still wanders; else the
+    search by sensor noise goes on as long as it gets below UNMODELLED. If that search explains nothing, innovations answer where they
+    explain it, or where they have causes and more than UNMODELLED wanders. If they were not asked before, they answer where they follow
+    the recordings better, name the same, or find an input at fault; where neither has a name, parameters that predict the hold-out better stay."""
     vague = weighed.supports(study.model) and bool(guessed(study.model))
     if vague or not study.model.inputs and weighed.misfit(study, study.null, case.log).size:
         return _by_innovations(case, None, _weighed(case, study))
@@ -74,17 +73,24 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
         w = _weighed(case, study)
         if w.verdict == "explained" and weighed.UNMODELLED < w.level < 2.0 * WORTH:
             return _by_innovations(case, beam[0], w)
-    study, explanations = search.grow(study, beam, case.log)
-    beside = weighed.misfit(study, explanations[0].fit, case.log) if w and not w.causes and explanations else None
-    if beside is None or beside.size <= weighed.UNMODELLED:
+
+    def hopeless(study: Study, e: Explanation) -> bool:
+        return w is not None and weighed.misfit(study, e.fit, case.log).size > weighed.UNMODELLED
+
+    study, explanations = search.grow(study, beam, case.log, hopeless=hopeless)
+    if not explanations or not hopeless(study, explanations[0]):
         study, explanations = resting(other, study, explanations, case.log)
-        beside = weighed.misfit(study, explanations[0].fit if explanations else study.null, case.log)
+    beside = weighed.misfit(study, explanations[0].fit if explanations else study.null, case.log)
     best = explanations[0] if explanations else None
     if beside.size:
         w = w or _weighed(case, study)
         if _decides(w, beside.size, study, best, bool(faults)):
             return _by_innovations(case, best, w)
-    answer = by_noise(case, study, explanations, faults, bursts)
+    study, judged = judge_explanations(case, study, explanations, faults, bursts)
+    sure = w if w and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED) else None
+    if sure and judged.verdict == "unexplained":  # before an extended model is made that nobody would see
+        return _by_innovations(case, best, sure)
+    answer = by_noise(case, study, best, judged)
     if answer.verdict in ("unexplained", "partly_explained") and w is None and weighed.supports(study.model):
         w = _weighed(case, study)
         same = {(c.kind, c.where) for c in w.causes} == set(best.groups if best else ()) != set()
@@ -93,9 +99,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
         if answer.verdict == "unexplained" and not answer.explained and w.mends():  # nothing has a name, but parameters are nearer
             return _by_innovations(case, best, replace(w, verdict="unexplained", causes=(), explanations=(), explained=0.0))
         return answer
-    if w and answer.verdict == "unexplained" and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED):
-        return _by_innovations(case, best, w)
-    return answer
+    return _by_innovations(case, best, sure) if sure and answer.verdict == "unexplained" else answer
 
 
 def _decides(w: weighed.Weighed, level: float, study: Study, best: Explanation | None, faulty: bool) -> bool:

@@ -17,7 +17,7 @@ from .naming import with_kinds
 from .study import Study, loss
 
 CLOSED = 1e-4  # of what there is to gain: a fit that gains less by an iteration is good enough to be compared
-HEAVY = 2e6  # steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause
+HEAVY = 2e6  # steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause; and one law mends its form
 ROUGH = 5e5  # the same: where it takes more, fits begin with longer steps
 
 
@@ -91,9 +91,9 @@ def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
     return found
 
 
-def heavy(e: Explanation, most: float = HEAVY) -> bool:
+def heavy(e: Explanation) -> bool:
     """Do its derivatives take so many steps that the search has to be narrow to end in time?"""
-    return len(e.fit.free) * e.problem.steps > most
+    return len(e.fit.free) * e.problem.steps > HEAVY
 
 
 def settled(study: Study, e: Explanation) -> Explanation:

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
 from penode_gen.model import Model
+from scipy import constants
 
 from .build import Extended, Term
 from .fit import Fit, Problem
@@ -21,7 +21,6 @@ from .hypotheses import CLOCK, VALUED, Basis, Fault
 from .score import Candidate
 from .study import Study
 
-GRAVITY = 9.81  # [m/s^2]
 CHANCE = 3.0  # deviations of chi2
 COST = 10.0  # chi2 that an elementary law must gain for each of its numbers, and the choice among many
 NEW = 50.0  # chi2 that a further kind must gain beyond that
@@ -106,11 +105,6 @@ def cost(c: Candidate) -> float:
     return COST * (own + (len(c.what.shapes) if isinstance(c.what, Basis) else 0))
 
 
-def taken(study: Study, e: Explanation) -> float:
-    """The share of what is more than noise that an explanation takes, in the noise it was fitted in."""
-    return (study.null.cost - e.fit.cost) / max(study.null.cost - rows(study), 1.0)
-
-
 def loaded(e: Explanation) -> float:
     """What the loads of an explanation are at most, all together [N]: some that nearly cancel each other count in full."""
     return sum(abs(t.gain) for t in e.terms if t.candidate.kind == "constant_force")
@@ -123,7 +117,7 @@ def numbers(e: Explanation) -> int:
 
 def weight(model: Model) -> float:
     """Of all bodies [N], without any no bound. A load beyond it is a start in motion in disguise."""
-    return GRAVITY * sum(model.parameters[b.mass].value for b in model.bodies) or np.inf
+    return constants.g * sum(model.parameters[b.mass].value for b in model.bodies) or np.inf
 
 
 def related(groups: Sequence[Group]) -> set[str]:

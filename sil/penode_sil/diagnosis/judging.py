@@ -13,6 +13,7 @@ from . import explaining, explanation, noise, refining, search, sized
 from .echo import LAGGING
 from .explanation import Explanation
 from .hypotheses import CLOCK, Basis
+from .late import SHORT
 from .result import OUTSIDE, Cause, Named
 from .study import Study
 
@@ -22,10 +23,8 @@ ENOUGH = 0.85  # share of the avoidable residual that named causes must take awa
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.2  # a hidden mass with more damping is no part on rubber, whose loss factor is 0.4 at most: it stands for some other dynamics
 MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks only stand in for it
-LATE = 0.008  # of a sample: less delay than that is no fault of a sensor
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
 SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "maxwell_bushing": "stiffness", "hidden_resonance": "frequency"}
-SURE = 8.0  # chi2 for each gain, by which several together are sure
 
 
 def judge(
@@ -104,7 +103,7 @@ def unsized(e: Explanation, c: Cause) -> bool:
     gains = {f"{name}_{what.gain[0]}" for name, what in laws.items()}
     at = [i for i, f in enumerate(e.fit.free) if f.target in gains]
     size = np.array([e.fit.free[i].value / e.fit.free[i].unit for i in at])
-    return float(size @ np.linalg.pinv(e.fit.covariance()[np.ix_(at, at)]) @ size) < SURE * len(at)
+    return float(size @ np.linalg.pinv(e.fit.covariance()[np.ix_(at, at)]) @ size) < explanation.COST * len(at)
 
 
 def worth(study: Study, c: Cause) -> bool:
@@ -117,7 +116,7 @@ def worth(study: Study, c: Cause) -> bool:
             low, high = c.parameters["force"].ci95
             return low * high > 0.0
         case "sensor_delay":
-            return p["delay"] > LATE * study.model.sample_time
+            return p["delay"] > SHORT * study.model.sample_time
         case "wrong_parameter":
             return all(abs(v / study.model.parameters[k].value - 1.0) > study.model.parameters[k].tolerance for k, v in p.items())
         case "hidden_resonance":

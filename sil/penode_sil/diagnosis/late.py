@@ -11,7 +11,7 @@ import numpy as np
 
 from .entries import table, toml
 
-SHORT = 0.02  # of a sample: shorter delays are not written
+SHORT = 0.02  # of a sample: shorter delays are no cause, and not written
 ONE_POLE = 0.48  # of a delay squared: beyond that the second pole of a filter is 50 times as fast as the first
 
 

@@ -22,11 +22,10 @@ from .study import Study, loss
 HIDDEN = 8  # neurons, of deflection and rate: 32 weights
 ITERATIONS = 30  # at the most
 FIRST = 8  # after which it has to look promising
-EARLY = 0.75  # of the share that it must take in the end
+PROMISING = 0.225  # share of the avoidable residual that it must take by then, or the fit is given up
 CLOSED = 1e-2  # of the avoidable residual: the fit ends where an iteration takes less
 STARTS = 4  # of the regression before, which sees the force that the smoother estimates
 POINTS = 1500
-SHARE = 0.3  # of the avoidable residual that it must take away
 
 
 def fitted(study: Study, best: Explanation | None) -> Explanation | None:
@@ -58,11 +57,11 @@ def fitted(study: Study, best: Explanation | None) -> Explanation | None:
     plain = [replace(f, value=f.origin) if isinstance(f.target, str) else f for f in study.null.free]  # as it was stated
     close = max(CLOSED * avoidable(study), COST)
     fit = problem.solve((*plain, *free), FIRST, close)
-    if not np.isfinite(fit.cost) or share(study, fit) < EARLY * SHARE:
+    if not np.isfinite(fit.cost) or share(study, fit) < PROMISING:
         return None
     fit = problem.solve(fit.free, ITERATIONS - FIRST, close)
     gain = loss(study, study.null) - loss(study, fit)
-    if gain < COST * len(free) or share(study, fit) < SHARE:
+    if gain < COST * len(free):
         return None
     return Explanation((), Extended(model, tuple(free), (), frozenset(), ()), problem, fit, gain)
 

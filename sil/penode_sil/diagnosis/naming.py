@@ -30,7 +30,6 @@ UNEVEN = 0.5  # even part of a curve over its odd one, without a line, that make
 EDGE = 0.15  # of the reach: a stop or a loss of contact that begins nearer than that to the middle is an element that bends there
 MENDING = 0.2  # of the largest force of a stop on one side at the reach: with less, another only mends its form
 STRAIGHT = 0.02  # of the straight part of a curve: less than that beside it, and it is a straight line
-FLAT = 0.015  # of what a tyre lacks when stretched: bent by less than that when pressed in, it only loses contact
 PEAK = 1.2  # friction at low rates over that at higher ones that makes it Stribeck's
 FAST = 0.3  # of the rates: from there on the line in a curve is a damper's
 STEP = 0.65  # of its greatest force from a twentieth of the rates on that friction without memory has there: with less, it is a damper
@@ -127,14 +126,7 @@ def _contact(terms: Sequence[Term], names: Sequence[str], values: Values, reach:
 
 def _tyre(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
     lost = [values[f"{n}_static"] for t, n in zip(terms, names) if t.candidate.what.law == "liftoff"]
-    if lost and max(lost) > EDGE * reach:
-        return "tyre_liftoff"
-    s = np.linspace(-reach, reach, 401)
-    f = Curve(terms, names)(s, np.zeros_like(s), values)
-    pressed = s < 0.0
-    slope, level = np.polyfit(s[pressed], f[pressed], 1)
-    off = f - slope * s - level
-    return "tyre_liftoff" if not lost and _size(off[pressed]) < -FLAT * off[-1] else "tyre_nonlinear"
+    return "tyre_liftoff" if max(lost, default=0.0) > EDGE * reach else "tyre_nonlinear"
 
 
 def straight(

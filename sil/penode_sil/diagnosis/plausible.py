@@ -28,7 +28,6 @@ NEAR = 0.14  # of a factor, in its logarithm: what else is wrong with a model ch
 ALIKE = 0.9  # correlation of measured and simulated signals that differ by a factor only
 POOR = 0.1  # share of a signal's power that the model must miss before another plant is thought of
 FAR = 0.1  # a parameter that is so much off, and 3 tolerances, is another one
-MANY = 3  # so many other parameters are another plant
 LITTLE = 0.05  # of what the nominal plant leaves: more than that, and it is no explanation either
 UNLIKE = 0.5  # share of a signal's power that the model misses, beyond which the signal may not be of its plant
 
@@ -121,7 +120,7 @@ def other_plant(study: Study, bound: float) -> str:
     ratios = {f.target: f.value / f.origin for f in fit.free if f.target in parameters}
     far = {k: r for k, r in ratios.items() if abs(np.log(r)) > max(FAR, 3.0 * parameters[k].tolerance)}
     rows = len(fit.residual)
-    if len(far) < MANY or fit.chi2 > min(bound - NEW - COST * len(ratios), rows + LITTLE * (study.null.chi2 - rows)):
+    if len(far) < 2 or fit.chi2 > min(bound - NEW - COST * len(ratios), rows + LITTLE * (study.null.chi2 - rows)):
         return ""
     texts = ", ".join(f"{r:.2f} times its {k}" for k, r in far.items())
     return f"these are rather data of another plant, with {texts}; name the model file of that plant"

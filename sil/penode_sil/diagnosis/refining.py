@@ -18,8 +18,6 @@ from .study import Study, noise_of, regression
 
 SHAPED = {*FRICTION, *DAMPERS} - {"bouc_wen"}  # kinds whose names follow from the shape of a curve alone, whatever laws it is made of
 FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
-MENDS = 4  # laws, at most, that only mend the form of what is named
-LABOUR = 1.5e6  # the same: where it takes more, one law is enough to mend the form of what is named
 SINGLE = ("wrong_parameter", "hidden_resonance", CLOCK)  # kinds that have one law only
 
 
@@ -71,16 +69,13 @@ def mended(study: Study, e: Explanation, log) -> tuple[Explanation, Explanation]
     """The explanation with as many more laws of its causes as are worth their numbers, under the same names: with laws of the sign of
     their kinds, from which its causes have their sizes; and then of any sign. A name is what a curve does in the large; what the
     extended model foretells depends on all of the curve, and may need less of a law as well as more."""
-    most = len(e.terms) + (1 if heavy(e, LABOUR) else MENDS)
-    study, sized, r = formed(study, e, None, most, log)
-    more = r is not None and not heavy(sized, LABOUR)
-    return sized, formed(study, sized, r.unsigned(), most, log)[1] if more else sized
+    study, sized, r = formed(study, e, None, log)
+    more = r is not None and not heavy(sized)
+    return sized, formed(study, sized, r.unsigned(), log)[1] if more else sized
 
 
-def formed(
-    study: Study, e: Explanation, r: Regression | None, most: int, log
-) -> tuple[Study, Explanation, Regression | None]:
-    """The explanation with more laws as they are in a regression about it, if it is known already, up to so many terms; with the study
+def formed(study: Study, e: Explanation, r: Regression | None, log) -> tuple[Study, Explanation, Regression | None]:
+    """The explanation with more laws as they are in a regression about it, if it is known already, one where fits are `heavy`; with the study
     that has the noise it leaves, and the regression about it. Laws may have any sign if they may in the regression."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
     spare = [g for g in e.groups if g[0] not in ("wrong_parameter", "constant_force", "sensor_delay", CLOCK)]
@@ -88,7 +83,7 @@ def formed(
     if spare and r is None:
         e = e.whole()
         r = regression(study, e.fit, parameters, related(spare))
-    while spare and len(e.terms) < most:
+    while spare:
         found = []
         for group in spare:
             own = {fault_of(t.candidate) for t in e.terms if t.group == group} - {None}
@@ -107,6 +102,8 @@ def formed(
             e = settled(study, wider).whole()
             r = regression(study, e.fit, parameters, related(spare))
             r = r.unsigned() if anyway else r
+            if heavy(e):
+                break
         else:
             spare.remove(group)
     return study, e, r

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 from .exchange import ranked
 from .explaining import explain, settled
-from .explanation import LOADS, NEW, Explanation, loaded, numbers, rows, taken, weight
+from .explanation import LOADS, NEW, Explanation, loaded, numbers, rows, weight
 from .pursuit import terms_of
-from .search import HOPELESS, NEAR, grow
+from .search import NEAR, grow
 from .study import MOVING, Study, loss, regression, with_noise_of
 
 IDLE = 3.0  # chi2 that a free start state gains though nothing moves: 1, and twice its deviation
@@ -53,7 +53,7 @@ def at_rest(rest: Study, free: Study, told: Sequence[Explanation], log) -> tuple
         if not loaded(told[0]):
             return rest, []
         beam = [idle]  # the load was but a start in motion that is none
-    if beam[0].score < max(NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW) or taken(rest, beam[0]) < HOPELESS:
+    if beam[0].score < max(NEW, moving - min(NEAR * moving, REST * rows(rest)) - NEW):
         return rest, []
     quiet = with_noise_of(rest, beam[0].fit)
     again = [explain(quiet, e.terms, 4, e.fit, e.formulas) for e in beam[:3]]

@@ -4,25 +4,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from .exchange import MAX_LOSS, exchanged, lightened, ranked
 from .explaining import explain, heavy, settled
-from .explanation import NEW, Explanation, curve, distinct, exact, law_of, level, only_noise, rows, spared, taken, unloaded
+from .explanation import COST, NEW, Explanation, curve, distinct, exact, law_of, level, only_noise, rows, spared, unloaded
 from .noise import ALIKE, correlation
 from .pursuit import further, strongest, terms_of
 from .refining import filtered, refine
 from .score import Regression
 from .singles import singles
 from .study import Study, loss, regression, with_noise_of
-from .textbook import SLACK, owned, plain, softened
+from .textbook import owned, plain, softened
 
 WHOLE = 0.97  # share that is a whole explanation
 NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
-MIN_TAKEN = 0.5  # of what is more than noise
-DOUBLE = 0.5  # of the noise: a residual with less on top of it is noise of a colour
-HOPELESS = 0.3  # of what is more than noise: causes that take less have no name, whatever is exchanged among them
 
 
 def first(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation]]:
@@ -39,20 +36,13 @@ def first(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation]
         found = sorted([*found, *singles(slow, regression(slow, slow.null, parameters), 1)], key=lambda e: -e.score)
     for e in found:
         log(f"first {e.groups} {e.gain:.0f}")
-    if not found or found[0].score <= 0.0 and not hopeful(bare, found[0]):
+    if not found or found[0].score <= 0.0:
         return study, []
     quiet = with_noise_of(bare, found[0].fit)
     if quiet is bare:
         return quiet, found
     again = [*singles(quiet, regression(quiet, quiet.null, parameters)), explain(quiet, found[0].terms, start=found[0].fit)]
     return quiet, distinct(again)
-
-
-def hopeful(study: Study, e: Explanation) -> bool:
-    """Does a cause take most of what is more than noise, though noise of another colour would do as well? Then another cause is left
-    that was hidden in that noise, such as a bias, and both together may do better."""
-    more = study.null.cost - rows(study)
-    return more > DOUBLE * rows(study) and study.null.cost - e.fit.cost > MIN_TAKEN * more
 
 
 def _refined(study: Study, e: Explanation, parameters: Sequence[str], log) -> tuple[Study, Explanation, Regression]:
@@ -77,9 +67,11 @@ def _refined(study: Study, e: Explanation, parameters: Sequence[str], log) -> tu
     return here, e, r
 
 
-def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tuple[Study, list[Explanation]]:
+def grow(
+    study: Study, beam: Sequence[Explanation], log, width: int = 2, hopeless: Callable[[Study, Explanation], bool] = lambda study, e: False
+) -> tuple[Study, list[Explanation]]:
     """Explanations by one kind, those of the `beam`, by two and by three, from best to worst; `width`: how many of each are given a
-    further one."""
+    further one. After each round the search ends if the best explanation so far is `hopeless`."""
     if not beam:
         return study, []
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
@@ -87,7 +79,7 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
         log(f"{e.groups} {e.gain:.0f}")
     done = list(beam)
     ended: list[Explanation] = []
-    share = 0.0
+    stopped = False
     for _ in (2, 3):
         grown: list[Explanation] = []
         enough = beam[0].gain - MAX_LOSS * abs(beam[0].gain)
@@ -99,7 +91,6 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
                 continue  # it would need more laws to become as good
             here, e, r = _refined(study, e, parameters, log)
             done.append(e)
-            share = max(share, taken(here, e))
             log(f"refined {e.groups} x{len(e.terms)} {e.gain:.0f} {[law_of(t.candidate) for t in e.terms]}")
             if second := filtered(here, e, r):
                 done.append(second)
@@ -112,25 +103,26 @@ def grow(study: Study, beam: Sequence[Explanation], log, width: int = 2) -> tupl
             for new in ways:
                 wider = explain(here, [*e.terms, *new], start=e.fit, formulas=e.gain if exact(e.groups) else e.formulas)
                 log(f"  + {wider.groups[-1]} -> {wider.gain:.0f}")
-                share = max(share, taken(here, wider))
                 if wider.score > e.score:
                     grown.append(wider)
         done += grown
         if not grown:
             break
         beam = sorted(grown, key=lambda e: -e.score)
+        if stopped := hopeless(study, max(done, key=lambda e: e.score)):
+            break
     done = sorted((e for e in spared(done) if e.score > 0.0), key=lambda e: -e.score)
     if done:
         study = with_noise_of(study, done[0].fit)
-    if done and len(done[0].groups) > 1 and share > HOPELESS:
+    if stopped or not done:
+        return study, done
+    if len(done[0].groups) > 1:
         found = exchanged(study, done[0], parameters, log)
         if found and max(e.score for e in found) > done[0].score:
             found += lightened(study, max(found, key=lambda e: e.score), log)
         done = sorted(done + found, key=lambda e: -e.score)
-    if not done:
-        return study, []
     others = [e for e in done[1:] if unloaded(e) != unloaded(done[0]) and len(e.groups) <= len(done[0].groups)]  # for loads, see ranked
-    equal = [e for e in others if e.gain > done[0].gain - SLACK]  # and may be the plainer one
+    equal = [e for e in others if e.gain > done[0].gain - COST]  # and may be the plainer one
     first = level([done[0], *equal[:1]])
     plainer = list(zip(first, level([plain(study, e, parameters, log) for e in first])))
     best = settled(study, owned(study, max(plainer, key=lambda both: max(e.score for e in both))[1], log))

@@ -23,7 +23,6 @@ SHARP = 3.0  # of a sensor's limits, to begin with
 BENT = 0.1  # more of a signal at its largest, to begin with
 CLOSE = 0.02  # of the gain: an exchanged cause that is nearly as good gets more laws
 WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
-SLACK = 10.0  # of score, that a textbook law may be worse by
 TEXTBOOK = {
     "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
     "asymmetric_spring": (BENDS["s"], "linear_spring"), "asymmetric_damper": (BENDS["v"], "linear_damper"),
@@ -69,7 +68,7 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
             simple = explain(study, [*(t for t in e.terms if t.group != group), *new], start=e.fit, formulas=e.formulas)
             log(f"  plain {group} as {other[0]}, {simple.groups}: {simple.gain:.0f} for {e.gain:.0f}, {simple.score:.0f} for {e.score:.0f}")
             same = set(simple.groups) == {other if g == group else g for g in e.groups}
-            if same and (group == other and simple.gain > e.gain - SLACK or simple.score > e.score - SLACK):
+            if same and (group == other and simple.gain > e.gain - COST or simple.score > e.score - COST):
                 e = simple
     return joined(study, e, log)
 
@@ -83,7 +82,7 @@ def level_friction(study: Study, e: Explanation, log) -> Explanation:
         term = replace(t, candidate=replace(t.candidate, kind="coulomb_friction", what=one))
         level = explain(study, [*(x for x in e.terms if x.group != t.group), term], start=e.fit, formulas=e.formulas)
         log(f"  one level of {t.group}: {level.gain:.0f} for {e.gain:.0f}, {level.score:.0f} for {e.score:.0f}")
-        if len(level.groups) == len(e.groups) and level.score > e.score - SLACK:
+        if len(level.groups) == len(e.groups) and level.score > e.score - COST:
             return level
     return e
 
@@ -97,7 +96,7 @@ def unlagged(study: Study, e: Explanation, log) -> Explanation:
             term = replace(t, candidate=replace(t.candidate, kind="cubic_spring", where=place, companion=False, what=what))
             spring = explain(study, [*(x for x in e.terms if x.group != t.group), term], start=e.fit, formulas=e.formulas)
             log(f"  no memory in {t.group}: {spring.gain:.0f} for {e.gain:.0f}")
-            e = spring if spring.score > e.score - SLACK else e
+            e = spring if spring.score > e.score - COST else e
     return e
 
 
@@ -160,7 +159,7 @@ def unbent(study: Study, e: Explanation, log) -> Explanation:
             term = Term(Candidate("wrong_parameter", name, 0, False, name), 0.0)
             simple = explain(study, [*(t for t in e.terms if t.group != group), term], start=e.fit, formulas=e.formulas)
             log(f"  straight {group}: {simple.gain:.0f} for {e.gain:.0f}")
-            if simple.score > e.score - SLACK:
+            if simple.score > e.score - COST:
                 e = simple
     return e
 

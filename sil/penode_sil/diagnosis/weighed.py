@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +90,7 @@ def supports(model: Model) -> bool:
     return bool(model.bodies or model.states and not model.elements) and not model.networks
 
 
+@lru_cache(maxsize=2)  # the search asks, and the engine asks for the same again
 def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: None) -> Misfit:
     """The misfit of an explanation."""
     if not supports(study.model) or _is_noise(study, fit):
