@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from penode_sil.diagnosis import search
 from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.hypotheses import HALVES, Basis
 from penode_sil.diagnosis.score import Candidate, Regression
@@ -238,3 +239,24 @@ def test_what_has_no_force_goes(gains, left):
     terms = [law("backlash", gains[0]), law("backlash", gains[1], companion=True), law("bump_stop", gains[2])]
     wrong = Term(Candidate("wrong_parameter", "c", 0, False, "c"), 0.0)
     assert acting([*terms, wrong]) == [*(terms[k] for k in left), wrong]
+
+
+@pytest.mark.parametrize("hopeless, causes", [(True, 2), (False, 3)])
+def test_a_hopeless_search_ends_after_its_round(monkeypatch, hopeless, causes):
+    """Each round adds a cause; causes are exchanged only where the search went on to its end. Nothing is simulated."""
+
+    def made(n: int) -> SimpleNamespace:
+        fit = SimpleNamespace(chi2=0.0)
+        return SimpleNamespace(groups=tuple(("bump_stop", str(i)) for i in range(n)), terms=[], gain=100.0 * n, score=100.0 * n, fit=fit, formulas=0.0)
+
+    exchanged = []
+    same = {"owned": lambda study, e, log: e, "plain": lambda study, e, parameters, log: e, "settled": lambda study, e: e, "with_noise_of": lambda study, fit: study,
+            "spared": list, "level": list, "unloaded": lambda e: e.groups, "ranked": lambda study, best, rest, log: [best, *rest], "heavy": lambda e: False,
+            "further": lambda study, e, r: [[0]], "terms_of": lambda r, chosen: [len(r.groups)], "filtered": lambda study, e, r: None,
+            "_refined": lambda study, e, parameters, log: (study, e, e), "explain": lambda study, terms, start, formulas: made(terms[-1] + 1),
+            "exchanged": lambda study, e, parameters, log: exchanged.append(e) or []}  # fmt: skip
+    for name, stub in same.items():
+        monkeypatch.setattr(search, name, stub)
+    study = SimpleNamespace(null=SimpleNamespace(free=()))
+    found = search.grow(study, [made(1)], lambda text: None, hopeless=lambda study, e: hopeless)[1]
+    assert len(found[0].groups) == causes and bool(exchanged) != hopeless
