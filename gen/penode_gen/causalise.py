@@ -247,7 +247,7 @@ def _solve(equations: list[Relation], unknowns: list[sp.Symbol]) -> list[Step]:
         try:
             solution = system[0].LUsolve(system[1], iszerofunc=lambda e: _tidy(e).is_zero)
         except ValueError:  # a pivot is zero
-            problems.append((first.where, f"equations {names} have no unique solution for {unknown}", "check for an equation said twice"))
+            problems.append((first.where, f"equations {names} have no unique solution for {unknown}", "check for an equation given twice"))
             continue
         steps += [Step(t, _tidy(e), comment=equations[q].comment, where=equations[q].where) for t, e, q in zip(targets, solution, block)]
     if problems:

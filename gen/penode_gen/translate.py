@@ -23,7 +23,7 @@ _ASSIGN = ("=", "+=", "-=", "*=", "/=")
 
 
 class Untranslated(Exception):
-    """A line of C that the evaluator does not know: the generator prints what its evaluator was not told of."""
+    """A line of C that the evaluator does not know: the generator prints what its evaluator does not support."""
 
 
 def function(name: str, parameters: list[str], lines: list[str], environment: dict[str, Any], real: type) -> Any:

@@ -33,7 +33,7 @@ from .targets import FLAGS, ROOT, _digest, _files, _kept, build_directory, compi
 Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
 # Not -ffast-math, which takes nothing for NaN. But gcc drops 0*x, by which lanes_max and its like pass NaN on: states, inputs and outputs
-# that are not finite are told by their bits all the same.
+# that are not finite are detected by their bits all the same.
 QUICK = ("-ffp-contract=fast", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math", "-DLANES_FLUSH",
          # the library refuses these options and prevents contraction; here its bits are not asked for
          "-DPEN_EXACT_H", "-U__ASSOCIATIVE_MATH__", "-U__NO_SIGNED_ZEROS__")  # fmt: skip
@@ -107,7 +107,7 @@ class Batch:
 
         u [n, n_u], or [runs, n, n_u]; x0 [n_x] or [runs, n_x], the model's start if not given; a parameter's value, one
         or [runs], replaces that of the model file or set; `sets` [set length] or [runs, set length] replaces the values
-        of the named set (see penode_gen.set_values). Kept are the named sensors (all if not said), outputs and states, of
+        of the named set (see penode_gen.set_values). Kept are the named sensors (all if none are named), outputs and states, of
         one in `every` samples from the first on; sensors of the others are not computed.
         Raises UserError for unknown names, ValueError for shapes and a start that is not finite.
         """

@@ -3,7 +3,7 @@
 """Recordings made ready for a diagnosis: SI units on the model's raster, and per sensor which samples can be trusted.
 
 Nothing is repaired in silence. A sensor's bad samples are masked. A gap in an input, which no simulation can cross,
-parts the recording; only up to BRIDGE missing samples, or a spike, are bridged by a straight line. All of it is said
+parts the recording; only up to BRIDGE missing samples, or a spike, are bridged by a straight line. All of it is reported
 in `Quality.problems`. What cannot be used at all is a UserError.
 """
 

@@ -27,7 +27,7 @@ from .signals import Signal
 Array = NDArray[np.float64]
 RTOL, ATOL = 1e-11, 1e-13
 SHORT = 0.02  # [s] pieces below it are for DOP853
-Progress = Callable[[float], None]  # told the time [s] reached
+Progress = Callable[[float], None]  # gets the time [s] reached
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ from .schedule import Call
 
 ROOT = Path(__file__).resolve().parents[2]
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
-Progress = Callable[[int], None]  # told the samples done
+Progress = Callable[[int], None]  # gets the samples done
 
 
 @dataclass(frozen=True)

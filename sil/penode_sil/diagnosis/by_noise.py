@@ -235,7 +235,7 @@ def absorbing(
         model = penode_gen.load(absorb.write(study, e, learnt, beside, place))
         gain = measuring.measure(study, model, unused, (), absorb.SET)[0] if unused else {}
     names = ", ".join(t.element for t in learnt)
-    said = {"file": absorb.FILE, "set": absorb.SET, "networks": {t.port: {"missing": t.missing} for t in learnt}, "gain": gain}
+    entry = {"file": absorb.FILE, "set": absorb.SET, "networks": {t.port: {"missing": t.missing} for t in learnt}, "gain": gain}
     after = ", ".join(f"{k} {g.after_rmse:.3g} {g.unit}" for k, g in gain.items())
     note = f"{names} can learn it: {absorb.FILE} has a set for the code that runs already"
-    return said, [note + f"; hold-out after: {after}" * bool(after)]
+    return entry, [note + f"; hold-out after: {after}" * bool(after)]

@@ -60,12 +60,12 @@ def settled(
     study, lead = _led(model, held[0], set_name)
     other = begin(model, smooth[0], set_name)[0]
     better = loss(other, other.null) - loss(study, study.null)
-    told = f"the sensors tell by {abs(better):.3g} of -2 ln(likelihood)"
+    margin = f"by {abs(better):.3g} of -2 ln(likelihood) of the sensors"
     if better < 0.0:
-        return smooth[0], smooth[1], [f"{what}the plant was driven by a smooth one, {told}"]
+        return smooth[0], smooth[1], [f"{what}the plant was driven by a smooth one, {margin}"]
     held = [[_ahead(e, lead) for e in es] for es in held]
     when = f", {1e3 * lead * model.sample_time:.3g} ms before the rows that show them"
-    return held[0], held[1], [f"{what}the plant was driven by its steps{when}, {told}"]
+    return held[0], held[1], [f"{what}the plant was driven by its steps{when}, {margin}"]
 
 
 def _led(model: Model, experiments: Sequence[Experiment], set_name: str) -> tuple[Study, float]:

@@ -175,7 +175,7 @@ def _on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[int, Answer
     except ImportError:
         raise UserError(f"--scheduler {address}: Dask is not installed here; pip install penode[cluster]") from None
     for name in ("distributed", "distributed.client"):
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what matters is said here
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what matters is reported here
 
     async def greet() -> None:  # a client would wait for ever on a server of another kind
         comm = await asyncio.wait_for(connect(address, timeout=5.0, **Security().get_connection_args("client")), 10.0)

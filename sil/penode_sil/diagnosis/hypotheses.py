@@ -43,7 +43,7 @@ class Basis:
     companion: bool = False  # may help another of its kind, but is no cause alone
     settled: bool = False  # acted already long before the start
     fixed: dict[str, tuple[float, str]] = field(default_factory=dict)  # shapes that are known
-    least: dict[str, float] = field(default_factory=dict)  # what shapes may be at least: less cannot be told
+    least: dict[str, float] = field(default_factory=dict)  # least values of shapes: smaller ones make no difference that can be seen
 
 
 VALUED = ("bias", "scale", "delay", "roll_off", "rail", "sharpness", "clock")  # faults of a value alone; the others add a series
@@ -64,7 +64,7 @@ class Fault:
     companion: bool = False
 
     def of(self, y: Array, recording: int) -> Array:
-        """What it adds for gain 1 to a simulated signal [..., n]; a fault of scale must not be told by what was measured."""
+        """What it adds for gain 1 to a simulated signal [..., n]; a fault of scale must not depend on what was measured."""
         match self.what:
             case "scale_side":
                 return np.abs(y)

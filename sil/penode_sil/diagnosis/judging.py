@@ -83,13 +83,13 @@ def pitching(e: Explanation) -> bool:
 
 def damped(causes: Sequence[Cause]) -> list[str]:
     """A line on each hidden mass whose damping is more than that of a part on rubber."""
-    said = []
+    lines = []
     for c in (c for c in causes if c.kind == "hidden_resonance"):
         v = {k: p.value for k, p in c.parameters.items()}
         if v["damping_ratio"] > DAMPED:
             like = f"a mass of {v['mass']:.3g} kg at {v['frequency']:.3g} Hz with a damping ratio of {v['damping_ratio']:.2f}"
-            said.append(f"what {c.where} lacks is like {like}, too much for a part on rubber: pitch, roll, an occupant, a load that moves?")
-    return said
+            lines.append(f"what {c.where} lacks is like {like}, too much for a part on rubber: pitch, roll, an occupant, a load that moves?")
+    return lines
 
 
 def unsized(e: Explanation, c: Cause) -> bool:

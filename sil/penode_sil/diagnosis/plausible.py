@@ -100,11 +100,11 @@ def doubt(study: Study, best: Explanation | None, verdict: str) -> str:
     little = max(2.0 * NEW, 0.01 * (study.null.cost - best.fit.cost)) if best else 0.0
     settled = best is not None and len(best.groups) == 1 and left < little
     named = best.fit.cost + NEW * len(best.groups) + sum(cost(t.candidate) for t in best.terms) if best else np.inf
-    said = "" if settled else other_plant(study, named if verdict != "unexplained" else np.inf)
-    if not said and verdict == "unexplained" and max(misses.values()) > UNLIKE:
+    problem = "" if settled else other_plant(study, named if verdict != "unexplained" else np.inf)
+    if not problem and verdict == "unexplained" and max(misses.values()) > UNLIKE:
         shares = ", ".join(f"{max(0.0, 1.0 - share):.0%} of {name}" for name, share in misses.items())
-        said = f"the model explains {shares}; check that the signals were recorded together, and with this plant"
-    return said
+        problem = f"the model explains {shares}; check that the signals were recorded together, and with this plant"
+    return problem
 
 
 def other_plant(study: Study, bound: float) -> str:

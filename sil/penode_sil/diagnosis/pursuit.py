@@ -101,11 +101,11 @@ def resembles(e: Explanation, c: Candidate) -> bool:
 def further(study: Study, e: Explanation, r: Regression) -> list[list[int]]:
     """Choices of one more kind by what no curve of the causes so far can do, from best to worst."""
     taken = [k for k in family(study, r, e.groups) if resembles(e, r.candidates[k])]
-    rest, kin = r.beside(taken), set(taken)
+    rest, related = r.beside(taken), set(taken)
     least = 0.0 if exact(e.groups) else LEAST * e.gain
     found = []
     for pool in pools(r).values():
-        if kin.isdisjoint(pool):
+        if related.isdisjoint(pool):
             gain, chosen = pursue(rest, pool, terms=2)
             price = sum(cost(r.candidates[c]) for c in chosen)
             if chosen and gain > max(NEW + price, least):

@@ -96,7 +96,7 @@ def ordered(channels: Sequence[Channel]) -> list[Channel]:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One sensor in one recording: what is said of it, and its figures."""
+    """One sensor in one recording: its summary and figures."""
 
     c: Channel
     summary: str
@@ -175,8 +175,8 @@ def running(c: Channel) -> Figure:
     path = f"M0 {fig.HIGH - half}L{fig.WIDE} {-half}V{half}L0 {fig.HIGH + half}z"
     marks = [fig.Mark("area", "noise", path, "white, 95 %")]
     marks += [fig.line(name, c.bins, r.running, x, y, name, 400) for name, r in _both(c)]
-    said = [f"{name}: distance {r.white.distance:.3f}, {_chance(r.white.p_value)}" for name, r in _both(c)]
-    says = f"{'; '.join(said)}; limit {c.before.white.limit:.3f}."
+    distances = [f"{name}: distance {r.white.distance:.3f}, {_chance(r.white.p_value)}" for name, r in _both(c)]
+    says = f"{'; '.join(distances)}; limit {c.before.white.limit:.3f}."
     return Figure("Whiteness (running periodogram)", x, y, tuple(marks), says)
 
 
@@ -186,7 +186,7 @@ def _chance(p: float) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """The restoring force of a place: what is said of it, and its figures."""
+    """The restoring force of a place: its summary and figures."""
 
     s: Surface
     summary: str

@@ -123,5 +123,5 @@ def _page(folder: Path, model: str, rows: Sequence[Row]) -> str:
     text = (Path(__file__).parent / "templates" / "diagnoses.html").read_text(encoding="utf-8")
     template = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(text)
     links = {row.folder: (folder / row.folder / "report.html").exists() for row in rows}
-    said = {"summary": summary(rows), "links": links, "parameters": _parameters, "gain": _gain}
-    return template.render(model=model, rows=rows, **said)
+    context = {"summary": summary(rows), "links": links, "parameters": _parameters, "gain": _gain}
+    return template.render(model=model, rows=rows, **context)

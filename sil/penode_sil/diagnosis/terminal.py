@@ -44,9 +44,9 @@ def _sure(d: Diagnosis) -> list[str]:
     """That something is wrong, and that it is what is named."""
     if d.verdict == "no_discrepancy":
         return []
-    said = [f"the residual exceeds noise by {sigmas(d.evidence)} standard deviations"] if d.evidence > 3.0 else []
-    said += [line(d.reliability, min(c.confidence for c in _named(d)))] if _named(d) else []
-    return [f"  how sure: {'; '.join(said)}"] if said else []
+    reasons = [f"the residual exceeds noise by {sigmas(d.evidence)} standard deviations"] if d.evidence > 3.0 else []
+    reasons += [line(d.reliability, min(c.confidence for c in _named(d)))] if _named(d) else []
+    return [f"  how sure: {'; '.join(reasons)}"] if reasons else []
 
 
 def _named(d: Diagnosis) -> list[Cause]:
