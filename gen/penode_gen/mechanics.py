@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import sympy as sp
 
@@ -149,16 +150,22 @@ def _law(
     own = LAWS[e.law].states if e.law in LAWS else {}
     meant = {"s": s, "v": v} | {k: ex.symbol(p) for k, p in e.arguments.items()}
     meant |= {k: ex.symbol(e.state(k)) for k in own}
-    swap = {ex.symbol(k): to for k, to in meant.items()}
+    swap = frozenset((ex.symbol(k), to) for k, to in meant.items())
     value = parse(where, text, set(meant))
     for name, state in own.items():
-        rate = parse(where, state.rate, set(meant)).xreplace(swap)
+        rate = _renamed(parse(where, state.rate, set(meant)), swap)
         yield Relation(where, ex.derivative(e.state(name)), rate, f"{name} of {e.name}")
     if e.law == "expression":
         for name in sorted({"s", "v"} & names & {a.name for a in value.free_symbols}):
             what = f"'{name}' is the {'deflection' if name == 's' else 'rate'} of this element, and a name of the model"
             problem(where, what, f"write {name}_{e.name} for the element's, or rename the other")
-    yield Relation(where, force, value.xreplace(swap), f"force of {e.name}")
+    yield Relation(where, force, _renamed(value, swap), f"force of {e.name}")
+
+
+@lru_cache(maxsize=1024)  # a diagnosis makes models with the same laws at the same elements again and again
+def _renamed(expr: sp.Expr, names: frozenset[tuple[sp.Symbol, sp.Symbol]]) -> sp.Expr:
+    """An expression with other names for its symbols."""
+    return expr.xreplace(dict(names))
 
 
 def balances(model: Model) -> Iterator[Relation]:
