@@ -28,7 +28,7 @@ from penode_gen.sampled import beside
 
 from .errors import UserError
 from .output import whole
-from .targets import FLAGS, ROOT, _digest, _files, _kept, build_directory, compile_program
+from .building import FLAGS, ROOT, build_directory, build_once, compile_program, digest_of, sources_in
 
 Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
@@ -262,12 +262,12 @@ def _build(model: penode_gen.Model, code: BatchCode, dtype: type, per_run: bool,
         *(f"-I{ROOT}/{folder}" for folder in ("sil/firmware", "src", "inc", "port/gnu")),
     ]
     functions = (("src", f"pen_{name}.c") for name in ("math", "trig", "atan", "log", "root"))
-    parts = _files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes*.h"), *functions)
+    parts = sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes*.h"), *functions)
     folding = []
     if "LANES_PIECES" in code.text:
         own = [ROOT / "src" / name for name in ("pen_fold.c", "pen_net.c")]
-        folding = [_kept("folding", ".o", [*command, "-r", "-nostdlib", *map(str, own)], [_processor(compiler), *parts, *own])]  # for every model
-    stem = build_directory() / f"{model.name}-batch-{_digest([*command, _processor(compiler), code.text, *folding, *parts])}"
+        folding = [build_once("folding", ".o", [*command, "-r", "-nostdlib", *map(str, own)], [_processor(compiler), *parts, *own])]  # for every model
+    stem = build_directory() / f"{model.name}-batch-{digest_of([*command, _processor(compiler), code.text, *folding, *parts])}"
     library = stem.with_suffix(".so")
     if not library.exists():
         stem.parent.mkdir(parents=True, exist_ok=True)

@@ -94,6 +94,22 @@ class _Inputs:
         return u, udot
 
 
+def _solver(system: Any, source: _Inputs, piece: _Piece, x: Array) -> Any:
+    """A solver of the equations over a piece, from its first state on."""
+    from scipy.integrate import DOP853, LSODA  # here, for other commands need not wait for it
+
+    method = DOP853 if piece.end - piece.begin < SHORT else LSODA
+    return method(lambda t, state: system.rates(state, *source.before(t)), piece.begin, x, piece.end, rtol=RTOL, atol=ATOL)
+
+
+def _step(solver: Any, what: str) -> None:
+    """One step of a solver. UserError if `what` it solves cannot be continued."""
+    message = solver.step()
+    if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
+        why = message or "a state is not finite"
+        raise UserError(f"{what} cannot be continued after {solver.t:.6g} s ({why}); the model is unstable there")
+
+
 def solve(
     model: Any,
     instance: Instance,
@@ -105,8 +121,6 @@ def solve(
     progress: Progress = lambda t: None,
 ) -> Trajectory:
     """Exact states, outputs and sensors of one instance at `times` [s] (increasing, within 0..duration)."""
-    from scipy.integrate import DOP853, LSODA  # here, for other commands need not wait for it
-
     signals = driving(model, inputs, duration)
     knots = {knot for signal in signals for knot in signal.knots()}
     equations = {name: penode_gen.numeric(model, name) for name in model.sets}
@@ -135,20 +149,12 @@ def solve(
                 rows_y[row] = rows_y[max(row - 1, 0)]  # outputs are held as well, sensors are not
             done = last
             continue
-        method = DOP853 if piece.end - piece.begin < SHORT else LSODA
-        solver = method(
-            lambda t, state: system.rates(state, *source.before(t)), piece.begin, x, piece.end, rtol=RTOL, atol=ATOL
-        )
+        solver = _solver(system, source, piece, x)
         while done < last and times[done] <= piece.begin:
             keep(done, x)
             done += 1
         while solver.status == "running":
-            message = solver.step()
-            if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
-                raise UserError(
-                    f"{model.path}: the exact solution of {instance.name} cannot be continued after "
-                    f"{solver.t:.6g} s ({message or 'a state is not finite'}); the model is unstable there"
-                )
+            _step(solver, f"{model.path}: the exact solution of {instance.name}")
             reached = int(np.searchsorted(times, solver.t, side="right"))
             if reached > done:
                 between = solver.dense_output()

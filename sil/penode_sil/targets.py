@@ -13,9 +13,8 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +23,11 @@ from numpy.typing import NDArray
 
 import penode_gen
 
+from .building import FLAGS, ROOT, build_library, build_once, compiler_version, generated, model_options, sources_in
 from .errors import UserError
 from .instance import Instance, Set
 from .schedule import Call
 
-ROOT = Path(__file__).resolve().parents[2]
-FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
 Progress = Callable[[int], None]  # gets the samples done
 
 
@@ -58,118 +56,6 @@ class Run:
     def digest(self) -> str:
         """SHA-256 over the bytes of states and outputs of all samples."""
         return hashlib.sha256(self.x.tobytes() + self.y.tobytes()).hexdigest()
-
-
-# -- building ---------------------------------------------------------------------------------------------------------
-
-
-def build_directory() -> Path:
-    """Where compiled things are kept: PENODE_BUILD, else build/sil of the checkout, else the user's cache."""
-    if os.environ.get("PENODE_BUILD"):
-        return Path(os.environ["PENODE_BUILD"]).absolute()
-    if os.access(ROOT, os.W_OK):
-        return ROOT / "build" / "sil"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute() / "penode"
-
-
-def _digest(parts: Iterable[str | bytes | Path]) -> str:
-    """A short name for texts, bytes and the contents of files."""
-    sha = hashlib.sha256()
-    for part in parts:
-        data = part.read_bytes() if isinstance(part, Path) else part.encode() if isinstance(part, str) else part
-        sha.update(len(data).to_bytes(8, "little") + data)
-    return sha.hexdigest()[:16]
-
-
-def _files(*places: tuple[str, str]) -> list[Path]:
-    """Files of the checkout by folder and pattern, sorted."""
-    return sorted(path for folder, pattern in places for path in (ROOT / folder).rglob(pattern))
-
-
-def generated(model: Any) -> Path:
-    """The folder with the model's C, generated unless an earlier call did; keyed by model and generator."""
-    sources = [path for path in _files(("gen/penode_gen", "*")) if path.is_file() and path.suffix != ".pyc"]
-    folder = build_directory() / f"{model.name}-{_digest([model.digest, *sources])}"
-    if not (folder / f"{model.name}.c").exists():
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-            penode_gen.generate(model, Path(scratch) / "c", self_test=False)
-            _move(Path(scratch) / "c", folder)
-    return folder
-
-
-def _move(source: Path, target: Path) -> None:
-    """Rename, unless another process was faster."""
-    try:
-        os.replace(source, target)
-    except OSError:
-        if not target.exists():
-            raise
-
-
-def model_options(model: Any) -> list[str]:
-    """Compiler options that tell sil/firmware/sample.h which model it is about."""
-    return [
-        f'-DMODEL_HEADER="{model.name}.h"',
-        f"-DMODEL(name)={model.name}_##name",
-        f"-DMODEL_SIZE(name)={model.name.upper()}_##name",
-        *(["-DMODEL_STATES"] if model.states else []),
-        *(["-DMODEL_SENSORS"] if model.sensors else []),
-    ]
-
-
-def compile_program(command: Sequence[str], output: Path) -> None:
-    """Run a compiler that writes `output`, all or nothing. UserError if it is missing or refuses."""
-    with tempfile.TemporaryDirectory(dir=output.parent) as scratch:
-        part = Path(scratch) / output.name
-        try:
-            result = subprocess.run(
-                [*command, "-o", str(part)], capture_output=True, text=True, stdin=subprocess.DEVNULL
-            )
-        except FileNotFoundError as exc:
-            raise UserError(f"{command[0]}: this compiler is not installed; install it (make test does)") from exc
-        if result.returncode != 0:
-            lines = (
-                [line for line in result.stderr.splitlines() if "error" in line] or result.stderr.splitlines() or ["?"]
-            )
-            raise UserError(f"{output.name}: {command[0]} refused it: {lines[0]}; report this with the model file")
-        _move(part, output)
-
-
-def _kept(name: str, suffix: str, command: Sequence[str], read: Iterable[str | bytes | Path]) -> Path:
-    """What a compiler makes, in the build directory; made once for a command and the contents of all that it reads."""
-    output = build_directory() / f"{name}-{_digest([*command, *read])}{suffix}"
-    if not output.exists():
-        output.parent.mkdir(parents=True, exist_ok=True)
-        compile_program(command, output)
-    return output
-
-
-@cache
-def _version(compiler: str) -> bytes:
-    """What a compiler says of itself, nothing if it is not installed."""
-    return subprocess.run([compiler, "--version"], capture_output=True).stdout if shutil.which(compiler) else b""
-
-
-def build_library(
-    model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None
-) -> Path:
-    """The shared library of a model; `source` is a folder with its C if it is not to be generated."""
-    source = source or generated(model)
-    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], _files(("src", "*.c"))
-    shim = ROOT / "sil" / "firmware" / "sil.c"
-    options = [
-        *compiler,
-        *FLAGS,
-        "-fPIC",
-        *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []),
-        f"-I{ROOT}/inc",
-        f"-I{ROOT}/port/gnu",
-    ]
-    read = [_version(compiler[0]), *_files(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
-    same = _kept("runtime", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
-    own = ["-shared", *model_options(model), f"-I{source}", *map(str, [shim, *code, same])]
-    return _kept(model.name, ".so", [*options, *own], [*read, shim, *code, source / f"{model.name}.h", same])
 
 
 # -- SiL --------------------------------------------------------------------------------------------------------------
@@ -301,7 +187,7 @@ TROUBLE = {1: "it could not open, read or write its files", 2: "it was given a t
 def build_firmware(model: Any, machine: str, source: Path | None = None, optimise: str = "-O2") -> Path:
     """The PiL program of a model for one of MACHINES."""
     source = source or generated(model)
-    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], _files(("src", "*.c"))
+    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
     program, board = ROOT / "sil" / "firmware" / "pil.c", MACHINES[machine]
     port = ROOT / "port" / "host" / "board.c"
     sets = ",".join(f"&{model.name}_set_{name}" for name in model.sets)
@@ -310,24 +196,24 @@ def build_firmware(model: Any, machine: str, source: Path | None = None, optimis
         raise UserError(f"{compiler}: this compiler is not installed; install it (make test does)")
     own = ["gcc", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/sil/firmware"]
     options = [*([str(PORT / "cc"), board] if board else own), *FLAGS, optimise]
-    read = [_version(compiler), *runtime, *_included()]
-    same = _kept(f"runtime-{machine}", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], read)  # for every model
+    read = [compiler_version(compiler), *runtime, *_included()]
+    same = build_once(f"runtime-{machine}", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], read)  # for every model
     files = [program, *code, same, *([] if board else [port])]
     command = [*options, *model_options(model), f"-DMODEL_SETS={sets}", f"-I{source}", *map(str, files)]
-    return _kept(f"{model.name}-{machine}", ".elf", command, [*read, program, *code, source / f"{model.name}.h", same])
+    return build_once(f"{model.name}-{machine}", ".elf", command, [*read, program, *code, source / f"{model.name}.h", same])
 
 
 def build_object(model: Any, machine: str, name: str) -> Path:
     """One file of a model's C as it is for an emulated one of MACHINES, by itself."""
     source = generated(model)
     command = [str(PORT / "cc"), MACHINES[machine], *FLAGS, "-O2", f"-I{source}", f"-I{ROOT}/src", "-c", str(source / name)]
-    read = [_version("arm-none-eabi-gcc"), source / name, source / f"{model.name}.h", *_files(("src", "*.h")), *_included()]
-    return _kept(f"{Path(name).stem}-{machine}", ".o", command, read)
+    read = [compiler_version("arm-none-eabi-gcc"), source / name, source / f"{model.name}.h", *sources_in(("src", "*.h")), *_included()]
+    return build_once(f"{Path(name).stem}-{machine}", ".o", command, read)
 
 
 def _included() -> list[Path]:
     """What any program for one of MACHINES may include, and how its compiler is called."""
-    return [path for path in _files(("inc", "*.h"), ("port", "*"), ("sil/firmware", "*.h")) if path.is_file()]
+    return [path for path in sources_in(("inc", "*.h"), ("port", "*"), ("sil/firmware", "*.h")) if path.is_file()]
 
 
 class Pil:

@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 import cortex_m4
 import penode_gen
 from figures import exchange, hostile_inputs
-from penode_sil.targets import MACHINES, PORT, Pil, build_directory
+from penode_sil.building import build_directory
+from penode_sil.targets import MACHINES, PORT, Pil
 
 HERE = Path(__file__).parent
 CALL = np.dtype([("entry", "<u8"), ("instructions", "<u8"), ("low", "<u8"), ("high", "<u8")])

@@ -17,7 +17,8 @@ import cortex_m4
 import cycles
 import peers
 import penode_gen
-from penode_sil.targets import FLAGS, MACHINES, PORT, ROOT, generated, model_options
+from penode_sil.building import FLAGS, ROOT, generated, model_options
+from penode_sil.targets import MACHINES, PORT
 
 HERE = Path(__file__).parent
 PLACE = ROOT / "build" / "bench"

@@ -23,7 +23,8 @@ import programs
 from all_laws import all_laws
 from penode_gen import fold
 from penode_sil.status import BIT
-from penode_sil.targets import MACHINES, ROOT
+from penode_sil.building import ROOT
+from penode_sil.targets import MACHINES
 
 ROUND = 100  # steps, see worst_case.c
 METHODS, POLICIES = ("rk4", "ros1"), ("clamp", "fade")  # of a model of everything: values, and slopes, of all there is

@@ -14,7 +14,8 @@ import pytest
 
 import penode_gen
 from penode_sil.status import BIT, names
-from penode_sil.targets import ROOT, Sil
+from penode_sil.building import ROOT
+from penode_sil.targets import Sil
 from test_emit import COMPILERS, REALS, STRICT
 
 NQVM = ROOT / "gen" / "nqvm"

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import gate
 import penode_gen
-from penode_sil.targets import FLAGS, generated, model_options
+from penode_sil.building import FLAGS, generated, model_options
 
 WORK = gate.BUILD / "flip"
 MODELS = ("nqvm/nqvm", "nqvm/nqvm_folded", "small/small_rollback")

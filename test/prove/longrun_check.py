@@ -12,7 +12,7 @@ from pathlib import Path
 
 import gate
 import penode_gen
-from penode_sil.targets import FLAGS, generated
+from penode_sil.building import FLAGS, generated
 
 WORK = gate.BUILD / "longrun"
 U = 2.0**-24  # what one float operation may be off, relative

@@ -13,7 +13,8 @@ import gate
 
 import penode_gen
 from interruption import executed, interrupted, never
-from penode_sil.targets import FLAGS, MACHINES, PORT, generated
+from penode_sil.building import FLAGS, generated
+from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "preempt"
 CORES = ("m3", "m4f", "m33")

@@ -15,7 +15,7 @@ from pathlib import Path
 import gate
 import penode_gen
 from penode_gen.sets import offsets
-from penode_sil.targets import FLAGS, generated, model_options
+from penode_sil.building import FLAGS, generated, model_options
 
 WORK = gate.BUILD / "status"
 METHODS = ("euler", "heun", "rk4", "ros1", "ros2")

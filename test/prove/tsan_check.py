@@ -12,7 +12,7 @@ from pathlib import Path
 
 import gate
 import penode_gen
-from penode_sil.targets import FLAGS, generated, model_options
+from penode_sil.building import FLAGS, generated, model_options
 
 WORK = gate.BUILD / "tsan"
 SET = gate.ROOT / "src" / "pen_set.c"

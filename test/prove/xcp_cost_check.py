@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 
 import gate
-from penode_sil.targets import FLAGS, MACHINES, PORT
+from penode_sil.building import FLAGS
+from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "xcp-cost"
 PAGE = gate.ROOT / "port" / "xcp" / "README.md"

@@ -12,7 +12,8 @@ import gate
 
 import penode_gen
 from interruption import executed, interrupted, never
-from penode_sil.targets import FLAGS, MACHINES, PORT, generated
+from penode_sil.building import FLAGS, generated
+from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "xcp-preempt"
 MACHINE = "m4f"

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import gate
-from penode_sil.targets import FLAGS, MACHINES, PORT
+from penode_sil.building import FLAGS
+from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "xcp-size"
 PAGE = gate.ROOT / "port" / "xcp" / "README.md"

@@ -869,7 +869,7 @@ def test_rails_are_written_as_they_were_fitted(sharpness):
 
 
 def test_loads_that_cancel_each_other_count_in_full(model):
-    """A start in motion of a quarter vehicle of 445 kg, told as loads of 191 kN and -229 kN."""
+    """A start in motion of a quarter vehicle of 445 kg, explained by loads of 191 kN and -229 kN."""
     terms = [SimpleNamespace(candidate=SimpleNamespace(kind="constant_force"), gain=g) for g in (-190.8e3, 228.8e3)]
     assert explanation.loaded(SimpleNamespace(terms=terms)) == pytest.approx(419.6e3) and explanation.weight(model) == pytest.approx(9.80665 * (M_B + M_W))
 

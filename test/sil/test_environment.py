@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from penode_sil.environment import LAST, problems
-from penode_sil.targets import build_directory
+from penode_sil.building import build_directory
 
 COMMAND = [sys.executable, "-m", "penode_sil", "--version"]
 

@@ -13,7 +13,8 @@ import pytest
 from conftest import ROOT
 from samples import sample
 
-from penode_sil.targets import MACHINES, generated
+from penode_sil.building import generated
+from penode_sil.targets import MACHINES
 
 
 @pytest.mark.parametrize("machine", sample([name for name, board in MACHINES.items() if board], "m3", "m4f", "m33"))

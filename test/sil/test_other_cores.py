@@ -13,7 +13,7 @@ from conftest import ROOT
 from test_targets import chirp, every_call, need
 
 import penode_gen
-from penode_sil import targets
+from penode_sil import building, targets
 from penode_sil.errors import UserError
 
 # the emulator and the compiler of each core of test/builds/user
@@ -73,6 +73,7 @@ def test_a_checksum_over_bytes_as_they_lie_is_found(nqvm, monkeypatch, tmp_path)
     text, found = re.subn(body, r"\1(first[0] == 2U) ? 1U : 0U;", file.read_text(), flags=re.S)
     assert found == 1
     file.write_text(text)
-    monkeypatch.setattr(targets, "ROOT", tmp_path / "copy")
+    for module in (building, targets):
+        monkeypatch.setattr(module, "ROOT", tmp_path / "copy")
     with pytest.raises(UserError, match="it refused the first parameter set"):
         targets.Pil(nqvm, "s390x").run(chirp(1))

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from test_diagnosis import MODEL, SAMPLES, STEP, drive, record, road
 
 import penode_gen
-from penode_sil import targets
+from penode_sil import building
 from penode_sil.cli import cli
 from penode_sil.diagnosis import advice, catalogue, files, noise, reliability, report, report_figure as fig, report_price, residual, restoring, result, terminal
 from penode_sil.diagnosis.report_figure import Axis
@@ -377,7 +377,7 @@ def test_price_is_compiled_once(model, monkeypatch, extended):
     def refuse(*_):
         raise AssertionError("compiled again")
 
-    monkeypatch.setattr(targets, "compile_program", refuse)
+    monkeypatch.setattr(building, "compile_program", refuse)
     assert first and report_price.price(model, extended) == first
 
 

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UserError, hint
-from ..targets import FLAGS, MACHINES, PORT, ROOT, _files, _included, _kept, _version, generated, model_options
+from ..building import FLAGS, ROOT, build_once, compiler_version, generated, model_options, sources_in
+from ..targets import MACHINES, PORT, _included
 from .codes import Slave
 from .virtual import Served, describe, free_port, identity, period
 
@@ -33,14 +34,14 @@ def build(model: Any, machine: str) -> Path:
     if 10**9 % between:  # ns
         raise UserError(f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; use --on sil")
     source, firmware = generated(model), ROOT / "sil" / "firmware"
-    code = [source / f"{model.name}.c", source / f"{model.owner}_params.c", *_files(("src", "*.c"))]
+    code = [source / f"{model.name}.c", source / f"{model.owner}_params.c", *sources_in(("src", "*.c"))]
     own = [firmware / "serve_uart.c", firmware / "controller.c", PORT / "uart.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
     command = [
         str(PORT / "cc"), MACHINES[machine], *FLAGS, "-O2", "-g", f"-I{ROOT}/port/xcp", f"-I{PORT}", f"-I{source}", *model_options(model),
         f'-DCONTROLLER_EPK="{identity(model)} {machine}"', f"-DCONTROLLER_PERIOD={between}ULL", *map(str, [*own, *code]),
     ]  # fmt: skip
-    headers = [*_files(("port/xcp", "*.h"), ("sil/firmware", "*.h")), source / f"{model.name}.h"]
-    return _kept(f"{model.name}-uart-{machine}", ".elf", command, [_version("arm-none-eabi-gcc"), *_included(), *headers, *own, *code])
+    headers = [*sources_in(("port/xcp", "*.h"), ("sil/firmware", "*.h")), source / f"{model.name}.h"]
+    return build_once(f"{model.name}-uart-{machine}", ".elf", command, [compiler_version("arm-none-eabi-gcc"), *_included(), *headers, *own, *code])
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from penode_gen import exports, placeholder
 from .. import scenario as scenarios
 from ..console import note
 from ..errors import UserError
-from ..targets import FLAGS, ROOT, _files, _kept, _version, generated, model_options
+from ..building import FLAGS, ROOT, build_once, compiler_version, generated, model_options, sources_in
 from .codes import Slave
 
 MEASURED = "shown"  # the variable of it with what may be measured besides the instance
@@ -51,15 +51,15 @@ def period(model: Any) -> int:
 def build(model: Any) -> Path:
     """The virtual controller of a model. Raises UserError."""
     source, firmware = generated(model), ROOT / "sil" / "firmware"
-    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], _files(("src", "*.c"))
+    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
     own = [ROOT / "port" / "host" / "serve.c", firmware / "controller.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
     include = [f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/port/xcp", f"-I{firmware}", f"-I{source}"]
     options = ["gcc", "-O2", "-g", *FLAGS, "-fno-pie", *include]
-    read = [_version("gcc"), *_files(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("sil/firmware", "*.h"))]
-    same = _kept("runtime-serve", ".o", [*options[:-1], "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
+    read = [compiler_version("gcc"), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("sil/firmware", "*.h"))]
+    same = build_once("runtime-serve", ".o", [*options[:-1], "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     told = [f'-DCONTROLLER_EPK="{identity(model)}"', f"-DCONTROLLER_PERIOD={period(model)}ULL"]
     command = [*options, "-no-pie", "-pthread", *model_options(model), *told, *map(str, [*own, *code, same])]
-    return _kept(f"{model.name}-serve", ".elf", command, [*read, *own, *code, source / f"{model.name}.h", same])
+    return build_once(f"{model.name}-serve", ".elf", command, [*read, *own, *code, source / f"{model.name}.h", same])
 
 
 def describe(model: Any, program: Path, transport: str) -> str:

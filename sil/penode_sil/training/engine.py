@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from penode_gen.model import Model
 
 from ..output import whole
-from ..targets import _kept, _version, build_directory
+from ..building import build_directory, build_once, compiler_version
 from .curve import Curve
 from .dense import Dense
 from .drive import NODES, SHARES, Drive
@@ -125,7 +125,7 @@ class Engine:
 
 def compiler() -> str:
     """The version of the compiler that makes the library."""
-    return _version("gcc")
+    return compiler_version("gcc")
 
 
 def _compiled(text: str) -> Path:
@@ -137,4 +137,4 @@ def _compiled(text: str) -> Path:
     if not source.exists():
         with whole(source) as part:
             part.write_text(text, encoding="utf-8")
-    return _kept("train", ".so", ["gcc", *OPTIONS, "-fPIC", "-shared", str(source)], [compiler(), text])
+    return build_once("train", ".so", ["gcc", *OPTIONS, "-fPIC", "-shared", str(source)], [compiler(), text])
