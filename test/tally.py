@@ -20,8 +20,15 @@ from typing import NamedTuple
 UNITY = re.compile(r"\b(\d+) Tests (\d+) Failures (\d+) Ignored")
 PYTEST = re.compile(r"^(?:=+ )?((?:\d+ \w+(?:, )?)+|no tests ran) in [\d.]+s")
 GATE = re.compile(r"^(ok|FAIL|skip)  ")
-PYTEST_WORDS = {"passed": "passed", "xfailed": "passed", "failed": "failed", "error": "failed", "errors": "failed",
-                "xpassed": "failed", "skipped": "skipped"}  # fmt: skip
+PYTEST_WORDS = {
+    "passed": "passed",
+    "xfailed": "passed",
+    "failed": "failed",
+    "error": "failed",
+    "errors": "failed",
+    "xpassed": "failed",
+    "skipped": "skipped",
+}
 
 
 class Count(NamedTuple):
@@ -66,8 +73,12 @@ def run(suite: str) -> tuple[Count, str]:
     start = time.monotonic()
     done = subprocess.run(
         ["make", "--no-print-directory", "-k", suite],
-        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
-    )  # fmt: skip
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    )
     total = Count()
     for line in done.stdout.splitlines():
         total = total.plus(count_line(line))

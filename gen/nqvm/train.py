@@ -110,18 +110,18 @@ def damper_task(name: str, f_brk: float, f_c: float, scale: float) -> Task:
         name,
         lambda v: friction(v, f_brk, f_c),
         lambda v: friction_curvature(v, f_brk, f_c),
-        1.5, scale, ("rate", "m/s"), f"friction, F_brk = {f_brk:g} N, F_C = {f_c:g} N",
-    )  # fmt: skip
+        1.5,
+        scale,
+        ("rate", "m/s"),
+        f"friction, F_brk = {f_brk:g} N, F_C = {f_c:g} N",
+    )
 
 
 TASKS = (
-    Task(
-        "spring", spring, spring_curvature, 0.08, 2800.0, ("deflection", "m"),
-        f"progressive spring, c1 = {C1:g}, s_u = {S_U:g} m",
-    ),
+    Task("spring", spring, spring_curvature, 0.08, 2800.0, ("deflection", "m"), f"progressive spring, c1 = {C1:g}, s_u = {S_U:g} m"),
     damper_task("damper", 45.0, 35.0, 260.0),
     damper_task("damper_altered", 90.0, 70.0, 295.0),
-)  # fmt: skip
+)
 
 
 def by_curvature(task: Task, n: int) -> Array:

@@ -8,6 +8,17 @@ from .serial_form import SerialSet, read_serial, serial
 from .sets import set_head, set_values
 
 __all__ = [
-    "VERSION", "Model", "ModelError", "Numeric", "SerialSet", "generate", "load", "numeric", "read_serial", "render", "serial", "set_head",
+    "VERSION",
+    "Model",
+    "ModelError",
+    "Numeric",
+    "SerialSet",
+    "generate",
+    "load",
+    "numeric",
+    "read_serial",
+    "render",
+    "serial",
+    "set_head",
     "set_values",
-]  # fmt: skip
+]

@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
-from . import expressions as ex
-from . import functions
+from . import expressions as ex, functions
 
 
 def literal(value: float) -> str:
@@ -120,10 +119,17 @@ class Printer:
     """Prints SymPy expressions; `name` gives the C text of a symbol."""
 
     _calls = {
-        sp.exp: "pen_exp", sp.tanh: "pen_tanh", ex.Sigmoid: "pen_sigmoid", ex.Softplus: "pen_softplus", ex.Absolute: "pen_port_abs",
-        ex.Sign: "pen_sign", sp.Heaviside: "pen_heaviside", sp.Max: "pen_max", sp.Min: "pen_min",
+        sp.exp: "pen_exp",
+        sp.tanh: "pen_tanh",
+        ex.Sigmoid: "pen_sigmoid",
+        ex.Softplus: "pen_softplus",
+        ex.Absolute: "pen_port_abs",
+        ex.Sign: "pen_sign",
+        sp.Heaviside: "pen_heaviside",
+        sp.Max: "pen_max",
+        sp.Min: "pen_min",
         sp.Piecewise: "pen_where",
-    } | functions.CALLS  # fmt: skip
+    } | functions.CALLS
 
     def __init__(self, name: Callable[[sp.Symbol], str]):
         self._name = name
@@ -192,5 +198,5 @@ class Printer:
         if not exponent.is_Integer:
             raise ValueError(f"no C for the power {expr}")
         if exponent < 0:
-            return f"{real(1.0)} / {self.inner(base ** -exponent)}"
+            return f"{real(1.0)} / {self.inner(base**-exponent)}"
         return " * ".join([self.inner(base)] * int(exponent))

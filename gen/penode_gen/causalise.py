@@ -16,8 +16,7 @@ import sympy as sp
 from sympy.core.function import Application, AppliedUndef
 from sympy.core.relational import Relational
 
-from . import expressions as ex
-from . import units
+from . import expressions as ex, units
 from .mechanics import Relation, aliases, balances, forces, kinematics, meanings
 from .model import Model
 
@@ -112,9 +111,7 @@ def causalise(model: Model) -> Causal:
     for q in model.equations:
         left, right = (parse(("equations", q.name), side) for side in ex.sides(q.text))
         equations.append(Relation(("equations", q.name), left, right, q.name))
-    signals = {
-        section: [parse((section, s.name), s.expression) for s in getattr(model, section)] for section in ("outputs", "sensors")
-    }
+    signals = {section: [parse((section, s.name), s.expression) for s in getattr(model, section)] for section in ("outputs", "sensors")}
     rename, meant = aliases(model), meanings(model)
     equations = [q for q in equations if q.left not in rename]
     equations = [replace(q, left=q.left.xreplace(meant), right=q.right.xreplace(meant)) for q in equations]
@@ -131,9 +128,14 @@ def causalise(model: Model) -> Causal:
     states = tuple(ex.symbol(n) for n in model.states)
     velocities = {b.position: ex.symbol(b.velocity) for b in model.bodies}
     causal = Causal(
-        model, states, tuple(ex.symbol(i.name) for i in (*model.inputs, *model.sampled)), tuple(_hoist(steps, names)),
-        tuple(velocities.get(n, ex.derivative(n)) for n in model.states), tuple(signals["outputs"]), tuple(signals["sensors"]),
-    )  # fmt: skip
+        model,
+        states,
+        tuple(ex.symbol(i.name) for i in (*model.inputs, *model.sampled)),
+        tuple(_hoist(steps, names)),
+        tuple(velocities.get(n, ex.derivative(n)) for n in model.states),
+        tuple(signals["outputs"]),
+        tuple(signals["sensors"]),
+    )
     _check_result(causal)
     return causal
 
@@ -150,9 +152,7 @@ def check(model: Model) -> list[Problem]:
 # -- checks -----------------------------------------------------------------------------------------------------------
 
 
-def _check_units(
-    model: Model, equations: list[Relation], signals: dict[str, list[sp.Expr]], unit_of: dict[str, str]
-) -> Iterable[Problem]:
+def _check_units(model: Model, equations: list[Relation], signals: dict[str, list[sp.Expr]], unit_of: dict[str, str]) -> Iterable[Problem]:
     per_second = units.dimension("1/s")
 
     def of(leaf: sp.Basic) -> units.Dimension:
@@ -191,10 +191,14 @@ def _check_result(causal: Causal) -> None:
     problems: list[Problem] = []
     everything = [*causal.rates, *causal.outputs, *causal.sensors]
     if model.interpolation == "held" and causal.uses(everything, causal.input_rates):
-        problems.append((("model", "input"), "the model uses the rate of an input, which is not defined for a held input", 'write input = "linear"'))
+        problems.append(
+            (("model", "input"), "the model uses the rate of an input, which is not defined for a held input", 'write input = "linear"')
+        )
     steps = [s.name for s in model.sampled if s.law == "held"]
     for name in (n for n in steps if model.interpolation != "held" and causal.uses(everything, [ex.derivative(n)])):
-        problems.append((("actuators", name), f"the model uses the rate of '{name}', which moves in steps", "put a lag behind it, and use that"))
+        problems.append(
+            (("actuators", name), f"the model uses the rate of '{name}', which moves in steps", "put a lag behind it, and use that")
+        )
     constants = {ex.symbol(p.name): sp.Float(p.value, 17) for p in model.parameters.values() if not p.tunable}
     parts = [(step.where, part) for step in causal.steps for part in (step.arguments if step.network else (step.value,))]
     for section, found in (("outputs", causal.outputs), ("sensors", causal.sensors)):
@@ -206,7 +210,9 @@ def _check_result(causal: Causal) -> None:
         if part.has(sp.zoo, sp.nan) or not all(ex.in_range(n) for n in part.atoms(sp.Number)):
             problems.append((where, "its solution holds a number that a float cannot hold", "scale the equation"))
     locals_ = {f"{s.target.name}{end}" for s in causal.steps if s.network for end in ("_in", "_slope", "_bend")}
-    for name in sorted(locals_ & {*model.states, *model.parameters, *(i.name for i in (*model.inputs, *model.sampled)), *(v.name for v in model.variables)}):
+    for name in sorted(
+        locals_ & {*model.states, *model.parameters, *(i.name for i in (*model.inputs, *model.sampled)), *(v.name for v in model.variables)}
+    ):
         problems.append((("model",), f"the code needs the name '{name}' for a network call", f"rename '{name}'"))
     known = {*causal.states, *causal.inputs, *causal.input_rates, *(s.target for s in causal.steps)}
     known |= {ex.symbol(p) for p in model.parameters}
@@ -242,7 +248,13 @@ def _solve(equations: list[Relation], unknowns: list[sp.Symbol]) -> list[Step]:
         unknown = ", ".join(t.name for t in targets)
         system = _linear([equations[q].residual for q in block], targets)
         if system is None:
-            problems.append((first.where, f"equations {names} form an algebraic loop that is not linear in {unknown}", "break it with a state, or write it solved"))
+            problems.append(
+                (
+                    first.where,
+                    f"equations {names} form an algebraic loop that is not linear in {unknown}",
+                    "break it with a state, or write it solved",
+                )
+            )
             continue
         try:
             solution = system[0].LUsolve(system[1], iszerofunc=lambda e: _tidy(e).is_zero)

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from . import expressions as ex
-from . import functions, sampled, sets
+from . import expressions as ex, functions, sampled, sets
 from .c_text import Printer, fold, real
 from .causalise import Causal, Step
 from .emit_c import _RUNGE_KUTTA, _TEMPLATES, VERSION, _Emitter
@@ -68,18 +67,35 @@ class _LaneEmitter(_Emitter):
         rosenbrock = model.method.startswith("ros")
         nodes, weights, divisor = _RUNGE_KUTTA.get(model.method, ((), (), 1.0))
         return {
-            **sampled.context(self.given), "model": model, "version": VERSION, "source": model.path.name, "digest": model.digest[:16], "real": real,
+            **sampled.context(self.given),
+            "model": model,
+            "version": VERSION,
+            "source": model.path.name,
+            "digest": model.digest[:16],
+            "real": real,
             "rates": self._lines(causal.rates, "dx") if model.method != "ros1" else None,
             "rates_jacobian": self._lines(causal.rates, "dx", ("fx", "fu")) if rosenbrock else None,
-            "outputs": self._lines(causal.outputs, "y"), "sensors": self._lines(causal.sensors, "z"),
-            "n_x": len(model.states), "n_q": causal.n_mechanical, "n_u": len(model.inputs), "n_drive": len(self.drive),
-            "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
-            "curved": self.curved, "cubic": self.cubic, "elementary": functions.used(causal),
-            "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor,
+            "outputs": self._lines(causal.outputs, "y"),
+            "sensors": self._lines(causal.sensors, "z"),
+            "n_x": len(model.states),
+            "n_q": causal.n_mechanical,
+            "n_u": len(model.inputs),
+            "n_drive": len(self.drive),
+            "n_y": len(model.outputs),
+            "n_z": len(model.sensors),
+            "uses_input_rate": self.uses_input_rate,
+            "curved": self.curved,
+            "cubic": self.cubic,
+            "elementary": functions.used(causal),
+            "nodes": [real(n) for n in nodes],
+            "weights": [real(w) for w in weights],
+            "divisor": divisor,
             "networks": [{"code": c, "value": self._value_lines(c), "slope": self._lane_slope_lines(c)} for c in self.networks],
-            "folded": self.folded, "at": self.weights_at, "length": {user: sets.network_length(code.network) for user, code in self.folded},
+            "folded": self.folded,
+            "at": self.weights_at,
+            "length": {user: sets.network_length(code.network) for user, code in self.folded},
             "parameters": [f"1 / {name}" if inverse else name for name, inverse in self.taken],
-        }  # fmt: skip
+        }
 
     def _lines(self, results: tuple[sp.Expr, ...], target: str, jacobian: tuple[str, str] | None = None) -> list[str]:
         lanes = {"pen_real_t": "lanes_t", "bool": "mask_t"}
@@ -108,8 +124,13 @@ class _LaneEmitter(_Emitter):
         lines = [f"const lanes_t inputs_of_{name}[{n}] = {{ {parts} }};", f"lanes_t {name};"]
         if not slope:
             return [*lines, f"*outside |= {function}({weights}, inputs_of_{name}, &{name});"]
-        lines += [f"lanes_t slopes_of_{name}[{n}];", f"*outside |= {function}_slope({weights}, inputs_of_{name}, &{name}, slopes_of_{name});"]
-        return lines + [f"const lanes_t {s.name} = slopes_of_{name}[{i}];" for i, s in enumerate(self.derivatives.slopes[step.target]) if s in used]
+        lines += [
+            f"lanes_t slopes_of_{name}[{n}];",
+            f"*outside |= {function}_slope({weights}, inputs_of_{name}, &{name}, slopes_of_{name});",
+        ]
+        return lines + [
+            f"const lanes_t {s.name} = slopes_of_{name}[{i}];" for i, s in enumerate(self.derivatives.slopes[step.target]) if s in used
+        ]
 
     def _value_lines(self, code: NetworkCode) -> list[str]:
         """Statements that take a network from `in` to `*out`; h holds the values of a layer, g those of the next."""

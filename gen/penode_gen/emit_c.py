@@ -8,8 +8,7 @@ from typing import Any
 import jinja2
 import sympy as sp
 
-from . import expressions as ex
-from . import layout, promises, sampled, selftest, sets, units
+from . import expressions as ex, layout, promises, sampled, selftest, sets, units
 from .c_text import Printer, fold, literal, literals, real
 from .causalise import Causal, Step, causalise
 from .emit_networks import NetworkCode, by_value, hidden16, network_code, network_lines, second_lines, slope_lines
@@ -34,24 +33,29 @@ def compiled_templates() -> jinja2.BytecodeCache | None:
 
 
 _TEMPLATES = jinja2.Environment(
-    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"), bytecode_cache=compiled_templates(),
-    undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
-)  # fmt: skip
+    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    bytecode_cache=compiled_templates(),
+    undefined=jinja2.StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+    autoescape=False,
+)
 
 # Runge-Kutta methods in which every stage builds on the one before: nodes, weights and the divisor of the weights.
-_RUNGE_KUTTA = {
-    "heun": ((0.0, 1.0), (1.0, 1.0), 2.0),
-    "rk4": ((0.0, 0.5, 0.5, 1.0), (1.0, 2.0, 2.0, 1.0), 6.0),
-}
+_RUNGE_KUTTA = {"heun": ((0.0, 1.0), (1.0, 1.0), 2.0), "rk4": ((0.0, 0.5, 0.5, 1.0), (1.0, 2.0, 2.0, 1.0), 6.0)}
 # Names of the templates inside functions that also hold names of the model; the model's get a _ there.
 _TAKEN = frozenset(
     "p x u y z dx fx fu yx yu zx zu kx ku cx cu status rates rates_jacobian outputs outputs_jacobian sensors curvature network "
     "inner along drive layer_by_layer before advance fold f x0 copy begin finish usable unit solve integrate node".split()
 )
 _METHOD_NAMES = {
-    "euler": "explicit Euler", "heun": "Heun (order 2)", "rk4": "Runge-Kutta of order 4",
-    "ros1": "Rosenbrock of order 1 (linearly implicit Euler)", "ros2": "Rosenbrock of order 2 (ROS2, L-stable)",
-}  # fmt: skip
+    "euler": "explicit Euler",
+    "heun": "Heun (order 2)",
+    "rk4": "Runge-Kutta of order 4",
+    "ros1": "Rosenbrock of order 1 (linearly implicit Euler)",
+    "ros2": "Rosenbrock of order 2 (ROS2, L-stable)",
+}
 
 
 # Template -> file. Sets are named after the model that owns them, so several methods of one model write the same.
@@ -110,31 +114,71 @@ class _Emitter:
         uses_p, uses_f = (any(f[uses] for f in functions.values() if f) for uses in ("uses_p", "uses_f"))
         reads_set = uses_p or not uses_f  # else its pieces are all that it has
         return {
-            **sampled.context(self.given), "given": self.given.inputs or model.inputs,
-            "model": model, "name": model.name, "prefix": self.prefix, "version": VERSION, "abi": sets.ABI,
-            "source": model.path.name, "digest": model.digest[:16], "method_name": _METHOD_NAMES[model.method],
+            **sampled.context(self.given),
+            "given": self.given.inputs or model.inputs,
+            "model": model,
+            "name": model.name,
+            "prefix": self.prefix,
+            "version": VERSION,
+            "abi": sets.ABI,
+            "source": model.path.name,
+            "digest": model.digest[:16],
+            "method_name": _METHOD_NAMES[model.method],
             "states": [{"name": s, "unit": state_unit(model, s), "start": literal(x)} for s, x in zip(model.states, model.start)],
-            "n_x": len(model.states), "n_q": causal.n_mechanical, "n_u": len(model.inputs), "n_drive": len(self.drive),
-            "n_y": len(model.outputs), "n_z": len(model.sensors), "uses_input_rate": self.uses_input_rate,
-            "curved": self.curved, "cubic": self.cubic, "kept": self.kept,
-            "functions": functions, "constants": self._constants(), "networks": self.networks,
+            "n_x": len(model.states),
+            "n_q": causal.n_mechanical,
+            "n_u": len(model.inputs),
+            "n_drive": len(self.drive),
+            "n_y": len(model.outputs),
+            "n_z": len(model.sensors),
+            "uses_input_rate": self.uses_input_rate,
+            "curved": self.curved,
+            "cubic": self.cubic,
+            "kept": self.kept,
+            "functions": functions,
+            "constants": self._constants(),
+            "networks": self.networks,
             "network_lines": {c.name: network_lines(model, c) for c in self.networks},
             "second_lines": {c.name: by_value(c, second_lines(model, c)) for c in self.networks if self._needs_second(c, functions)},
             "elementary": self._mentions(functions, tuple(f"{call}(" for call in CALLS.values())),
-            "called": {f"{c.name}{part}" for c in self.networks for part in ("", "_slope", "_or_pieces", "_or_pieces_slope") if self._mentions(functions, (f" {c.name}{part}(", f"){c.name}{part}("))},
+            "called": {
+                f"{c.name}{part}"
+                for c in self.networks
+                for part in ("", "_slope", "_or_pieces", "_or_pieces_slope")
+                if self._mentions(functions, (f" {c.name}{part}(", f"){c.name}{part}("))
+            },
             "slope_lines": {c.name: by_value(c, slope_lines(model, c)) for c in self.networks},
-            "layout_float": sets.layout(model), "layout_double": sets.layout(model, float),
-            "set_length": set_length, "scrub": max(set_length if reads_set else 0, model.pieces if uses_f else 0), "offsets": self._offset_lines(),
-            "verify": set_length + (model.pieces * len(folded) if uses_f else 0), "saved": self._saved(set_length), "ranges": self._ranges(), "trial_room": 1 << (model.guard.trial + 2).bit_length(), "bounds": [real(0.0 if o.trial_bound is None else o.trial_bound) for o in model.outputs],
-            "owner": model.owner, "sets_digest": sets.digest(model)[:16], "map_lines": layout.map_lines(model),
-            "set_summary": self._set_summary(), "sets": [self._set(name) for name in model.sets],
-            "nodes": [real(n) for n in nodes], "weights": [real(w) for w in weights], "divisor": divisor, "rosenbrock": rosenbrock,
+            "layout_float": sets.layout(model),
+            "layout_double": sets.layout(model, float),
+            "set_length": set_length,
+            "scrub": max(set_length if reads_set else 0, model.pieces if uses_f else 0),
+            "offsets": self._offset_lines(),
+            "verify": set_length + (model.pieces * len(folded) if uses_f else 0),
+            "saved": self._saved(set_length),
+            "ranges": self._ranges(),
+            "trial_room": 1 << (model.guard.trial + 2).bit_length(),
+            "bounds": [real(0.0 if o.trial_bound is None else o.trial_bound) for o in model.outputs],
+            "owner": model.owner,
+            "sets_digest": sets.digest(model)[:16],
+            "map_lines": layout.map_lines(model),
+            "set_summary": self._set_summary(),
+            "sets": [self._set(name) for name in model.sets],
+            "nodes": [real(n) for n in nodes],
+            "weights": [real(w) for w in weights],
+            "divisor": divisor,
+            "rosenbrock": rosenbrock,
             "uses_net16": any(hidden16(list(c.network.layers[i:])) for c in self.networks for i in range(len(c.network.layers))),
-            "folded": folded, "prepared": self._prepared(), "promised": any(port.promises for port in model.networks.values()),
-            "uses_p": uses_p, "uses_f": uses_f, "reads_set": reads_set,
-            "sample_time": real(model.sample_time), "real": real, "si": units.si,
+            "folded": folded,
+            "prepared": self._prepared(),
+            "promised": any(port.promises for port in model.networks.values()),
+            "uses_p": uses_p,
+            "uses_f": uses_f,
+            "reads_set": reads_set,
+            "sample_time": real(model.sample_time),
+            "real": real,
+            "si": units.si,
             "columns": len(model.states) + (2 + self.curved + self.cubic) * len(model.inputs),
-        }  # fmt: skip
+        }
 
     @staticmethod
     def _needs_second(code: NetworkCode, functions: dict[str, dict[str, Any] | None]) -> bool:
@@ -164,8 +208,7 @@ class _Emitter:
         """Divisions by constants become multiplications with constants of their own."""
         constants = {ex.symbol(p.name) for p in self.model.parameters.values() if not p.tunable}
         return expr.replace(
-            lambda e: e.is_Pow and e.base in constants and e.exp.is_Integer and e.exp < 0,
-            lambda e: ex.symbol(f"1/{e.base.name}") ** -e.exp,
+            lambda e: e.is_Pow and e.base in constants and e.exp.is_Integer and e.exp < 0, lambda e: ex.symbol(f"1/{e.base.name}") ** -e.exp
         )
 
     def _print(self, expr: sp.Expr) -> str:
@@ -243,9 +286,13 @@ class _Emitter:
             lines.append("")
         lines += [f"{name} = {self._print(e)};" for name, e in wanted]
         return {
-            "lines": lines, "calls": calls, "uses_p": uses_p or any(ex.symbol(p.name) in used for p in model.tunable), "uses_f": uses_f,
-            "uses_x": any(s in used for s in causal.states), "uses_u": any(s in used for s in self.drive),
-        }  # fmt: skip
+            "lines": lines,
+            "calls": calls,
+            "uses_p": uses_p or any(ex.symbol(p.name) in used for p in model.tunable),
+            "uses_f": uses_f,
+            "uses_x": any(s in used for s in causal.states),
+            "uses_u": any(s in used for s in self.drive),
+        }
 
     def _call(self, step: Step, value: bool, slope: bool, second: bool, used: set[sp.Symbol]) -> list[str]:
         name = self._c_name(step.target)
@@ -265,7 +312,9 @@ class _Emitter:
         if slope:
             lines.append(f"pen_real_t slopes_of_{name}[{len(step.arguments)}];")
             result = f"const pen_real_t {name} =" if step.target in used else "(void)"
-            lines += _remarked(f"{result} {function}_slope({values}, {argument}, slopes_of_{name}, &status);".replace("(void) ", "(void)"), step)
+            lines += _remarked(
+                f"{result} {function}_slope({values}, {argument}, slopes_of_{name}, &status);".replace("(void) ", "(void)"), step
+            )
             for i, s in enumerate(self.derivatives.slopes[step.target]):
                 lines += [f"const pen_real_t {s.name} = slopes_of_{name}[{i}];"] if s in used else []
         elif value:
@@ -308,16 +357,30 @@ class _Emitter:
                 port = self.model.networks[name]
                 promise = promises.initialiser(port, code.neurons) if port.promises else ""
                 if code.folded or promise:
-                    found.append({"name": name, "code": code.name, "layers": len(code.chain()), "width": code.width, "neurons": code.neurons, "promise": promise})
+                    found.append(
+                        {
+                            "name": name,
+                            "code": code.name,
+                            "layers": len(code.chain()),
+                            "width": code.width,
+                            "neurons": code.neurons,
+                            "promise": promise,
+                        }
+                    )
         return found
 
     def _ranges(self) -> list[dict[str, Any]]:
         """The inputs that have a declared range, and its edges."""
         limit = "PEN_REAL_MAX"
         return [
-            {"at": n, "least": f"-{limit}" if i.minimum is None else real(i.minimum), "most": limit if i.maximum is None else real(i.maximum)}
-            for n, i in enumerate(self.model.inputs) if i.minimum is not None or i.maximum is not None
-        ]  # fmt: skip
+            {
+                "at": n,
+                "least": f"-{limit}" if i.minimum is None else real(i.minimum),
+                "most": limit if i.maximum is None else real(i.maximum),
+            }
+            for n, i in enumerate(self.model.inputs)
+            if i.minimum is not None or i.maximum is not None
+        ]
 
     def _saved(self, set_length: int) -> int:
         """Values of an instance and its banks."""
@@ -336,7 +399,9 @@ class _Emitter:
                 found.append({"name": f"{self.prefix}_{p.name.upper()}", "text": f"({real(p.value)})", "remark": remark})
             if f"1/{p.name}" in self.constants:
                 value = real(p.value).removeprefix("(pen_real_t)")
-                found.append({"name": f"{self.prefix}_{p.name.upper()}_INVERSE", "text": f"((pen_real_t)(1.0 / {value}))", "remark": f"1 / {p.name}"})
+                found.append(
+                    {"name": f"{self.prefix}_{p.name.upper()}_INVERSE", "text": f"((pen_real_t)(1.0 / {value}))", "remark": f"1 / {p.name}"}
+                )
         return found
 
     def _offset_lines(self) -> list[dict[str, str]]:
@@ -356,7 +421,9 @@ class _Emitter:
         for name, network in (first.networks if first else {}).items():
             port = self.model.networks[name]
             sizes = [network.n_inputs] + [la.n_out for la in network.layers if isinstance(la, Dense)]
-            found.append(f"{name} [{', '.join(port.input_units)}] -> [{port.output_unit}]: {'-'.join(map(str, sizes))}, {network.n_parameters} parameters")
+            found.append(
+                f"{name} [{', '.join(port.input_units)}] -> [{port.output_unit}]: {'-'.join(map(str, sizes))}, {network.n_parameters} parameters"
+            )
         return found
 
     def _set(self, name: str) -> dict[str, Any]:
@@ -366,9 +433,12 @@ class _Emitter:
             for p, texts in ((p, literals(p.values)) for p in sets.pieces(self.model, chosen))
         ] or [{"comment": "this model has nothing to tune", "rows": ["0.0F"]}]
         return {
-            "name": name, "id": chosen.id, "pieces": pieces,
-            "checksum_float": sets.set_head(self.model, name)[3], "checksum_double": sets.set_head(self.model, name, float)[3],
-        }  # fmt: skip
+            "name": name,
+            "id": chosen.id,
+            "pieces": pieces,
+            "checksum_float": sets.set_head(self.model, name)[3],
+            "checksum_double": sets.set_head(self.model, name, float)[3],
+        }
 
 
 def _remarked(line: str, step: Step) -> list[str]:

@@ -62,7 +62,11 @@ def network_code(model: Model) -> list[NetworkCode]:
     for i, users in enumerate(groups.values()):
         name = f"{model.name}_network_{chr(ord('a') + i)}" if len(groups) > 1 else f"{model.name}_network"
         sizes = [users[0][1].n_inputs] + [la.n_out for la in users[0][1].layers if isinstance(la, Dense)]
-        found.append(NetworkCode(name, " -> ".join(map(str, sizes)), tuple(n for n, _ in users), users[0][1], model.pieces > 0 and foldable(users[0][1])))
+        found.append(
+            NetworkCode(
+                name, " -> ".join(map(str, sizes)), tuple(n for n, _ in users), users[0][1], model.pieces > 0 and foldable(users[0][1])
+            )
+        )
     return found
 
 
@@ -190,9 +194,7 @@ def second_lines(model: Model, code: NetworkCode) -> list[str]:
     if model.outside == "fade":
         lines.append(f"const pen_real_t trust = pen_fade({n}U, &p[0], {fade}, in);")
         slope = f"pen_fade_slope({n}U, &p[0], {fade}, in, ?U)"
-        each(
-            f"second[@][%] = (trust * second[@][%]) + ({t}[@][0] * {slope.replace('?', '%')}) + ({t}[%][0] * {slope.replace('?', '@')});",
-        )
+        each(f"second[@][%] = (trust * second[@][%]) + ({t}[@][0] * {slope.replace('?', '%')}) + ({t}[%][0] * {slope.replace('?', '@')});")
     return lines
 
 

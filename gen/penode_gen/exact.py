@@ -72,7 +72,14 @@ def _layer(layer) -> _Layer:
     most = max(v.denominator for v in (*bias, *(v for row in weights for v in row)))  # powers of two
     whole = np.array([[int(v * most) for v in row] for row in weights], dtype=object)
     sizes = np.array([[abs(float(v)) for v in row] for row in weights])
-    return _Layer(whole, np.array([int(v * most) for v in bias], dtype=object), most.bit_length() - 1, relu, sizes, np.array([abs(float(v)) for v in bias]))
+    return _Layer(
+        whole,
+        np.array([int(v * most) for v in bias], dtype=object),
+        most.bit_length() - 1,
+        relu,
+        sizes,
+        np.array([abs(float(v)) for v in bias]),
+    )
 
 
 def _piece(layers: list[_Layer], start: Fraction | None) -> Piece:

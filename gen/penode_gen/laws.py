@@ -70,7 +70,9 @@ LAWS: dict[str, Law] = {
     "fading_damper": Law("damping*faded*v", {"damping": "N*s/m", "time": "s"}, {"faded": LawState("1", "(1 - faded)/time")}),
     # warmed by the work that it does, cooled by the air
     "heating_damper": Law(
-        "damping*warm*v", {"damping": "N*s/m", "work": "m^2/s", "cooling": "s"}, {"warm": LawState("1", "(1 - warm)*v^2/work - warm/cooling")}
+        "damping*warm*v",
+        {"damping": "N*s/m", "work": "m^2/s", "cooling": "s"},
+        {"warm": LawState("1", "(1 - warm)*v^2/work - warm/cooling")},
     ),
     "coulomb_friction": Law("force*tanh(v/transition)", {"force": "N", "transition": "m/s"}),
     # Modelica.Mechanics.Translational friction in its smooth form: breakaway peak at `breakaway_rate`, then Coulomb
@@ -84,16 +86,18 @@ LAWS: dict[str, Law] = {
     ),
     # the same with other loops: bend 0 .. 1.4 for exponents 1 .. 2.5; share of what the rate's sign does, 1 for loops of Dahl
     "bouc_wen_loop": Law(
-        "force*slip", {"force": "N", "presliding": "m", "bend": "1", "share": "1"},
+        "force*slip",
+        {"force": "N", "presliding": "m", "bend": "1", "share": "1"},
         {"slip": LawState("1", "(v - (share*abs(v)*slip + (1 - share)*v*abs(slip))*(1 - bend + bend*abs(slip)))/presliding")},
-    ),  # fmt: skip
+    ),
     # hysteresis of Dahl: ever softer after a reversal
     "dahl_friction": Law("force*slip", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - abs(v)*slip)/presliding")}),
     # the part of a dry friction that is there at low rates only, with the memory of Dahl's
     "falling_friction": Law(
-        "force*slip/(1 + (v/stribeck)^2)", {"force": "N", "presliding": "m", "stribeck": "m/s"},
+        "force*slip/(1 + (v/stribeck)^2)",
+        {"force": "N", "presliding": "m", "stribeck": "m/s"},
         {"slip": LawState("1", "(v - abs(v)*slip)/presliding")},
-    ),  # fmt: skip
+    ),
     # hysteresis behind a play: without force for about 1.4 times the presliding after a reversal
     "slack_friction": Law(
         "force*slip^5", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - (v*slip^2 + abs(v)*slip*abs(slip))/2)/presliding")}
@@ -111,9 +115,7 @@ LAWS: dict[str, Law] = {
         {"pressed": LawState("m", "v - rate*(pressed/pocket)^3")},
     ),
     # spring and damper in series, relaxation = damping/stiffness
-    "maxwell_bushing": Law(
-        "pull", {"stiffness": "N/m", "relaxation": "s"}, {"pull": LawState("N", "stiffness*v - pull/relaxation")}
-    ),
+    "maxwell_bushing": Law("pull", {"stiffness": "N/m", "relaxation": "s"}, {"pull": LawState("N", "stiffness*v - pull/relaxation")}),
     # what a bushing of rubber pulls more than its linear one when it is stretched far
     "hardening_bushing": Law(
         "cubic*stretch^3", {"cubic": "N/m^3", "relaxation": "s"}, {"stretch": LawState("m", "v - stretch/relaxation")}

@@ -74,7 +74,10 @@ def _of_network(model: Model, name: str, network: Network, at: int) -> list[Arra
         else:
             affine += 1
             parts = ("shift", "factor") if layer.form == "centre" else ("factor", "shift")
-            found += [Array(f"{name}.{part}_{affine}", (layer.n_out,), "", (Block(0, layer.n_out, start + i * layer.n_out),)) for i, part in enumerate(parts)]
+            found += [
+                Array(f"{name}.{part}_{affine}", (layer.n_out,), "", (Block(0, layer.n_out, start + i * layer.n_out),))
+                for i, part in enumerate(parts)
+            ]
     return found
 
 
@@ -98,9 +101,12 @@ def map_lines(model: Model) -> list[str]:
 def to_json(model: Model) -> str:
     """The table for programs."""
     table = {
-        "model": model.owner, "layout": {"float": sets.layout(model), "double": sets.layout(model, float)}, "length": length(model),
-        "sets": {name: s.id for name, s in model.sets.items()}, "arrays": [asdict(a) for a in arrays(model)],
-    }  # fmt: skip
+        "model": model.owner,
+        "layout": {"float": sets.layout(model), "double": sets.layout(model, float)},
+        "length": length(model),
+        "sets": {name: s.id for name, s in model.sets.items()},
+        "arrays": [asdict(a) for a in arrays(model)],
+    }
     return json.dumps(table, indent=1) + "\n"
 
 

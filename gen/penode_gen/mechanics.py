@@ -15,8 +15,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from . import expressions as ex
-from . import units
+from . import expressions as ex, units
 from .laws import LAWS, for_angles
 from .model import GROUND, Body, Element, Model, Point
 
@@ -77,7 +76,9 @@ def combination(text: str, moving: dict[str, Motion], parameters: set[str]) -> M
 
 def motions(model: Model) -> dict[str, Motion]:
     """Position and rate of every end of a checked model."""
-    named: dict[str, Motion] = {i.name: (ex.symbol(i.name), ex.derivative(i.name)) for i in (*model.inputs, *model.sampled, *model.extra_states)}
+    named: dict[str, Motion] = {
+        i.name: (ex.symbol(i.name), ex.derivative(i.name)) for i in (*model.inputs, *model.sampled, *model.extra_states)
+    }
     named |= {b.position: (ex.symbol(b.position), ex.symbol(b.velocity)) for b in model.bodies}
     for p in model.points:
         named[p.name] = combination(p.text, named, set(model.parameters))
@@ -141,9 +142,14 @@ def forces(model: Model, parse: Parse, names: set[str], problem: Callable[[tuple
 
 
 def _law(
-    e: Element, force: sp.Symbol, s: sp.Symbol, v: sp.Symbol, parse: Parse, names: set[str],
+    e: Element,
+    force: sp.Symbol,
+    s: sp.Symbol,
+    v: sp.Symbol,
+    parse: Parse,
+    names: set[str],
     problem: Callable[[tuple[str, ...], str, str], None],
-) -> Iterator[Relation]:  # fmt: skip
+) -> Iterator[Relation]:
     """Force and rates of an element with a named law or an expression."""
     where = ("elements", e.name)
     text = e.expression if e.law == "expression" else LAWS[e.law].force

@@ -233,20 +233,12 @@ class Model:
     @property
     def states(self) -> tuple[str, ...]:
         """Names of all states: positions, velocities, then the others."""
-        return (
-            tuple(b.position for b in self.bodies)
-            + tuple(b.velocity for b in self.bodies)
-            + tuple(s.name for s in self.extra_states)
-        )
+        return tuple(b.position for b in self.bodies) + tuple(b.velocity for b in self.bodies) + tuple(s.name for s in self.extra_states)
 
     @property
     def start(self) -> tuple[float, ...]:
         """Initial values of `states`, SI."""
-        return (
-            tuple(b.start[0] for b in self.bodies)
-            + tuple(b.start[1] for b in self.bodies)
-            + tuple(s.start for s in self.extra_states)
-        )
+        return tuple(b.start[0] for b in self.bodies) + tuple(b.start[1] for b in self.bodies) + tuple(s.start for s in self.extra_states)
 
     @property
     def tunable(self) -> tuple[Parameter, ...]:

@@ -102,9 +102,7 @@ class Network:
     def architecture(self) -> tuple[tuple[str | int, ...], ...]:
         """What the generated code depends on: networks that agree here differ in numbers only."""
         return tuple(
-            ("affine", layer.form, layer.n_out)
-            if isinstance(layer, Affine)
-            else ("dense", layer.activation, layer.n_in, layer.n_out)
+            ("affine", layer.form, layer.n_out) if isinstance(layer, Affine) else ("dense", layer.activation, layer.n_in, layer.n_out)
             for layer in self.layers
         )
 
@@ -211,10 +209,7 @@ def _layer_problem(layer: Layer) -> str:
         if layer.activation not in ACTIVATIONS:
             return f"unknown activation '{layer.activation}'; use one of {', '.join(ACTIVATIONS)}"
         if layer.weights.ndim != 2 or layer.weights.size == 0 or layer.bias.shape != layer.weights.shape[:1]:
-            return (
-                f"weights {layer.weights.shape} and bias {layer.bias.shape} do not fit; "
-                "they must be [n_out, n_in] and [n_out]"
-            )
+            return f"weights {layer.weights.shape} and bias {layer.bias.shape} do not fit; they must be [n_out, n_in] and [n_out]"
         numbers = (layer.weights, layer.bias)
     if not all(np.isfinite(n).all() for n in numbers):
         return "a NaN or infinite number among its parameters; train or export the network again"

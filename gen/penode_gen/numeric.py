@@ -14,7 +14,14 @@ from .causalise import Causal, causalise
 from .model import Model
 
 _NUMPY = [
-    {"Root": np.sqrt, "Logarithm": np.log, "Softplus": lambda x: np.logaddexp(0.0, x), "Sigmoid": lambda x: 1.0 / (1.0 + np.exp(-x)), "Sign": np.sign, "Absolute": np.abs},
+    {
+        "Root": np.sqrt,
+        "Logarithm": np.log,
+        "Softplus": lambda x: np.logaddexp(0.0, x),
+        "Sigmoid": lambda x: 1.0 / (1.0 + np.exp(-x)),
+        "Sign": np.sign,
+        "Absolute": np.abs,
+    },
     "numpy",
 ]
 
@@ -23,7 +30,9 @@ _NUMPY = [
 def along(expression: str, names: tuple[str, ...]) -> Callable[..., np.ndarray]:
     """An expression of the model language as a function of arrays of one shape, or numbers, in the order of `names`."""
     parsed = ex.parse(expression, names, {})
-    parsed = parsed.replace(sp.Max, sp.Function("larger")).replace(sp.Min, sp.Function("smaller"))  # NumPy's own take arrays of one shape only
+    parsed = parsed.replace(sp.Max, sp.Function("larger")).replace(
+        sp.Min, sp.Function("smaller")
+    )  # NumPy's own take arrays of one shape only
     modules = [{"larger": lambda *x: reduce(np.maximum, x), "smaller": lambda *x: reduce(np.minimum, x)}, *_NUMPY]
     return sp.lambdify([ex.symbol(n) for n in names], parsed, modules=modules)
 
@@ -40,9 +49,7 @@ class Numeric:
             raise KeyError(f"{model.path.name} has no set '{set_name}'; it has {', '.join(model.sets)}")
         self._networks = chosen.networks if chosen else {}
         self._values = {p.name: p.value for p in model.parameters.values()} | (chosen.parameters if chosen else {})
-        self._rates, self._outputs, self._sensors = map(
-            self._function, (self._causal.rates, self._causal.outputs, self._causal.sensors)
-        )
+        self._rates, self._outputs, self._sensors = map(self._function, (self._causal.rates, self._causal.outputs, self._causal.sensors))
 
     def with_parameters(self, values: Mapping[str, float]) -> Numeric:
         """The same equations with other values of these parameters, at no cost: nothing is ordered or compiled again. KeyError for

@@ -48,7 +48,9 @@ def read(path: Path, model: ModelProto, reader: Callable[[ModelProto], Network])
     first, second = (reader(_ending(graph.model, name)) for name in pair)
     both = [_fused(_dense(n.layers)) for n in (first, second)]
     if _form(both[0]) != _form(both[1]) or _form(both[0])[-1][0] != "identity":
-        raise NetworkError(f"{path}: the two branches of its last Sub are not of one shape; subtract networks of equal layers, such as f(x) - f(-x)")
+        raise NetworkError(
+            f"{path}: the two branches of its last Sub are not of one shape; subtract networks of equal layers, such as f(x) - f(-x)"
+        )
     return replace(first, layers=_beside(*both))
 
 
@@ -107,7 +109,14 @@ class _Graph:
 
     def rewrite(self) -> None:
         """All nodes by their rules, in the order of the graph."""
-        rules = {"BatchNormalization": self.batch_norm, "LeakyRelu": self.leaky, "PRelu": self.leaky, "Clip": self.clip, "Max": self.limit, "Min": self.limit}
+        rules = {
+            "BatchNormalization": self.batch_norm,
+            "LeakyRelu": self.leaky,
+            "PRelu": self.leaky,
+            "Clip": self.clip,
+            "Max": self.limit,
+            "Min": self.limit,
+        }
         for node in list(self.model.graph.node):
             if node.op_type == "Constant" and node.attribute and node.attribute[0].name == "value":
                 self.constants[node.output[0]] = numpy_helper.to_array(node.attribute[0].t)
@@ -135,7 +144,12 @@ class _Graph:
 
     def batch_norm(self, node: NodeProto) -> list[NodeProto] | None:
         """Into the Gemm before it if only it uses that, else a scaling."""
-        if len(node.input) < 5 or any(n not in self.constants for n in node.input[1:5]) or _attribute(node, "training_mode", 0) or self.ranks.get(node.input[0]) != 2:
+        if (
+            len(node.input) < 5
+            or any(n not in self.constants for n in node.input[1:5])
+            or _attribute(node, "training_mode", 0)
+            or self.ranks.get(node.input[0]) != 2
+        ):
             return None
         scale, bias, mean, variance = (self.constants[n].astype(np.float64) for n in node.input[1:5])
         factor = scale / np.sqrt(variance + _attribute(node, "epsilon", 1e-5))

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from . import expressions as ex
-from . import units
+from . import expressions as ex, units
 from .c_text import literal
 from .exact import Piece, pieces
 from .fold import foldable
@@ -36,9 +35,13 @@ def read(where: tuple[str, ...], entry: dict[str, Any], inputs: list[str], outpu
         for key, of in (("max_slope", [output, *inputs[:1]]), ("max_force", [output]), ("dissipative", [output]))
     )
     return Promises(
-        increasing=rising in (True, "increasing"), decreasing=rising == "decreasing", dissipative=small if isinstance(band, str) else 0.0 if band else None,
-        max_slope=slope, max_force=force, zero_at_zero=entry.get("zero_at_zero", False),
-    )  # fmt: skip
+        increasing=rising in (True, "increasing"),
+        decreasing=rising == "decreasing",
+        dissipative=small if isinstance(band, str) else 0.0 if band else None,
+        max_slope=slope,
+        max_force=force,
+        zero_at_zero=entry.get("zero_at_zero", False),
+    )
 
 
 def _quantity(where: tuple[str, ...], text: Any, of: list[str], problem: Problem) -> float | None:
@@ -67,9 +70,17 @@ def check(networks: dict[str, NetworkPort], sets: dict[str, ParameterSet], outsi
             continue
         shapes = [chosen.networks[name] for chosen in sets.values() if name in chosen.networks]
         if not all(foldable(net) for net in shapes):
-            problem(("networks", name), "promises are proven for networks of one input with ReLU activations only", "remove them, or train such a network")
+            problem(
+                ("networks", name),
+                "promises are proven for networks of one input with ReLU activations only",
+                "remove them, or train such a network",
+            )
         elif outside == "fade":
-            problem(("networks", name), "a network that fades is not piecewise linear: its promises cannot be proven", "choose outside = 'extrapolate' or 'clamp', or remove them")
+            problem(
+                ("networks", name),
+                "a network that fades is not piecewise linear: its promises cannot be proven",
+                "choose outside = 'extrapolate' or 'clamp', or remove them",
+            )
         else:
             done: set[int] = set()  # sets that leave a network out share that of the set 'default'
             for chosen in (c for c in sets.values() if name in c.networks and id(c.networks[name]) not in done):
@@ -132,7 +143,11 @@ def _ends(line: list[Piece], margin: int) -> Iterator[tuple[Fraction, Fraction, 
     """Place, value and margin at both ends of each piece, and at 0."""
     for p in line:
         inside = (p.start is None or p.start < 0) and (p.end is None or p.end > 0)
-        for x, by in ((p.start, p.start_margin), (p.end, p.end_margin), (Fraction(0) if inside else None, min(p.start_margin, p.end_margin))):
+        for x, by in (
+            (p.start, p.start_margin),
+            (p.end, p.end_margin),
+            (Fraction(0) if inside else None, min(p.start_margin, p.end_margin)),
+        ):
             if x is not None:
                 yield x, p.at(x), margin * FORCE * Fraction(by), p
 
@@ -153,7 +168,11 @@ def _driving(promises: Promises, line: list[Piece], margin: int) -> Iterator[Fra
     yield from (_place(p) for p in line if (p.start is None or p.end is None) and p.slope < margin * Fraction(p.slope_margin))
     for x, value, by, p in ends:
         away = min(by, abs(x) * margin * Fraction(p.slope_margin)) if limit == 0 else by
-        if (x == near and abs(value) + (by if limit else 0) > limit) or (x > near and value - away < -limit) or (x < near and value + away > limit):
+        if (
+            (x == near and abs(value) + (by if limit else 0) > limit)
+            or (x > near and value - away < -limit)
+            or (x < near and value + away > limit)
+        ):
             yield x
 
 
@@ -184,9 +203,13 @@ def initialiser(port: NetworkPort, neurons: int) -> str:
     """The port's promises as initialiser of a pen_promise_t; `neurons` of all its ReLU layers."""
     given = port.promises
     kinds = {
-        "INCREASING": given.increasing, "DECREASING": given.decreasing, "DISSIPATIVE": given.dissipative is not None,
-        "MAX_SLOPE": given.max_slope is not None, "MAX_FORCE": given.max_force is not None, "ZERO_AT_ZERO": given.zero_at_zero,
-    }  # fmt: skip
+        "INCREASING": given.increasing,
+        "DECREASING": given.decreasing,
+        "DISSIPATIVE": given.dissipative is not None,
+        "MAX_SLOPE": given.max_slope is not None,
+        "MAX_FORCE": given.max_force is not None,
+        "ZERO_AT_ZERO": given.zero_at_zero,
+    }
     named = " | ".join(f"PEN_PROMISE_{kind}" for kind, made in kinds.items() if made) or "0U"
     numbers = ", ".join(literal(float(_stored(v or 0.0))) for v in (given.dissipative, given.max_slope, given.max_force))
     return f"{{ {named}, {LOOKS[0] + LOOKS[1] * neurons}U, {numbers} }}"

@@ -7,9 +7,7 @@ from __future__ import annotations
 import difflib
 from typing import Any, Iterable
 
-from . import expressions as ex
-from . import model as m
-from . import sampled, units
+from . import expressions as ex, model as m, sampled, units
 from .laws import LAWS, for_angles
 from .mechanics import combination
 from .read_networks import UNKNOWN, NetworkTables
@@ -33,7 +31,11 @@ class EndTables(NetworkTables):
         if NAME.fullmatch(text):
             if text not in parameters:
                 near = difflib.get_close_matches(text, parameters, 1)
-                self.problem(where, f"'{text}' is no parameter", f"did you mean '{near[0]}'?" if near else f"add it to [parameters] or write a quantity in {unit}")
+                self.problem(
+                    where,
+                    f"'{text}' is no parameter",
+                    f"did you mean '{near[0]}'?" if near else f"add it to [parameters] or write a quantity in {unit}",
+                )
             elif not same(parameters[text].unit, unit):
                 self.problem(where, f"'{text}' is in {parameters[text].unit}, needed is {unit}", "use a parameter of that unit")
             return text
@@ -52,13 +54,23 @@ class EndTables(NetworkTables):
             where = ("bodies", name)
             given = [key for key in INERTIA if key in entry]
             if len(given) != 1:
-                self.problem(where, "has both a mass and an inertia" if given else "'mass' is missing", "add mass = ... for a body that moves, or inertia = ... for one that turns")
+                self.problem(
+                    where,
+                    "has both a mass and an inertia" if given else "'mass' is missing",
+                    "add mass = ... for a body that moves, or inertia = ... for one that turns",
+                )
                 given = given or ["mass"]
             key = given[0]
             unit, z, v, length = INERTIA[key]
-            mass = self.argument(where, key, entry[key], unit, f"{'J' if key == 'inertia' else 'm'}_{name}", parameters) if key in entry else ""
+            mass = (
+                self.argument(where, key, entry[key], unit, f"{'J' if key == 'inertia' else 'm'}_{name}", parameters)
+                if key in entry
+                else ""
+            )
             if mass in parameters and parameters[mass].value <= 0.0:
-                self.problem(where, f"{key} '{entry[key]}' is not above zero", f"give a positive {key}; write a massless point as plain equations")
+                self.problem(
+                    where, f"{key} '{entry[key]}' is not above zero", f"give a positive {key}; write a massless point as plain equations"
+                )
             for part in ("position", "velocity"):
                 if part in entry:
                     self.name((*where, part), entry[part])
@@ -108,7 +120,7 @@ class EndTables(NetworkTables):
             else:
                 value = parameters[arguments["time"]].value if arguments["time"] in parameters else 1.0
                 if value <= 0.0:
-                    self.problem((*where, "time"), "is not above zero", "give a positive time, or write law = \"gain\"")
+                    self.problem((*where, "time"), "is not above zero", 'give a positive time, or write law = "gain"')
                 start = self.quantity((*where, "start"), entry["start"], of[source]) if "start" in entry else 0.0
                 states.append(m.State(name, of[source], start, f"{source} behind a lag"))
                 equations.append(m.Equation(name, f"der({name})*{arguments['time']} = {source} - {name}"))
@@ -118,9 +130,13 @@ class EndTables(NetworkTables):
         return points, states, equations, late
 
     def points(
-        self, bodies: tuple[m.Body, ...], inputs: tuple[m.Input, ...], states: Iterable[m.State], earlier: list[m.Point],
+        self,
+        bodies: tuple[m.Body, ...],
+        inputs: tuple[m.Input, ...],
+        states: Iterable[m.State],
+        earlier: list[m.Point],
         parameters: dict[str, m.Parameter],
-    ) -> Iterable[m.Point]:  # fmt: skip
+    ) -> Iterable[m.Point]:
         """Linear combinations of positions; `earlier`: those that actuators are."""
         unit_of = {p.name: p.unit for p in parameters.values()} | {i.name: i.unit for i in (*inputs, *states, *earlier)}
         unit_of |= {b.position: b.unit for b in bodies if b.position}
@@ -162,7 +178,11 @@ class EndTables(NetworkTables):
                     self.problem(where, f"input '{end}' is in {unfit.unit}, an end needs a position", "use an input in m or rad")
             elif end not in known:
                 near = difflib.get_close_matches(end, known, 1)
-                self.problem(where, f"end {show(end)} is no body, point, input or ground", f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}")
+                self.problem(
+                    where,
+                    f"end {show(end)} is no body, point, input or ground",
+                    f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}",
+                )
         if {"m", "rad"} == {self.kinds[end] for end in ends if end in self.kinds}:
             turning = next(end for end in ends if self.kinds[end] == "rad")
             moves = next(end for end in ends if end != turning)
@@ -196,7 +216,11 @@ class EndTables(NetworkTables):
         if network not in networks:
             if "network" in entry:
                 near = difflib.get_close_matches(network, networks, 1)
-                self.problem((*where, "network"), f"network {show(network)} is not declared", f"did you mean '{near[0]}'?" if near else "add it to [networks]")
+                self.problem(
+                    (*where, "network"),
+                    f"network {show(network)} is not declared",
+                    f"did you mean '{near[0]}'?" if near else "add it to [networks]",
+                )
             return m.Element(name, ends, "network")
         port = networks[network]
         length, force = self.of_ends(ends, "m"), self.of_ends(ends, "N")
@@ -206,13 +230,21 @@ class EndTables(NetworkTables):
         if inputs is None:  # the units say which is meant
             inputs = [next((k for k, u in kinds.items() if same(u, unit)), "") for unit in takes]
             for unit in (unit for unit, kind in zip(takes, inputs) if not kind):
-                self.problem(where, f"network '{network}' takes {unit or 'a number without unit'}, an element has a deflection in {length} and a rate in {length}/s", "mend the unit in [networks]")
+                self.problem(
+                    where,
+                    f"network '{network}' takes {unit or 'a number without unit'}, an element has a deflection in {length} and a rate in {length}/s",
+                    "mend the unit in [networks]",
+                )
         else:
             for kind, unit in zip(inputs, takes):
                 if kind not in list(kinds):
                     self.problem((*where, "inputs"), f"{show(kind)} is neither deflection nor rate", 'write inputs = ["deflection"]')
                 elif not same(kinds[kind], unit):
-                    self.problem((*where, "inputs"), f"the network takes {unit or 'a number without unit'}, but {kind} is in {kinds[kind]}", "mend the unit in [networks]")
+                    self.problem(
+                        (*where, "inputs"),
+                        f"the network takes {unit or 'a number without unit'}, but {kind} is in {kinds[kind]}",
+                        "mend the unit in [networks]",
+                    )
             if takes and len(inputs) != len(takes):
                 self.problem((*where, "inputs"), f"{len(inputs)} inputs for a network of {len(takes)}", "give one for each")
         if not same(port.output_unit, force):

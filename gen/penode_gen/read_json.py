@@ -89,7 +89,7 @@ class _Reader:
         return [(self.scale if scales else self.dense)(entry, f"layers[{i}]") for i, (entry, scales) in enumerate(zip(value, scaled))]
 
     def scale(self, value: Any, where: str) -> Affine:
-        """"centre": (x - shift) * factor; "rescale": x * factor + shift."""
+        """Form "centre": (x - shift) * factor; "rescale": x * factor + shift."""
         table = self.table(value, where, ("form", "shift", "factor"), ("form", "shift", "factor"))
         if table["form"] not in FORMS:
             raise self.error(f"{where}.form", f"unknown form {table['form']!r}", f"known are {', '.join(FORMS)}")

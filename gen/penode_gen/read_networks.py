@@ -10,9 +10,7 @@ from typing import Any, Iterable
 
 import numpy as np
 
-from . import expressions as ex
-from . import model as m
-from . import promises, units
+from . import expressions as ex, model as m, promises, units
 from .fold import foldable, pieces, room
 from .network_files import read_network
 from .networks import Network, NetworkError
@@ -44,7 +42,11 @@ class NetworkTables(Tables):
                 inputs = []
             for unit in (*inputs, entry.get("output")):
                 if self.unit(where, unit) != 1.0:
-                    self.problem(where, f"a network in {unit}: networks take and give SI values", f"declare {units.si(unit)}, and scale in the network")
+                    self.problem(
+                        where,
+                        f"a network in {unit}: networks take and give SI values",
+                        f"declare {units.si(unit)}, and scale in the network",
+                    )
             output = entry.get("output", UNKNOWN)
             made = m.Promises() if name in self.unsure or output == UNKNOWN else promises.read(where, entry, inputs, output, self.problem)
             yield name, m.NetworkPort(name, tuple(inputs), output, entry.get("description", ""), made)
@@ -55,8 +57,12 @@ class NetworkTables(Tables):
         if given == 0 or not sets:
             return
         if head["outside"] == "fade":
-            self.problem(where, "a network that fades is not piecewise linear", "choose outside = 'extrapolate' or 'clamp', or leave pieces out")
-        elif not any(foldable(net) for net in sets["default"].networks.values()) and len(sets["default"].networks) == len(self.data.get("networks", {})):
+            self.problem(
+                where, "a network that fades is not piecewise linear", "choose outside = 'extrapolate' or 'clamp', or leave pieces out"
+            )
+        elif not any(foldable(net) for net in sets["default"].networks.values()) and len(sets["default"].networks) == len(
+            self.data.get("networks", {})
+        ):
             self.problem(where, "no network has one input and only ReLU activations", "leave pieces out")
         elif head["more_pieces"] == "refuse":
             for chosen in sets.values():
@@ -90,11 +96,15 @@ class NetworkTables(Tables):
                     self.problem((*where, n), f"mass {show(own[n])} is not above zero", "give a positive mass")
             if name == "default":
                 files, values = files | own_files, values | own_values
-            sets[name] = m.ParameterSet(name, number, {n: net for n, net in (files | own_files).items() if net is not None}, values | own_values)
+            sets[name] = m.ParameterSet(
+                name, number, {n: net for n, net in (files | own_files).items() if net is not None}, values | own_values
+            )
             for n, net in own_files.items():
                 first = files[n]
                 if net is not None and first is not None and net.architecture != first.architecture:
-                    self.problem((*where, n), "has another architecture than in the set 'default'", "train the same layers: sets share one code")
+                    self.problem(
+                        (*where, n), "has another architecture than in the set 'default'", "train the same layers: sets share one code"
+                    )
         return sets
 
     def untrained(self, where: tuple[str, ...], name: str, entry: dict[str, Any], port: m.NetworkPort) -> Network | None:
@@ -134,7 +144,11 @@ class NetworkTables(Tables):
         if network is None or port.name in self.unsure:
             return None
         if network.n_inputs != len(port.input_units) or network.n_outputs != 1:
-            self.problem(where, f"{path.name} has {network.n_inputs} input(s) and {network.n_outputs} output(s), declared are {len(port.input_units)} and 1", "mend [networks] or the file")
+            self.problem(
+                where,
+                f"{path.name} has {network.n_inputs} input(s) and {network.n_outputs} output(s), declared are {len(port.input_units)} and 1",
+                "mend [networks] or the file",
+            )
             return None
         remedy = "give min and max, one number for each input, or write them into the file"
         for key in ("min", "max"):

@@ -74,7 +74,9 @@ def parse(path: Path, called: str = "") -> tuple[dict[str, Any], bytes, Lines]:
         raw = path.read_bytes()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise m.ModelError([one_line(f"{called or path}{f': {path}' * bool(called)}: cannot be read ({reason}); give the path of a model file")]) from error
+        raise m.ModelError(
+            [one_line(f"{called or path}{f': {path}' * bool(called)}: cannot be read ({reason}); give the path of a model file")]
+        ) from error
     try:
         text = raw.decode("utf-8").replace("\r\n", "\n")
         return tomllib.loads(text), raw, Lines(text)

@@ -11,9 +11,7 @@ import re
 from pathlib import Path
 from typing import Any, Iterable
 
-from . import expressions as ex
-from . import model as m
-from . import promises, units
+from . import expressions as ex, model as m, promises, units
 from .read_places import Lines, merge, one_line, parse, show
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -25,7 +23,18 @@ C_WORDS = set(
 )
 C_PATTERN = re.compile(r"u?int\w*_t|U?INT\w*_(MAX|MIN|C)|(SIZE|PTRDIFF|WCHAR|SIG_ATOMIC|WINT)_(MAX|MIN)")
 RESERVED = {*ex.FUNCTIONS, "der", "where", m.GROUND}
-PREFIXES = ("pen_", "PEN_", "slope_", "second_", "inputs_of_", "slopes_of_", "seconds_of_", "piece_of_", "der_", "network_")  # of names that the generated code makes
+PREFIXES = (
+    "pen_",
+    "PEN_",
+    "slope_",
+    "second_",
+    "inputs_of_",
+    "slopes_of_",
+    "seconds_of_",
+    "piece_of_",
+    "der_",
+    "network_",
+)  # of names that the generated code makes
 MACROS = (  # that each generated model defines, behind its name
     "N_X N_U N_IN N_Y N_SENSORS N_LAST N_DRIVE N_COLUMNS N_KEPT N_Q N_W SAMPLE_TIME SUBSTEPS STEP IMPLICIT_STEP AT_FIRST AT_SECOND AT_THIRD "
     "LAYOUT SET_LENGTH SCRUB VERIFY SAVED SAVED_MAIN PIECES TRIAL TRIAL_ROOM H SETS_H".split()
@@ -78,7 +87,9 @@ class Tables:
             before = self.places[-1][0]
             place = f"{before}:{lines.of(('model', 'extends'))}: model.extends"
             if len(self.places) > 2:
-                raise m.ModelError([one_line(f"{place}: this would be the third file that extends another; extend {base} by at most two in a row")])
+                raise m.ModelError(
+                    [one_line(f"{place}: this would be the third file that extends another; extend {base} by at most two in a row")]
+                )
             base_path = before.parent / base
             shares = shares and not {"parameters", "networks", "sets"} & set(own)
             own, raw, lines = parse(base_path, place)
@@ -114,7 +125,9 @@ class Tables:
             else:
                 good[key] = value
                 if key == "description" and not _COMMENT.fullmatch(value):
-                    self.problem((*where, key), "cannot be a comment in C", "use one line of up to 200 characters, without backslash, /* and */")
+                    self.problem(
+                        (*where, key), "cannot be a comment in C", "use one line of up to 200 characters, without backslash, /* and */"
+                    )
         for key in required:
             if key not in data:
                 self.problem(where, f"'{key}' is missing", f"add {key} = ...")
@@ -135,7 +148,9 @@ class Tables:
     def name(self, where: tuple[str, ...], name: str, prefixes: tuple[str, ...] = PREFIXES) -> None:
         """Report what cannot stand for a value in the generated C."""
         if not NAME.fullmatch(name) or name.endswith("_"):
-            self.problem(where, f"{show(name)} cannot be a name", "use up to 40 letters, digits and _, with a letter in front and no _ at the end")
+            self.problem(
+                where, f"{show(name)} cannot be a name", "use up to 40 letters, digits and _, with a letter in front and no _ at the end"
+            )
         elif name in C_WORDS or name in RESERVED or C_PATTERN.fullmatch(name) or name.startswith(prefixes) or self._is_macro(name):
             self.problem(where, f"'{name}' has a meaning of its own in C or in model files", "choose another name")
 
@@ -213,5 +228,5 @@ def _type_name(kind: Any) -> str:
     if kind in ((int, float), (bool, str)):
         return "a number" if kind == (int, float) else "true, false or a text"
     if kind == (int, float, str):
-        return "a number or \"unknown\""
+        return 'a number or "unknown"'
     return names.get(kind, "a text or a table")

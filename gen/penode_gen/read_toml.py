@@ -10,9 +10,7 @@ import re
 from pathlib import Path
 from typing import Any, Iterable
 
-from . import expressions as ex
-from . import model as m
-from . import promises
+from . import expressions as ex, model as m, promises
 from .causalise import check
 from .fold import room
 from .laws import LAWS
@@ -28,9 +26,21 @@ _MODEL_WORDS = set(
     "stdio stdlib string tgmath time wchar wctype size ptrdiff sample pen".split()
 )
 MODEL = {
-    "extends": str, "name": str, "description": str, "sample_time": str, "method": str, "substeps": int, "input": str, "outside": str,
-    "fade_width": (int, float), "pieces": int, "more_pieces": str, "out_of_range": str, "on_damage": str, "trial": int,
-}  # fmt: skip
+    "extends": str,
+    "name": str,
+    "description": str,
+    "sample_time": str,
+    "method": str,
+    "substeps": int,
+    "input": str,
+    "outside": str,
+    "fade_width": (int, float),
+    "pieces": int,
+    "more_pieces": str,
+    "out_of_range": str,
+    "on_damage": str,
+    "trial": int,
+}
 
 
 class _All(frozenset):
@@ -84,12 +94,34 @@ class _Reader(EndTables):
             self.expressions(elements, equations, (*outputs, *sensors), networks, len(outputs))
             raise m.ModelError(self.problems)
         return m.Model(
-            name=head["name"], description=head.get("description", ""), sample_time=sample_time, method=head["method"],
-            substeps=head["substeps"], interpolation=head["input"], outside=head["outside"], fade_width=float(head["fade_width"]),
-            pieces=room(head["pieces"]), more_pieces=head["more_pieces"], parameters=parameters, inputs=inputs, bodies=bodies, elements=elements, extra_states=states, variables=variables,
-            equations=equations, networks=networks, outputs=outputs, sensors=sensors, sets=sets, path=self.path,
-            digest=self.digest.hexdigest(), guard=m.Guard(head["out_of_range"], head["on_damage"], head["trial"]), set_owner=self.set_owner, points=points, sampled=tuple(sampled),
-        )  # fmt: skip
+            name=head["name"],
+            description=head.get("description", ""),
+            sample_time=sample_time,
+            method=head["method"],
+            substeps=head["substeps"],
+            interpolation=head["input"],
+            outside=head["outside"],
+            fade_width=float(head["fade_width"]),
+            pieces=room(head["pieces"]),
+            more_pieces=head["more_pieces"],
+            parameters=parameters,
+            inputs=inputs,
+            bodies=bodies,
+            elements=elements,
+            extra_states=states,
+            variables=variables,
+            equations=equations,
+            networks=networks,
+            outputs=outputs,
+            sensors=sensors,
+            sets=sets,
+            path=self.path,
+            digest=self.digest.hexdigest(),
+            guard=m.Guard(head["out_of_range"], head["on_damage"], head["trial"]),
+            set_owner=self.set_owner,
+            points=points,
+            sampled=tuple(sampled),
+        )
 
     def head(self) -> tuple[dict[str, Any], float]:
         """The table [model] with its defaults, and the sample time [s]."""
@@ -101,12 +133,17 @@ class _Reader(EndTables):
             self.problem(("model", "name"), f"'{name}' has a meaning of its own in C", "choose another name")
         sample_time = self.quantity(("model", "sample_time"), head.get("sample_time", "1 s"), "s")
         if sample_time < 1e-9 or sample_time > 86400.0:
-            self.problem(("model", "sample_time"), f"{head['sample_time']} is out of range", "give a time from 1 ns to 1 day, such as '1 ms'")
+            self.problem(
+                ("model", "sample_time"), f"{head['sample_time']} is out of range", "give a time from 1 ns to 1 day, such as '1 ms'"
+            )
         for key, default, choices in (
-            ("method", "rk4", m.METHODS), ("input", "linear", m.INTERPOLATIONS),
-            ("outside", "extrapolate", m.OUTSIDE), ("more_pieces", "refuse", m.MORE_PIECES),
-            ("out_of_range", "report", m.OUT_OF_RANGE), ("on_damage", "report", m.ON_DAMAGE),
-        ):  # fmt: skip
+            ("method", "rk4", m.METHODS),
+            ("input", "linear", m.INTERPOLATIONS),
+            ("outside", "extrapolate", m.OUTSIDE),
+            ("more_pieces", "refuse", m.MORE_PIECES),
+            ("out_of_range", "report", m.OUT_OF_RANGE),
+            ("on_damage", "report", m.ON_DAMAGE),
+        ):
             if head.setdefault(key, default) not in choices:
                 self.problem(("model", key), f"'{head[key]}' is unknown", f"choose one of {', '.join(choices)}")
         if not 1 <= head.setdefault("substeps", 1) <= 1000:
@@ -114,9 +151,17 @@ class _Reader(EndTables):
         if not 1e-6 <= head.setdefault("fade_width", 0.1) <= 100.0:
             self.problem(("model", "fade_width"), "is out of range", "give the fading distance in widths of the envelope, 1e-6 to 100")
         if head.setdefault("pieces", 0) != 0 and not 4 <= head["pieces"] <= ROOM:
-            self.problem(("model", "pieces"), f"{head['pieces']} is out of range", f"give room for 4 to {ROOM} pieces, or 0 to evaluate layer by layer")
+            self.problem(
+                ("model", "pieces"),
+                f"{head['pieces']} is out of range",
+                f"give room for 4 to {ROOM} pieces, or 0 to evaluate layer by layer",
+            )
         if not 0 <= head.setdefault("trial", 0) <= 10000:
-            self.problem(("model", "trial"), f"{head['trial']} is out of range", "give the number of last samples that a new set is tried on, up to 10000, or 0 for no trial")
+            self.problem(
+                ("model", "trial"),
+                f"{head['trial']} is out of range",
+                "give the number of last samples that a new set is tried on, up to 10000, or 0 for no trial",
+            )
         return head, sample_time
 
     def parameters(self) -> dict[str, m.Parameter]:
@@ -126,7 +171,9 @@ class _Reader(EndTables):
             value = self.number((*where, "value"), entry["value"], self.unit(where, entry.get("unit"))) if "value" in entry else math.nan
             tolerance = self.tolerance(where, entry)
             tunable = entry.get("tunable", "tunable" in self.stated("parameters", name))  # of a wrong type: meant to be
-            found[name] = m.Parameter(name, value, entry.get("unit", UNKNOWN), tolerance, tunable, entry.get("description", ""), entry.get("exact") is True)
+            found[name] = m.Parameter(
+                name, value, entry.get("unit", UNKNOWN), tolerance, tunable, entry.get("description", ""), entry.get("exact") is True
+            )
         return found
 
     def tolerance(self, where: tuple[str, ...], entry: dict[str, Any]) -> float:
@@ -208,7 +255,7 @@ class _Reader(EndTables):
         for name, text in self.entries("equations").items():
             self.label(("equations", name), name)
             if not isinstance(text, str) or len(ex.sides(text)) != 2:
-                self.problem(("equations", name), "is not one equation", "write it as \"der(T) = (T0 - T)/tau\"")
+                self.problem(("equations", name), "is not one equation", 'write it as "der(T) = (T0 - T)/tau"')
                 continue
             yield m.Equation(name, text)
 
@@ -218,7 +265,11 @@ class _Reader(EndTables):
             noise = self.noise((section, name), entry, scale)
             bound = self.number((section, name, "trial_bound"), entry["trial_bound"], scale) if "trial_bound" in entry else None
             if bound is not None and not bound > 0.0:
-                self.problem((section, name, "trial_bound"), f"{bound} is not a bound", "give how far outputs with a new set may be from those with the running one, above 0")
+                self.problem(
+                    (section, name, "trial_bound"),
+                    f"{bound} is not a bound",
+                    "give how far outputs with a new set may be from those with the running one, above 0",
+                )
             yield m.Signal(name, entry.get("value", ""), entry.get("unit", UNKNOWN), noise, entry.get("description", ""), bound)
 
     def unique(self, parameters, inputs, bodies, points, elements, states, variables, networks) -> None:
@@ -230,7 +281,9 @@ class _Reader(EndTables):
         actuators = self.entries("actuators")
         named += [("point", p.name, ("actuators" if p.name in actuators else "points", p.name)) for p in points]
         of_laws = {s.name: ("elements", e.name) for e in elements for s in self.law_states([e])} | {n: ("actuators", n) for n in actuators}
-        named += [("state", s.name, of_laws.get(s.name, ("states", s.name))) for s in states] + [("variable", v.name, ("variables", v.name)) for v in variables]
+        named += [("state", s.name, of_laws.get(s.name, ("states", s.name))) for s in states] + [
+            ("variable", v.name, ("variables", v.name)) for v in variables
+        ]
         named += [("network", n, ("networks", n)) for n in networks]
         for e in elements:
             where = ("elements", e.name)
@@ -251,7 +304,9 @@ class _Reader(EndTables):
         for n, s in enumerate(signals):
             other = s.name in states and not re.search(rf"\b{s.name}\b", s.expression)
             if s.expression and (other or first.setdefault(s.name, s.expression.strip()) != s.expression.strip()):
-                self.problem(("outputs" if n < n_outputs else "sensors", s.name), f"'{s.name}' is already the name of another quantity", "rename one")
+                self.problem(
+                    ("outputs" if n < n_outputs else "sensors", s.name), f"'{s.name}' is already the name of another quantity", "rename one"
+                )
 
     def expressions(self, elements, equations, signals, networks: dict[str, m.NetworkPort], n_outputs: int) -> None:
         """What is wrong with expressions whatever the names in them mean: for a file with other problems."""
@@ -285,7 +340,9 @@ def load(path: str | Path) -> m.Model:
     try:
         problems = check(model)
     except RecursionError as error:
-        raise m.ModelError([one_line(f"{path}: has equations that depend on each other in too long a chain; write a smaller model")]) from error
+        raise m.ModelError(
+            [one_line(f"{path}: has equations that depend on each other in too long a chain; write a smaller model")]
+        ) from error
     for where, what, remedy in problems:
         reader.problem(where, what, remedy)
     if reader.problems:

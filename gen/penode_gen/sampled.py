@@ -27,9 +27,7 @@ Array = NDArray[Any]
 Problem = Callable[[tuple[str, ...], str, str], None]
 
 
-def read(
-    where: tuple[str, str], entry: dict[str, Any], unit: str, made_by: str, sample_time: float, problem: Problem
-) -> Sampled | None:
+def read(where: tuple[str, str], entry: dict[str, Any], unit: str, made_by: str, sample_time: float, problem: Problem) -> Sampled | None:
     """An actuator that delays or holds; `made_by`: the law of the actuator that it acts on, empty for an input. None if it is wrong."""
     law, source = entry["law"], entry["input"]
     if made_by and made_by not in LAWS:
@@ -38,7 +36,11 @@ def read(
         return None
     for key in ("gain", "time", "start"):
         if key in entry:
-            problem((*where, key), f"the law '{law}' has no {key}", "give a number of samples, such as samples = 5" if key == "time" else "remove it")
+            problem(
+                (*where, key),
+                f"the law '{law}' has no {key}",
+                "give a number of samples, such as samples = 5" if key == "time" else "remove it",
+            )
     if law == "delay" and "samples" not in entry:
         problem(where, "'samples' is missing", "add samples = ...")
         return None
@@ -66,7 +68,9 @@ def context(model: Model) -> dict[str, Any]:
         n, short = samples(model, s), len(found)
         entry = {"name": s.name, "law": s.law, "samples": n, "unit": si(s.unit), "at": len(names) + short, "ring": values, "word": words}
         entry["of"] = names.index(s.source) if s.source in names else next(e["at"] for e in found if e["name"] == s.source)
-        entry["text"] = f"{s.source}, {n} sample{'s' * (n > 1)} late" if s.law == "delay" else f"{s.source}, held for {n} sample{'s' * (n > 1)}"
+        entry["text"] = (
+            f"{s.source}, {n} sample{'s' * (n > 1)} late" if s.law == "delay" else f"{s.source}, held for {n} sample{'s' * (n > 1)}"
+        )
         if s.law == "held" and n == 1:
             entry["word"] = None
         else:

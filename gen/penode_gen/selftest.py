@@ -65,12 +65,15 @@ def answered(context: dict[str, Any], wanted: bool) -> dict[str, Any]:
 def model_context(context: dict[str, Any]) -> dict[str, Any]:
     """What templates/selftest.c.j2 needs besides the emitter's context."""
     ranges = [
-        (i.minimum, i.maximum) if i.minimum is not None and i.maximum is not None
-        else (i.minimum, i.minimum + 2.0 * _UNBOUNDED) if i.minimum is not None
-        else (i.maximum - 2.0 * _UNBOUNDED, i.maximum) if i.maximum is not None
+        (i.minimum, i.maximum)
+        if i.minimum is not None and i.maximum is not None
+        else (i.minimum, i.minimum + 2.0 * _UNBOUNDED)
+        if i.minimum is not None
+        else (i.maximum - 2.0 * _UNBOUNDED, i.maximum)
+        if i.maximum is not None
         else (-_UNBOUNDED, _UNBOUNDED)
         for i in context["given"]
-    ]  # fmt: skip
+    ]
     double, levels = None, []
     for quarterings in range(_QUARTERINGS):
         levels = [Levels.within(low, high, 0.25**quarterings) for low, high in ranges]
@@ -79,9 +82,12 @@ def model_context(context: dict[str, Any]) -> dict[str, Any]:
             break
     return {
         "levels": [{"name": i.name, "low": literal(v.low), "step": literal(v.step)} for i, v in zip(context["given"], levels)],
-        "n_levels": LEVELS, "hold": HOLD, "level_shift": 32 - _LEVEL_BITS,
-        "answer_float": _run(context, levels, np.float32, strict=False), "answer_double": double,
-    }  # fmt: skip
+        "n_levels": LEVELS,
+        "hold": HOLD,
+        "level_shift": 32 - _LEVEL_BITS,
+        "answer_float": _run(context, levels, np.float32, strict=False),
+        "answer_double": double,
+    }
 
 
 def _run(context: dict[str, Any], levels: list[Levels], real: type, strict: bool) -> int | None:
@@ -107,9 +113,11 @@ def _run(context: dict[str, Any], levels: list[Levels], real: type, strict: bool
 
 # Of src/pen_selftest.c, in 1/256.
 _ARGUMENTS = {
-    "pen_exp": (-4865, -2019, 1831, 4169, -4528, -1319, 1377, 4362), "pen_tanh": (-141, 126, -300, 700, -132, 115, -180, 1000),
-    "pen_sigmoid": (-3264, -1324, 101, 591, -2774, -1359, 252, 4000), "pen_softplus": (-2379, -395, 395, 411, -2571, -565, 257, 443),
-}  # fmt: skip
+    "pen_exp": (-4865, -2019, 1831, 4169, -4528, -1319, 1377, 4362),
+    "pen_tanh": (-141, 126, -300, 700, -132, 115, -180, 1000),
+    "pen_sigmoid": (-3264, -1324, 101, 591, -2774, -1359, 252, 4000),
+    "pen_softplus": (-2379, -395, 395, 411, -2571, -565, 257, 443),
+}
 
 
 def runtime_answer(real: type) -> int:

@@ -90,7 +90,11 @@ def pieces(model: Model, chosen: ParameterSet) -> list[Piece]:
     """All values of a set with comments, in order."""
     at = offsets(model)
     found = [
-        Piece(at[p.name], np.array([chosen.parameters[p.name]]), f"{p.name} [{units.si(p.unit)}]{': ' + p.description if p.description else ''}")
+        Piece(
+            at[p.name],
+            np.array([chosen.parameters[p.name]]),
+            f"{p.name} [{units.si(p.unit)}]{': ' + p.description if p.description else ''}",
+        )
         for p in model.tunable
     ]
     for name, network in chosen.networks.items():

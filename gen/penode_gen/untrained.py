@@ -21,6 +21,9 @@ def untrained(entry: dict[str, Any], n_inputs: int, name: str) -> Network:
     if activation not in ACTIVATIONS or activation == "step":
         raise NetworkError(f"{name}: activation '{activation}' cannot be trained; use relu, tanh, sigmoid or softplus")
     width = (n_inputs, *layers, 1)
-    dense = [Dense(np.zeros((o, i)), np.zeros(o), activation if k < len(layers) else "identity") for k, (i, o) in enumerate(zip(width, width[1:]))]
+    dense = [
+        Dense(np.zeros((o, i)), np.zeros(o), activation if k < len(layers) else "identity")
+        for k, (i, o) in enumerate(zip(width, width[1:]))
+    ]
     scales = Affine(np.zeros(n_inputs), np.ones(n_inputs), "centre"), Affine(np.zeros(1), np.ones(1), "rescale")
     return Network((scales[0], *dense, scales[1]), None, None, f"{name} (untrained)")

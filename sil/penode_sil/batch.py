@@ -26,17 +26,25 @@ from penode_gen.emit_batch import BatchCode, render_batch
 from penode_gen.placeholder import columns
 from penode_gen.sampled import beside
 
+from .building import FLAGS, ROOT, build_directory, build_once, compile_program, digest_of, sources_in
 from .errors import UserError
 from .output import whole
-from .building import FLAGS, ROOT, build_directory, build_once, compile_program, digest_of, sources_in
 
 Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
 # Not -ffast-math, which takes nothing for NaN. But gcc drops 0*x, by which lanes_max and its like pass NaN on: states, inputs and outputs
 # that are not finite are detected by their bits all the same.
-QUICK = ("-ffp-contract=fast", "-fno-trapping-math", "-fno-signed-zeros", "-fassociative-math", "-DLANES_FLUSH",
-         # the library refuses these options and prevents contraction; here its bits are not asked for
-         "-DPEN_EXACT_H", "-U__ASSOCIATIVE_MATH__", "-U__NO_SIGNED_ZEROS__")  # fmt: skip
+QUICK = (
+    "-ffp-contract=fast",
+    "-fno-trapping-math",
+    "-fno-signed-zeros",
+    "-fassociative-math",
+    "-DLANES_FLUSH",
+    # the library refuses these options and prevents contraction; here its bits are not asked for
+    "-DPEN_EXACT_H",
+    "-U__ASSOCIATIVE_MATH__",
+    "-U__NO_SIGNED_ZEROS__",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +79,12 @@ class _Job(ctypes.Structure):
 
     _fields_ = [(name, ctypes.c_size_t) for name in ("samples", "every", "runs", "input_runs")]
     _fields_ += [(name, ctypes.c_void_p) for name in ("u", "p", "w")]
-    _fields_ += [("set_length", ctypes.c_size_t), ("start", ctypes.c_void_p), ("update", ctypes.c_size_t), ("measured_runs", ctypes.c_size_t)]
+    _fields_ += [
+        ("set_length", ctypes.c_size_t),
+        ("start", ctypes.c_void_p),
+        ("update", ctypes.c_size_t),
+        ("measured_runs", ctypes.c_size_t),
+    ]
     _fields_ += [("measured", ctypes.c_void_p), ("gain", ctypes.c_void_p), ("count", ctypes.c_size_t * 3)]
     _fields_ += [("which", ctypes.c_void_p * 3), ("kept", ctypes.c_void_p * 3)]
     _fields_ += [(name, ctypes.c_void_p) for name in ("first_bad", "first_outside")]
@@ -266,7 +279,9 @@ def _build(model: penode_gen.Model, code: BatchCode, dtype: type, per_run: bool,
     folding = []
     if "LANES_PIECES" in code.text:
         own = [ROOT / "src" / name for name in ("pen_fold.c", "pen_net.c")]
-        folding = [build_once("folding", ".o", [*command, "-r", "-nostdlib", *map(str, own)], [_processor(compiler), *parts, *own])]  # for every model
+        folding = [
+            build_once("folding", ".o", [*command, "-r", "-nostdlib", *map(str, own)], [_processor(compiler), *parts, *own])
+        ]  # for every model
     stem = build_directory() / f"{model.name}-batch-{digest_of([*command, _processor(compiler), code.text, *folding, *parts])}"
     library = stem.with_suffix(".so")
     if not library.exists():

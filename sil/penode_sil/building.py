@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 import penode_gen
 
 from .errors import UserError
@@ -83,15 +84,11 @@ def compile_program(command: Sequence[str], output: Path) -> None:
     with tempfile.TemporaryDirectory(dir=output.parent) as scratch:
         part = Path(scratch) / output.name
         try:
-            result = subprocess.run(
-                [*command, "-o", str(part)], capture_output=True, text=True, stdin=subprocess.DEVNULL
-            )
+            result = subprocess.run([*command, "-o", str(part)], capture_output=True, text=True, stdin=subprocess.DEVNULL)
         except FileNotFoundError as exc:
             raise UserError(f"{command[0]}: this compiler is not installed; install it (make test does)") from exc
         if result.returncode != 0:
-            lines = (
-                [line for line in result.stderr.splitlines() if "error" in line] or result.stderr.splitlines() or ["?"]
-            )
+            lines = [line for line in result.stderr.splitlines() if "error" in line] or result.stderr.splitlines() or ["?"]
             raise UserError(f"{output.name}: {command[0]} refused it: {lines[0]}; report this with the model file")
         _move(part, output)
 
@@ -111,21 +108,12 @@ def compiler_version(compiler: str) -> bytes:
     return subprocess.run([compiler, "--version"], capture_output=True).stdout if shutil.which(compiler) else b""
 
 
-def build_library(
-    model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None
-) -> Path:
+def build_library(model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None) -> Path:
     """The shared library of a model; `source` is a folder with its C if it is not to be generated."""
     source = source or generated(model)
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
     shim = ROOT / "sil" / "firmware" / "sil.c"
-    options = [
-        *compiler,
-        *FLAGS,
-        "-fPIC",
-        *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []),
-        f"-I{ROOT}/inc",
-        f"-I{ROOT}/port/gnu",
-    ]
+    options = [*compiler, *FLAGS, "-fPIC", *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []), f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu"]
     read = [compiler_version(compiler[0]), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
     same = build_once("runtime", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     own = ["-shared", *model_options(model), f"-I{source}", *map(str, [shim, *code, same])]

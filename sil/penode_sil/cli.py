@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from . import environment as environment  # isort: split
+
 import gc
 import json
 import os

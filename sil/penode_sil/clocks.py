@@ -153,7 +153,7 @@ def regular(time: Array, marks: Flags, wide: bool = False) -> Raster | None:
     count = int(np.sum(marks))
     if count < RULES.fewest or count > time.size / RULES.slower:
         return None
-    some = slice(0, RULES.searched if np.sum(marks[:RULES.searched]) >= RULES.fewest else time.size)
+    some = slice(0, RULES.searched if np.sum(marks[: RULES.searched]) >= RULES.fewest else time.size)
     first = _Marks(time[some], marks[some], wide)
     least = first.usual * (2.0 if wide else RULES.slower)  # lines show their corners if two rows lie on each
     found = [first.clock(interval) for interval in first.intervals() if interval > 0.99 * least]
@@ -192,7 +192,7 @@ class _Marks:
             return []
         left, here, right = (power[peak + k] for k in (-1, 0, 1))
         exact = peak + 0.5 * (left - right) / (left - 2.0 * here + right - 1e-300)
-        return (size / RULES.fine * self.usual / exact[exact > RULES.padded][:RULES.tried]).tolist()
+        return (size / RULES.fine * self.usual / exact[exact > RULES.padded][: RULES.tried]).tolist()
 
     def clock(self, interval: float) -> Raster:
         """The clock of about this interval that catches most marks."""

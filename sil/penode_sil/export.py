@@ -42,7 +42,11 @@ def _options() -> list[click.Parameter]:
             found.setdefault(option.name, (option, []))[1].append(name)
     made: list[click.Parameter] = []
     for option, formats in found.values():
-        shape: dict[str, Any] = {"is_flag": True} if option.kind == "flag" else {"type": click.Choice(option.choices) if option.choices else _KINDS[option.kind]}
+        shape: dict[str, Any] = (
+            {"is_flag": True}
+            if option.kind == "flag"
+            else {"type": click.Choice(option.choices) if option.choices else _KINDS[option.kind]}
+        )
         made.append(click.Option([_flag(option.name), option.name], default=None, help=f"{', '.join(formats)}: {option.help}", **shape))
     return made
 

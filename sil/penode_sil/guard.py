@@ -42,9 +42,7 @@ def guarded(command: Callable[[], object]) -> None:
         sys.stderr.close()
         sys.exit(0)
     except OSError as exc:
-        click.echo(
-            f"penode: {exc.filename or 'a file'}: {exc.strerror or exc}; check the path and its permissions", err=True
-        )
+        click.echo(f"penode: {exc.filename or 'a file'}: {exc.strerror or exc}; check the path and its permissions", err=True)
         sys.exit(2)
     except Exception as exc:  # a fault of ours, whatever it is
         click.echo(_crashed(exc), err=True)

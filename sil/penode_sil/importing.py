@@ -20,9 +20,17 @@ from .output import check_writable, whole
 
 @click.command("import")
 @click.argument("file", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help="Network file to write (.json), to be named in a set of a model file; or model file (.toml), from a Modelica model.")
+@click.option(
+    "-o",
+    "--output",
+    type=FILE,
+    required=True,
+    help="Network file to write (.json), to be named in a set of a model file; or model file (.toml), from a Modelica model.",
+)
 @click.option("--network", help="Which one, if the file has several.")
-@click.option("--activation", type=click.Choice(ACTIVATIONS), default="relu", show_default=True, help="Of hidden layers, where the file does not say.")
+@click.option(
+    "--activation", type=click.Choice(ACTIVATIONS), default="relu", show_default=True, help="Of hidden layers, where the file does not say."
+)
 @click.option("--model", help="Which Modelica model, if the file has several; for a .toml only.")
 def import_(file: Path, output: Path, network: str | None, activation: str, model: str | None) -> None:
     """Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits; or a Modelica model of masses, springs and dampers, as a model file."""

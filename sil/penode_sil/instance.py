@@ -52,9 +52,7 @@ class Instance:
         self.banks = np.zeros((2, sil.set_length), dtype=self.dtype)
         self._kept: list[Any] = []  # what the instance borrows
         self._y = np.zeros(sil.n_y, dtype=self.dtype)
-        status = sil.function("init")(
-            self._self, ctypes.byref(sil.flash_set(set_name)), self._pointer(self.banks) if banks else None
-        )
+        status = sil.function("init")(self._self, ctypes.byref(sil.flash_set(set_name)), self._pointer(self.banks) if banks else None)
         if status:
             raise AssertionError(f"init refused its own set: {status:#x}")
 
@@ -144,9 +142,7 @@ class Instance:
 
     def write(self, offset: int, values: Any) -> int:
         values = self._vector(values)
-        return self.sil.function("tune_write")(
-            self._self, ctypes.c_uint32(offset), self._pointer(values), ctypes.c_uint32(values.size)
-        )
+        return self.sil.function("tune_write")(self._self, ctypes.c_uint32(offset), self._pointer(values), ctypes.c_uint32(values.size))
 
     def begin_copy(self, identity: int) -> int:
         """Open a set with the values of the running one."""
@@ -154,9 +150,7 @@ class Instance:
 
     def write_bytes(self, offset: int, part: bytes) -> int:
         """Bytes of a set's serial form, behind its head."""
-        return self.sil.function("tune_write_bytes")(
-            self._self, ctypes.c_uint32(offset), ctypes.c_char_p(part), ctypes.c_uint32(len(part))
-        )
+        return self.sil.function("tune_write_bytes")(self._self, ctypes.c_uint32(offset), ctypes.c_char_p(part), ctypes.c_uint32(len(part)))
 
     def expect(self, checksum: int) -> int:
         return self.sil.function("tune_expect")(self._self, ctypes.c_uint32(checksum))

@@ -124,7 +124,9 @@ def _channel(table: Recording, key: str, clock: Clock | None) -> Channel:
     good = values[np.isfinite(values)]
     low, high = (float(good.min()), float(good.max())) if good.size else (float("nan"), float("nan"))
     counts = [int(np.sum(flags)) for flags in (faults.missing, faults.held, faults.saturated, faults.spikes)]
-    return Channel(key, unit, "", values.size, low, high, *counts, faults.quantum, faults.constant, *((own.how, own.interval) if own else ()))
+    return Channel(
+        key, unit, "", values.size, low, high, *counts, faults.quantum, faults.constant, *((own.how, own.interval) if own else ())
+    )
 
 
 def _signals(tables: Sequence[Recording], model: Any) -> tuple[Signal, ...]:

@@ -192,17 +192,13 @@ def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
     first, last = float(max(c.time[0] for c in clocks)), float(min(c.time[-1] for c in clocks))
     count = max(0, int(min((last - first) / step + 1e-3, 1e12)) + 1)
     if count < SHORTEST:
-        raise UserError(
-            f"{path}: its {count} samples of {step * 1e3:g} ms are too few; record at least {SHORTEST}"
-        )
+        raise UserError(f"{path}: its {count} samples of {step * 1e3:g} ms are too few; record at least {SHORTEST}")
     if count > 20 * sum(c.time.size * max(1.0, c.interval / step) for c in clocks):
         raise UserError(f"{path}: it has far longer gaps than samples; split the recording there")
     return first + np.arange(count) * step
 
 
-def _take(
-    raster: Array, step: float, signal: Any, table: Recording, own: Own, driving: bool, notes: list[str]
-) -> _Taken | None:
+def _take(raster: Array, step: float, signal: Any, table: Recording, own: Own, driving: bool, notes: list[str]) -> _Taken | None:
     """One channel on the raster; None if it cannot be used, which is noted, or a UserError if it drives the model."""
     clock, rows, scale = own.clock, own.rows, own.scale
     faults = quality.examine(own.raw)
@@ -231,28 +227,19 @@ def _take(
     return _Taken(rows, faults, scale, clock, values, usable, shown, own.how, smooth)
 
 
-def _parts(
-    path: Path, step: float, raster: Array, inputs: list[str], taken: dict[str, _Taken], notes: list[str]
-) -> list[Measured]:
+def _parts(path: Path, step: float, raster: Array, inputs: list[str], taken: dict[str, _Taken], notes: list[str]) -> list[Measured]:
     """Channels on the raster, parted where an input is missing."""
     sensors = [name for name in taken if name not in inputs]
     sound = np.logical_and.reduce([np.ones(raster.size, dtype=bool), *(taken[name].usable for name in inputs)])
     parts = [(a, b) for a, b in stretches(sound) if b - a >= SHORTEST]
     if not parts:
-        raise UserError(
-            f"{path}: the inputs are nowhere measured {SHORTEST} samples in a row; record them without gaps", *notes
-        )
+        raise UserError(f"{path}: the inputs are nowhere measured {SHORTEST} samples in a row; record them without gaps", *notes)
     if not any(np.sum(taken[name].usable & sound) >= SHORTEST for name in sensors):
-        raise UserError(
-            f"{path}: no sensor has {SHORTEST} sound samples beside those of the inputs; record at least so many",
-            *notes,
-        )
+        raise UserError(f"{path}: no sensor has {SHORTEST} sound samples beside those of the inputs; record at least so many", *notes)
     _tell_resampling(path, step, {id(t.clock): t.clock for t in taken.values() if not t.how}, notes)
     lost = raster.size - sum(b - a for a, b in parts)
     if lost:
-        notes.append(
-            f"{path}: {lost} of {raster.size} samples lie in or beside gaps of the inputs; parts: {len(parts)}"
-        )
+        notes.append(f"{path}: {lost} of {raster.size} samples lie in or beside gaps of the inputs; parts: {len(parts)}")
     u = np.column_stack([np.zeros((raster.size, 0)), *(taken[name].values for name in inputs)])
     smooth = None
     if any(taken[name].smooth is not None for name in inputs):
@@ -300,24 +287,12 @@ def _noise(
         values, usable = on_raster(raster, clock.interval, clock, own.rows, own.faults.any, False)
         return noise.estimate(filled(values, usable), usable, clock.interval, quantum=quantum)
     drive = np.column_stack([np.zeros((sound.size, 0)), *(filled(taken[n].values, sound) for n in inputs)])
-    others = [
-        filled(t.values, t.usable)
-        for n, t in taken.items()
-        if n not in (name, *inputs) and t.clock.interval < 1.001 * step
-    ]
+    others = [filled(t.values, t.usable) for n, t in taken.items() if n not in (name, *inputs) and t.clock.interval < 1.001 * step]
     company = [drive, np.column_stack([drive, *others])] if others else [drive]
     return noise.estimate(filled(own.values, own.usable), own.usable & sound, step, company, rest, quantum, kept)
 
 
-def _tell(
-    notes: list[str],
-    table: Recording,
-    clock: Clock,
-    signal: Any,
-    faults: quality.Faults,
-    scale: float,
-    driving: bool,
-) -> None:
+def _tell(notes: list[str], table: Recording, clock: Clock, signal: Any, faults: quality.Faults, scale: float, driving: bool) -> None:
     """A line for each kind of trouble in a channel."""
     unit, per = signal.unit or "1", factor(signal.unit)
     edges = " and ".join(f"{e * scale / per:.6g} {unit}" for e in (faults.low, faults.high) if e is not None)
@@ -343,9 +318,7 @@ def _tell_resampling(path: Path, step: float, clocks: dict[int, Clock], notes: l
             how = "inputs are joined by straight lines, a sensor counts once per row"
         else:
             continue
-        notes.append(
-            f"{path}: its rows are {clock.interval * 1e3:.6g} ms apart, the model's samples {step * 1e3:.6g} ms; {how}"
-        )
+        notes.append(f"{path}: its rows are {clock.interval * 1e3:.6g} ms apart, the model's samples {step * 1e3:.6g} ms; {how}")
 
 
 def _check_range(path: Path, signal: Any, values: Array, notes: list[str]) -> None:
@@ -355,10 +328,7 @@ def _check_range(path: Path, signal: Any, values: Array, notes: list[str]) -> No
     for bound, worst, sign in ((signal.minimum, np.min(values), -1.0), (signal.maximum, np.max(values), 1.0)):
         if bound is None or sign * worst <= sign * bound:
             continue
-        text = (
-            f"{path}: channel {signal.name} reaches {worst / per:.6g} {unit}, "
-            f"the model's range ends at {bound / per:.6g} {unit}"
-        )
+        text = f"{path}: channel {signal.name} reaches {worst / per:.6g} {unit}, the model's range ends at {bound / per:.6g} {unit}"
         if abs(worst) > WILD * widest:
             what = " its numbers look like thousandths (mm for m);" if abs(worst) < 2000.0 * widest else ""
             raise UserError(f"{text};{what} correct the unit in the recording, or the range in the model file")

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 import penode_gen
 
 from .errors import UserError
-from .scenario import Instance, Scenario, staging_samples
 from .late import Held, driving
+from .scenario import Instance, Scenario, staging_samples
 from .signals import Signal
 
 Array = NDArray[np.float64]
@@ -50,9 +50,7 @@ class _Piece:
     held: bool
 
 
-def _pieces(
-    instance: Instance, duration: float, set_length: int, sample_time: float, knots: set[float]
-) -> list[_Piece]:
+def _pieces(instance: Instance, duration: float, set_length: int, sample_time: float, knots: set[float]) -> list[_Piece]:
     """Cut 0..duration wherever something changes its form."""
     changes: list[tuple[float, str]] = [(0.0, instance.set)]
     holds: list[tuple[float, float]] = []
@@ -135,11 +133,7 @@ def solve(
 
         def keep(row: int, state: Array) -> None:
             u, udot = source(float(times[row]))
-            rows_x[row], rows_y[row], rows_z[row] = (
-                state,
-                system.outputs(state, u, udot),
-                system.sensors(state, u, udot),
-            )
+            rows_x[row], rows_y[row], rows_z[row] = (state, system.outputs(state, u, udot), system.sensors(state, u, udot))
 
         # a sample that lies on the end of a piece belongs to it: the set before an exchange
         last = int(np.searchsorted(times, piece.end, side="right"))
@@ -163,18 +157,11 @@ def solve(
                 done = reached
                 progress(solver.t)
         x = solver.y
-    return Trajectory(
-        rows_x, rows_y, rows_z, tuple(int(round(e.time / model.sample_time)) + 1 for e in instance.exchanges)
-    )
+    return Trajectory(rows_x, rows_y, rows_z, tuple(int(round(e.time / model.sample_time)) + 1 for e in instance.exchanges))
 
 
 def run(
-    model: Any,
-    scenario: Scenario,
-    instance: Instance,
-    times: Array,
-    set_length: int,
-    progress: Progress = lambda t: None,
+    model: Any, scenario: Scenario, instance: Instance, times: Array, set_length: int, progress: Progress = lambda t: None
 ) -> Trajectory:
     """The exact solution of one instance of a scenario."""
     return solve(model, instance, scenario.inputs, scenario.duration, times, set_length, scenario.initial, progress)

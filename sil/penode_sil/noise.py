@@ -24,9 +24,7 @@ Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 Kept = dict[tuple[object, ...], tuple[Spectra, Index]]  # transforms of channels, see estimate
 TOP = 0.8  # of the Nyquist frequency: above it a resampling filter may have been
-POLES = np.concatenate(
-    (-np.geomspace(0.98, 0.02, 40), [0.0], np.geomspace(0.02, 0.5, 40), 1.0 - np.geomspace(0.49, 0.002, 60))
-)
+POLES = np.concatenate((-np.geomspace(0.98, 0.02, 40), [0.0], np.geomspace(0.02, 0.5, 40), 1.0 - np.geomspace(0.49, 0.002, 60)))
 WHITE = 40  # the place of 0 in POLES
 SPREAD = 2.08  # variance of the median of exponential variables over that of their mean, 1/ln(2)^2
 WIDE = 2.0  # bins that the window makes one
@@ -125,9 +123,7 @@ def _transformed(values: Array, usable: Flags, bends: int, size: int, hop: int) 
     return np.fft.rfft(stretches * (window / math.sqrt(np.sum(window**2))), axis=1), starts
 
 
-def _spectrum(
-    values: Array, usable: Flags, known: list[Array], bends: int, kept: Kept
-) -> tuple[Array, Array, Array, Array] | None:
+def _spectrum(values: Array, usable: Flags, known: list[Array], bends: int, kept: Kept) -> tuple[Array, Array, Array, Array] | None:
     """Frequency [cycles per sample], variance density [unit^2 per half a cycle per sample], weight, unrest; by bands.
 
     What each of `known` [n, channels] explains linearly is left out; of them counts the one that leaves least. `weight`
@@ -145,9 +141,7 @@ def _spectrum(
     return best
 
 
-def _bands(
-    values: Array, usable: Flags, known: list[Array], bends: int, size: int, kept: Kept
-) -> tuple[Array, Array, Array, Array] | None:
+def _bands(values: Array, usable: Flags, known: list[Array], bends: int, size: int, kept: Kept) -> tuple[Array, Array, Array, Array] | None:
     """The same from stretches of `size` samples; None if there are too few."""
     enough = 24 if size > 64 else 8
     transform, starts = _frames(values, usable, bends, size, kept)
@@ -207,9 +201,7 @@ def _shape(poles: Array, cycles: Array) -> Array:
     return 1.0 / (1.0 + poles[:, None] ** 2 - 2.0 * poles[:, None] * np.cos(2.0 * np.pi * cycles))
 
 
-def _fit(
-    cycles: Array, level: Array, weight: Array, interval: float, floor: float, above: float, careful: bool
-) -> Noise:
+def _fit(cycles: Array, level: Array, weight: Array, interval: float, floor: float, above: float, careful: bool) -> Noise:
     """The law of highest Whittle likelihood with a white part of variance `floor`; white if a pole hardly matters.
 
     `careful`: of all poles that are as likely, the one that says least about what was not seen.
@@ -220,9 +212,7 @@ def _fit(
     scale = np.sum(share * np.maximum(level - floor, 0.01 * level) / shape, axis=1, keepdims=True)
     for _ in range(12):  # towards the root of the likelihood's derivative
         model = scale * shape + floor
-        scale *= np.sum(share * level * shape / model**2, axis=1, keepdims=True) / np.sum(
-            share * shape / model, axis=1, keepdims=True
-        )
+        scale *= np.sum(share * level * shape / model**2, axis=1, keepdims=True) / np.sum(share * shape / model, axis=1, keepdims=True)
     model = scale * shape + floor
     misfit = 2.0 * np.sum(weight * (np.log(model) + level / model), axis=1)  # minus twice the log-likelihood
     best = int(np.argmin(misfit))

@@ -19,10 +19,19 @@ from matplotlib.axes import Axes
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 STYLE = {
-    "figure.dpi": 150, "font.size": 10, "axes.titlesize": 11, "axes.titlelocation": "left", "axes.spines.top": False,
-    "axes.spines.right": False, "axes.grid": True, "grid.color": "#DDDDDD", "grid.linewidth": 0.6, "axes.axisbelow": True,
-    "legend.frameon": False, "lines.linewidth": 1.1,
-}  # fmt: skip
+    "figure.dpi": 150,
+    "font.size": 10,
+    "axes.titlesize": 11,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "lines.linewidth": 1.1,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +73,7 @@ def _mark(panel: Axes, lines: list[Line], text: bool) -> None:
                 )
 
 
-def draw(
-    path: Path, title: str, subtitle: str, time: NDArray[np.float64], signal: str, unit: str, lines: list[Line]
-) -> None:
+def draw(path: Path, title: str, subtitle: str, time: NDArray[np.float64], signal: str, unit: str, lines: list[Line]) -> None:
     """One signal of all instances over time; below it, if there are several, what each differs from the first.
 
     Where a run is long and sets change, a second column shows the time around the first change.
@@ -74,28 +81,26 @@ def draw(
     scale, label = _scale(max(float(np.max(np.abs(line.values))) for line in lines), unit)
     changes = [when for line in lines for when, _ in line.changes]
     several, zoomed = len(lines) > 1, bool(changes) and time[-1] > 3 * sum(ZOOM)
-    windows = [(time[0], time[-1])] + (
-        [(max(time[0], min(changes) - ZOOM[0]), min(changes) + ZOOM[1])] if zoomed else []
-    )
+    windows = [(time[0], time[-1])] + ([(max(time[0], min(changes) - ZOOM[0]), min(changes) + ZOOM[1])] if zoomed else [])
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(
-            2 if several else 1, len(windows), sharex="col", sharey="row", squeeze=False, layout="constrained",
-            figsize=(10.5 if zoomed else 8.0, 5.6 if several else 3.6), height_ratios=(3, 2) if several else (1,),
+            2 if several else 1,
+            len(windows),
+            sharex="col",
+            sharey="row",
+            squeeze=False,
+            layout="constrained",
+            figsize=(10.5 if zoomed else 8.0, 5.6 if several else 3.6),
+            height_ratios=(3, 2) if several else (1,),
             width_ratios=(3, 2) if zoomed else (1,),
-        )  # fmt: skip
+        )
         for column, (low, high) in enumerate(windows):
             shown = (time >= low) & (time <= high)
             for n, line in enumerate(lines):
-                look = {
-                    "color": COLOURS[n % len(COLOURS)],
-                    "label": line.name,
-                    "linewidth": 1.8 if several and n == 0 else 1.1,
-                }
+                look = {"color": COLOURS[n % len(COLOURS)], "label": line.name, "linewidth": 1.8 if several and n == 0 else 1.1}
                 axes[0, column].plot(time[shown], scale * line.values[shown], **look)
                 if n > 0:
-                    axes[1, column].plot(
-                        time[shown], _small_scale(lines, unit)[0] * (line.values - lines[0].values)[shown], **look
-                    )
+                    axes[1, column].plot(time[shown], _small_scale(lines, unit)[0] * (line.values - lines[0].values)[shown], **look)
             axes[-1, column].set_xlim(low, high)
             axes[-1, column].set_xlabel("time in s")
             for row, panel in enumerate(axes[:, column]):

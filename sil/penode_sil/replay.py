@@ -103,9 +103,7 @@ def _clock(path: Path, sensed: dict[str, Sensed], model: Any) -> Array:
     return first + np.arange(count) * step
 
 
-def _between(
-    tables: Sequence[Any], wanted: dict[str, str], raster: Array, step: float, how: str
-) -> tuple[Array, list[str]]:
+def _between(tables: Sequence[Any], wanted: dict[str, str], raster: Array, step: float, how: str) -> tuple[Array, list[str]]:
     """Inputs [n, inputs] on a raster, held or band-limited between the rows of the file; notes."""
     columns, remarks = [], []
     for name, unit in wanted.items():

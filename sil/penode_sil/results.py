@@ -66,13 +66,7 @@ def table(
 
 
 def plot(
-    model: Any,
-    plan: scenarios.Scenario,
-    times: NDArray[np.float64],
-    results: list[Result],
-    signal: str,
-    path: Path,
-    target: str,
+    model: Any, plan: scenarios.Scenario, times: NDArray[np.float64], results: list[Result], signal: str, path: Path, target: str
 ) -> None:
     from . import plots  # matplotlib is slow to load
 
@@ -105,11 +99,7 @@ def summary(
     """What a machine may want to read."""
     instances = []
     for result in results:
-        entry: dict[str, Any] = {
-            "name": result.instance.name,
-            "set": result.instance.set,
-            "adopted_at_sample": list(result.adopted),
-        }
+        entry: dict[str, Any] = {"name": result.instance.name, "set": result.instance.set, "adopted_at_sample": list(result.adopted)}
         if result.status is not None:
             entry["flags"] = status.counts(result.status)
         if result.run is not None:
@@ -144,9 +134,7 @@ def sentences(summary: dict[str, Any]) -> str:
         others = {k: n for k, n in entry.get("flags", {}).items() if k != "adopted"}
         parts += [f"{name} in {n} samples" for name, n in others.items()]
         parts += [
-            f"{kind} step {c['min']}..{c['max']} instructions"
-            if c["min"] != c["max"]
-            else f"{kind} step {c['min']} instructions"
+            f"{kind} step {c['min']}..{c['max']} instructions" if c["min"] != c["max"] else f"{kind} step {c['min']} instructions"
             for kind, c in entry.get("instructions_per_step", {}).items()
         ]
         parts += [f"stack {entry['stack_bytes']} B"] if "stack_bytes" in entry else []

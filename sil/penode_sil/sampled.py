@@ -63,7 +63,10 @@ def origin(table: Recording, name: str, own: Own, driving: bool) -> str:
     """What rows between a channel's samples are, and what is made of them."""
     clock = f"{1e3 * own.clock.interval:.6g} ms, every {own.every:.4g} rows"
     if own.how == "held":
-        text, done = "repeats its last value between samples", "held or smooth, as the sensors show" if driving else "each sample counts once"
+        text, done = (
+            "repeats its last value between samples",
+            "held or smooth, as the sensors show" if driving else "each sample counts once",
+        )
     elif own.how == "lines":
         text, done = "is joined by straight lines between samples", "only the samples count"
     else:

@@ -87,9 +87,7 @@ class _Table:
             self.complain(key, "is missing", f"add {key} = {example}")
         return self.data.get(key, None if default is _REQUIRED else default)
 
-    def quantity(
-        self, key: str, unit: str, default: Any = _REQUIRED, *, positive: bool = False, minimum: float = -math.inf
-    ) -> float:
+    def quantity(self, key: str, unit: str, default: Any = _REQUIRED, *, positive: bool = False, minimum: float = -math.inf) -> float:
         """An SI number that measures what `unit` does; NaN after a problem, so that reading goes on."""
         value = self.raw(key, default, f'"1 {unit}"' if unit else "1")
         if value is None or (not self.has(key) and default is not _REQUIRED):
@@ -161,18 +159,14 @@ def _chirp(table: _Table, unit: str, duration: float) -> Signal:
     velocity = table.has("velocity_amplitude")
     if velocity == table.has("amplitude"):
         table.complain(
-            "",
-            "needs exactly one of amplitude and velocity_amplitude",
-            f'amplitude = "1 {unit}" or velocity_amplitude = "1 {unit}/s"',
+            "", "needs exactly one of amplitude and velocity_amplitude", f'amplitude = "1 {unit}" or velocity_amplitude = "1 {unit}/s"'
         )
         size = 0.0
     else:
         size = table.quantity("velocity_amplitude", f"{unit}/s") if velocity else table.quantity("amplitude", unit)
     start = table.quantity("start_frequency", "Hz", minimum=0.0)
     if table.has("rate") == table.has("end_frequency"):
-        table.complain(
-            "", "needs exactly one of end_frequency and rate", 'end_frequency = "10 Hz" or rate = "0.25 Hz/s"'
-        )
+        table.complain("", "needs exactly one of end_frequency and rate", 'end_frequency = "10 Hz" or rate = "0.25 Hz/s"')
         rate = 0.0
     elif table.has("rate"):
         rate = table.quantity("rate", "Hz/s")
@@ -187,18 +181,12 @@ def _constant(table: _Table, unit: str, duration: float) -> Signal:
 
 
 def _ramp(table: _Table, unit: str, duration: float) -> Signal:
-    return Ramp(
-        table.quantity("height", unit),
-        table.quantity("start", "s", 0.0, minimum=0.0),
-        table.quantity("rise", "s", positive=True),
-    )
+    return Ramp(table.quantity("height", unit), table.quantity("start", "s", 0.0, minimum=0.0), table.quantity("rise", "s", positive=True))
 
 
 def _bump(table: _Table, unit: str, duration: float) -> Signal:
     height, start = table.quantity("height", unit), table.quantity("start", "s", 0.0, minimum=0.0)
-    return Bump(
-        height, start, table.quantity("length", "m", positive=True) / table.quantity("speed", "m/s", positive=True)
-    )
+    return Bump(height, start, table.quantity("length", "m", positive=True) / table.quantity("speed", "m/s", positive=True))
 
 
 def _road(table: _Table, unit: str, duration: float) -> Signal:
@@ -221,9 +209,7 @@ def _recording(table: _Table, unit: str, duration: float) -> Signal:
             table.problems.extend(exc.problems)
         else:
             if time[-1] - time[0] < duration * (1.0 - 1e-9):
-                table.complain(
-                    "file", f"{file} ends after {time[-1] - time[0]:.6g} s", "shorten the scenario's duration"
-                )
+                table.complain("file", f"{file} ends after {time[-1] - time[0]:.6g} s", "shorten the scenario's duration")
             return Samples(time - time[0], level)
     return Constant(0.0)
 
@@ -269,15 +255,11 @@ def on_raster(time: float, sample_time: float, table: _Table, key: str) -> float
         return math.nan
     ticks = round(time / sample_time)
     if abs(time / sample_time - ticks) > 1e-6:
-        table.complain(
-            key, f"{time:g} s is not on the raster of {sample_time:g} s", f'use "{ticks * sample_time:.9g} s"'
-        )
+        table.complain(key, f"{time:g} s is not on the raster of {sample_time:g} s", f'use "{ticks * sample_time:.9g} s"')
     return ticks * sample_time
 
 
-def _instance(
-    table: _Table, sets: dict[str, Any], length: int, sample_time: float, duration: float, name: str
-) -> Instance:
+def _instance(table: _Table, sets: dict[str, Any], length: int, sample_time: float, duration: float, name: str) -> Instance:
     name = table.text("name", name)
     start = table.text("set", next(iter(sets)), choices=tuple(sets))
     exchanges: list[Exchange] = []
@@ -293,20 +275,14 @@ def _instance(
             target = item.text("set", choices=tuple(sets))
             exchange = Exchange(time, target, how)
             if how == "write":
-                exchange = Exchange(
-                    time, target, how, item.integer("chunk", CHUNK, minimum=1), item.flag("hold", False)
-                )
+                exchange = Exchange(time, target, how, item.integer("chunk", CHUNK, minimum=1), item.flag("hold", False))
         item.finish()
         if time > duration - sample_time / 2:
-            item.complain(
-                "time", f"{time:g} s is not before the end at {duration:g} s", "exchange earlier or run longer"
-            )
+            item.complain("time", f"{time:g} s is not before the end at {duration:g} s", "exchange earlier or run longer")
         begin = time - (staging_samples(length, exchange.chunk) - 1) * sample_time if how == "write" else time
         if begin < free - sample_time / 2:
             item.complain(
-                "time",
-                f"staging would begin at {begin:.6g} s, before {free:.6g} s, when it may",
-                "exchange later or in larger chunks",
+                "time", f"staging would begin at {begin:.6g} s, before {free:.6g} s, when it may", "exchange later or in larger chunks"
             )
         free = time + sample_time
         exchanges.append(exchange)

@@ -184,9 +184,7 @@ class Road:
         total = np.empty_like(flat)
         for first in range(0, flat.size, 2048):  # bounded memory
             angle = np.multiply.outer(flat[first : first + 2048], omega) + phase
-            total[first : first + 2048] = (
-                np.cos(angle) @ (amplitude * omega) if derivative else np.sin(angle) @ amplitude
-            )
+            total[first : first + 2048] = np.cos(angle) @ (amplitude * omega) if derivative else np.sin(angle) @ amplitude
         return total.reshape(np.shape(t))
 
     def _fade(self, t: Array) -> tuple[Array, Array]:

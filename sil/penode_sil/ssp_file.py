@@ -15,7 +15,12 @@ from .errors import UserError
 
 SSP = "http://ssp-standard.org/SSP1/SystemStructure"
 SCHEDULE = "extra/penode/schedule.xml"
-_SPACE = {"ssd": f"{SSP}Description", "ssv": f"{SSP}ParameterValues", "ssm": f"{SSP}ParameterMapping", "ps": "urn:penode:parameter-schedule:1"}
+_SPACE = {
+    "ssd": f"{SSP}Description",
+    "ssv": f"{SSP}ParameterValues",
+    "ssm": f"{SSP}ParameterMapping",
+    "ps": "urn:penode:parameter-schedule:1",
+}
 _TYPES = ("Real", "Float64", "Float32", "Integer", "Enumeration", "Int64", "Int32", "UInt32", "Boolean")
 
 Values = dict[str, tuple[float, ...]]  # by name in the component
@@ -52,7 +57,9 @@ def read(path: Path) -> System:
     except OSError as error:
         raise UserError(f"{path}: {error.strerror or error}; name a file that can be read") from None
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
-        raise UserError(f"{path}: no SSP that can be read: {' '.join(str(error).split()) or type(error).__name__}; export it again") from None
+        raise UserError(
+            f"{path}: no SSP that can be read: {' '.join(str(error).split()) or type(error).__name__}; export it again"
+        ) from None
 
 
 class _Reader:
@@ -108,22 +115,34 @@ class _Reader:
             raise self.error(name, f"{len(components)} elements", "this player takes a system of one component; use another one for more")
         component = components[0]
         owner = self.attribute(component, "name", name)
-        kinds = {self.attribute(c, "name", name): self.attribute(c, "kind", name) for c in system.findall("ssd:Connectors/ssd:Connector", _SPACE)}
+        kinds = {
+            self.attribute(c, "name", name): self.attribute(c, "kind", name) for c in system.findall("ssd:Connectors/ssd:Connector", _SPACE)
+        }
         wires = dict(self.wire(c, owner, name) for c in system.findall("ssd:Connections/ssd:Connection", _SPACE))
         if not kinds:  # players of SSP 1.0 take connections between components only: the component's own connectors are the signals
-            kinds = {self.attribute(c, "name", name): self.attribute(c, "kind", name) for c in component.findall("ssd:Connectors/ssd:Connector", _SPACE)}
+            kinds = {
+                self.attribute(c, "name", name): self.attribute(c, "kind", name)
+                for c in component.findall("ssd:Connectors/ssd:Connector", _SPACE)
+            }
             wires = {connector: connector for connector in kinds}
         start: Values = {}
         for binding in component.findall("ssd:ParameterBindings/ssd:ParameterBinding", _SPACE):
             mapping = binding.find("ssd:ParameterMapping", _SPACE)
-            start |= self.values(self.attribute(binding, "source", name), self.attribute(mapping, "source", name) if mapping is not None else "", name)
+            start |= self.values(
+                self.attribute(binding, "source", name), self.attribute(mapping, "source", name) if mapping is not None else "", name
+            )
         experiment = root.find("ssd:DefaultExperiment", _SPACE)
         stop = self.number(experiment.attrib["stopTime"], name) if experiment is not None and "stopTime" in experiment.attrib else None
         return System(
-            owner, self.data(self.attribute(component, "source", name), name),
-            tuple(k for k, kind in kinds.items() if kind == "input" and k in wires), tuple(k for k, kind in kinds.items() if kind == "output" and k in wires),
-            wires, start, self.schedule(owner), stop,
-        )  # fmt: skip
+            owner,
+            self.data(self.attribute(component, "source", name), name),
+            tuple(k for k, kind in kinds.items() if kind == "input" and k in wires),
+            tuple(k for k, kind in kinds.items() if kind == "output" and k in wires),
+            wires,
+            start,
+            self.schedule(owner),
+            stop,
+        )
 
     def wire(self, connection: ElementTree.Element, owner: str, where: str) -> tuple[str, str]:
         """Connector of the system, and that of the component which it is connected with."""

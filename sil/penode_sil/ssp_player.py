@@ -51,7 +51,9 @@ def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array]
     times = np.arange(steps + 1) * fmu.step_size
     half = fmu.step_size / 2
     at = np.maximum(np.searchsorted(table["time"], times + half * 1e-3, side="right") - 1, 0) if table else None
-    inputs = np.array([table[name][at] if name in table else np.full(steps + 1, _start(system, fmu, name)) for name in system.inputs]).reshape(-1, steps + 1)
+    inputs = np.array(
+        [table[name][at] if name in table else np.full(steps + 1, _start(system, fmu, name)) for name in system.inputs]
+    ).reshape(-1, steps + 1)
     outputs = np.empty((steps + 1, len(system.outputs)))
     waiting = list(system.schedule)
     fmu.initialise({**system.start, **{system.wires[n]: (u[0],) for n, u in zip(system.inputs, inputs)}}, f"{path}: start")
@@ -92,7 +94,9 @@ def _record(path: Path, known: tuple[str, ...]) -> dict[str, Array]:
     except ValueError as error:
         raise UserError(f"{path}: {' '.join(str(error).split())[:200]}; give every row as many numbers as the header has names") from None
     if values.shape[1] != len(names) or not np.isfinite(values).all() or (np.diff(values[:, names.index("time")]) <= 0).any():
-        raise UserError(f"{path}: a row that does not fit the header, a number that is not finite, or times that do not ascend; mend the table")
+        raise UserError(
+            f"{path}: a row that does not fit the header, a number that is not finite, or times that do not ascend; mend the table"
+        )
     return {name: values[:, i] for i, name in enumerate(names) if name == "time" or name in known}
 
 
@@ -109,7 +113,9 @@ class _Fmu:
         experiment = description.defaultExperiment
         self.step_size = float((experiment and experiment.stepSize) or 1e-3)
         identifier = description.coSimulation.modelIdentifier
-        self.fmu: Any = (FMU3Slave if self.new else FMU2Slave)(guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName=name)
+        self.fmu: Any = (FMU3Slave if self.new else FMU2Slave)(
+            guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName=name
+        )
         if self.new:
             self.fmu.instantiate(logMessage=lambda env, status, category, text: self.line(status, text))
         else:
@@ -183,7 +189,9 @@ def _component(path: Path, system: ssp_file.System, tell: Any) -> Iterator[_Fmu]
             fmpy.extract(str(file), str(Path(folder) / "fmu"))
             fmu = _Fmu(path, str(Path(folder) / "fmu"), description, system.component, tell)
         except Exception as error:  # FMPy raises many kinds
-            raise UserError(f"{path}: its FMU cannot be used: {' '.join(str(error).split())[:300]}; export it again, with a binary for this machine") from None
+            raise UserError(
+                f"{path}: its FMU cannot be used: {' '.join(str(error).split())[:300]}; export it again, with a binary for this machine"
+            ) from None
         missing = [name for name in system.wires.values() if name not in fmu.variables]
         if missing:
             raise UserError(f"{path}: the FMU has no variable {missing[0]!r}; mend the SSP")

@@ -26,7 +26,9 @@ class Rules:
     off: float = 0.1  # of a step: stamps that all are so near to multiples of it are in such steps; by chance with 0.2^n
     slack: float = 0.05  # of a step or interval beyond rounding: what printing in other digits adds
     most: float = 100.0  # rows that share a stamp
-    jitter: float = 0.25  # of an interval beyond rounding: a row that is lost moves all later ones by a whole one, half of it to either side
+    jitter: float = (
+        0.25  # of an interval beyond rounding: a row that is lost moves all later ones by a whole one, half of it to either side
+    )
     nearer: float = 1.0  # squares of a step that a lost row must explain: half of the rows of one stamp alone explain 1/4
     lost: int = 64  # places at which rows are lost
     patience: int = 5  # places that are tried together

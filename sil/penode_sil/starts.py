@@ -118,10 +118,14 @@ def fit(model: Any, set_name: str, replay: Replay, start: Start) -> tuple[dict[s
             x[model.states.index(signal.expression)] = replay.sensed[signal.name].values[0]
     free = [i for i, name in enumerate(model.states) if name not in start.given]
     if sum(values.size for _, _, _, values, _ in residual.rows) < len(free):
-        raise UserError(f"{replay.plan.path}: its first {count} samples measure too little to fit {len(free)} states; give --start measured:K with a larger K")
+        raise UserError(
+            f"{replay.plan.path}: its first {count} samples measure too little to fit {len(free)} states; give --start measured:K with a larger K"
+        )
     x, unseen = _solve(residual, x, free)
     if not np.isfinite(x).all():
-        raise UserError(f"{replay.plan.path}: no start fits its first samples; give the states with --start, or another window with measured:K")
+        raise UserError(
+            f"{replay.plan.path}: no start fits its first samples; give the states with --start, or another window with measured:K"
+        )
     parts = [f"{model.states[i]} = {x[i]:.6g} {states[model.states[i]]}".rstrip() for i in free]
     text = f"start fitted to the first {count} samples ({count * model.sample_time:.4g} s): {', '.join(parts)}"
     if unseen:

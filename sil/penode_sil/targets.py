@@ -64,9 +64,7 @@ class Run:
 class Sil:
     """A model's shared library; instance() gives as many independent copies as wanted."""
 
-    def __init__(
-        self, model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None
-    ):
+    def __init__(self, model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None):
         self.model, self.dtype = model, dtype
         self._library = ctypes.CDLL(str(build_library(model, dtype, compiler, source)))
         sizes = list((ctypes.c_uint32 * 8).in_dll(self._library, "sil_sizes"))
@@ -96,13 +94,7 @@ class Sil:
         """A fresh, initialised instance."""
         return SilInstance(self, set_name, banks)
 
-    def run(
-        self,
-        u: NDArray[Any],
-        calls: Sequence[Call] = (),
-        set_name: str = "default",
-        progress: Progress = lambda n: None,
-    ) -> Run:
+    def run(self, u: NDArray[Any], calls: Sequence[Call] = (), set_name: str = "default", progress: Progress = lambda n: None) -> Run:
         """Initialise an instance with a set and step through u [n, n_u]."""
         return self.instance(set_name).run(u, calls, progress)
 
@@ -157,31 +149,18 @@ class SilInstance(Instance):
 
 # -- PiL --------------------------------------------------------------------------------------------------------------
 
-MACHINES = {
-    "m4f": "mps2-an386",
-    "m3": "mps2-an385",
-    "m7": "mps2-an500",
-    "m33": "mps2-an505",
-    "m55": "mps3-an547",
-    "host": "",
-}
+MACHINES = {"m4f": "mps2-an386", "m3": "mps2-an385", "m7": "mps2-an500", "m33": "mps2-an505", "m55": "mps3-an547", "host": ""}
 TAPE_MAGIC = 0x314C4950
-OPERATION = {
-    "end": 0,
-    "step": 1,
-    "begin": 2,
-    "write": 3,
-    "commit": 4,
-    "abort": 5,
-    "select": 6,
-    "rollback": 7,
-    "hold": 8,
-    "state": 9,
-}
+OPERATION = {"end": 0, "step": 1, "begin": 2, "write": 3, "commit": 4, "abort": 5, "select": 6, "rollback": 7, "hold": 8, "state": 9}
 COST_KINDS = ("normal", "adopting", "holding")
 PORT = ROOT / "port" / "cortex-m"
-TROUBLE = {1: "it could not open, read or write its files", 2: "it was given a tape for another model",
-           3: "it refused the first parameter set", 70: "it met a processor fault", 124: "it took too long"}  # fmt: skip
+TROUBLE = {
+    1: "it could not open, read or write its files",
+    2: "it was given a tape for another model",
+    3: "it refused the first parameter set",
+    70: "it met a processor fault",
+    124: "it took too long",
+}
 
 
 def build_firmware(model: Any, machine: str, source: Path | None = None, optimise: str = "-O2") -> Path:
@@ -221,21 +200,15 @@ class Pil:
 
     dtype = np.float32
 
-    def __init__(
-        self, model: Any, machine: str = "m4f", source: Path | None = None, optimise: str = "-O2", limit: int = 900
-    ):
+    def __init__(self, model: Any, machine: str = "m4f", source: Path | None = None, optimise: str = "-O2", limit: int = 900):
         self.model, self.machine, self.limit = model, machine, limit
         self.program = build_firmware(model, machine, source, optimise)
 
-    def run(
-        self,
-        u: NDArray[Any],
-        calls: Sequence[Call] = (),
-        set_name: str = "default",
-        progress: Progress = lambda n: None,
-    ) -> Run:
+    def run(self, u: NDArray[Any], calls: Sequence[Call] = (), set_name: str = "default", progress: Progress = lambda n: None) -> Run:
         """Initialise an instance with a set and step through u [n, n_u], making each call before its sample."""
-        u = np.ascontiguousarray(penode_gen.placeholder.columns(self.model, u).reshape(-1, max(len(self.model.inputs), 1)), dtype=self.dtype)
+        u = np.ascontiguousarray(
+            penode_gen.placeholder.columns(self.model, u).reshape(-1, max(len(self.model.inputs), 1)), dtype=self.dtype
+        )
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "tape").write_bytes(self._tape(u, calls, set_name))
             board = MACHINES[self.machine]
@@ -262,9 +235,7 @@ class Pil:
             text = (process.stdout.read() if process.stdout else "").strip().replace("\n", " | ")
             if process.returncode != 0:
                 what = TROUBLE.get(process.returncode, f"it ended with {process.returncode}")
-                raise UserError(
-                    f"pil:{self.machine}: {what}{': ' + text if text else ''}; run make test to check the installation"
-                )
+                raise UserError(f"pil:{self.machine}: {what}{': ' + text if text else ''}; run make test to check the installation")
             progress(len(u))
             return self._read(np.fromfile(record, dtype="<u4"), len(u), calls)
 
@@ -279,9 +250,7 @@ class Pil:
         """Inputs and calls as pil.c reads them."""
         names, (n_x, n_y, n_z) = list(self.model.sets), self._widths
         layout, length, *_ = penode_gen.set_head(self.model, set_name, self.dtype)
-        parts: list[Any] = [
-            [TAPE_MAGIC, 4, 4 * n_x, 4 * u.shape[1], 4 * n_y, 4 * n_z, length, layout, names.index(set_name)]
-        ]
+        parts: list[Any] = [[TAPE_MAGIC, 4, 4 * n_x, 4 * u.shape[1], 4 * n_y, 4 * n_z, length, layout, names.index(set_name)]]
         done = 0
         for call in [*calls, None]:
             until = len(u) if call is None else min(call.sample, len(u))
@@ -323,11 +292,5 @@ class Pil:
         cost = {kind: c for kind, c in cost.items() if c.steps and c.most}
         x, y, z = np.split(rows[:, :-1].view(np.float32), np.cumsum(widths[:2]), axis=1)
         return Run(
-            np.ascontiguousarray(x),
-            np.ascontiguousarray(y),
-            np.ascontiguousarray(z),
-            rows[:, -1].copy(),
-            made,
-            cost,
-            int(words[-1]),
+            np.ascontiguousarray(x), np.ascontiguousarray(y), np.ascontiguousarray(z), rows[:, -1].copy(), made, cost, int(words[-1])
         )

@@ -96,16 +96,42 @@ def log1p_tail(e: mp.mpf) -> mp.mpf:
 
 FITS = (
     # |r| reaches log(2)/2 plus what the rounding of x * log2(e) + bias adds: 2^-15 (float: 277 leaves 15 bits to it).
-    Fit("expm1", "e^r = 1 + r + r^2 P(r)", expm1_tail, lambda r: r * r / mp.exp(r),
-        -LN2 / 2 - mp.mpf(2) ** -15, LN2 / 2 + mp.mpf(2) ** -15, {"float": 5, "double": 11}),
-    Fit("tanh", "tanh(x) = x - x z P(z), z = x^2", tanh_tail,
+    Fit(
+        "expm1",
+        "e^r = 1 + r + r^2 P(r)",
+        expm1_tail,
+        lambda r: r * r / mp.exp(r),
+        -LN2 / 2 - mp.mpf(2) ** -15,
+        LN2 / 2 + mp.mpf(2) ** -15,
+        {"float": 5, "double": 11},
+    ),
+    Fit(
+        "tanh",
+        "tanh(x) = x - x z P(z), z = x^2",
+        tanh_tail,
         lambda z: z if z == 0 else z * mp.sqrt(z) / mp.tanh(mp.sqrt(z)),
-        mp.mpf(0), mp.mpf("0.625") ** 2, {"float": 5, "double": 11}),
-    Fit("softplus", "softplus(x) = log(2) + x/2 + z P(z), z = x^2", softplus_tail,
+        mp.mpf(0),
+        mp.mpf("0.625") ** 2,
+        {"float": 5, "double": 11},
+    ),
+    Fit(
+        "softplus",
+        "softplus(x) = log(2) + x/2 + z P(z), z = x^2",
+        softplus_tail,
         lambda z: z / mp.log1p(mp.exp(-mp.sqrt(z))),  # of the smaller value, at -x
-        mp.mpf(0), mp.mpf(1), {"float": 5, "double": 11}),
-    Fit("log1p", "log(1 + e) = e + e^2 P(e)", log1p_tail, lambda e: e if e == 0 else e * e / mp.log1p(e),
-        mp.mpf(0), mp.exp(-1), {"float": 7, "double": 16}),
+        mp.mpf(0),
+        mp.mpf(1),
+        {"float": 5, "double": 11},
+    ),
+    Fit(
+        "log1p",
+        "log(1 + e) = e + e^2 P(e)",
+        log1p_tail,
+        lambda e: e if e == 0 else e * e / mp.log1p(e),
+        mp.mpf(0),
+        mp.exp(-1),
+        {"float": 7, "double": 16},
+    ),
 )
 
 
@@ -146,9 +172,11 @@ def c_function(fit: Fit, real: str) -> str:
     exact = [mp.mpf(c) for c in coefficients]
     worst = max(abs(fit.weight(x) * (fit.target(x) - polynomial(exact, x))) for x in grid) * 2 ** PRECISION[real]
     variable = fit.formula[fit.formula.index("P(") + 2]
-    return (f"/* {fit.formula}; relative error {mp.nstr(worst, 2)} * 2^-{PRECISION[real]} */\n"
-            f"static pen_real_t {fit.name}_tail(pen_real_t {variable})\n"
-            f"{{\n    return {horner(coefficients, real, variable)};\n}}\n")
+    return (
+        f"/* {fit.formula}; relative error {mp.nstr(worst, 2)} * 2^-{PRECISION[real]} */\n"
+        f"static pen_real_t {fit.name}_tail(pen_real_t {variable})\n"
+        f"{{\n    return {horner(coefficients, real, variable)};\n}}\n"
+    )
 
 
 def constants(real: str) -> list[str]:

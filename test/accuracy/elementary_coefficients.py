@@ -52,17 +52,44 @@ def per_root(z: mp.mpf, function) -> mp.mpf:
 
 
 FITS = (
-    Fit("sin", "sin(r) = r + r z P(z), z = r^2", sin_tail, lambda z: z * per_root(z, mp.sin),
-        mp.mpf(0), QUARTER**2, {"float": 3, "double": 6}),
-    Fit("cos", "cos(r) = 1 - z/2 + z^2 P(z), z = r^2", cos_tail, lambda z: z * z / mp.cos(mp.sqrt(z)),
-        mp.mpf(0), QUARTER**2, {"float": 3, "double": 6}),
-    Fit("atan", "atan(t) = t - t z P(z), z = t^2", atan_tail, lambda z: z * per_root(z, mp.atan),
-        mp.mpf(0), NEAR**2, {"float": 6, "double": 15}),
-    Fit("log", "log((1 + s)/(1 - s)) = 2 s + s z P(z), z = s^2", log_tail,
+    Fit(
+        "sin",
+        "sin(r) = r + r z P(z), z = r^2",
+        sin_tail,
+        lambda z: z * per_root(z, mp.sin),
+        mp.mpf(0),
+        QUARTER**2,
+        {"float": 3, "double": 6},
+    ),
+    Fit(
+        "cos",
+        "cos(r) = 1 - z/2 + z^2 P(z), z = r^2",
+        cos_tail,
+        lambda z: z * z / mp.cos(mp.sqrt(z)),
+        mp.mpf(0),
+        QUARTER**2,
+        {"float": 3, "double": 6},
+    ),
+    Fit(
+        "atan",
+        "atan(t) = t - t z P(z), z = t^2",
+        atan_tail,
+        lambda z: z * per_root(z, mp.atan),
+        mp.mpf(0),
+        NEAR**2,
+        {"float": 6, "double": 15},
+    ),
+    Fit(
+        "log",
+        "log((1 + s)/(1 - s)) = 2 s + s z P(z), z = s^2",
+        log_tail,
         lambda z: z * per_root(z, lambda s: mp.log((1 + s) / (1 - s))),
-        mp.mpf(0), LOG_RATIO, {"float": 3, "double": 7}),
+        mp.mpf(0),
+        LOG_RATIO,
+        {"float": 3, "double": 7},
+    ),
     Fit("root", "1/sqrt(m) = P(m)", lambda m: 1 / mp.sqrt(m), mp.sqrt, mp.mpf(1), mp.mpf(4), {"float": 4, "double": 4}),
-)  # fmt: skip
+)
 
 
 def right_angle(real: str) -> list[float]:

@@ -132,8 +132,10 @@ def models(folder: Path) -> dict[str, penode_gen.Model]:
 def numpy_rates(model: penode_gen.Model) -> Callable[[float, np.ndarray, float], np.ndarray]:
     """Right-hand side of the nQVM as one would write it in NumPy."""
     value = {name: p.value for name, p in model.parameters.items()}
-    networks = {name: [(a.shift, a.factor, a.form) if isinstance(a, Affine) else (a.weights, a.bias, a.activation) for a in net.layers]
-                for name, net in model.sets["default"].networks.items()}  # fmt: skip
+    networks = {
+        name: [(a.shift, a.factor, a.form) if isinstance(a, Affine) else (a.weights, a.bias, a.activation) for a in net.layers]
+        for name, net in model.sets["default"].networks.items()
+    }
 
     def evaluate(name: str, x: float) -> float:
         h = np.array([x])
@@ -206,7 +208,9 @@ def measure() -> list[dict[str, str | float]]:
                 ns = best(contenders)
                 if title.startswith("nQVM"):
                     fastest = min(fastest, ns["batch"])
-                rows.append({"model": title, "real": np.dtype(dtype).name, "ratio": round(min(ns[" ".join(c)] for c in FLAGS) / ns["batch"], 1)})
+                rows.append(
+                    {"model": title, "real": np.dtype(dtype).name, "ratio": round(min(ns[" ".join(c)] for c in FLAGS) / ns["batch"], 1)}
+                )
         model = all_models["nQVM, layer by layer"]
         exact = Batch(model).run(few, states=model.states).x[0]
         for loop, apart in ((numpy_loop, 1e-12), (scipy_loop, 1e-3)):  # SciPy's method is another one

@@ -24,17 +24,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 import batch
 import checkouts
 import cycles
+import numpy as np
 import peers
 import programs
 import report
 import worst_case
 from figures import CORES, OURS, PRICES, README, ROOT, accuracy, hostile_inputs, run_text, same, with_block
+from numpy.typing import NDArray
 from programs import Program
 from reference import same_step
 
@@ -164,9 +163,7 @@ def peer_figures(case: peers.Case, say: Callable[[str], None], makers: dict[str,
                 if not share <= 1:
                     raise AssertionError(f"{peer.name} {level} {contract}: {share:.2g} times what rounding allows")
                 found = measured(program, hostile_inputs()[::12, 0].copy(), weights_inside=peer.weights_inside)
-                rows.append(
-                    {"name": peer.name, "level": level, "contract": contract, "rounding": round(share, 3)} | found
-                )
+                rows.append({"name": peer.name, "level": level, "contract": contract, "rounding": round(share, 3)} | found)
     return rows
 
 
@@ -250,12 +247,7 @@ def measure(kept: Figures) -> Figures:
 
     case = peers.the_case()
     return {
-        "made with": [
-            {
-                "compiler": first_line("arm-none-eabi-gcc", "--version"),
-                "emulator": first_line("qemu-system-arm", "--version"),
-            }
-        ],
+        "made with": [{"compiler": first_line("arm-none-eabi-gcc", "--version"), "emulator": first_line("qemu-system-arm", "--version")}],
         "peers": peer_figures(case, say, peers.PEERS) + local_figures(case, say, kept["peers"]),
         "host": host_ratios(case, say),
         "batch": batch.measure(),

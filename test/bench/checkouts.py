@@ -18,7 +18,6 @@ from pathlib import Path
 
 import onnx
 from onnx import helper, numpy_helper
-
 from peers import GLUE, Case, Layer, Peer, _flat, _folder
 
 
@@ -49,7 +48,9 @@ def onnx2c(case: Case, checkout: Path) -> Peer:
     folder, inside = _folder("onnx2c", case), 0
     for name, layers in case.networks.items():
         onnx.save(graph(layers), folder / f"{name}.onnx")
-        made = subprocess.run([str(checkout / "build" / "onnx2c"), str(folder / f"{name}.onnx")], check=True, capture_output=True, text=True)
+        made = subprocess.run(
+            [str(checkout / "build" / "onnx2c"), str(folder / f"{name}.onnx")], check=True, capture_output=True, text=True
+        )
         text, count = re.subn(r"\bentry\(", f"peer_{name}_entry(", made.stdout)
         if count < 1:
             raise SystemExit("bench: onnx2c made no function entry()")

@@ -82,10 +82,7 @@ def _instruction(address: int, size: int, mnemonic: str, operands: str) -> Instr
     target, rest = _registers(parts[0]), _registers(",".join(parts[1:]))
     inside = frozenset(_registers(" ".join(re.findall(r"\[(.*?)\]", operands))))
     listed = _registers("".join(re.findall(r"\{(.*?)\}", operands)))
-    loads_list, stores = (
-        re.match(r"v?(ldm|pop)", name),
-        STORE.match(name) or re.match(r"v?(cmpe?$|stm|push|strd)", name),
-    )
+    loads_list, stores = (re.match(r"v?(ldm|pop)", name), STORE.match(name) or re.match(r"v?(cmpe?$|stm|push|strd)", name))
     if stores or re.match(r"(cmp|cmn|tst|teq|b|bl|bx|cbn?z|strd)$", name):
         writes, reads = frozenset(), frozenset(target + rest)
     elif loads_list:
@@ -106,9 +103,7 @@ def disassemble(elf: Path) -> tuple[Instruction, ...]:
 
 @lru_cache(8)
 def _disassemble(elf: Path, _made: int) -> tuple[Instruction, ...]:
-    text = subprocess.run(
-        ["arm-none-eabi-objdump", "-d", "-z", str(elf)], check=True, capture_output=True, text=True
-    ).stdout
+    text = subprocess.run(["arm-none-eabi-objdump", "-d", "-z", str(elf)], check=True, capture_output=True, text=True).stdout
     found = []
     for line in text.splitlines():
         match = LINE.match(line)

@@ -21,12 +21,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import cortex_m4
 import numpy as np
+from figures import exchange, hostile_inputs
 from numpy.typing import NDArray
 
-import cortex_m4
 import penode_gen
-from figures import exchange, hostile_inputs
 from penode_sil.building import build_directory
 from penode_sil.targets import MACHINES, PORT, Pil
 
@@ -57,13 +57,9 @@ def plugin() -> Path:
 
 def symbols(elf: Path) -> dict[str, int]:
     """Addresses of the functions of a program."""
-    lines = subprocess.run(
-        ["arm-none-eabi-nm", str(elf)], check=True, capture_output=True, text=True
-    ).stdout.splitlines()
+    lines = subprocess.run(["arm-none-eabi-nm", str(elf)], check=True, capture_output=True, text=True).stdout.splitlines()
     return {
-        name: int(address, 16) & ~1
-        for address, kind, name in (line.split() for line in lines if len(line.split()) == 3)
-        if kind in "tTwW"
+        name: int(address, 16) & ~1 for address, kind, name in (line.split() for line in lines if len(line.split()) == 3) if kind in "tTwW"
     }
 
 
@@ -98,9 +94,7 @@ def counting(elf: Path, functions: Sequence[str], modelled: bool = True) -> Iter
     def read() -> Counted:
         calls = np.fromfile(files["calls"], dtype=CALL)
         hits = np.fromfile(files["hits"], dtype="<u8").reshape(-1, 2)
-        strange = [
-            code[k].text for k in np.flatnonzero(hits.sum(axis=1)) if modelled and cortex_m4.base(code[k]) is None
-        ]
+        strange = [code[k].text for k in np.flatnonzero(hits.sum(axis=1)) if modelled and cortex_m4.base(code[k]) is None]
         if strange:
             raise AssertionError(f"{elf}: cortex_m4.py does not know {strange[0]}")
         return Counted({name: calls[calls["entry"] == places[name]] for name in functions}, code, hits, cost)

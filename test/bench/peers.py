@@ -112,9 +112,7 @@ def _folder(name: str, case: Case, order: str = "C") -> Path:
     weights = [_flat(layers, order) for layers in case.networks.values()]
     (folder / "constants.h").write_text(_constants(case, weights[0].size))
     values = ",\n".join(_literal(v) for v in np.concatenate(weights))
-    (folder / "weights.c").write_text(
-        f'#include "constants.h"\nconst float peer_weights[{2 * weights[0].size}] = {{\n{values}\n}};\n'
-    )
+    (folder / "weights.c").write_text(f'#include "constants.h"\nconst float peer_weights[{2 * weights[0].size}] = {{\n{values}\n}};\n')
     return folder
 
 
@@ -259,14 +257,10 @@ PEERS: dict[str, Callable[[Case], Peer]] = {
 def _pip(*arguments: str) -> None:
     PLACE.mkdir(parents=True, exist_ok=True)
     done = subprocess.run(
-        [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", *arguments],
-        capture_output=True,
-        text=True,
+        [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", *arguments], capture_output=True, text=True
     )
     if done.returncode != 0:
-        raise SystemExit(
-            f"bench: pip {arguments[0]} failed: {done.stderr.strip().splitlines()[-1]}; is the package index reachable?"
-        )
+        raise SystemExit(f"bench: pip {arguments[0]} failed: {done.stderr.strip().splitlines()[-1]}; is the package index reachable?")
 
 
 def _package(name: str) -> Any:

@@ -16,6 +16,7 @@ from pathlib import Path
 import cortex_m4
 import cycles
 import peers
+
 import penode_gen
 from penode_sil.building import FLAGS, ROOT, generated, model_options
 from penode_sil.targets import MACHINES, PORT
@@ -39,8 +40,10 @@ def core(machine: str) -> list[str]:
     """The compiler's options for a machine's core."""
     text = subprocess.run(
         ["sh", "-c", f". {shlex.quote(str(PORT))}/machines.sh; choose_machine {MACHINES[machine]}; echo $core -mthumb"],
-        check=True, capture_output=True, text=True,
-    ).stdout  # fmt: skip
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
     return text.split()
 
 
@@ -63,7 +66,11 @@ def _compiler(machine: str) -> list[str]:
 
 
 def our_program(
-    model: penode_gen.Model, machine: str = "m4f", flags: Sequence[str] = ("-O2",), main: Path = HERE / "drive.c", source: Path | None = None
+    model: penode_gen.Model,
+    machine: str = "m4f",
+    flags: Sequence[str] = ("-O2",),
+    main: Path = HERE / "drive.c",
+    source: Path | None = None,
 ) -> Program:
     """Our step with the runtime as it stands; `main` drives it. source: where the model's C is; None: it is generated."""
     folder = PLACE / "programs" / "-".join([model.name, machine, main.stem, *flags, *(["committed"] if source else [])])
@@ -92,9 +99,7 @@ def _runtime(machine: str, flags: tuple[str, ...]) -> list[Path]:
     return objects
 
 
-def peer_program(
-    peer: peers.Peer, machine: str = "m4f", flags: Sequence[str] = ("-O2", "-ffp-contract=off")
-) -> Program:
+def peer_program(peer: peers.Peer, machine: str = "m4f", flags: Sequence[str] = ("-O2", "-ffp-contract=off")) -> Program:
     """A peer's step. The peer gets what it may want of the C library."""
     folder = PLACE / "programs" / "-".join([re.sub(r"\W+", "_", peer.name), machine, *flags])
     folder.mkdir(parents=True, exist_ok=True)
@@ -114,9 +119,7 @@ def run(program: Program, arguments: Sequence[str], folder: Path, limit: int = 6
     """Run a program on its machine, in a folder, for at most `limit` seconds."""
     machine = MACHINES[program.machine]
     command = [str(PORT / "run"), machine, str(program.elf)] if machine else [str(program.elf)]
-    done = subprocess.run(
-        [*command, *arguments], cwd=folder, env=os.environ | {"LIMIT": str(limit)}, capture_output=True, text=True
-    )
+    done = subprocess.run([*command, *arguments], cwd=folder, env=os.environ | {"LIMIT": str(limit)}, capture_output=True, text=True)
     if done.returncode != 0:
         raise SystemExit(f"bench: {program.elf} ended with {done.returncode}: {done.stdout}{done.stderr}")
 
@@ -128,10 +131,20 @@ def sizes(program: Program, weights_inside: int = 0) -> dict[str, int]:
     """Bytes of text, rodata and RAM of the step with all it calls, without weights: linked alone."""
     elf = program.elf.with_name("size.elf")
     _make(
-        ["arm-none-eabi-gcc", *core(program.machine), "-nostdlib", "-Wl,--gc-sections", f"-Wl,-e,{program.step}",
-         "-Wl,--defsym=peer_weights=0x10000000", *program.objects, "-lm", "-lc", "-lgcc"],
+        [
+            "arm-none-eabi-gcc",
+            *core(program.machine),
+            "-nostdlib",
+            "-Wl,--gc-sections",
+            f"-Wl,-e,{program.step}",
+            "-Wl,--defsym=peer_weights=0x10000000",
+            *program.objects,
+            "-lm",
+            "-lc",
+            "-lgcc",
+        ],
         elf,
-    )  # fmt: skip
+    )
     text = _run(["arm-none-eabi-size", "-A", elf])
     found = {m[1]: int(m[2]) for m in re.finditer(r"^\.(\w+)\S*\s+(\d+)", text, re.M)}
     return {

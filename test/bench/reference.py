@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
-
 import peers
+from numpy.typing import NDArray
 
 U32 = 2.0**-24  # unit roundoff of float
 

@@ -120,11 +120,7 @@ soft float takes a time that depends on the numbers, a tenth of the calls. "ever
 function and kind of layer that there is (`all_laws.py`); ros1 runs through all their slopes, too."""
 
 HOSTS = {f"**penode, {what}**": f"**penode, {what}** ({OURS['RK4', what].title})" for what in ("layered", "folded")}
-BATCH = {
-    "nQVM, layer by layer": "`nqvm.toml`",
-    "nQVM, folded": "`nqvm.toml`, pieces = 96",
-    "hypothesis, 12 states": "`batch.py`",
-}
+BATCH = {"nQVM, layer by layer": "`nqvm.toml`", "nQVM, folded": "`nqvm.toml`, pieces = 96", "hypothesis, 12 states": "`batch.py`"}
 CALLER = ("instance", "banks", "set", "commit stack bound")
 COSTS = ("instructions", "modelled kilocycles", "text", "constants", "RAM", "stack", "its bound")
 
@@ -142,7 +138,6 @@ def summary(figures: Figures) -> str:
         rows.append([row["name"], row["level"], *counts])
     header = ["RK4 step on a Cortex-M4F", "flags", "instructions", "modelled kilocycles", "times ours", "code [B]"]
     return rows_of(header, rows)
-
 
 
 def files(figures: Figures) -> dict[str, str]:
@@ -177,7 +172,10 @@ def prices(figures: Figures) -> str:
     caller = {"instance": "an instance", "set": "a parameter set, in flash or in RAM of the caller"}
     sizes += [[name, *(number(memory[PRICES[title]][key]) for title, _ in columns)] for key, name in caller.items()]
     errors = {row["model"]: row for row in figures["accuracy"]}
-    exact = [[name, *(_micrometres(errors[title][key]) for title in PRICES)] for key, name in (("largest", "largest error of z_b, z_w"), ("RMS", "RMS error"))]
+    exact = [
+        [name, *(_micrometres(errors[title][key]) for title in PRICES)]
+        for key, name in (("largest", "largest error of z_b, z_w"), ("RMS", "RMS error"))
+    ]
     return "\n\n".join(
         (
             rows_of(["instructions a step", *header], [of, *counts]),
@@ -220,11 +218,16 @@ def table(figures: Figures) -> str:
             [[_quoted(r)["name"], r["level"], r["contract"].split("=")[1], *_costs(r)] for r in figures["peers"]],
         ),
         "### On the host",
-        rows_of(["time of a step, gcc -O2", "times ours"], [[HOSTS.get(r["name"], r["name"]), f"{r['ratio']:.2f}"] for r in figures["host"]]),
+        rows_of(
+            ["time of a step, gcc -O2", "times ours"], [[HOSTS.get(r["name"], r["name"]), f"{r['ratio']:.2f}"] for r in figures["host"]]
+        ),
         HOST,
         "### Many runs at once on the host",
         MANY,
-        rows_of(["model", "model file", "real", "times the C loop"], [[r["model"], BATCH[r["model"]], r["real"], f"{r['ratio']:.1f}"] for r in figures["batch"] if "real" in r]),
+        rows_of(
+            ["model", "model file", "real", "times the C loop"],
+            [[r["model"], BATCH[r["model"]], r["real"], f"{r['ratio']:.1f}"] for r in figures["batch"] if "real" in r],
+        ),
         "\n".join(f"* {r['model']}: {number(r['ratio'])} times" for r in figures["batch"] if "real" not in r),
         "## Worst case",
         WORST,

@@ -14,16 +14,16 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 import cycles
-import penode_gen
+import numpy as np
 import programs
 from all_laws import all_laws
+from numpy.typing import NDArray
+
+import penode_gen
 from penode_gen import fold
-from penode_sil.status import BIT
 from penode_sil.building import ROOT
+from penode_sil.status import BIT
 from penode_sil.targets import MACHINES
 
 ROUND = 100  # steps, see worst_case.c
@@ -58,7 +58,9 @@ def everything() -> list[penode_gen.Model]:
     return [dataclasses.replace(model, name=name, method=m, outside=o) for (m, o), name in names.items()]
 
 
-def measure(model: penode_gen.Model, machine: str, steps: int, flags: Sequence[str] = ("-O2",), source: Path | None = None) -> dict[str, NDArray]:
+def measure(
+    model: penode_gen.Model, machine: str, steps: int, flags: Sequence[str] = ("-O2",), source: Path | None = None
+) -> dict[str, NDArray]:
     """
     Calls (cycles.CALL) of the step, at least `steps` of them, by kind: normal, refused (a number was not finite),
     adopting, holding; and of commit.
@@ -77,12 +79,7 @@ def measure(model: penode_gen.Model, machine: str, steps: int, flags: Sequence[s
         raise AssertionError(f"{len(found)} steps counted of {len(status)}")
     held, adopted = status & BIT["held"] != 0, status & BIT["adopted"] != 0
     bad = status & (BIT["input_nonfinite"] | BIT["state_nonfinite"] | BIT["step_nonfinite"] | BIT["singular"]) != 0
-    kinds = {
-        "normal": ~(held | adopted | bad),
-        "refused": bad & ~(held | adopted),
-        "adopting": adopted,
-        "holding": held & ~adopted,
-    }
+    kinds = {"normal": ~(held | adopted | bad), "refused": bad & ~(held | adopted), "adopting": adopted, "holding": held & ~adopted}
     return {kind: found[which] for kind, which in kinds.items()} | {"commit": calls[commit]}
 
 

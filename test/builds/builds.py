@@ -56,7 +56,9 @@ BROKEN = [
     (["arm-none-eabi-gcc", "-mcpu=cortex-m55", "-mfloat-abi=hard", "-mthumb"], "(MVE)"),
 ]
 STOPPED = [[c, f] for c in ("gcc", "clang-19") for f in ("-ffast-math", "-Ofast")] + [
-    ["gcc", "-funsafe-math-optimizations"], ["gcc", "-fassociative-math", "-fno-trapping-math", "-fno-signed-zeros"]]  # fmt: skip
+    ["gcc", "-funsafe-math-optimizations"],
+    ["gcc", "-fassociative-math", "-fno-trapping-math", "-fno-signed-zeros"],
+]
 HARMLESS = ["-frounding-math", "-fno-trapping-math", "-fno-math-errno", "-fsignaling-nans", "-fno-strict-aliasing", "-funsigned-char"]
 
 
@@ -93,7 +95,12 @@ DEFAULT = {
     "clang -Os, Cortex-M7": [*CLANG_ARM, "-mcpu=cortex-m7", "-Os"],
     "clang -O3 -march=haswell": ["clang-19", "-O3", "-march=haswell"],
 }
-FUSING = ("gcc -O2, Cortex-M4F", "gcc -O3 -march=haswell", "clang -Os, Cortex-M7", "clang -O3 -march=haswell")  # clang does not on a Cortex-M4F
+FUSING = (
+    "gcc -O2, Cortex-M4F",
+    "gcc -O3 -march=haswell",
+    "clang -Os, Cortex-M7",
+    "clang -O3 -march=haswell",
+)  # clang does not on a Cortex-M4F
 
 
 def fused(compiler: list[str], files: list[Path], root: Path = ROOT) -> int:
@@ -134,12 +141,18 @@ def dialects() -> None:
         with tempfile.TemporaryDirectory() as folder:
             place = copy(folder)
             for file in [*RUNTIME, *MODEL]:
-                subprocess.run([c, "-std=c99", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/gen/nqvm/c", "-c", file], cwd=folder, check=True)
+                subprocess.run(
+                    [c, "-std=c99", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/gen/nqvm/c", "-c", file], cwd=folder, check=True
+                )
             (place / "main.cpp").write_text(text)
             objects = [str(path) for path in sorted(place.glob("*.o"))]
             strict = [cpp, "-std=c++17", *STRICT, "-o", str(place / "main")]
             run = compile([*strict, str(place / "main.cpp")], Path(objects[0]), *objects[1:])
-            check(f"{cpp} -std=c++17 compiles and links {len(functions)} functions", run.returncode == 0 and len(functions) > 60, run.stderr[:3000])
+            check(
+                f"{cpp} -std=c++17 compiles and links {len(functions)} functions",
+                run.returncode == 0 and len(functions) > 60,
+                run.stderr[:3000],
+            )
             for header in [h for part in ("inc", "gen/nqvm/c") for h in sorted((place / part).rglob("*.h"))]:
                 header.write_text(header.read_text().replace("__cplusplus", "NO_CPLUSPLUS").replace("#if NO_C", "#if 0 && NO_C"))
             run = compile([*[w for w in strict if w != "-Wundef"], str(place / "main.cpp")], Path(objects[0]), *objects[1:], root=place)
@@ -148,7 +161,7 @@ def dialects() -> None:
 
 # -- a whole program for a core without atomic instructions -----------------------------------------------------------
 
-MAIN = '#include "nqvm.h"\nnqvm_t model;\nnqvm_banks_t banks;\nint main(void)\n{\n    nqvm_u_t u = { 0 };\n    nqvm_y_t y;\n    return (int)(nqvm_init(&model, &nqvm_set_default, &banks) | nqvm_step(&model, &u, &y) | nqvm_tune_commit(&model));\n}\n'  # fmt: skip
+MAIN = '#include "nqvm.h"\nnqvm_t model;\nnqvm_banks_t banks;\nint main(void)\n{\n    nqvm_u_t u = { 0 };\n    nqvm_y_t y;\n    return (int)(nqvm_init(&model, &nqvm_set_default, &banks) | nqvm_step(&model, &u, &y) | nqvm_tune_commit(&model));\n}\n'
 
 
 def link(root: Path, core: str, level: str) -> str:
@@ -158,10 +171,29 @@ def link(root: Path, core: str, level: str) -> str:
         objects = []
         for file in [Path(folder, "main.c"), *sorted(root.glob("src/*.c")), root / "gen/nqvm/c/nqvm.c", root / "gen/nqvm/c/nqvm_params.c"]:
             objects.append(str(Path(folder, file.stem + ".o")))
-            run = compile(["clang-19", "--target=thumbv6m-none-eabi", f"-mcpu={core}", "-ffreestanding", level, "-Wall", "-Wextra", "-c", "-o", objects[-1]], file, root=root)
+            run = compile(
+                [
+                    "clang-19",
+                    "--target=thumbv6m-none-eabi",
+                    f"-mcpu={core}",
+                    "-ffreestanding",
+                    level,
+                    "-Wall",
+                    "-Wextra",
+                    "-c",
+                    "-o",
+                    objects[-1],
+                ],
+                file,
+                root=root,
+            )
             if run.returncode or run.stderr:
                 return run.stderr
-        run = subprocess.run(["arm-none-eabi-gcc", f"-mcpu={core}", "-mthumb", "-nostdlib", "-Wl,-e,main", "-o", f"{folder}/program", *objects, "-lgcc"], capture_output=True, text=True)  # fmt: skip
+        run = subprocess.run(
+            ["arm-none-eabi-gcc", f"-mcpu={core}", "-mthumb", "-nostdlib", "-Wl,-e,main", "-o", f"{folder}/program", *objects, "-lgcc"],
+            capture_output=True,
+            text=True,
+        )
         return run.stderr if run.returncode else ""
 
 

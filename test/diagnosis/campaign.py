@@ -2,10 +2,10 @@
 # Copyright (c) 2026 the penode authors
 """Hides effects in recordings, lets a command diagnose them, scores the answers.
 
-    campaign.py --cases 300 --jobs 2 --out DIR           a fresh draw; its seed is printed
-    campaign.py --only 123456:17 --out DIR               one case again; leaves its files and truth
-    campaign.py --command "penode diagnose" --command "neural=python neural.py"     several on the same cases
-    campaign.py --cases 20 --generate --out DIR          only the files: DIR/cases/... and, apart from them, DIR/truth/...
+campaign.py --cases 300 --jobs 2 --out DIR           a fresh draw; its seed is printed
+campaign.py --only 123456:17 --out DIR               one case again; leaves its files and truth
+campaign.py --command "penode diagnose" --command "neural=python neural.py"     several on the same cases
+campaign.py --cases 20 --generate --out DIR          only the files: DIR/cases/... and, apart from them, DIR/truth/...
 """
 
 import argparse
@@ -145,7 +145,9 @@ def commit() -> str:
 
     if not shutil.which("git") or (found := git("describe", "--always")).returncode:
         return "an unknown commit"
-    return f"commit {found.stdout.strip()}" + "-dirty" * bool(git("diff", "--quiet", "HEAD", "--", ":/", ":(exclude)CAMPAIGN.md").returncode)
+    return f"commit {found.stdout.strip()}" + "-dirty" * bool(
+        git("diff", "--quiet", "HEAD", "--", ":/", ":(exclude)CAMPAIGN.md").returncode
+    )
 
 
 def least(text: str) -> tuple[str, int]:
@@ -188,14 +190,28 @@ def arguments() -> argparse.ArgumentParser:
     add("--strata", default=",".join(cases.STRATA), help="take these only: " + ", ".join(cases.STRATA))
     add("--least", action="append", default=[], type=least, metavar="STRATUM=N", help="go on until so many are of it; may be given again")
     add("--kinds", default="", help="take only cases with one of these kinds")
-    add("--command", action="append", default=[], metavar="[NAME=]COMMAND",
-        help="called as COMMAND MODEL.toml --data REC... --holdout REC -o DIR (penode diagnose); may be given again")
-    add("--simulate", default="", metavar="COMMAND",
-        help="measure the gain by COMMAND model_extended.toml --input REC -o OUT.csv, not by what the diagnosis says")
+    add(
+        "--command",
+        action="append",
+        default=[],
+        metavar="[NAME=]COMMAND",
+        help="called as COMMAND MODEL.toml --data REC... --holdout REC -o DIR (penode diagnose); may be given again",
+    )
+    add(
+        "--simulate",
+        default="",
+        metavar="COMMAND",
+        help="measure the gain by COMMAND model_extended.toml --input REC -o OUT.csv, not by what the diagnosis says",
+    )
     add("--timeout", type=float, default=240, help="seconds for one case, by the clock (240)")
     add("--jobs", type=int, default=1, help="cases at the same time (1)")
-    add("--alone", type=float, default=float("inf"), metavar="SECONDS",
-        help="when all are through, run those that took the first command longer once more by themselves, for their time")
+    add(
+        "--alone",
+        type=float,
+        default=float("inf"),
+        metavar="SECONDS",
+        help="when all are through, run those that took the first command longer once more by themselves, for their time",
+    )
     add("--out", type=Path, default=Path("build/campaign"), help="folder (build/campaign)")
     add("--page", type=Path, help="write the tables there too")
     add("--keep", action="store_true", help="keep recordings, diagnoses and truths")
@@ -253,11 +269,16 @@ def main() -> int:
     if not asked.brief:
         print("".join(f"\n{name}: {commands[name]}\n{own}" for name, own in texts.items()) + f"\n{side}\n")
     paces.append(pace())
-    said = (f"Code of {commit()}. Seconds are of the processor for a whole command, imports and files included, compilers not; "
-            f"to count to ten million took it {paces[0]:.2f} s before and {paces[1]:.2f} s after.")
+    said = (
+        f"Code of {commit()}. Seconds are of the processor for a whole command, imports and files included, compilers not; "
+        f"to count to ten million took it {paces[0]:.2f} s before and {paces[1]:.2f} s after."
+    )
     if again := sum("alone" in r for r in next(iter(rows.values()))):
         said += f" Of the {again} cases of more than {asked.alone:g} s with {asked.jobs} at a time, the time is that of a second run by themselves."
-    page = [f"# Campaign of {count}, seed {seed}\n\n{said}\n\n{side}\n", *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items())]
+    page = [
+        f"# Campaign of {count}, seed {seed}\n\n{said}\n\n{side}\n",
+        *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items()),
+    ]
     for path in filter(None, (asked.out / "campaign.md", asked.page)):
         path.write_text("".join(page))
     result = {"seed": seed, "commands": commands, "tables": tables, "rows": rows}

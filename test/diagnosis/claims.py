@@ -17,7 +17,10 @@ SIZES = {
     "hidden_resonance": ("mass",),
     "network_extrapolation": ("force_at_peak",),
 }
-PAIRS = {"asymmetric_damper": ("rebound", "compression"), "degressive_damper": ("low_rate_damping", "high_rate_damping")}  # size: their difference
+PAIRS = {
+    "asymmetric_damper": ("rebound", "compression"),
+    "degressive_damper": ("low_rate_damping", "high_rate_damping"),
+}  # size: their difference
 NONE = {"scale": 1.0, "gain": 1.0}  # what a size is where nothing is wrong; 0 for others, for a parameter the value of the file
 
 

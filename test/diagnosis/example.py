@@ -2,20 +2,19 @@
 # Copyright (c) 2026 the penode authors
 """Makes the recordings of sil/recordings/friction: a vehicle whose damper also rubs, which its model file does not know.
 
-    example.py [DIR]
+example.py [DIR]
 """
 
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+import numpy as np
 from hidden import cases, plants, roads
 from hidden.bench import Bench, Drive
 from hidden.effects import FORMS
 from hidden.energy import Noise
 from hidden.solver import knots
-
-import numpy as np
 
 STATED = {"m_b": 400.0, "m_w": 45.0, "c": 22e3, "d": 1500.0, "c_t": 210e3}
 TRUE = {"m_b": 403.0, "m_w": 44.8, "c": 22.1e3, "d": 1492.0, "c_t": 210.9e3}  # within 1 %

@@ -41,11 +41,16 @@ def main(arguments: list[str] | None = None) -> int:
     kept = HERE / "frozen.json"
     head, new = rows(asked.rows)
     if asked.take_over:
-        kept.write_text(json.dumps({"seed": head["seed"], "code": head["code"], "right": {c.split(":")[1]: r for c, r in new.items()}}) + "\n")
+        kept.write_text(
+            json.dumps({"seed": head["seed"], "code": head["code"], "right": {c.split(":")[1]: r for c, r in new.items()}}) + "\n"
+        )
         return 0
     draw = json.loads(kept.read_text())
     if others := {c.split(":")[0] for c in new} - {str(draw["seed"])}:  # by its cases: a campaign --only SEED:INDEX has no seed of its own
-        print(f"{asked.rows}: seed {', '.join(sorted(others))}; the frozen draw has {draw['seed']}: run the campaign with --seed {draw['seed']}", file=sys.stderr)
+        print(
+            f"{asked.rows}: seed {', '.join(sorted(others))}; the frozen draw has {draw['seed']}: run the campaign with --seed {draw['seed']}",
+            file=sys.stderr,
+        )
         return 2
     old = {f"{draw['seed']}:{index}": right for index, right in draw["right"].items()}
     lost, won, p = mcnemar(old, new)

@@ -22,8 +22,9 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
-import penode_gen
 from mechanisms.generator import KINDS, WHERE, Case, cases
+
+import penode_gen
 from penode_gen.model import GROUND, Model
 from penode_sil import diagnosis
 from penode_sil.diagnosis import noise, study
@@ -101,8 +102,11 @@ def main() -> int:
             s = score(model, case)
             wrong += not s.right
             what = s.verdict or f"force missed by {s.error:.1%}, place ranks {s.rank}"
-            print(f"{plant} {case.seed} {case.kind:<9} {'ok   ' if s.right else 'WRONG'} {what}{f', not seen: {s.unseen}' * bool(s.unseen)}"
-                  f" ({time.process_time() - began:.1f} s)", flush=True)  # fmt: skip
+            print(
+                f"{plant} {case.seed} {case.kind:<9} {'ok   ' if s.right else 'WRONG'} {what}{f', not seen: {s.unseen}' * bool(s.unseen)}"
+                f" ({time.process_time() - began:.1f} s)",
+                flush=True,
+            )
     print(f"{wrong} wrong")
     return int(wrong > 0)
 

@@ -22,7 +22,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from score import wilson
 
-TABLE = Path(__file__).resolve().parents[2] / "sil/penode_sil/diagnosis/templates/reliability.json"  # of which penode_sil.diagnosis.reliability reads
+TABLE = (
+    Path(__file__).resolve().parents[2] / "sil/penode_sil/diagnosis/templates/reliability.json"
+)  # of which penode_sil.diagnosis.reliability reads
 APART = 0.05  # that mean confidence and share right may be, over all
 
 
@@ -44,7 +46,9 @@ def read(path: Path, command: str) -> tuple[list[dict], dict]:
     except (OSError, UnicodeDecodeError) as problem:
         raise SystemExit(_bad(f"{path}: cannot be read ({problem})")) from None
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise SystemExit(_bad(f"{path}:{k}: not a row that says how sure each named cause is and whether it is right; run the campaign again")) from None
+        raise SystemExit(
+            _bad(f"{path}:{k}: not a row that says how sure each named cause is and whether it is right; run the campaign again")
+        ) from None
     rows = list(found.values())
     seeds = sorted({int(r["case"].partition(":")[0]) for r in rows})
     codes = sorted({str(r.get("code", head.get("code", ""))) for r in rows})
@@ -65,15 +69,27 @@ def table(rows: Sequence[Mapping]) -> dict:
         if own:
             right, (low, high) = sum(c["right"] for c in own), wilson(sum(c["right"] for c in own), len(own))
             mean = sum(c["confidence"] for c in own) / len(own)
-            deciles.append({"from": k / 10, "to": (k + 1) / 10, "named": len(own), "right": right, "stated": round(mean, 4),
-                            "ci95": [round(low, 4), round(high, 4)], "inside": low <= mean <= high})  # fmt: skip
+            deciles.append(
+                {
+                    "from": k / 10,
+                    "to": (k + 1) / 10,
+                    "named": len(own),
+                    "right": right,
+                    "stated": round(mean, 4),
+                    "ci95": [round(low, 4), round(high, 4)],
+                    "inside": low <= mean <= high,
+                }
+            )
     right = sum(c["right"] for c in named)
     return {
-        "cases": len(rows), "named": len(named), "right": right, "deciles": deciles,
+        "cases": len(rows),
+        "named": len(named),
+        "right": right,
+        "deciles": deciles,
         "stated": sum(c["confidence"] for c in named) / len(named) if named else None,
         "nothing": [f"{r['case']} {c['cause']}" for r in rows for c in r["named"] if c["nothing"]],
         "unstated": sum(c["confidence"] is None for r in rows for c in r["named"]),
-    }  # fmt: skip
+    }
 
 
 def text(t: Mapping) -> str:
@@ -122,7 +138,9 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--command", default="diagnose", help="of several in one file (diagnose)")
     parser.add_argument("--code", default="", help="what made rows that do not say it: commit 1234567")
     parser.add_argument("--take-over", action="store_true", help=f"write the table that reports state, {TABLE.name}")
-    parser.add_argument("--gate", action="store_true", help="exit code 1 if a decile is outside, over all by more than 5 points, or a size may be nothing")
+    parser.add_argument(
+        "--gate", action="store_true", help="exit code 1 if a decile is outside, over all by more than 5 points, or a size may be nothing"
+    )
     return parser.parse_args()
 
 
@@ -137,7 +155,9 @@ def main() -> int:
     print(text(t))
     if asked.take_over:
         if any(not c or c.endswith("-dirty") or c.startswith("an unknown") for m in made for c in m["codes"]):
-            return _bad("not taken over: the rows do not say which commit made them, or it had changes; --code names it where they say none")
+            return _bad(
+                "not taken over: the rows do not say which commit made them, or it had changes; --code names it where they say none"
+            )
         kept = {"source": source(made), "cases": t["cases"], "deciles": t["deciles"]}
         TABLE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
         print(f"-> {TABLE}")

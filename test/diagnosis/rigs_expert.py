@@ -68,7 +68,11 @@ def jacobian(f: Callable[[Array], Array], x: Array) -> Array:
 
 def swing(train: Sequence[tuple[Array, Array, Array]], held: tuple[Array, Array, Array], terms: Sequence[str]) -> float:
     """RMSE on the hold-out, started from its first samples, of a swing fitted to the training."""
-    free = [0] * any(u.any() for _, u, _ in train) + [1, 2] + [i for name, i in (("coulomb", 3), ("constant", 4), ("drag", 5)) if name in terms]
+    free = (
+        [0] * any(u.any() for _, u, _ in train)
+        + [1, 2]
+        + [i for name, i in (("coulomb", 3), ("constant", 4), ("drag", 5)) if name in terms]
+    )
     thin = [tuple(a[:: max(len(a) // MOST, 1)] for a in r) for r in train]
 
     def full(x: Array) -> Array:
@@ -82,8 +86,19 @@ def swing(train: Sequence[tuple[Array, Array, Array]], held: tuple[Array, Array,
 
     first = {0: 4.0, 1: 30.0 if 0 in free else 64.0, 2: 0.06}
     x0 = np.concatenate([[first.get(i, 0.0) for i in free], *(begin(t, y) for t, _, y in thin)])
-    best = min((least_squares(lambda x: left(x[:, None])[:, 0], np.where(np.arange(len(x0)) == len(free) - 1, x0 + kick, x0), lambda x: jacobian(left, x),
-                              x_scale="jac", max_nfev=60) for kick in (0.0, 0.1)), key=lambda r: r.cost)  # fmt: skip
+    best = min(
+        (
+            least_squares(
+                lambda x: left(x[:, None])[:, 0],
+                np.where(np.arange(len(x0)) == len(free) - 1, x0 + kick, x0),
+                lambda x: jacobian(left, x),
+                x_scale="jac",
+                max_nfev=60,
+            )
+            for kick in (0.0, 0.1)
+        ),
+        key=lambda r: r.cost,
+    )
     t, u, y = held
     p = full(best.x[:, None])
     near = least_squares(lambda s: swung(p, s[:, None], t[:FIRST], u[:FIRST], terms)[:, 0] - y[:FIRST], begin(t, y), x_scale="jac").x

@@ -55,7 +55,16 @@ def moves(model: Path) -> bool:
 
 def predicted(command: str, model: Path, recording: Path, rig: dict) -> float | None:
     """RMSE of a model file on a recording, started from its first 50 samples where it has states; None if it cannot be simulated."""
-    call = [*shlex.split(command), "simulate", str(model), "--input", str(recording), "-o", str(model.with_name("prediction.csv")), "--json"]
+    call = [
+        *shlex.split(command),
+        "simulate",
+        str(model),
+        "--input",
+        str(recording),
+        "-o",
+        str(model.with_name("prediction.csv")),
+        "--json",
+    ]
     call += ["--start", f"measured:{rigs_expert.FIRST}"] if moves(model) else []
     call += [x for c in rig.get("channels", []) for x in ("--channel", c)]
     done = subprocess.run(call, capture_output=True, text=True, timeout=600)
@@ -94,9 +103,19 @@ def case(command: str, folder: Path, place: Path, rig: dict, one: dict, out: Pat
     extended = out / "diagnosis" / "model_extended.toml"
     names = [c["kind"] for c in (found or {}).get("causes") or []]
     accepted = [sorted(a) for a in one.get("accept", rig.get("accept_all", []))]
-    return {"rig": folder.name, "case": one["name"], "names": names, "verdict": (found or {}).get("verdict") or why, "right": sorted(names) in accepted,
-            "before": predicted(command, model, held[0], rig), "after": predicted(command, extended, held[0], rig) if extended.exists() else None,
-            "fitted": fitted, "expert": expert, "unit": rig["unit"], "seconds": round(seconds, 1)}  # fmt: skip
+    return {
+        "rig": folder.name,
+        "case": one["name"],
+        "names": names,
+        "verdict": (found or {}).get("verdict") or why,
+        "right": sorted(names) in accepted,
+        "before": predicted(command, model, held[0], rig),
+        "after": predicted(command, extended, held[0], rig) if extended.exists() else None,
+        "fitted": fitted,
+        "expert": expert,
+        "unit": rig["unit"],
+        "seconds": round(seconds, 1),
+    }
 
 
 def shown(value: float | None, unit: str) -> str:

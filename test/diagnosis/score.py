@@ -7,15 +7,22 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import permutations
 from math import ceil, sqrt
 
-from claims import claims
-from claims import right as rightly
+from claims import claims, right as rightly
 
 OUTSIDE = "outside_taxonomy"
 MOST_ALTERNATIVES = 4  # who lists more has not decided
 EXACT = 1.0  # chi-square that an exact equivalent may leave of an effect
 # stratum -> share of right answers that is asked for, and the least share of any kind in it
-DEMANDED = {"single_common": (0.97, 0.85), "single_foreign": (0.90, 0.70), "pair": (0.85, 0.0), "triple": (0.60, 0.0),
-            "hard": (0.90, 0.0), "null": (1.0, 0.0), "null_hard": (0.99, 0.0), "outside": (0.90, 0.0)}
+DEMANDED = {
+    "single_common": (0.97, 0.85),
+    "single_foreign": (0.90, 0.70),
+    "pair": (0.85, 0.0),
+    "triple": (0.60, 0.0),
+    "hard": (0.90, 0.0),
+    "null": (1.0, 0.0),
+    "null_hard": (0.99, 0.0),
+    "outside": (0.90, 0.0),
+}
 
 
 def _named(item: object) -> tuple[str, str]:
@@ -73,7 +80,11 @@ def outcome(truth: Mapping, causes: Sequence[Mapping], verdict: str | None) -> s
 
 
 def score(
-    truth: Mapping, diagnosis: Mapping | None, seconds: float, why: str = "", measured: Mapping[str, float] | None = None,
+    truth: Mapping,
+    diagnosis: Mapping | None,
+    seconds: float,
+    why: str = "",
+    measured: Mapping[str, float] | None = None,
     nominal: Mapping[str, float] | None = None,
 ) -> dict:
     """One row of the table. `diagnosis` None: the command gave none, `why` says so (crash, timeout).
@@ -161,11 +172,7 @@ def summary(rows: Sequence[Mapping]) -> dict:
     out: dict = {"strata": {}, "kinds": {}, "confusion": {}, "outcomes": {}}
     for name, own in strata.items():
         if own:
-            out["strata"][name] = {
-                **_share(own),
-                "demanded": DEMANDED[name][0],
-                "outcomes": dict(Counter(r["outcome"] for r in own)),
-            }
+            out["strata"][name] = {**_share(own), "demanded": DEMANDED[name][0], "outcomes": dict(Counter(r["outcome"] for r in own))}
     for r in rows:
         if len(r["kinds"]) <= 1:
             hidden, answer = r["kinds"] or ["nothing"], [a.split(" at ")[0] for a in r["answer"]]
@@ -182,11 +189,7 @@ def summary(rows: Sequence[Mapping]) -> dict:
     named = [r for r in rows if r["right"] and r["answer"] and OUTSIDE not in r["kinds"]]
     inside = [max(g[1] for g in r["gain"].values()) for r in named if r["gain"] and r.get("inside")]
     hidden = [max(r["gain"].values(), key=lambda g: g[1]) for r in rows if r["kinds"] and r["gain"] and r.get("inside")]
-    worse = [
-        r["case"]
-        for r in rows
-        if r["stratum"] == "outside" and r["answer"] and any(g[1] > 1.05 * g[0] for g in r["gain"].values())
-    ]
+    worse = [r["case"] for r in rows if r["stratum"] == "outside" and r["answer"] and any(g[1] > 1.05 * g[0] for g in r["gain"].values())]
     seconds = [r.get("alone", round(r["seconds"] - r.get("compiling", 0.0), 2)) for r in rows]
     out["outcomes"] = dict(Counter(r["outcome"] for r in rows))
     out["no_answer"] = sum(r["verdict"] is None for r in rows)
@@ -300,8 +303,10 @@ def compare(tables: Mapping[str, Mapping]) -> str:
     row("false alarms on null cases", lambda t: str(sum(t["strata"][s]["outcomes"].get("false alarm", 0) for s in nulls)))
     row("no answer", lambda t: str(t["no_answer"]))
     for which, of in (("parameters_above_noise", "above the noise"), ("parameters", "of any size")):
-        row(f"parameter error, effects {of}: median; 95 % within",
-            lambda t: f"{_percent(t[which]['median_error'])}; {_percent(t[which]['error_95'])}")
+        row(
+            f"parameter error, effects {of}: median; 95 % within",
+            lambda t: f"{_percent(t[which]['median_error'])}; {_percent(t[which]['error_95'])}",
+        )
     row("95 % intervals cover", lambda t: _percent(t["coverage"]["share"]))
     row("hold-out RMSE / noise floor before, median", lambda t: number(t["gain"]["all"]["before"]))
     row("hold-out RMSE / noise floor after, median", lambda t: number(t["gain"]["all"]["after"]))

@@ -80,7 +80,9 @@ def test_what_comes_out_the_same_everywhere_decides_nothing(tmp_path):
 
 
 def test_only_cases_that_a_threshold_decides_are_run_without_it(tmp_path, monkeypatch):
-    notes = noted(tmp_path / "notes", **{"1_0": {"a.ONCE @ a.py:2": [1, 0]}, "1_1": {"a.ONCE @ a.py:2": [0, 1]}, "1_2": {"a.ONCE @ a.py:2": [1, 0]}})
+    notes = noted(
+        tmp_path / "notes", **{"1_0": {"a.ONCE @ a.py:2": [1, 0]}, "1_1": {"a.ONCE @ a.py:2": [0, 1]}, "1_2": {"a.ONCE @ a.py:2": [1, 0]}}
+    )
     calls = []
 
     def run(campaign, cases, off):
@@ -88,7 +90,9 @@ def test_only_cases_that_a_threshold_decides_are_run_without_it(tmp_path, monkey
         return {case: off is None for case in cases}
 
     monkeypatch.setattr(ablate, "run", run)
-    assert ablate.switched_off("a.ONCE", ablate.read([notes]), {"worlds_campaign.py": ["1:1"]}).startswith("a.ONCE off: 0 cases")  # another draw
+    assert ablate.switched_off("a.ONCE", ablate.read([notes]), {"worlds_campaign.py": ["1:1"]}).startswith(
+        "a.ONCE off: 0 cases"
+    )  # another draw
     calls.clear()
     said = ablate.switched_off("a.ONCE", ablate.read([notes]), {"campaign.py": ["1:0", "1:1", "1:2"]})
     assert said == "a.ONCE off: 1 cases run, won none; lost 1:1"
@@ -108,7 +112,10 @@ def test_a_watched_diagnosis_answers_the_same(tmp_path):
     recordings = cases.make(917549355, 0).write(tmp_path / "case")
     rest = [str(tmp_path / "case" / "model.toml"), "--data", *map(str, recordings[:-1]), "--holdout", str(recordings[-1])]
     answers = []
-    for name, command in (("plain", [Path(sys.executable).parent / "penode"]), ("watched", [sys.executable, HERE / "ablation" / "probes.py"])):
+    for name, command in (
+        ("plain", [Path(sys.executable).parent / "penode"]),
+        ("watched", [sys.executable, HERE / "ablation" / "probes.py"]),
+    ):
         subprocess.run([*map(str, command), "diagnose", *rest, "-o", str(tmp_path / name)], check=True, capture_output=True)
         answer = json.loads((tmp_path / name / "diagnosis.json").read_text())
         answers.append({k: v for k, v in answer.items() if not k.endswith("seconds")})

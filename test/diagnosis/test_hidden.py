@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import signal as dsp
-from scipy.integrate import solve_ivp
-
 from hidden import cases, effects, energy, plants, roads
 from hidden.bench import NOTHING, Bench, Drive
 from hidden.cases import KINDS
 from hidden.effects import FORMS, OUTSIDE, Change
 from hidden.solver import GROUND, KNOT_RATE, MOTION, RATE, Kind, Law, World, knots, simulate
+from scipy import signal as dsp
+from scipy.integrate import solve_ivp
 
 CAR = {"m_b": 350.0, "m_w": 40.0, "c": 2e4, "d": 1500.0, "c_t": 2e5}
 RIG = {"c": 2e4, "d": 1500.0}
@@ -58,6 +57,7 @@ def test_order_of_the_integrator_is_four():
 
 def quarter_reference(t, road, extra):
     """The car by scipy, written out again."""
+
     def rates(time, x):
         z_b, z_w, v_b, v_w = x
         f, tyre = CAR["c"] * (z_b - z_w) + CAR["d"] * (v_b - v_w) + extra(z_b - z_w, v_b - v_w), CAR["c_t"] * (z_w - road(time))
@@ -66,8 +66,14 @@ def quarter_reference(t, road, extra):
     return solve_ivp(rates, (0, t[-1]), np.zeros(4), "DOP853", t, rtol=1e-10, atol=1e-13).y
 
 
-@pytest.mark.parametrize("extra, kind", [(lambda s, v: 0 * s, Kind.RATE_CURVE), (lambda s, v: 5e6 * s**3, Kind.DEFLECTION_CURVE),
-                                         (lambda s, v: 60 * np.tanh(v / 0.02), Kind.RATE_CURVE)])
+@pytest.mark.parametrize(
+    "extra, kind",
+    [
+        (lambda s, v: 0 * s, Kind.RATE_CURVE),
+        (lambda s, v: 5e6 * s**3, Kind.DEFLECTION_CURVE),
+        (lambda s, v: 60 * np.tanh(v / 0.02), Kind.RATE_CURVE),
+    ],
+)
 def test_quarter_vehicle_against_scipy(extra, kind):
     """Road interpolation: h^4 / 384 of the 4th derivative, (2 pi 8 / 5000)^4 / 384 = 3e-11 of 5 mm; the tables give the rest.
 
@@ -279,8 +285,13 @@ READINGS = {
     "two_stiffnesses": (0.2, lambda s, v, f: {"difference": slope(s, f, s < -0.01) - slope(s, f, s > 0.01)}),
     "linear_stop": (3.0, lambda s, v, f: {"stiffness": slope(s, f, np.abs(f) > 0.2 * np.abs(f).max())}),
     "two_dampings": (0.2, lambda s, v, f: {"rebound": RIG["d"] + slope(v, f, v > 0), "compression": RIG["d"] + slope(v, f, v < 0)}),
-    "one_knee": (0.4, lambda s, v, f: {"low_rate_damping": RIG["d"] + slope(v, f, np.abs(v) < 0.006),
-                                       "high_rate_damping": RIG["d"] + slope(v, f, v > 0.1)}),
+    "one_knee": (
+        0.4,
+        lambda s, v, f: {
+            "low_rate_damping": RIG["d"] + slope(v, f, np.abs(v) < 0.006),
+            "high_rate_damping": RIG["d"] + slope(v, f, v > 0.1),
+        },
+    ),
     "rate_squared": (0.3, lambda s, v, f: {"coefficient": slope(v * np.abs(v), f, np.abs(v) > 0)}),
     "gaussian_fall": (0.2, lambda s, v, f: {"coulomb": f[v > 0.12].mean()}),
     "bouc_wen": (0.2, lambda s, v, f: {"force": np.abs(f).max(), "yield_deflection": np.abs(f).max() / initial_stiffness(s, f)}),
@@ -326,9 +337,7 @@ def test_absorber_has_the_frequency_of_its_truth():
     bench, form = a_bench(), next(f for f in FORMS if f.name == "absorber")
     change = form.make(np.random.default_rng(1), bench.place("body"))(0.05)
     (law,), (mass,) = change.laws.values(), change.masses
-    assert (np.sqrt(law.p[0] / mass) / 2 / np.pi, mass) == pytest.approx(
-        (change.parameters["frequency"], change.parameters["mass"])
-    )
+    assert (np.sqrt(law.p[0] / mass) / 2 / np.pi, mass) == pytest.approx((change.parameters["frequency"], change.parameters["mass"]))
 
 
 @pytest.mark.parametrize("name", [f.name for f in FORMS if f.kind == "coulomb_friction"])
@@ -362,8 +371,8 @@ def test_every_delay_is_the_group_delay_at_low_frequency(name):
     bench, form = a_bench(), next(f for f in FORMS if f.name == name)
     change = form.make(np.random.default_rng(2), bench.place("a_body"))(0.5)
     k = np.arange(int(10 * RATE))
-    late = change.sensor["a_body"](np.sin(2 * np.pi * k / RATE), np.random.default_rng(0), RATE)[int(2 * RATE):]
-    phase = np.angle(np.sum(late * np.exp(-2j * np.pi * k[int(2 * RATE):] / RATE)) * 1j)
+    late = change.sensor["a_body"](np.sin(2 * np.pi * k / RATE), np.random.default_rng(0), RATE)[int(2 * RATE) :]
+    phase = np.angle(np.sum(late * np.exp(-2j * np.pi * k[int(2 * RATE) :] / RATE)) * 1j)
     assert -phase / (2 * np.pi) == pytest.approx(change.parameters["delay"], rel=0.015)
 
 
@@ -458,9 +467,7 @@ def test_stated_energies_leave_out_one_effect_at_a_time():
     """Two biases on different sensors do not explain each other: the energies of the pair are those of each alone."""
     bench = a_bench()
     offset = next(f for f in FORMS if f.name == "offset")
-    two = [
-        cases.Effect(offset, s, 0.05, offset.make(np.random.default_rng(1), bench.place(s))(0.05)) for s in ("a_body", "a_wheel")
-    ]
+    two = [cases.Effect(offset, s, 0.05, offset.make(np.random.default_rng(1), bench.place(s))(0.05)) for s in ("a_body", "a_wheel")]
     pair = cases.Case(0, 3, "pair", bench, tuple(two))
     alone = [cases.Case(0, 2, "single_common", bench, (e,)).energies[0] for e in two]
     assert pair.energies == pytest.approx(alone, rel=1e-3)
@@ -472,20 +479,13 @@ def test_settled_force_and_bias_of_the_deflection_are_answers_of_each_other():
     load = next(f for f in FORMS if f.name == "settled_load")
     bench = replace(bench, noise={s: bench.noise[s] for s in ("a_body", "deflection")})
     case = cases.Case(
-        0,
-        2,
-        "single_common",
-        bench,
-        (cases.Effect(load, "body", 0.3, load.make(np.random.default_rng(1), bench.place("body"))(0.3)),),
+        0, 2, "single_common", bench, (cases.Effect(load, "body", 0.3, load.make(np.random.default_rng(1), bench.place("body"))(0.3)),)
     )
-    assert {(r["kind"], *r["where"]) for r in case.rivals(0)} >= {
-        ("sensor_bias", "deflection"),
-        ("constant_force", "spring", "damper"),
-    }
+    assert {(r["kind"], *r["where"]) for r in case.rivals(0)} >= {("sensor_bias", "deflection"), ("constant_force", "spring", "damper")}
     with_height = replace(case, bench=a_bench())
-    assert ("sensor_bias", "deflection") not in {
-        (r["kind"], *r["where"]) for r in with_height.rivals(0)
-    }, "a height sensor tells them apart"
+    assert ("sensor_bias", "deflection") not in {(r["kind"], *r["where"]) for r in with_height.rivals(0)}, (
+        "a height sensor tells them apart"
+    )
 
 
 def test_bias_that_wanders_may_be_a_load_that_does():
@@ -501,9 +501,7 @@ def test_faint_force_on_the_body_may_be_one_on_the_wheel():
     bench = replace(bench, noise={s: bench.noise[s] for s in ("a_body", "a_wheel", "z_body")})
     load = next(f for f in FORMS if f.name == "put_on_at_the_start")
     build = load.make(np.random.default_rng(1), bench.place("body"))
-    faint, strong = (
-        cases.Case(0, 2, "single_foreign", bench, (cases.Effect(load, "body", size, build(size)),)) for size in (0.004, 0.05)
-    )
+    faint, strong = (cases.Case(0, 2, "single_foreign", bench, (cases.Effect(load, "body", size, build(size)),)) for size in (0.004, 0.05))
     wheel = ("constant_force", "wheel")
     assert faint.energies[0] > cases.BOUND and wheel in {(r["kind"], *r["where"]) for r in faint.rivals(0)}
     assert wheel not in {(r["kind"], *r["where"]) for r in strong.rivals(0)}

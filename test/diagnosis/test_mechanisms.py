@@ -4,13 +4,15 @@
 
 import numpy as np
 import pytest
-
 from mechanisms import generator
 from mechanisms_campaign import LIMIT, model_of, score
+
 from penode_sil.diagnosis import missing
 
 
-@pytest.mark.parametrize("plant, kind, seed", [("halfcar", "friction", 901), ("drive", "backlash", 902), ("drive", "friction", 3), ("drive", "nothing", 903)])
+@pytest.mark.parametrize(
+    "plant, kind, seed", [("halfcar", "friction", 901), ("drive", "backlash", 902), ("drive", "friction", 3), ("drive", "nothing", 903)]
+)
 def test_places_and_missing_force(plant, kind, seed):
     case = {"halfcar": generator.halfcar, "drive": generator.drive}[plant]([kind], [seed], 3.0)[0]
     found = score(model_of(plant), case)

@@ -7,9 +7,9 @@ import subprocess
 import sys
 
 import pytest
+import reliability
 from scipy import stats
 
-import reliability
 from penode_sil.diagnosis import reliability as told
 from penode_sil.diagnosis.result import Cause
 
@@ -62,14 +62,28 @@ def test_sizes_that_may_be_nothing_are_counted():
 
 def test_of_a_case_that_was_timed_again_the_later_row_counts(tmp_path):
     path = written(tmp_path / "rows.jsonl", [claim(0.95, True)] * 3, {"seed": 7, "code": "commit 1"}, command="diagnose")
-    path.write_text(path.read_text() + json.dumps({"case": "7:1", "stratum": "main", "command": "diagnose", "named": [claim(0.95, False)]}) + "\n"
-                    + json.dumps({"case": "7:1", "stratum": "main", "command": "neural", "named": []}) + "\n")  # fmt: skip
+    path.write_text(
+        path.read_text()
+        + json.dumps({"case": "7:1", "stratum": "main", "command": "diagnose", "named": [claim(0.95, False)]})
+        + "\n"
+        + json.dumps({"case": "7:1", "stratum": "main", "command": "neural", "named": []})
+        + "\n"
+    )
     rows, made = reliability.read(path, "diagnose")
     assert [c["right"] for r in rows for c in r["named"]] == [True, False, True]
     assert made == {"seeds": [7], "cases": 3, "codes": ["commit 1"]}
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"case": "1:2"}', '{"case": "1:2", "named": [{"confidence": 0.5}]}', '{"case": "1:2", "named": [{"confidence": 2, "right": true, "nothing": false}]}'])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{",
+        "[]",
+        '{"case": "1:2"}',
+        '{"case": "1:2", "named": [{"confidence": 0.5}]}',
+        '{"case": "1:2", "named": [{"confidence": 2, "right": true, "nothing": false}]}',
+    ],
+)
 def test_rows_that_cannot_be_read_are_one_line(tmp_path, text):
     (tmp_path / "rows.jsonl").write_text(text + "\n")
     done = called(tmp_path / "rows.jsonl")
@@ -93,8 +107,10 @@ def test_gate_and_table_from_the_command(tmp_path):
 def test_taken_over_and_told(tmp_path, monkeypatch):
     """What the script writes is what a report reads; not from rows whose commit is unknown."""
     monkeypatch.setattr(reliability, "TABLE", tmp_path / "reliability.json")
-    rows = [written(tmp_path / "a.jsonl", [claim(0.97, k > 0) for k in range(40)], {"seed": 7, "code": "commit abc"}),
-            written(tmp_path / "b.jsonl", [claim(0.55, k % 2 == 0) for k in range(10)], code="commit abc")]  # fmt: skip
+    rows = [
+        written(tmp_path / "a.jsonl", [claim(0.97, k > 0) for k in range(40)], {"seed": 7, "code": "commit abc"}),
+        written(tmp_path / "b.jsonl", [claim(0.55, k % 2 == 0) for k in range(10)], code="commit abc"),
+    ]
     call = ["reliability.py", *map(str, rows), "--take-over"]
     monkeypatch.setattr(sys, "argv", call)
     assert reliability.main() == 0

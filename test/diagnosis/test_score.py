@@ -9,12 +9,11 @@ import subprocess
 import sys
 import time
 
-import pytest
-from scipy import stats
-
 import campaign
 import frozen
+import pytest
 import score
+from scipy import stats
 
 FRICTION = {
     "kind": "coulomb_friction",
@@ -84,44 +83,47 @@ BIAS = ("sensor_bias", "deflection")
 NEAR = LOAD | {"rivals": [{"kind": "sensor_bias", "where": ["deflection"], "left": 12.0}]}
 
 
-@pytest.mark.parametrize("effects, diagnosis, outcome", [
-    ((FRICTION,), said(cause("coulomb_friction", "damper")), "right"),
-    ((FRICTION,), said(cause("coulomb_friction", "spring")), "right"),
-    ((FRICTION,), said(cause("coulomb_friction", "tyre")), "wrong name"),
-    ((FRICTION,), said(cause("stribeck_friction", "damper")), "wrong name"),
-    ((FRICTION,), said(cause("stribeck_friction", "damper", ["coulomb_friction"])), "wrong name"),
-    ((FRICTION,), said(cause("coulomb_friction", "damper"), cause("cubic_spring", "spring")), "extra name"),
-    ((FRICTION,), said(verdict="no_discrepancy"), "missed"),
-    ((FRICTION,), said(verdict="not_identifiable"), "missed"),
-    ((FRICTION,), said(cause("outside_taxonomy"), verdict="unexplained"), "missed"),
-    ((FRICTION | {"energy": 49.0},), said(verdict="not_identifiable"), "right"),
-    ((FRICTION | {"energy": 49.0},), said(verdict="unexplained"), "missed"),
-    ((FRICTION, LOAD), said(cause("coulomb_friction", "damper"), cause("constant_force", "body", ["sensor_bias"])), "right"),
-    ((FRICTION, LOAD), said(cause("constant_force", "body", ["sensor_bias"]), cause("coulomb_friction", "damper")), "right"),
-    ((FRICTION, LOAD), said(cause("coulomb_friction", "damper")), "part missed"),
-    ((FRICTION, LOAD | {"energy": 10.0}), said(cause("coulomb_friction", "damper")), "right"),
-    ((FRICTION, LOAD), said(cause("coulomb_friction", "damper"), cause("coulomb_friction", "spring")), "part missed"),
-    ((LOAD,), said(cause(*BIAS, ["constant_force"])), "right"),
-    ((LOAD,), said(cause(*BIAS, [{"kind": "constant_force", "where": "body"}])), "right"),
-    ((LOAD,), said(cause("constant_force", "body")), "equivalent not told"),
-    ((LOAD,), said(cause(*BIAS)), "equivalent not told"),
-    ((NEAR,), said(cause("constant_force", "body")), "right"),
-    ((NEAR,), said(cause(*BIAS)), "equivalent not told"),
-    ((NEAR,), said(cause(*BIAS, ["constant_force"])), "right"),
-    ((LOAD,), said(cause("sensor_bias", "a_body", ["constant_force"])), "wrong name"),
-    ((LOAD,), said(cause(*BIAS, ["constant_force", "bump_stop", "backlash", "cubic_spring", "bouc_wen"])), "equivalent not told"),
-    ((WRONG,), said(cause("wrong_parameter", "spring", c={"value": 2e4})), "right"),
-    ((WRONG,), said(cause("wrong_parameter", "spring", d={"value": 2e4})), "wrong name"),
-    ((WRONG,), said(cause("wrong_parameter", "spring", c={"value": 2e4}, d={"value": 1.0})), "wrong name"),
-    ((ALIEN,), said(cause("outside_taxonomy"), verdict="unexplained"), "right"),
-    ((ALIEN,), said(verdict="unexplained"), "right"),
-    ((ALIEN,), said(cause("outside_taxonomy"), cause("backlash", "spring")), "wrong name"),
-    ((ALIEN,), said(verdict="no_discrepancy"), "missed"),
-    ((), said(verdict="no_discrepancy"), "right"),
-    ((), said(cause("coulomb_friction", "damper")), "false alarm"),
-    ((), said(verdict="unexplained"), "false alarm"),
-    ((), said(verdict="not_identifiable"), "open"),
-])
+@pytest.mark.parametrize(
+    "effects, diagnosis, outcome",
+    [
+        ((FRICTION,), said(cause("coulomb_friction", "damper")), "right"),
+        ((FRICTION,), said(cause("coulomb_friction", "spring")), "right"),
+        ((FRICTION,), said(cause("coulomb_friction", "tyre")), "wrong name"),
+        ((FRICTION,), said(cause("stribeck_friction", "damper")), "wrong name"),
+        ((FRICTION,), said(cause("stribeck_friction", "damper", ["coulomb_friction"])), "wrong name"),
+        ((FRICTION,), said(cause("coulomb_friction", "damper"), cause("cubic_spring", "spring")), "extra name"),
+        ((FRICTION,), said(verdict="no_discrepancy"), "missed"),
+        ((FRICTION,), said(verdict="not_identifiable"), "missed"),
+        ((FRICTION,), said(cause("outside_taxonomy"), verdict="unexplained"), "missed"),
+        ((FRICTION | {"energy": 49.0},), said(verdict="not_identifiable"), "right"),
+        ((FRICTION | {"energy": 49.0},), said(verdict="unexplained"), "missed"),
+        ((FRICTION, LOAD), said(cause("coulomb_friction", "damper"), cause("constant_force", "body", ["sensor_bias"])), "right"),
+        ((FRICTION, LOAD), said(cause("constant_force", "body", ["sensor_bias"]), cause("coulomb_friction", "damper")), "right"),
+        ((FRICTION, LOAD), said(cause("coulomb_friction", "damper")), "part missed"),
+        ((FRICTION, LOAD | {"energy": 10.0}), said(cause("coulomb_friction", "damper")), "right"),
+        ((FRICTION, LOAD), said(cause("coulomb_friction", "damper"), cause("coulomb_friction", "spring")), "part missed"),
+        ((LOAD,), said(cause(*BIAS, ["constant_force"])), "right"),
+        ((LOAD,), said(cause(*BIAS, [{"kind": "constant_force", "where": "body"}])), "right"),
+        ((LOAD,), said(cause("constant_force", "body")), "equivalent not told"),
+        ((LOAD,), said(cause(*BIAS)), "equivalent not told"),
+        ((NEAR,), said(cause("constant_force", "body")), "right"),
+        ((NEAR,), said(cause(*BIAS)), "equivalent not told"),
+        ((NEAR,), said(cause(*BIAS, ["constant_force"])), "right"),
+        ((LOAD,), said(cause("sensor_bias", "a_body", ["constant_force"])), "wrong name"),
+        ((LOAD,), said(cause(*BIAS, ["constant_force", "bump_stop", "backlash", "cubic_spring", "bouc_wen"])), "equivalent not told"),
+        ((WRONG,), said(cause("wrong_parameter", "spring", c={"value": 2e4})), "right"),
+        ((WRONG,), said(cause("wrong_parameter", "spring", d={"value": 2e4})), "wrong name"),
+        ((WRONG,), said(cause("wrong_parameter", "spring", c={"value": 2e4}, d={"value": 1.0})), "wrong name"),
+        ((ALIEN,), said(cause("outside_taxonomy"), verdict="unexplained"), "right"),
+        ((ALIEN,), said(verdict="unexplained"), "right"),
+        ((ALIEN,), said(cause("outside_taxonomy"), cause("backlash", "spring")), "wrong name"),
+        ((ALIEN,), said(verdict="no_discrepancy"), "missed"),
+        ((), said(verdict="no_discrepancy"), "right"),
+        ((), said(cause("coulomb_friction", "damper")), "false alarm"),
+        ((), said(verdict="unexplained"), "false alarm"),
+        ((), said(verdict="not_identifiable"), "open"),
+    ],
+)
 def test_outcome(effects, diagnosis, outcome):
     row = score.score(truth(*effects), diagnosis, 1.0)
     assert (row["outcome"], row["right"]) == (outcome, outcome == "right")
@@ -133,37 +135,43 @@ def sized(kind, where="", confidence=0.9, alternatives=(), **intervals):
     return cause(kind, where, alternatives, **values) | {"confidence": confidence}
 
 
-@pytest.mark.parametrize("effects, causes, right", [
-    ((FRICTION,), [sized("coulomb_friction", "damper")], [True]),
-    ((FRICTION,), [sized("coulomb_friction", "damper"), sized("coulomb_friction", "spring")], [True, False]),
-    ((FRICTION, LOAD), [sized("backlash", "spring"), sized("constant_force", "body")], [False, True]),
-    ((LOAD,), [sized("sensor_bias", "deflection")], [True]),  # it is, whether it tells its equivalent or not
-    ((LOAD, LOAD | {"rivals": []}), [sized("constant_force", "body"), sized("sensor_bias", "deflection")], [True, True]),
-    ((ALIEN,), [sized("backlash", "spring")], [False]),
-    ((), [sized("backlash", "spring")], [False]),
-    ((ALIEN,), [sized("outside_taxonomy")], []),
-    ((), [], []),
-])
+@pytest.mark.parametrize(
+    "effects, causes, right",
+    [
+        ((FRICTION,), [sized("coulomb_friction", "damper")], [True]),
+        ((FRICTION,), [sized("coulomb_friction", "damper"), sized("coulomb_friction", "spring")], [True, False]),
+        ((FRICTION, LOAD), [sized("backlash", "spring"), sized("constant_force", "body")], [False, True]),
+        ((LOAD,), [sized("sensor_bias", "deflection")], [True]),  # it is, whether it tells its equivalent or not
+        ((LOAD, LOAD | {"rivals": []}), [sized("constant_force", "body"), sized("sensor_bias", "deflection")], [True, True]),
+        ((ALIEN,), [sized("backlash", "spring")], [False]),
+        ((), [sized("backlash", "spring")], [False]),
+        ((ALIEN,), [sized("outside_taxonomy")], []),
+        ((), [], []),
+    ],
+)
 def test_rows_say_of_each_named_cause_how_sure_and_whether_right(effects, causes, right):
     row = score.score(truth(*effects), said(*causes), 1.0)
     assert [c["right"] for c in row["named"]] == right
     assert all(c["confidence"] == 0.9 and c["cause"] for c in row["named"])
 
 
-@pytest.mark.parametrize("told, nothing", [
-    (sized("coulomb_friction", "damper", force=(-1.0, 9.0)), True),
-    (sized("coulomb_friction", "damper", force=(1.0, 9.0)), False),
-    (sized("sensor_scale", "x", scale=(0.98, 1.05)), True),
-    (sized("sensor_scale", "x", scale=(-0.1, 0.9)), False),
-    (sized("input_gain", "u", gain=(0.7, 1.1)), True),
-    (sized("wrong_parameter", c=(1.9e4, 2.3e4)), True),
-    (sized("wrong_parameter", c=(2.1e4, 2.3e4)), False),
-    (sized("bump_stop", "spring", gap=(-0.1, 0.1), stiffness=(1.0, 2.0)), False),
-    (sized("asymmetric_damper", "damper", rebound=(1.0, 3.0), compression=(1.5, 3.5)), True),
-    (sized("asymmetric_damper", "damper", rebound=(1.0, 3.0), compression=(4.0, 6.0)), False),
-    (cause("coulomb_friction", "damper", force={"value": 3.0}), False),
-    (cause("coulomb_friction", "damper"), False),
-])
+@pytest.mark.parametrize(
+    "told, nothing",
+    [
+        (sized("coulomb_friction", "damper", force=(-1.0, 9.0)), True),
+        (sized("coulomb_friction", "damper", force=(1.0, 9.0)), False),
+        (sized("sensor_scale", "x", scale=(0.98, 1.05)), True),
+        (sized("sensor_scale", "x", scale=(-0.1, 0.9)), False),
+        (sized("input_gain", "u", gain=(0.7, 1.1)), True),
+        (sized("wrong_parameter", c=(1.9e4, 2.3e4)), True),
+        (sized("wrong_parameter", c=(2.1e4, 2.3e4)), False),
+        (sized("bump_stop", "spring", gap=(-0.1, 0.1), stiffness=(1.0, 2.0)), False),
+        (sized("asymmetric_damper", "damper", rebound=(1.0, 3.0), compression=(1.5, 3.5)), True),
+        (sized("asymmetric_damper", "damper", rebound=(1.0, 3.0), compression=(4.0, 6.0)), False),
+        (cause("coulomb_friction", "damper", force={"value": 3.0}), False),
+        (cause("coulomb_friction", "damper"), False),
+    ],
+)
 def test_a_size_may_be_nothing_where_its_interval_holds_the_model_without_it(told, nothing):
     row = score.score(truth(FRICTION), said(told), 1.0, nominal={"c": 2e4})
     assert [c["nothing"] for c in row["named"]] == [nothing]
@@ -176,9 +184,7 @@ def test_without_an_answer_every_case_is_wrong():
 def test_errors_and_intervals_count_for_common_forms_that_are_named_themselves():
     force = {"value": 42.0, "unit": "N", "ci95": [39.0, 45.0]}
     row = score.score(truth(FRICTION), said(cause("coulomb_friction", "damper", force=force)), 1.0)
-    assert row["errors"] == [["coulomb_friction.force", pytest.approx(0.05), 0.5]] and row["covered"] == [
-        ["coulomb_friction.force", True]
-    ]
+    assert row["errors"] == [["coulomb_friction.force", pytest.approx(0.05), 0.5]] and row["covered"] == [["coulomb_friction.force", True]]
     narrow = score.score(truth(FRICTION), said(cause("coulomb_friction", "damper", force={**force, "ci95": [41.0, 43.0]})), 1.0)
     assert narrow["covered"] == [["coulomb_friction.force", False]]
     foreign = score.score(truth(FRICTION | {"common": False}), said(cause("coulomb_friction", "damper", force=force)), 1.0)
@@ -265,8 +271,12 @@ def test_tables_add_up():
     assert "18 of 20" in score.text(out) and "2x backlash at damper" in score.text(out)
 
 
-ANSWERS = {"honest": 'json.dump({"verdict": "no_discrepancy", "causes": []}, open(out / "diagnosis.json", "w"))',
-           "crash": 'sys.exit("penode: train_1.csv: too short")', "silent": "pass", "slow": "time.sleep(60)"}
+ANSWERS = {
+    "honest": 'json.dump({"verdict": "no_discrepancy", "causes": []}, open(out / "diagnosis.json", "w"))',
+    "crash": 'sys.exit("penode: train_1.csv: too short")',
+    "silent": "pass",
+    "slow": "time.sleep(60)",
+}
 
 
 @pytest.mark.parametrize(
@@ -280,9 +290,7 @@ def test_campaign_runs_a_command_and_survives_it(tmp_path, answer, outcome):
         "assert pathlib.Path(sys.argv[1]).name == 'model.toml' and not list(pathlib.Path(sys.argv[1]).parent.glob('*truth*'))\n"
         f"out.mkdir()\n{ANSWERS[answer]}\n"
     )
-    (row,) = campaign.run(
-        1, 1, {"mine": f"{sys.executable} {script}"}, "", 5.0 if answer != "slow" else 0.5, tmp_path / "out", keep=True
-    )
+    (row,) = campaign.run(1, 1, {"mine": f"{sys.executable} {script}"}, "", 5.0 if answer != "slow" else 0.5, tmp_path / "out", keep=True)
     assert row["stratum"] == "null" and (row["why"] or row["outcome"]).startswith(outcome)
     assert json.loads((tmp_path / "out" / "truth" / "1-1.json").read_text())["effects"] == []
 
@@ -296,7 +304,9 @@ def test_campaign_that_is_stopped_has_tables_of_what_is_through(tmp_path):
         f"out.mkdir()\n{ANSWERS['honest']}\n"
     )
     call = [sys.executable, campaign.__file__, "--cases", "4", "--seed", "1", "--out", tmp_path / "out", "--page", page, "--timeout", "5"]
-    running = subprocess.Popen([*map(str, call), "--command", f"{sys.executable} {script}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    running = subprocess.Popen(
+        [*map(str, call), "--command", f"{sys.executable} {script}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     while not mark.exists():
         assert running.poll() is None
         time.sleep(0.1)
@@ -323,7 +333,9 @@ def test_extended_model_is_simulated_again(tmp_path):
 def test_the_floor_is_asked_of_rightly_named_cases():
     """Not of cases where a faint effect was rightly left without a name, nor of effects outside of the list."""
     gain = {"a_body": {"before_rmse": 0.05, "after_rmse": 0.05}}
-    right = score.score(truth(FRICTION), said(cause("coulomb_friction", "damper"), gain={"a_body": {"before_rmse": 0.05, "after_rmse": 0.02}}), 1.0)
+    right = score.score(
+        truth(FRICTION), said(cause("coulomb_friction", "damper"), gain={"a_body": {"before_rmse": 0.05, "after_rmse": 0.02}}), 1.0
+    )
     faint = score.score(truth(FRICTION | {"energy": 40.0}), said(verdict="not_identifiable", gain=gain), 1.0)
     alien = score.score(truth(ALIEN, stratum="outside"), said(verdict="unexplained", gain=gain), 1.0)
     assert all(row["right"] for row in (right, faint, alien))

@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-
 import rigs_expert
 import rigs_table
 from worlds import equivalents, solver, world
@@ -88,20 +87,47 @@ def test_plants_of_every_kind_are_read(tmp_path):
         assert all(abs(world.rms(case.wrong(k)) / case._force(k, case.runs["train_1"]) / case.e - 1) < 0.05 for k in case.kind.sites)
 
 
-FRICTION = {"kind": "coulomb_friction", "where": ["mount", "damper"], "parameters": {"force": 40.0}, "ratio": 5.0, "share": 0.2,
-            "equivalents": [{"kind": "stribeck_friction", "where": ["mount", "damper"], "why": "near"}]}  # fmt: skip
+FRICTION = {
+    "kind": "coulomb_friction",
+    "where": ["mount", "damper"],
+    "parameters": {"force": 40.0},
+    "ratio": 5.0,
+    "share": 0.2,
+    "equivalents": [{"kind": "stribeck_friction", "where": ["mount", "damper"], "why": "near"}],
+}
 STIFF = {"kind": "wrong_parameter", "where": [], "parameters": {"k": 9.0}, "ratio": 5.0, "share": 0.2, "equivalents": []}
 
 
-SIDE = {"kind": "asymmetric_spring", "where": ["mount", "spring"], "parameters": {"difference": 40.0}, "ratio": 5.0, "share": 0.2, "equivalents": [],
-        "companions": ["k"]}  # fmt: skip
-GAIN = {"kind": "input_gain", "where": ["tau"], "parameters": {"gain": 0.8}, "ratio": 5.0, "share": 0.2,
-        "equivalents": [{"kind": "wrong_parameter", "where": [], "parameters": ["J", "k"], "why": "all"}]}  # fmt: skip
+SIDE = {
+    "kind": "asymmetric_spring",
+    "where": ["mount", "spring"],
+    "parameters": {"difference": 40.0},
+    "ratio": 5.0,
+    "share": 0.2,
+    "equivalents": [],
+    "companions": ["k"],
+}
+GAIN = {
+    "kind": "input_gain",
+    "where": ["tau"],
+    "parameters": {"gain": 0.8},
+    "ratio": 5.0,
+    "share": 0.2,
+    "equivalents": [{"kind": "wrong_parameter", "where": [], "parameters": ["J", "k"], "why": "all"}],
+}
 
 
 def truth(*effects):
-    return {"seed": 1, "index": 2, "stratum": "main", "group": ("null", "single", "pair")[len(effects)], "plant": "rig", "tolerance": None,
-            "mismodelling": 0.03, "effects": list(effects)}  # fmt: skip
+    return {
+        "seed": 1,
+        "index": 2,
+        "stratum": "main",
+        "group": ("null", "single", "pair")[len(effects)],
+        "plant": "rig",
+        "tolerance": None,
+        "mismodelling": 0.03,
+        "effects": list(effects),
+    }
 
 
 def cause(kind, where="", **parameters):
@@ -163,7 +189,11 @@ def test_rows_say_which_named_cause_is_right(effects, causes, right):
 
 def test_sets_are_not_names():
     """A set that holds the truth behind another name is seen, and not right."""
-    found = {"causes": [SCALE], "verdict": "explained", "explanations": [{"causes": [SCALE], "posterior": 0.6}, {"causes": [RUB], "posterior": 0.4}]}
+    found = {
+        "causes": [SCALE],
+        "verdict": "explained",
+        "explanations": [{"causes": [SCALE], "posterior": 0.6}, {"causes": [RUB], "posterior": 0.4}],
+    }
     assert score(truth(FRICTION), found)["outcome"] == "in the set, not first"
 
 
@@ -175,7 +205,7 @@ def test_page_counts_what_is_wrong():
 
 def test_laws_are_counted():
     """Two names and two laws at one place are one law each; a third law is one too many."""
-    before, more = '[elements]\na = {}\n', "b = {}\nc = {}\n"
+    before, more = "[elements]\na = {}\n", "b = {}\nc = {}\n"
     assert added_laws(before, before + more, ["cubic_spring", "quadratic_damper"]) == (2, 2)
     assert added_laws(before, before + more, ["cubic_spring", "wrong_parameter"]) == (2, 1)
 
@@ -185,7 +215,10 @@ def test_expert_fit_finds_a_swing():
     Order 4 at 8 rad/s and 8 ms errs alike where it is made and where it is fitted."""
     rng, t = np.random.default_rng(3), np.arange(400) * 0.008
     p = np.array([0, 60.0, 0.05, 0.5, 0, 0])[:, None]
-    made = [(t, 0 * t, rigs_expert.swung(p, np.array([[a], [0.0]]), t, 0 * t, ["sine"])[:, 0] + 1e-4 * rng.standard_normal(len(t))) for a in (0.6, 0.45)]
+    made = [
+        (t, 0 * t, rigs_expert.swung(p, np.array([[a], [0.0]]), t, 0 * t, ["sine"])[:, 0] + 1e-4 * rng.standard_normal(len(t)))
+        for a in (0.6, 0.45)
+    ]
     good, bad = (rigs_expert.swing(made[:1], made[1], terms) for terms in (["sine", "viscous", "coulomb"], ["sine", "viscous"]))
     assert good < 1e-3 < 5e-3 < bad  # ten times the noise, for a start from 50 samples of it
 
@@ -198,5 +231,8 @@ def test_rigs_without_data(tmp_path, capsys, monkeypatch):
 
 
 def test_small_causes_that_are_kept_count_as_reported():
-    notes = ["Maxwell bushing at spring is real but small: 2.6% of what acts there; not named, but in model_extended.toml", "x has an offset of 1 m: gravity?"]
+    notes = [
+        "Maxwell bushing at spring is real but small: 2.6% of what acts there; not named, but in model_extended.toml",
+        "x has an offset of 1 m: gravity?",
+    ]
     assert small(notes) == ["maxwell_bushing"]

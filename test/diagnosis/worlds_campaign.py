@@ -68,7 +68,11 @@ def page(rows: Sequence[Mapping], about: str) -> str:
     out = [f"# Wrong worlds\n\n{about}\n\n| | cases | right | share [95 %] | asked |\n|---|---|---|---|---|"]
     main = [r for r in rows if r["stratum"] == "main"]
     for group in ("single", "null", "pair"):
-        for name, some in (("", main), (", tolerances stated", [r for r in main if r["tolerance"]]), (", none stated", [r for r in main if not r["tolerance"]])):
+        for name, some in (
+            ("", main),
+            (", tolerances stated", [r for r in main if r["tolerance"]]),
+            (", none stated", [r for r in main if not r["tolerance"]]),
+        ):
             if some := [r for r in some if r["group"] == group]:
                 out.append(share(some, group + name))
     for stratum in ("halfcar", "drive"):
@@ -83,7 +87,9 @@ def page(rows: Sequence[Mapping], about: str) -> str:
     laws = [r["laws"] for r in rows if r.get("laws") and r["right"]]
     times = sorted(r["seconds"] for r in rows)
     out.append(f"\nOne textbook law a name: {sum(n <= m for n, m in laws)} of {len(laws)} rightly named." if laws else "")
-    out.append(f"Time on one core: median {times[len(times) // 2]:.0f} s, 90 % within {times[int(0.9 * (len(times) - 1))]:.0f} s, longest {times[-1]:.0f} s.\n")
+    out.append(
+        f"Time on one core: median {times[len(times) // 2]:.0f} s, 90 % within {times[int(0.9 * (len(times) - 1))]:.0f} s, longest {times[-1]:.0f} s.\n"
+    )
     return "\n".join([*out, "## Not right\n", *(f"- {line(r)}" for r in rows if not r["right"])]) + "\n"
 
 
@@ -124,13 +130,18 @@ def main() -> int:
         return 0
     rows, code = [], commit()
     with ProcessPoolExecutor(args.jobs) as pool, (args.out / "rows.jsonl").open("w") as file:
-        jobs = [pool.submit(one, seed, i, s, tolerances, args.command, args.timeout, args.out, args.keep or bool(args.only)) for s, i in chosen]
+        jobs = [
+            pool.submit(one, seed, i, s, tolerances, args.command, args.timeout, args.out, args.keep or bool(args.only)) for s, i in chosen
+        ]
         for job in jobs:
             rows.append(job.result() | {"code": code})
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
             print(line(rows[-1]), flush=True)
-    text = page(rows, f"Seed {seed}, {code}, `{args.command}`{', no tolerances' * args.no_tolerance}. Effects 3 to 10 times the mis-modelling at their place.")
+    text = page(
+        rows,
+        f"Seed {seed}, {code}, `{args.command}`{', no tolerances' * args.no_tolerance}. Effects 3 to 10 times the mis-modelling at their place.",
+    )
     (args.out / "WORLDS.md").write_text(text)
     print(text)
     return 0

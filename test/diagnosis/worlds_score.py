@@ -91,16 +91,30 @@ def score(truth: Mapping, diagnosis: Mapping | None, nominal: Mapping[str, float
     covered = []
     for cause in causes if what == "right" else []:
         for effect in effects:
-            for name, value in effect["parameters"].items() if names(cause, effect["kind"], effect["where"], list(effect["parameters"])) else ():
+            for name, value in (
+                effect["parameters"].items() if names(cause, effect["kind"], effect["where"], list(effect["parameters"])) else ()
+            ):
                 got = (cause.get("parameters") or {}).get(name)
                 if isinstance(got, Mapping) and got.get("ci95"):
                     covered.append([f"{effect['kind']}.{name}", bool(got["ci95"][0] <= value <= got["ci95"][1])])
     words = [f"{c.get('kind')} at {c.get('where') or ', '.join(c.get('parameters') or ())}" for c in causes]
-    return {"case": f"{truth['seed']}:{truth['index']}", "stratum": truth["stratum"], "group": truth["group"], "plant": truth["plant"],
-            "tolerance": truth["tolerance"], "mismodelling": truth["mismodelling"], "kinds": [e["kind"] for e in effects],
-            "ratios": [e["ratio"] for e in effects], "answer": words, "confidence": [c.get("confidence") for c in causes],
-            "named": claims(causes, rightly(causes, effects), nominal or {}),
-            "verdict": (diagnosis or {}).get("verdict"), "outcome": what, "right": what == "right", "covered": covered}  # fmt: skip
+    return {
+        "case": f"{truth['seed']}:{truth['index']}",
+        "stratum": truth["stratum"],
+        "group": truth["group"],
+        "plant": truth["plant"],
+        "tolerance": truth["tolerance"],
+        "mismodelling": truth["mismodelling"],
+        "kinds": [e["kind"] for e in effects],
+        "ratios": [e["ratio"] for e in effects],
+        "answer": words,
+        "confidence": [c.get("confidence") for c in causes],
+        "named": claims(causes, rightly(causes, effects), nominal or {}),
+        "verdict": (diagnosis or {}).get("verdict"),
+        "outcome": what,
+        "right": what == "right",
+        "covered": covered,
+    }
 
 
 def small(notes: Sequence[str]) -> list[str]:

@@ -46,12 +46,36 @@ LIMIT = 60  # [s] of wall-clock time for one file
 FORK = 50  # files for a process
 KEPT = b"this file stood here before"
 FOREIGN = [
-    b"", b"\0" * 500, b"PK\x03\x04", b"PK\x05\x06" + bytes(18), b"\x7fELF" + bytes(200), b"%PDF-1.7\n%\xe2\xe3", b"\x89PNG\r\n\x1a\n" + bytes(40), gzip.compress(b"model M end M;"),
-    "model M\n end M;".encode("utf-16"), b"\xef\xbb\xbfmodel M end M;", b"{}", b"[]", b"null", b"<?xml version='1.0'?><a/>", b"MZ" + bytes(300), b"time,x\n0,1\n", b"-" * 70_000,
-    b"<?xml version='1.0'?><!DOCTYPE z [<!ENTITY a 'aaaaaaaaaa'>" + b"".join(b"<!ENTITY %c '%s'>" % (98 + i, b"&%c;" % (97 + i) * 10) for i in range(9)) + b"]><z>&j;</z>",
-    b"<?xml version='1.0'?><!DOCTYPE z [<!ENTITY x SYSTEM 'file:///etc/hostname'>]><z>&x;</z>", b"<a>" * 20_000, b"{" * 20_000, b"[" * 20_000, b"(" * 20_000,
-    b"import os; os.abort()", b"@startuml", b"\xff\xfe" + bytes(range(256)), b"record R\n parameter Real layer_1_weights[1,1] = {{1e999}};\nend R;",
-]  # fmt: skip
+    b"",
+    b"\0" * 500,
+    b"PK\x03\x04",
+    b"PK\x05\x06" + bytes(18),
+    b"\x7fELF" + bytes(200),
+    b"%PDF-1.7\n%\xe2\xe3",
+    b"\x89PNG\r\n\x1a\n" + bytes(40),
+    gzip.compress(b"model M end M;"),
+    "model M\n end M;".encode("utf-16"),
+    b"\xef\xbb\xbfmodel M end M;",
+    b"{}",
+    b"[]",
+    b"null",
+    b"<?xml version='1.0'?><a/>",
+    b"MZ" + bytes(300),
+    b"time,x\n0,1\n",
+    b"-" * 70_000,
+    b"<?xml version='1.0'?><!DOCTYPE z [<!ENTITY a 'aaaaaaaaaa'>"
+    + b"".join(b"<!ENTITY %c '%s'>" % (98 + i, b"&%c;" % (97 + i) * 10) for i in range(9))
+    + b"]><z>&j;</z>",
+    b"<?xml version='1.0'?><!DOCTYPE z [<!ENTITY x SYSTEM 'file:///etc/hostname'>]><z>&x;</z>",
+    b"<a>" * 20_000,
+    b"{" * 20_000,
+    b"[" * 20_000,
+    b"(" * 20_000,
+    b"import os; os.abort()",
+    b"@startuml",
+    b"\xff\xfe" + bytes(range(256)),
+    b"record R\n parameter Real layer_1_weights[1,1] = {{1e999}};\nend R;",
+]
 
 
 @dataclass
@@ -124,7 +148,11 @@ def judge(code: int, said: str, before: dict[str, bytes], after: dict[str, bytes
     if "Traceback" in said or code not in (0, 2):
         return f"code {code}: {said[:300]}"
     if code == 0:
-        return "" if any(name.startswith(output) and data not in (KEPT, b"") for name, data in after.items()) else "code 0, but nothing was written"
+        return (
+            ""
+            if any(name.startswith(output) and data not in (KEPT, b"") for name, data in after.items())
+            else "code 0, but nothing was written"
+        )
     if not lines or not all(line.startswith("penode: ") and len(line) < 1000 for line in lines):
         return f"no line each: {said[:300]!r}"
     return "" if after == before else f"refused, but files differ: {sorted(set(after) ^ set(before)) or 'the output'}"
@@ -170,7 +198,9 @@ def many(importer: Importer, files: list[bytes], folder: Path, command: Any = cl
             found.append(wrong)
         code = os.waitstatus_to_exitcode(status)
         if code != 0:
-            found.append("too long" if code == -signal.SIGALRM else f"crash, signal {-code}" if code < 0 else f"the process ended with code {code}")
+            found.append(
+                "too long" if code == -signal.SIGALRM else f"crash, signal {-code}" if code < 0 else f"the process ended with code {code}"
+            )
     report.unlink(missing_ok=True)
     return found
 
@@ -219,7 +249,10 @@ def importers(folder: Path) -> list[Importer]:
     (folder / "net.json").write_bytes(layers[0].read_bytes())
     (folder / "small.toml").write_text(lag("lag", "net.json", tunable=True))
     small = penode_gen.load(folder / "small.toml")
-    made = {name: exports.export(small, name, folder / f"x.{suffix}", {"form": "library"} if suffix == "mo" else {}) for name, suffix in (("ssp", "ssp"), ("modelica", "mo"))}
+    made = {
+        name: exports.export(small, name, folder / f"x.{suffix}", {"form": "library"} if suffix == "mo" else {})
+        for name, suffix in (("ssp", "ssp"), ("modelica", "mo"))
+    }
     road = folder / "road.csv"
     road.write_text("time [s],u [m]\n0,0\n0.005,0.01\n")
     library = (HERE / "modelica" / "Translation.mo").read_bytes()
@@ -242,8 +275,15 @@ def importers(folder: Path) -> list[Importer]:
         Importer("ONNX", ".onnx", "out", generate("onnx.toml"), [p.read_bytes() for p in networks], network_changed),
         Importer("network files", ".json", "out", generate("json.toml"), [p.read_bytes() for p in layers], text_changed),
         Importer("model files", ".toml", "out", generate(""), [lag("lag", "net.json", tunable=True).encode()], text_changed),
-        Importer("Modelica models", ".mo", "out.toml", lambda path, output: [*read(path, output), "--model", "Translation.Swing"], [library], text_changed),
-    ]  # fmt: skip
+        Importer(
+            "Modelica models",
+            ".mo",
+            "out.toml",
+            lambda path, output: [*read(path, output), "--model", "Translation.Swing"],
+            [library],
+            text_changed,
+        ),
+    ]
 
 
 def check(seeds: range, only: str = "") -> Iterator[Importer]:
@@ -270,7 +310,10 @@ def main() -> int:
     good = True
     for importer in check(range(1000, 1000 + chosen.files), chosen.only):
         count = Counter(taken=importer.taken, refused=importer.refused)
-        good &= gate.report(f"imports: {importer.name}: {chosen.files} files: {count['taken']} taken, {count['refused']} refused in {len(importer.lines)} kinds of lines", importer.problems[:10])
+        good &= gate.report(
+            f"imports: {importer.name}: {chosen.files} files: {count['taken']} taken, {count['refused']} refused in {len(importer.lines)} kinds of lines",
+            importer.problems[:10],
+        )
     return int(not good)
 
 

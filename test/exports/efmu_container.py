@@ -15,7 +15,9 @@ import pytest
 
 from penode_gen import exports
 
-SCHEMAS = pytest.mark.skipif(importlib.util.find_spec("rumoca") is None, reason="rumoca, which has the schemas, is not installed: pip install penode[efmu]")
+SCHEMAS = pytest.mark.skipif(
+    importlib.util.find_spec("rumoca") is None, reason="rumoca, which has the schemas, is not installed: pip install penode[efmu]"
+)
 
 
 def export(model: Any, folder: Path, **options: Any) -> Path:
@@ -37,7 +39,9 @@ def problems(files: dict[str, bytes]) -> list[str]:
     for part in ElementTree.fromstring(files["__content.xml"]):
         manifest = f"{part.get('name')}/{part.get('manifest')}"
         root = ElementTree.fromstring(files[manifest])
-        found += [f"{manifest}: checksum"] * (part.get("checksum") != sha1(files[manifest])) + [f"{manifest}: id"] * (part.get("manifestRefId") != root.get("id"))
+        found += [f"{manifest}: checksum"] * (part.get("checksum") != sha1(files[manifest])) + [f"{manifest}: id"] * (
+            part.get("manifestRefId") != root.get("id")
+        )
         found += [f"{manifest}: kind"] * (part.get("kind") != root.get("kind"))
         roots[str(root.get("id"))] = manifest, root
         listed |= {manifest}
@@ -60,7 +64,9 @@ def identifiers(root: ElementTree.Element) -> list[str]:
     return [str(e.get("id")) for e in root.iter() if e.get("id")]
 
 
-def _references(manifest: str, root: ElementTree.Element, files: dict[str, bytes], roots: dict[str, tuple[str, ElementTree.Element]]) -> list[str]:
+def _references(
+    manifest: str, root: ElementTree.Element, files: dict[str, bytes], roots: dict[str, tuple[str, ElementTree.Element]]
+) -> list[str]:
     """Within a manifest, and to the one that it was made from."""
     ids = identifiers(root)
     found = [f"{manifest}: the id {i} twice" for i in sorted({i for i in ids if ids.count(i) > 1})]
@@ -73,14 +79,20 @@ def _references(manifest: str, root: ElementTree.Element, files: dict[str, bytes
         own = [(k, v) for k, v in e.attrib.items() if k.endswith("RefId") and k not in ("manifestRefId", "foreignRefId")]
         found += [f"{manifest}: {k} {v}" for k, v in own if v not in ids]
         if e.get("foreignRefId"):
-            found += [f"{manifest}: foreignRefId {e.get('foreignRefId')}"] * (e.get("foreignRefId") not in foreign.get(str(e.get("manifestReferenceRefId")), []))
+            found += [f"{manifest}: foreignRefId {e.get('foreignRefId')}"] * (
+                e.get("foreignRefId") not in foreign.get(str(e.get("manifestReferenceRefId")), [])
+            )
     return found
 
 
 def unmapped(files: dict[str, bytes], folder: str) -> list[str]:
     """What of the block a Production Code does not map once: variables, the error signals, methods."""
     block = ElementTree.fromstring(files["AlgorithmCode/manifest.xml"])
-    wanted = [str(v.get("id")) for v in block.findall("Variables/*")] + ["block:ErrorSignalStatus"] + [str(m.get("id")) for m in block.iter("BlockMethod")]
+    wanted = (
+        [str(v.get("id")) for v in block.findall("Variables/*")]
+        + ["block:ErrorSignalStatus"]
+        + [str(m.get("id")) for m in block.iter("BlockMethod")]
+    )
     logical = ElementTree.fromstring(files[f"{folder}/manifest.xml"]).find("CodeContainer/LogicalData")
     assert logical is not None
     mapped = [str(e.get("foreignRefId")) for e in logical.iter() if e.get("foreignRefId")]

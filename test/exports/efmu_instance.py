@@ -32,10 +32,16 @@ class Production:
         if not self.library.exists():
             sources = sorted(f.get("name") for f in root.findall("Files/File") if f.get("name").endswith(".c"))
             subprocess.run(["gcc", *FLAGS, *sources, "-o", str(self.library)], cwd=folder, check=True)
-        self.functions = {r.find("ForeignFunctionReference").get("foreignRefId"): r.find("GlobalFunction").get("functionRefId") for r in root.iter("FunctionReference")}
+        self.functions = {
+            r.find("ForeignFunctionReference").get("foreignRefId"): r.find("GlobalFunction").get("functionRefId")
+            for r in root.iter("FunctionReference")
+        }
         names = {f.get("id"): f.get("name") for f in root.iter("Function")}
         self.functions = {method: names[i] for method, i in self.functions.items()}
-        self.members = {r.find("ForeignVariableReference").get("foreignRefId"): r.find("FormalParameter").get("componentIdentifier") for r in root.iter("DataReference")}
+        self.members = {
+            r.find("ForeignVariableReference").get("foreignRefId"): r.find("FormalParameter").get("componentIdentifier")
+            for r in root.iter("DataReference")
+        }
         coded = {t.get("id"): t.get("codedType") for t in root.iter("TargetType")}
         types = {t.get("id"): coded[t.find("Alias").get("targetTypeRefId")] for t in root.iter("Typedef") if t.find("Alias") is not None}
         of = {"float": ctypes.c_float, "double": ctypes.c_double, "bool": ctypes.c_bool, "uint32_t": ctypes.c_uint32}

@@ -57,7 +57,14 @@ class Block:
         self._functions: dict[str, tuple[list[Of], Of]] = {}
         self._called: set[str] = set()
         self._raised: set[str] = set()
-        self._scope_of_python: dict[str, Any] = {"R": real, "np": np, "mv": _product, "compare": self._compare, "raised": self._raised, **_FUNCTIONS}
+        self._scope_of_python: dict[str, Any] = {
+            "R": real,
+            "np": np,
+            "mv": _product,
+            "compare": self._compare,
+            "raised": self._raised,
+            **_FUNCTIONS,
+        }
         self.values: dict[str, Any] = {}
         self._scope_of_python["S"] = self.values
         self._read(tree)
@@ -268,7 +275,11 @@ class Block:
         text, of = self._expression(tree.children[0], scope)
         for sign, part in zip(tree.children[1::2], tree.children[2::2]):
             other, right = self._expression(part, scope)
-            self._want(of.kind != "Boolean" and fits(right, Of(of.kind, of.shape)), tree, f"{of.kind}{list(of.shape)} {sign} {right.kind}{list(right.shape)}")
+            self._want(
+                of.kind != "Boolean" and fits(right, Of(of.kind, of.shape)),
+                tree,
+                f"{of.kind}{list(of.shape)} {sign} {right.kind}{list(right.shape)}",
+            )
             text, of = f"({text} {sign} {other})", Of(of.kind, of.shape)
         return text, of
 
@@ -321,8 +332,20 @@ def _product(a: Any, b: Any) -> Any:
 
 
 _FUNCTIONS: dict[str, Any] = {
-    "f_absolute": np.abs, "f_sign": np.sign, "f_sqrt": np.sqrt, "f_exp": np.exp, "f_ln": np.log, "f_sin": np.sin, "f_cos": np.cos, "f_atan": np.arctan,
-    "f_tanh": np.tanh, "f_min": np.fmin, "f_max": np.fmax, "f_isNaN": np.isnan, "f_hasNaN1D": lambda x: bool(np.isnan(x).any()),
-    "f_hasNaN2D": lambda x: bool(np.isnan(x).any()), "f_real": float,
-}  # fmt: skip
+    "f_absolute": np.abs,
+    "f_sign": np.sign,
+    "f_sqrt": np.sqrt,
+    "f_exp": np.exp,
+    "f_ln": np.log,
+    "f_sin": np.sin,
+    "f_cos": np.cos,
+    "f_atan": np.arctan,
+    "f_tanh": np.tanh,
+    "f_min": np.fmin,
+    "f_max": np.fmax,
+    "f_isNaN": np.isnan,
+    "f_hasNaN1D": lambda x: bool(np.isnan(x).any()),
+    "f_hasNaN2D": lambda x: bool(np.isnan(x).any()),
+    "f_real": float,
+}
 _ = INTEGER

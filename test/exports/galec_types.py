@@ -77,9 +77,13 @@ REAL, BOOLEAN, INTEGER = Of("Real"), Of("Boolean"), Of("Integer")
 _ANY = {1: Of("Real", (-1,)), 2: Of("Real", (-1, -1))}
 BUILT_IN: dict[str, tuple[tuple[Of, ...], Of]] = {
     **{n: ((REAL,), REAL) for n in ("absolute", "sign", "sqrt", "exp", "ln", "sin", "cos", "atan", "tanh")},
-    "min": ((REAL, REAL), REAL), "max": ((REAL, REAL), REAL), "isNaN": ((REAL,), BOOLEAN), "real": ((INTEGER,), REAL),
-    "hasNaN1D": ((_ANY[1],), BOOLEAN), "hasNaN2D": ((_ANY[2],), BOOLEAN),
-}  # fmt: skip
+    "min": ((REAL, REAL), REAL),
+    "max": ((REAL, REAL), REAL),
+    "isNaN": ((REAL,), BOOLEAN),
+    "real": ((INTEGER,), REAL),
+    "hasNaN1D": ((_ANY[1],), BOOLEAN),
+    "hasNaN2D": ((_ANY[2],), BOOLEAN),
+}
 
 
 def fits(given: Of, wanted: Of) -> bool:

@@ -49,7 +49,9 @@ class Master:
         self.now = start_time
         kind = FMU3Slave if unpacked.version == 3 else FMU2Slave
         identifier = unpacked.description.coSimulation.modelIdentifier
-        self.fmu: Any = kind(guid=token or unpacked.description.guid, unzipDirectory=str(unpacked.folder), modelIdentifier=identifier, instanceName="one")
+        self.fmu: Any = kind(
+            guid=token or unpacked.description.guid, unzipDirectory=str(unpacked.folder), modelIdentifier=identifier, instanceName="one"
+        )
         if unpacked.version == 3:
             self.fmu.instantiate(loggingOn=logging, logMessage=lambda env, status, category, text: self._line(status, category, text))
         else:

@@ -19,7 +19,10 @@ import pytest
 import penode_gen
 
 
-@pytest.mark.skipif(any(importlib.util.find_spec(p) is None for p in ("fmpy", "rumoca")), reason="FMPy or rumoca is not installed: pip install penode[ssp,modelica]")
+@pytest.mark.skipif(
+    any(importlib.util.find_spec(p) is None for p in ("fmpy", "rumoca")),
+    reason="FMPy or rumoca is not installed: pip install penode[ssp,modelica]",
+)
 def test_damaged_files_are_taken_or_refused_with_a_line_each() -> None:
     for importer in df.check(range(4)):
         assert importer.problems == [] and importer.refused > 0, importer.name
@@ -61,7 +64,9 @@ def hangs(path: Path, output: Path) -> None:
     time.sleep(100)
 
 
-@pytest.mark.parametrize("fault", [raises, writes_before_it_reads, leaves_a_part, talks_at_length, says_nothing, claims_success, crashes, hangs])
+@pytest.mark.parametrize(
+    "fault", [raises, writes_before_it_reads, leaves_a_part, talks_at_length, says_nothing, claims_success, crashes, hangs]
+)
 def test_a_faulty_importer_is_found(fault: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(df, "LIMIT", 1)
     importer = df.Importer("faulty", ".mo", "out.json", lambda path, output: [str(path), str(output)], [b"record"], df.text_changed)

@@ -69,10 +69,12 @@ def test_a_fault_in_the_block_is_found(nqvm: Any, text: str, fault: str) -> None
 
 
 VARIANTS = [
-    {"method": "heun", "substeps": 3, "outside": "clamp", "low": -0.001}, pytest.param({"method": "euler", "outside": "fade", "low": -0.001}, marks=pytest.mark.long),
-    pytest.param({"method": "rk4"}, marks=pytest.mark.long), pytest.param({"method": "rk4", "input": "held", "activation": "sigmoid"}, marks=pytest.mark.long),
+    {"method": "heun", "substeps": 3, "outside": "clamp", "low": -0.001},
+    pytest.param({"method": "euler", "outside": "fade", "low": -0.001}, marks=pytest.mark.long),
+    pytest.param({"method": "rk4"}, marks=pytest.mark.long),
+    pytest.param({"method": "rk4", "input": "held", "activation": "sigmoid"}, marks=pytest.mark.long),
     pytest.param({"method": "heun", "activation": "relu", "input": "held", "substeps": 2}, marks=pytest.mark.long),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("options", VARIANTS, ids=lambda o: " ".join(map(str, o.values())))
@@ -89,7 +91,11 @@ def test_other_models_make_the_steps_of_their_c(tmp_path: Path, options: dict[st
 
 @pytest.mark.parametrize(
     ("activations", "sizes"),
-    [(["step", "tanh", "identity"], [3, 17, 2, 1]), pytest.param(["softplus", "relu"], [1, 1, 1], marks=pytest.mark.long), pytest.param(["sigmoid"], [1, 1], marks=pytest.mark.long)],
+    [
+        (["step", "tanh", "identity"], [3, 17, 2, 1]),
+        pytest.param(["softplus", "relu"], [1, 1, 1], marks=pytest.mark.long),
+        pytest.param(["sigmoid"], [1, 1], marks=pytest.mark.long),
+    ],
 )
 def test_models_that_are_a_network(tmp_path: Path, activations: list[str], sizes: list[int]) -> None:
     """No state; one neuron, one input, one layer. step compares, so the function has a signal."""
@@ -134,14 +140,25 @@ def test_the_tensor_flow_is_not_scalarised(text: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "line"),
     [
-        (r"weights_2 \* h2", "weights_2 * h1", "is assigned to|Real"), (r"weights_2 \* h2", "weights_2 * p5", "Real"), (r"absolute\(p2", "relu(p2", "there is no function relu"),
-        (r"/\* force of spring \*/", "// force of spring", "character|token"), (r"(?s)  method Recalibrate.*?end Recalibrate;", "", "the methods are"),
-        (r"for i in 1:16", "for i in 1:17", "subscript"), (r"0\.5 \*", "1 *", "Integer"), (r"'state\.z_b' := 0\.0;", "'state.z_b' := 0;", "Integer"),
-        (r"self\.z_b := 0\.0;", "", "Startup does not set z_b"), (r"end network;", "end net;", "ends as"), (r"signals NAN;", "signals OVERFLOW;", "declares the signals"),
-        (r"0\.0 - \(F", "-(F", "token"), (r"\(weights_2 \* h2\) \+ bias_2", "weights_2 * h2 + bias_2", "token"), (r"350\.0", "3.5e2", "token|character"),
-        (r"self\.z_b := y", "self.z_c := y", "z_c is not declared"), (r"x0\[4\]", "x0[5]", "assigned"), (r"signal NAN;", "signal NONE;", "no signal"),
+        (r"weights_2 \* h2", "weights_2 * h1", "is assigned to|Real"),
+        (r"weights_2 \* h2", "weights_2 * p5", "Real"),
+        (r"absolute\(p2", "relu(p2", "there is no function relu"),
+        (r"/\* force of spring \*/", "// force of spring", "character|token"),
+        (r"(?s)  method Recalibrate.*?end Recalibrate;", "", "the methods are"),
+        (r"for i in 1:16", "for i in 1:17", "subscript"),
+        (r"0\.5 \*", "1 *", "Integer"),
+        (r"'state\.z_b' := 0\.0;", "'state.z_b' := 0;", "Integer"),
+        (r"self\.z_b := 0\.0;", "", "Startup does not set z_b"),
+        (r"end network;", "end net;", "ends as"),
+        (r"signals NAN;", "signals OVERFLOW;", "declares the signals"),
+        (r"0\.0 - \(F", "-(F", "token"),
+        (r"\(weights_2 \* h2\) \+ bias_2", "weights_2 * h2 + bias_2", "token"),
+        (r"350\.0", "3.5e2", "token|character"),
+        (r"self\.z_b := y", "self.z_c := y", "z_c is not declared"),
+        (r"x0\[4\]", "x0[5]", "assigned"),
+        (r"signal NAN;", "signal NONE;", "no signal"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_galec_is_refused(text: str, old: str, new: str, line: str) -> None:
     wrong, count = re.subn(old, new, text)
     assert count
@@ -158,7 +175,12 @@ def test_every_manifest_is_valid_and_names_what_is_there(efmu: dict[str, bytes],
     assert problems(efmu) == [] and schemas.errors_of_all(efmu) == []
     assert b"Modelica Association" in efmu["schemas/LICENSE"]
     manifest = efmu["AlgorithmCode/manifest.xml"]
-    for old, new in ((b'kind="DoStep"', b'kind="Step"'), (b'xsdVersion="0.14.0"', b'xsdVersion="0.13.0"'), (b"Units>", b"Unit>"), (b'number="1"', b'number="0"')):
+    for old, new in (
+        (b'kind="DoStep"', b'kind="Step"'),
+        (b'xsdVersion="0.14.0"', b'xsdVersion="0.13.0"'),
+        (b"Units>", b"Unit>"),
+        (b'number="1"', b'number="0"'),
+    ):
         assert schemas.errors("AlgorithmCode", manifest.replace(old, new)), old
     assert schemas.errors("", efmu["__content.xml"].replace(b"__content", b"").replace(b'id="{', b'id="'))
 
@@ -166,9 +188,11 @@ def test_every_manifest_is_valid_and_names_what_is_there(efmu: dict[str, bytes],
 def test_faults_between_the_files_are_found(efmu: dict[str, bytes]) -> None:
     code, manifest = efmu["AlgorithmCode/block.alg"], efmu["AlgorithmCode/manifest.xml"]
     for wrong in (
-        {"AlgorithmCode/block.alg": code + b" "}, {"AlgorithmCode/manifest.xml": manifest + b" "}, {"AlgorithmCode/more.alg": b""},
+        {"AlgorithmCode/block.alg": code + b" "},
+        {"AlgorithmCode/manifest.xml": manifest + b" "},
+        {"AlgorithmCode/more.alg": b""},
         {"AlgorithmCode/manifest.xml": manifest.replace(b'variableRefId="', b'variableRefId="no')},
-    ):  # fmt: skip
+    ):
         assert problems(efmu | wrong)
 
 
@@ -186,7 +210,9 @@ def test_the_manifest_has_the_variables_of_the_block(nqvm: Any, efmu: dict[str, 
         assert e.tag == f"{block.variables[name].kind}Variable"
         start = [s == "true" if e.tag == "BooleanVariable" else float(s) for s in e.get("start").split()]
         assert np.array_equal(np.ravel(block.values[name]), start)
-    assert {m.get("kind"): {s.get("value") for s in m.iter("Signal")} for m in root.find("BlockMethods")} == {m: block.clauses[m] for m in ("Startup", "Recalibrate", "DoStep")}
+    assert {m.get("kind"): {s.get("value") for s in m.iter("Signal")} for m in root.find("BlockMethods")} == {
+        m: block.clauses[m] for m in ("Startup", "Recalibrate", "DoStep")
+    }
     assert float(entries[root.find("Clock").get("variableRefId")].get("start")) == nqvm.sample_time
 
 
@@ -210,11 +236,15 @@ def test_schemas_of_a_folder(efmu: dict[str, bytes], tmp_path: Path) -> None:
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).write_bytes(data)
     given = str(tmp_path / "schemas")
-    assert efmu_schemas.schemas("beta1", given) == {n.removeprefix("schemas/"): data for n, data in efmu.items() if n.startswith("schemas/")}
+    assert efmu_schemas.schemas("beta1", given) == {
+        n.removeprefix("schemas/"): data for n, data in efmu.items() if n.startswith("schemas/")
+    }
     for dialect, path, data, line in (
-        ("dymola", "", b"", "efmiContainerManifest.xsd is not version 0.10.0, which the dialect dymola has"), ("beta1", "efmiUnits.xsd", b"<a>", "efmiUnits.xsd is no XML"),
-        ("beta1", "efmiUnits.xsd", None, "includes efmiUnits.xsd, which is missing"), ("beta1", "efmiContainerManifest.xsd", None, "it has no efmiContainerManifest.xsd"),
-    ):  # fmt: skip
+        ("dymola", "", b"", "efmiContainerManifest.xsd is not version 0.10.0, which the dialect dymola has"),
+        ("beta1", "efmiUnits.xsd", b"<a>", "efmiUnits.xsd is no XML"),
+        ("beta1", "efmiUnits.xsd", None, "includes efmiUnits.xsd, which is missing"),
+        ("beta1", "efmiContainerManifest.xsd", None, "it has no efmiContainerManifest.xsd"),
+    ):
         kept = (tmp_path / "schemas" / path).read_bytes() if path else b""
         if path and data is None:
             (tmp_path / "schemas" / path).unlink()
@@ -231,7 +261,10 @@ def test_schemas_of_a_folder(efmu: dict[str, bytes], tmp_path: Path) -> None:
     [
         ('[model]\nmethod = "ros2"', 'method = "ros2": it has no form in Algorithm Code here; use one of euler, heun, rk4'),
         ('[model]\ninput = "cubic"', 'input = "cubic": it has no form in Algorithm Code here; use held or linear'),
-        ('[actuators]\nlate = { input = "z_road", law = "delay", samples = 3 }', "'late': an actuator that works on samples has no form in Algorithm Code here"),
+        (
+            '[actuators]\nlate = { input = "z_road", law = "delay", samples = 3 }',
+            "'late': an actuator that works on samples has no form in Algorithm Code here",
+        ),
     ],
 )
 def test_what_has_no_form_is_one_line(nqvm: Any, tmp_path: Path, change: str, line: str) -> None:
@@ -245,7 +278,11 @@ def test_what_has_no_form_is_one_line(nqvm: Any, tmp_path: Path, change: str, li
 
 def test_without_the_package_of_the_schemas(nqvm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(efmu_schemas.importlib.util, "find_spec", lambda name: None)
-    for options, line in (({}, "pip install penode\\[efmu\\], or name their folder"), ({"schemas": "/none"}, "there is no such folder"), ({"dialect": "dymola"}, "its schemas are in no package")):
+    for options, line in (
+        ({}, "pip install penode\\[efmu\\], or name their folder"),
+        ({"schemas": "/none"}, "there is no such folder"),
+        ({"dialect": "dymola"}, "its schemas are in no package"),
+    ):
         with pytest.raises(exports.ExportError, match=line):
             export(nqvm, tmp_path, **options)
 
@@ -253,12 +290,17 @@ def test_without_the_package_of_the_schemas(nqvm: Any, tmp_path: Path, monkeypat
 def test_names_that_the_language_keeps_are_quoted(tmp_path: Path) -> None:
     """Inputs, parameters, states and outputs named as keywords and functions; no input at all; names that it cannot have."""
     path = tmp_path / "m.toml"
-    path.write_text('[model]\nname = "block"\nsample_time = "1 ms"\nmethod = "heun"\n[parameters]\nsignal = { value = 1, unit = "s" }\nx = { value = 2, unit = "m", tunable = true }\n'
-                    '[states]\ntanh1D = { unit = "m", start = 0.5 }\n[equations]\nlag = "der(tanh1D)*signal = x - tanh1D"\n[outputs]\nlimit = { value = "tanh1D + x", unit = "m" }\n'
-                    'x = { value = "tanh1D", unit = "m" }\n')  # fmt: skip
+    path.write_text(
+        '[model]\nname = "block"\nsample_time = "1 ms"\nmethod = "heun"\n[parameters]\nsignal = { value = 1, unit = "s" }\nx = { value = 2, unit = "m", tunable = true }\n'
+        '[states]\ntanh1D = { unit = "m", start = 0.5 }\n[equations]\nlag = "der(tanh1D)*signal = x - tanh1D"\n[outputs]\nlimit = { value = "tanh1D + x", unit = "m" }\n'
+        'x = { value = "tanh1D", unit = "m" }\n'
+    )
     with pytest.raises(exports.ExportError, match="'x' would be two variables of the eFMU"):
         efmu_code.block(penode_gen.load(path))
     path.write_text(path.read_text().replace('x = { value = "tanh1D"', 'y = { value = "tanh1D"'))
     model = penode_gen.load(path)
     assert distances(model, np.zeros((30, 0)), np.float64).max() <= MOST
-    assert all(f"{kind} 'signal';" in efmu_code.block(model).text for kind in ("constant Real",)) and "block 'block'" in efmu_code.block(model).text
+    assert (
+        all(f"{kind} 'signal';" in efmu_code.block(model).text for kind in ("constant Real",))
+        and "block 'block'" in efmu_code.block(model).text
+    )

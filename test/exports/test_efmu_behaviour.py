@@ -42,7 +42,9 @@ def check(name: str, tested: Any, real: type, efmu: dict[str, bytes], capsys: py
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64], ids=["32 bit", "64 bit"])
-def test_the_code_keeps_to_the_trajectories(efmu: dict[str, bytes], production: Any, real: type, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_code_keeps_to_the_trajectories(
+    efmu: dict[str, bytes], production: Any, real: type, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Up to the recalibration it is the sweep."""
     check("recalibration", production(real), real, efmu, capsys)
 
@@ -80,9 +82,10 @@ def test_faults_of_a_recalibration_are_found(efmu: dict[str, bytes], production:
     turned = [(n, (i % 16) * 16 + i // 16 if n == "'damper_net.weights_2'" and i is not None else i, at) for n, i, at in scenario.tuned]
     assert "'damper_net.weights_2'" in names
     wrong: dict[str, Scenario] = {
-        "left out": replace(scenario, lines=[with_tail(k, 1_000_000) for k in range(len(rows))]), "late": replace(scenario, lines=[with_tail(k, 10) for k in range(len(rows))]),
+        "left out": replace(scenario, lines=[with_tail(k, 1_000_000) for k in range(len(rows))]),
+        "late": replace(scenario, lines=[with_tail(k, 10) for k in range(len(rows))]),
         "turned": replace(scenario, tuned=turned),
-    }  # fmt: skip
+    }
     for name, s in wrong.items():
         assert play(tested, s).max() > 1.0, name
 
@@ -90,9 +93,11 @@ def test_faults_of_a_recalibration_are_found(efmu: dict[str, bytes], production:
 def small(folder: Path, more: str = "") -> Any:
     """A lag with a tunable time constant in two sets."""
     path = folder / "lag.toml"
-    path.write_text('[model]\nname = "lag"\nsample_time = "10 ms"\nmethod = "heun"\n[parameters]\nT = { value = 1, unit = "s", tunable = true }\n[inputs]\nu = { unit = "m" }\n'
-                    '[states]\nx = { unit = "m" }\n[equations]\nlag = "der(x)*T = u - x"\n[outputs]\ny = { value = "x", unit = "m" }\n'
-                    f'[sets.default]\n[sets.slow]\nT = "2 s"\n{more}')  # fmt: skip
+    path.write_text(
+        '[model]\nname = "lag"\nsample_time = "10 ms"\nmethod = "heun"\n[parameters]\nT = { value = 1, unit = "s", tunable = true }\n[inputs]\nu = { unit = "m" }\n'
+        '[states]\nx = { unit = "m" }\n[equations]\nlag = "der(x)*T = u - x"\n[outputs]\ny = { value = "x", unit = "m" }\n'
+        f'[sets.default]\n[sets.slow]\nT = "2 s"\n{more}'
+    )
     return penode_gen.load(path)
 
 
@@ -114,12 +119,17 @@ def test_other_times_sets_and_none(tmp_path: Path) -> None:
     ("asked", "line"),
     [
         ("2", "--recalibration: '2' is no exchange; write a time in seconds, a colon and a set, such as 2.5:default"),
-        ("2:fast", "--recalibration: the model file has no set 'fast'; use one of: default, slow"), ("0.505:slow", "--recalibration: 0.505 s is no multiple of the sample time"),
-        ("1:slow, 2:default", "--recalibration: '1:slow, 2:default' is not one exchange; write a time in seconds, a colon and a set, or none"),
-        ("0:slow", "--recalibration: '0:slow' is at the start, before any sample; choose a later time"), ("", "--recalibration: '' is not one exchange"),
+        ("2:fast", "--recalibration: the model file has no set 'fast'; use one of: default, slow"),
+        ("0.505:slow", "--recalibration: 0.505 s is no multiple of the sample time"),
+        (
+            "1:slow, 2:default",
+            "--recalibration: '1:slow, 2:default' is not one exchange; write a time in seconds, a colon and a set, or none",
+        ),
+        ("0:slow", "--recalibration: '0:slow' is at the start, before any sample; choose a later time"),
+        ("", "--recalibration: '' is not one exchange"),
         ("50000:slow", "--recalibration: a table of 5000051 samples with 1 numbers each is too large; choose an earlier time, or none"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_recalibration_is_one_line(tmp_path: Path, asked: str, line: str) -> None:
     with pytest.raises(exports.ExportError) as found:
         export(small(tmp_path), tmp_path, recalibration=asked)

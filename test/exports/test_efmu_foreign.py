@@ -18,8 +18,7 @@ from typing import Any
 
 import pytest
 from conftest import ROOT
-from efmu_container import SCHEMAS as WITH_SCHEMAS
-from efmu_container import Schemas, contents, export, problems, unmapped
+from efmu_container import SCHEMAS as WITH_SCHEMAS, Schemas, contents, export, problems, unmapped
 from efmu_instance import FOLDERS
 
 import penode_gen
@@ -29,7 +28,11 @@ sys.path.append(str(ROOT / "test" / "gen"))
 from models import BARE, network_file  # needs the path above
 
 EFMI = Path(os.environ["EFMI_DIR"]) if os.environ.get("EFMI_DIR") else None
-SCHEMAS = next((p.parent for p in sorted(EFMI.rglob("efmiContainerManifest.xsd")) if 'fixed="0.10.0"' in p.read_text(encoding="utf-8-sig")), None) if EFMI else None
+SCHEMAS = (
+    next((p.parent for p in sorted(EFMI.rglob("efmiContainerManifest.xsd")) if 'fixed="0.10.0"' in p.read_text(encoding="utf-8-sig")), None)
+    if EFMI
+    else None
+)
 pytestmark = WITH_SCHEMAS
 CHECKER = next((p.parent for p in sorted(EFMI.rglob("ComplianceChecker.py"))), None) if EFMI else None
 
@@ -40,7 +43,9 @@ def test_the_dialect_of_dymola(nqvm: Any, tmp_path: Path) -> None:
     files = contents(export(nqvm, tmp_path, dialect="dymola", schemas=str(SCHEMAS)))
     assert problems(files) == [] and Schemas(files, tmp_path).errors_of_all(files) == []
     assert [unmapped(files, folder) for folder in FOLDERS.values()] == [[], []]
-    assert Schemas(files, tmp_path).errors("AlgorithmCode", files["AlgorithmCode/manifest.xml"].replace(b'xsdVersion="0.13.0"', b'xsdVersion="0.14.0"'))
+    assert Schemas(files, tmp_path).errors(
+        "AlgorithmCode", files["AlgorithmCode/manifest.xml"].replace(b'xsdVersion="0.13.0"', b'xsdVersion="0.14.0"')
+    )
 
 
 def check(files: dict[str, bytes], folder: Path) -> tuple[int, str]:
@@ -65,7 +70,9 @@ RUNS = pytest.mark.skipif(
 
 @RUNS
 @pytest.mark.long
-@pytest.mark.parametrize("dialect", ["beta1", pytest.param("dymola", marks=pytest.mark.skipif(SCHEMAS is None, reason="EFMI_DIR has no schemas of Dymola"))])
+@pytest.mark.parametrize(
+    "dialect", ["beta1", pytest.param("dymola", marks=pytest.mark.skipif(SCHEMAS is None, reason="EFMI_DIR has no schemas of Dymola"))]
+)
 def test_the_public_checker_accepts_it(nqvm: Any, tmp_path: Path, dialect: str) -> None:
     """Judged by its return code. Half a minute of processor time for 26 KB of weights."""
     schemas = {"schemas": str(SCHEMAS)} if dialect == "dymola" else {}
@@ -78,7 +85,9 @@ def test_the_public_checker_accepts_it(nqvm: Any, tmp_path: Path, dialect: str) 
 def test_the_public_checker_finds_faults(tmp_path: Path) -> None:
     """In a small model: a name, a declaration, a statement."""
     network_file(tmp_path / "net.json", [2, 3, 1], ["relu", "identity"], 1)
-    (tmp_path / "bare.toml").write_text(BARE.format(outside="extrapolate", inputs='a = { unit = "1" }\nb = { unit = "1" }', units=["1", "1"], names="a, b"))
+    (tmp_path / "bare.toml").write_text(
+        BARE.format(outside="extrapolate", inputs='a = { unit = "1" }\nb = { unit = "1" }', units=["1", "1"], names="a, b")
+    )
     files = contents(export(penode_gen.load(tmp_path / "bare.toml"), tmp_path))
     assert check(files, tmp_path)[0] == 0
     block = files["AlgorithmCode/block.alg"]

@@ -38,7 +38,11 @@ def lag(folder: Path, u: str = "u", T: str = "T", x: str = "x", y: str = "y") ->
 
 
 @SCHEMAS
-@pytest.mark.parametrize("names", [{"u": "clock", "y": "ErrorSignalStatus"}, {"u": "AlgorithmCode", "T": "recalibration", "y": "sweep"}], ids=lambda names: " ".join(names.values()))
+@pytest.mark.parametrize(
+    "names",
+    [{"u": "clock", "y": "ErrorSignalStatus"}, {"u": "AlgorithmCode", "T": "recalibration", "y": "sweep"}],
+    ids=lambda names: " ".join(names.values()),
+)
 def test_identifiers_of_the_manifests_are_clear_of_names(tmp_path: Path, names: dict[str, str]) -> None:
     files = lag(tmp_path, **names)
     assert problems(files) == [] and unmapped(files, "ProductionCode_32bit") == []
@@ -54,10 +58,18 @@ def test_a_signal_called_time_has_a_column_of_its_own(tmp_path: Path) -> None:
 
 
 @SCHEMAS
-@pytest.mark.parametrize("names", [{"u": "NONFINITE", "T": "FIRST_SET", "x": "REFUSED", "y": "first_set"}, {"u": "refused", "T": "T", "x": "known", "y": "report"}], ids=["capitals", "locals"])
+@pytest.mark.parametrize(
+    "names",
+    [{"u": "NONFINITE", "T": "FIRST_SET", "x": "REFUSED", "y": "first_set"}, {"u": "refused", "T": "T", "x": "known", "y": "report"}],
+    ids=["capitals", "locals"],
+)
 def test_names_of_the_c_around_the_model_are_clear_of_names(tmp_path: Path, names: dict[str, str]) -> None:
     """Every macro that the wrapper defines starts with the block's own prefix, which no name of a model file has; it compiles without a warning."""
     for name, data in lag(tmp_path, **names).items():
         if name.startswith("ProductionCode_32bit/"):
             (tmp_path / Path(name).name).write_bytes(data)
-    subprocess.run(["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wshadow", "-pedantic", "-fsyntax-only", "m_efmu.c"], cwd=tmp_path, check=True)
+    subprocess.run(
+        ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wshadow", "-pedantic", "-fsyntax-only", "m_efmu.c"],
+        cwd=tmp_path,
+        check=True,
+    )

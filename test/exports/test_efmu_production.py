@@ -93,9 +93,17 @@ def test_everything_of_the_block_is_mapped_once(efmu: dict[str, bytes]) -> None:
     for folder in FOLDERS.values():
         assert unmapped(efmu, folder) == []
         manifest = efmu[f"{folder}/manifest.xml"]
-        for old, new in ((b'foreignRefId="z_b"', b'foreignRefId="z_w"'), (b'foreignRefId="DoStep()"', b'foreignRefId="Startup()"'), (b'foreignRefId="block:ErrorSignalStatus"', b'foreignRefId="c"')):
+        for old, new in (
+            (b'foreignRefId="z_b"', b'foreignRefId="z_w"'),
+            (b'foreignRefId="DoStep()"', b'foreignRefId="Startup()"'),
+            (b'foreignRefId="block:ErrorSignalStatus"', b'foreignRefId="c"'),
+        ):
             assert old in manifest and unmapped(efmu | {f"{folder}/manifest.xml": manifest.replace(old, new)}, folder)
-        for old, new in ((b'foreignRefId="z_b"', b'foreignRefId="z_c"'), (b'origin="true"', b'origin="true" checksum2=""'), (b'typeDefRefId="bool"', b'typeDefRefId="boole"')):
+        for old, new in (
+            (b'foreignRefId="z_b"', b'foreignRefId="z_c"'),
+            (b'origin="true"', b'origin="true" checksum2=""'),
+            (b'typeDefRefId="bool"', b'typeDefRefId="boole"'),
+        ):
             assert problems(efmu | {f"{folder}/manifest.xml": manifest.replace(old, new)})
     assert any("origin" in p for p in problems(efmu | {"AlgorithmCode/manifest.xml": efmu["AlgorithmCode/manifest.xml"] + b" "}))
 
@@ -104,9 +112,13 @@ def test_the_how_to_of_the_documentation(production: Any, tmp_path: Path) -> Non
     """The C of gen/EXPORTS.md, compiled against the container's, with a main around it."""
     code = re.search(r"```c\n(static nqvm_efmu_t block;.*?)```", (ROOT / "gen" / "EXPORTS.md").read_text(), re.S)[1]
     first, rest = code.split("\n", 1)
-    (tmp_path / "main.c").write_text(f'#include "nqvm_efmu.h"\n{first}\nint main(void)\n{{\n{rest}    return (block.sets == 1U) ? (int)block.error_signal_status : 1;\n}}\n')
+    (tmp_path / "main.c").write_text(
+        f'#include "nqvm_efmu.h"\n{first}\nint main(void)\n{{\n{rest}    return (block.sets == 1U) ? (int)block.error_signal_status : 1;\n}}\n'
+    )
     library = production(np.float32).library
-    subprocess.run(["gcc", "-std=c99", "-Wall", "-Wextra", f"-I{library.parent}", "main.c", str(library), "-o", "main"], cwd=tmp_path, check=True)
+    subprocess.run(
+        ["gcc", "-std=c99", "-Wall", "-Wextra", f"-I{library.parent}", "main.c", str(library), "-o", "main"], cwd=tmp_path, check=True
+    )
     assert subprocess.run([str(tmp_path / "main")]).returncode == 0
 
 
@@ -115,8 +127,10 @@ def test_the_how_to_of_the_documentation(production: Any, tmp_path: Path) -> Non
 def test_names_of_the_structure_itself(tmp_path: Path) -> None:
     """A model without parameters to tune, whose names are those of the structure: it compiles without a warning, and runs as SiL."""
     path = tmp_path / "m.toml"
-    path.write_text('[model]\nname = "m"\nsample_time = "1 ms"\nmethod = "heun"\n[inputs]\nsets = { unit = "m" }\nstaged = { unit = "m" }\n[parameters]\nbanks = { value = 1, unit = "s" }\n'
-                    '[states]\nx = { unit = "m", start = 0.5 }\n[equations]\nlag = "der(x)*banks = sets - staged - x"\n[outputs]\ninstance = { value = "x", unit = "m" }\n')  # fmt: skip
+    path.write_text(
+        '[model]\nname = "m"\nsample_time = "1 ms"\nmethod = "heun"\n[inputs]\nsets = { unit = "m" }\nstaged = { unit = "m" }\n[parameters]\nbanks = { value = 1, unit = "s" }\n'
+        '[states]\nx = { unit = "m", start = 0.5 }\n[equations]\nlag = "der(x)*banks = sets - staged - x"\n[outputs]\ninstance = { value = "x", unit = "m" }\n'
+    )
     model = penode_gen.load(path)
     block = Production(contents(export(model, tmp_path)), np.float32, tmp_path)
     assert block.run("Startup") == 0 and block.run("Recalibrate") == 0

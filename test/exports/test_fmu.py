@@ -110,7 +110,11 @@ def test_values_that_are_no_numbers_are_refused_at_once(unpacked: Unpacked) -> N
         with pytest.raises(FMICallException) as refused:
             master.set("damper_net.bias_2", values)
         assert refused.value.status == DISCARD
-        assert master.log[-1] == (DISCARD, "sets", "damper_net.bias_2: element 8 is NaN, Inf or too large; nothing was written; set finite values")
+        assert master.log[-1] == (
+            DISCARD,
+            "sets",
+            "damper_net.bias_2: element 8 is NaN, Inf or too large; nothing was written; set finite values",
+        )
         master.step(STEP)
         if unpacked.version == 3:  # in FMI 2 the elements are variables of their own
             assert np.array_equal(master.get("damper_net.bias_2", "set_checksum"), before)
@@ -154,8 +158,10 @@ def test_a_state_of_another_export_is_refused(tmp_path: Path) -> None:
     masters = []
     for k in (3, 4):
         path = tmp_path / f"{k}.toml"
-        path.write_text(f'[model]\nname = "lag"\nsample_time = "1 ms"\n[parameters]\nk = {{ value = {k}, unit = "1" }}\nT = {{ value = 1, unit = "s", tunable = true }}\n'
-                        '[inputs]\nu = { unit = "m" }\n[states]\nx = { unit = "m" }\n[equations]\nq = "der(x) = (k*u - x)/T"\n[outputs]\ny = { value = "x", unit = "m" }\n')  # fmt: skip
+        path.write_text(
+            f'[model]\nname = "lag"\nsample_time = "1 ms"\n[parameters]\nk = {{ value = {k}, unit = "1" }}\nT = {{ value = 1, unit = "s", tunable = true }}\n'
+            '[inputs]\nu = { unit = "m" }\n[states]\nx = { unit = "m" }\n[equations]\nq = "der(x) = (k*u - x)/T"\n[outputs]\ny = { value = "x", unit = "m" }\n'
+        )
         (tmp_path / str(k)).mkdir()
         masters.append(Master(Unpacked(export(penode_gen.load(path), 3, tmp_path / str(k)), tmp_path / f"unpacked{k}")).initialise())
     one, other = masters
@@ -192,7 +198,12 @@ def test_linear_inputs(unpacked: Unpacked, nqvm: Any) -> None:
 def test_start_values_and_outputs_before_the_first_step(unpacked: Unpacked, nqvm: Any) -> None:
     master = Master(unpacked, start_time=3.0)
     master.initialise(z_road=[0.01], **{"state.z_b": 0.02, "parameter_set": 2})
-    assert master.get("z_b", "state.z_b", "time", "set_id").tolist() == [np.float32(0.02), np.float32(0.02), 3.0, penode_gen.set_head(nqvm, SET)[2]]
+    assert master.get("z_b", "state.z_b", "time", "set_id").tolist() == [
+        np.float32(0.02),
+        np.float32(0.02),
+        3.0,
+        penode_gen.set_head(nqvm, SET)[2],
+    ]
     sensed = master.get("a_wheel")
     assert sensed != 0.0  # the road pushes at once
     master.step(10 * STEP)
@@ -209,7 +220,11 @@ def test_mistakes_of_a_master_are_one_line_and_change_nothing(unpacked: Unpacked
     master.initialise()
     get, put = (master.fmu.getFloat64, master.fmu.setFloat64) if unpacked.version == 3 else (master.fmu.getReal, master.fmu.setReal)
     wrong = [
-        (lambda: master.fmu.doStep(0.0, 1.5e-3), ERROR, "a communication step of 0.0015 s; use a whole multiple of the sample time, 0.001 s"),
+        (
+            lambda: master.fmu.doStep(0.0, 1.5e-3),
+            ERROR,
+            "a communication step of 0.0015 s; use a whole multiple of the sample time, 0.001 s",
+        ),
         (lambda: master.fmu.doStep(0.0, 0.5e-3), ERROR, "a communication step of 0.0005 s; use a whole multiple"),
         (lambda: master.fmu.doStep(0.0, 0.0), ERROR, "a communication step of 0 s; use a whole multiple"),
         (lambda: master.fmu.doStep(0.0, np.nan), ERROR, "a communication step of nan s; use a whole multiple"),
@@ -219,10 +234,20 @@ def test_mistakes_of_a_master_are_one_line_and_change_nothing(unpacked: Unpacked
         (lambda: master.set("z_b", 1.0), ERROR, "cannot be set now"),
         (lambda: master.set("parameter_set", 9), DISCARD, "parameter_set: there is no number 9; use 1 to 2"),
         (lambda: master.set("input_between_samples", 2), ERROR, "before the simulation only"),
-        (lambda: master.derivative("z_b", "damper_net.bias_4" if unpacked.version == 3 else "damper_net.bias_4[1]"), ERROR, "derivatives are by inputs"),
+        (
+            lambda: master.derivative("z_b", "damper_net.bias_4" if unpacked.version == 3 else "damper_net.bias_4[1]"),
+            ERROR,
+            "derivatives are by inputs",
+        ),
     ]
     if unpacked.version == 3:
-        wrong.append((lambda: master.fmu.setFloat64([unpacked.reference["damper_net.weights_2"]], [1.0] * 15), ERROR, "15 values for variables with 256 elements"))
+        wrong.append(
+            (
+                lambda: master.fmu.setFloat64([unpacked.reference["damper_net.weights_2"]], [1.0] * 15),
+                ERROR,
+                "15 values for variables with 256 elements",
+            )
+        )
         wrong.append((lambda: master.fmu.getInt32([0]), ERROR, "fmi3GetInt32: this FMU does not provide it"))
     for call, status, line in wrong:
         lines = len(master.log)
@@ -241,18 +266,26 @@ def test_mistakes_of_a_master_are_one_line_and_change_nothing(unpacked: Unpacked
 def test_a_refused_set_is_a_warning_with_its_reason(tmp_path: Path, nqvm: Any) -> None:
     """A promise of the model file that the written set breaks; the running set stays, and the next good one is taken."""
     path = tmp_path / "promised.toml"
-    path.write_text(f'[model]\nextends = "{nqvm.path}"\nname = "promised"\n[networks]\nspring_net = {{ inputs = ["m"], output = "N", max_slope = "130000 N/m" }}\n')
+    path.write_text(
+        f'[model]\nextends = "{nqvm.path}"\nname = "promised"\n[networks]\nspring_net = {{ inputs = ["m"], output = "N", max_slope = "130000 N/m" }}\n'
+    )
     model = penode_gen.load(path)
     master = Master(Unpacked(export(model, 3, tmp_path), tmp_path / "unpacked"), logging=True).initialise()
     factor = master.get("spring_net.factor_2")
     before = master.get("set_id", "set_checksum")
     master.set("spring_net.factor_2", 10 * factor)
     master.step(STEP)
-    assert master.log == [(WARNING, "sets", "t = 0 s: the new set is refused and the running set stays: a network breaks a promise of the model file")]
+    assert master.log == [
+        (WARNING, "sets", "t = 0 s: the new set is refused and the running set stays: a network breaks a promise of the model file")
+    ]
     assert np.array_equal(master.get("set_id", "set_checksum", "spring_net.factor_2"), [*before, *factor])
     master.set("spring_net.factor_2", 0.5 * factor)
     master.step(STEP)
-    assert master.get("set_id") == 1000 and master.log[-1] == (0, "sets", "t = 0.001 s: the set that was written is in force from the next sample on")
+    assert master.get("set_id") == 1000 and master.log[-1] == (
+        0,
+        "sets",
+        "t = 0.001 s: the set that was written is in force from the next sample on",
+    )
 
 
 def test_inputs_that_are_no_numbers_hold_the_step(unpacked: Unpacked) -> None:
@@ -280,12 +313,16 @@ def test_the_same_model_gives_the_same_bytes(nqvm: Any, version: int, tmp_path: 
 def test_models_without_inputs_states_sensors_or_sets(tmp_path: Path) -> None:
     """What C cannot leave empty is left out of the FMU all the same."""
     swing = tmp_path / "swing.toml"
-    swing.write_text('[model]\nname = "swing"\nsample_time = "1 ms"\n[parameters]\nm = { value = 2, unit = "kg" }\nc = { value = 200, unit = "N/m", tunable = true }\n'
-                     '[bodies]\nbob = { mass = "m", start_position = "10 mm" }\n[elements]\ns = { between = ["bob", "ground"], law = "linear_spring", stiffness = "c" }\n'
-                     '[outputs]\nx = { value = "z_bob", unit = "m" }\n')  # fmt: skip
+    swing.write_text(
+        '[model]\nname = "swing"\nsample_time = "1 ms"\n[parameters]\nm = { value = 2, unit = "kg" }\nc = { value = 200, unit = "N/m", tunable = true }\n'
+        '[bodies]\nbob = { mass = "m", start_position = "10 mm" }\n[elements]\ns = { between = ["bob", "ground"], law = "linear_spring", stiffness = "c" }\n'
+        '[outputs]\nx = { value = "z_bob", unit = "m" }\n'
+    )
     gain = tmp_path / "gain.toml"
-    gain.write_text('[model]\nname = "gain"\nsample_time = "1 ms"\n[parameters]\nk = { value = 3, unit = "1" }\n[inputs]\nu = { unit = "m" }\n'
-                    '[outputs]\ny = { value = "k*u", unit = "m" }\n')  # fmt: skip
+    gain.write_text(
+        '[model]\nname = "gain"\nsample_time = "1 ms"\n[parameters]\nk = { value = 3, unit = "1" }\n[inputs]\nu = { unit = "m" }\n'
+        '[outputs]\ny = { value = "k*u", unit = "m" }\n'
+    )
     for path, name, versions in ((swing, "x", (2,)), (gain, "y", (3,))):
         model = penode_gen.load(path)
         for version in versions:
@@ -310,10 +347,15 @@ def test_all_functions_of_the_standard_are_there(unpacked: Unpacked) -> None:
     from penode_gen.exports.fmi_functions import functions
 
     library = ctypes.CDLL(str(next(unpacked.folder.rglob("*.so"))))
-    assert all(hasattr(library, f.name) for f in functions(unpacked.version)) and len(functions(unpacked.version)) == {3: 75, 2: 44}[unpacked.version]
+    assert (
+        all(hasattr(library, f.name) for f in functions(unpacked.version))
+        and len(functions(unpacked.version)) == {3: 75, 2: 44}[unpacked.version]
+    )
 
 
-def test_a_binary_that_is_missing_is_a_note(nqvm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_binary_that_is_missing_is_a_note(
+    nqvm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """With no compiler at all the FMU has its sources, and a line for each platform says why there is no more."""
     from penode_sil.cli import cli
 

@@ -71,7 +71,9 @@ def test_libcosim_changes_weights_while_it_runs(nqvm: Any, held: Any, tmp_path: 
         if k == 500:
             for array in penode_gen.layout.arrays(nqvm):
                 elements = unpacked.elements(array.name)
-                manipulator.slave_real_values(slave, [unpacked.reference[n] for n in elements], np.ravel(penode_gen.layout.gather(array, values)).tolist())
+                manipulator.slave_real_values(
+                    slave, [unpacked.reference[n] for n in elements], np.ravel(penode_gen.layout.gather(array, values)).tolist()
+                )
         execution.step()
         found.append(observer.last_real_values(slave, [unpacked.reference["z_b"], unpacked.reference["z_w"]]))
     start = np.array([0.02, 0.0, 0.0, 0.0], np.float32)

@@ -31,7 +31,8 @@ TARGET = {3: "x86_64-linux", 2: "linux64"}
 STEP, SET = 1e-3, "altered_friction"
 
 pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("elftools") is None or importlib.util.find_spec("fmpy") is None, reason="pyelftools or FMPy is not installed: pip install penode[xcp,fmi]"
+    importlib.util.find_spec("elftools") is None or importlib.util.find_spec("fmpy") is None,
+    reason="pyelftools or FMPy is not installed: pip install penode[xcp,fmi]",
 )
 
 
@@ -80,7 +81,11 @@ def test_manifest_and_files_are_where_the_standard_has_them(opened: Unpacked) ->
     assert root.tag == "fmiLayeredStandardManifest"
     assert (root.get(f"{SPACE}fmi-ls-name"), root.get(f"{SPACE}fmi-ls-version")) == ("org.fmi-standard.fmi-ls-xcp", "1.0.0")
     (interface,) = root
-    assert (interface.tag, interface.get("supportsDirectMemoryAccess"), interface.get("containsXCPService")) == ("Interface", "true", "false")
+    assert (interface.tag, interface.get("supportsDirectMemoryAccess"), interface.get("containsXCPService")) == (
+        "Interface",
+        "true",
+        "false",
+    )
     definition = interface.get("definition")
     for target in ("", f"{TARGET[opened.version]}/"):
         assert f"{FOLDER}/{target}{definition}" in names
@@ -100,20 +105,46 @@ def test_the_same_bytes_again_and_none_of_it_without_the_option(opened: Unpacked
 @pytest.mark.skipif(not A2LTOOL.exists(), reason="a2ltool is not installed: pip install a2ltool")
 def test_a2ltool_finds_nothing_and_fills_in_the_addresses_of_compiled_sources(opened: Unpacked, tmp_path: Path) -> None:
     for target in ("", TARGET[opened.version]):
-        done = subprocess.run([A2LTOOL, opened.folder / FOLDER / target / "nqvm.a2l", "--strict", "--check"], capture_output=True, text=True)
+        done = subprocess.run(
+            [A2LTOOL, opened.folder / FOLDER / target / "nqvm.a2l", "--strict", "--check"], capture_output=True, text=True
+        )
         assert done.returncode == 0 and (done.stdout + done.stderr).strip() == "Consistency check complete. No problems found."
     zeros = a2l(opened)
     assert {entry.address for entry in (*zeros.characteristics.values(), *zeros.measurements.values())} == {0}
     sources = sorted((opened.folder / "sources").glob("*.c"))
     library, filled = tmp_path / "nqvm.so", tmp_path / "filled.a2l"
     subprocess.run(
-        ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-ffunction-sections", "-fdata-sections", "-shared", "-Wl,--gc-sections",
-         "-fPIC", "-Wl,--build-id=none", "-g", f"-DFMI{opened.version}_OVERRIDE_FUNCTION_PREFIX", *sources, "-o", library], check=True,
-    )  # fmt: skip
-    subprocess.run([A2LTOOL, opened.folder / FOLDER / "nqvm.a2l", "--elffile", library, "--update", "ADDRESSES", "-o", filled], check=True, capture_output=True)
+        [
+            "gcc",
+            "-std=c99",
+            "-O2",
+            "-ffp-contract=off",
+            "-fno-math-errno",
+            "-fvisibility=hidden",
+            "-ffunction-sections",
+            "-fdata-sections",
+            "-shared",
+            "-Wl,--gc-sections",
+            "-fPIC",
+            "-Wl,--build-id=none",
+            "-g",
+            f"-DFMI{opened.version}_OVERRIDE_FUNCTION_PREFIX",
+            *sources,
+            "-o",
+            library,
+        ],
+        check=True,
+    )
+    subprocess.run(
+        [A2LTOOL, opened.folder / FOLDER / "nqvm.a2l", "--elffile", library, "--update", "ADDRESSES", "-o", filled],
+        check=True,
+        capture_output=True,
+    )
     theirs, ours = a2l_read.parse(filled.read_text(), "filled"), a2l(opened, TARGET[opened.version])
     for kind in ("characteristics", "measurements"):
-        assert {name: e.address for name, e in getattr(theirs, kind).items()} == {name: e.address for name, e in getattr(ours, kind).items()}
+        assert {name: e.address for name, e in getattr(theirs, kind).items()} == {
+            name: e.address for name, e in getattr(ours, kind).items()
+        }
 
 
 def test_memory_at_its_addresses_is_that_of_the_running_fmu(opened: Unpacked, nqvm: Any, held: Any) -> None:
@@ -143,7 +174,9 @@ def test_memory_at_its_addresses_is_that_of_the_running_fmu(opened: Unpacked, nq
     master.set("z_road", u[0])
     master.step(STEP)
     assert [line[:2] for line in master.log] == [(WARNING, "sets")]  # refused: what runs stands there again
-    assert all(np.array_equal(memory.read(e), values[(e.address - found.segment[0]) // 4 :][: e.count]) for e in found.characteristics.values())
+    assert all(
+        np.array_equal(memory.read(e), values[(e.address - found.segment[0]) // 4 :][: e.count]) for e in found.characteristics.values()
+    )
     master.fmu.freeInstance()
 
 

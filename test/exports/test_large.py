@@ -21,8 +21,14 @@ def write_model(folder: Path) -> Path:
     """Some 198 000 parameters, drawn."""
     rng = np.random.default_rng(1)
     widths = (1, 256, 256, 256, 256, 1)
-    layers = [{"activation": "relu" if n_out > 1 else "identity", "weights": (rng.standard_normal((n_out, n_in)) / 16).tolist(), "bias": [0.0] * n_out}
-              for n_in, n_out in zip(widths, widths[1:])]  # fmt: skip
+    layers = [
+        {
+            "activation": "relu" if n_out > 1 else "identity",
+            "weights": (rng.standard_normal((n_out, n_in)) / 16).tolist(),
+            "bias": [0.0] * n_out,
+        }
+        for n_in, n_out in zip(widths, widths[1:])
+    ]
     (folder / "big.json").write_text(json.dumps({"layers": layers}))
     (folder / "big.toml").write_text(lag("big", "big.json"))
     return folder / "big.toml"

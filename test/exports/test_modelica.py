@@ -60,7 +60,9 @@ def test_a_foreign_compiler_simulates_the_whole_model(nqvm: Any, tmp_path: Path)
     import rumoca
 
     u = chirp(0.5)
-    (tmp_path / "Driven.mo").write_text(export(nqvm, "model") + POLYGON.format(n=len(u), samples=", ".join(repr(float(v)) for v in u[:, 0])))
+    (tmp_path / "Driven.mo").write_text(
+        export(nqvm, "model") + POLYGON.format(n=len(u), samples=", ".join(repr(float(v)) for v in u[:, 0]))
+    )
     result = rumoca.Session().load(str(tmp_path / "Driven.mo"), model="Driven").simulate(0.5, dt=1e-3)
     found = np.array([result[f"plant.{name}"] for name in ("z_b", "z_w")]).T
     assert np.abs(found - Sil(nqvm, np.float64).run(u).y).max() <= 1e-6
@@ -75,8 +77,12 @@ def test_a_foreign_compiler_reads_the_values_of_the_record(nqvm: Any, tmp_path: 
     record = re.search(r"  record damper_net_parameters.*?end damper_net_parameters;", export(nqvm, "library"), re.S)[0]
     names = re.findall(r"parameter Real (\w+)\[([\d, ]+)\]", record)
     fixed = record.replace("    extends Modelica.Icons.Record;\n", "")
-    lines = [f"  Real {name}_[{shape}];\n" for name, shape in names] + ["equation\n"] + [f"  {name}_ = params.{name};\n" for name, _ in names]
-    (tmp_path / "Probe.mo").write_text(f"{fixed}\nmodel Probe\n  damper_net_parameters params;\n  Real x(start=0.0, fixed=true);\n{''.join(lines)}  der(x) = 1.0;\nend Probe;\n")
+    lines = (
+        [f"  Real {name}_[{shape}];\n" for name, shape in names] + ["equation\n"] + [f"  {name}_ = params.{name};\n" for name, _ in names]
+    )
+    (tmp_path / "Probe.mo").write_text(
+        f"{fixed}\nmodel Probe\n  damper_net_parameters params;\n  Real x(start=0.0, fixed=true);\n{''.join(lines)}  der(x) = 1.0;\nend Probe;\n"
+    )
     result = rumoca.Session().load(str(tmp_path / "Probe.mo"), model="Probe").simulate(0.01, dt=0.01)
     from penode_gen.exports.modelica_model import arrays
 
@@ -90,11 +96,33 @@ def test_networks_as_c_beside_one_another(nqvm: Any, tmp_path: Path) -> None:
     data = exports.export(nqvm, "modelica", Path("m.zip"), {"form": "external"})
     zipfile.ZipFile(io.BytesIO(data)).extractall(tmp_path)
     names = list(nqvm.networks)
-    calls = "".join(f"void call_{n}(const double u[], double y[]);\nvoid call_{n}(const double u[], double y[])\n{{\n    nqvm_{n}(u, y);\n}}\n" for n in names)
+    calls = "".join(
+        f"void call_{n}(const double u[], double y[]);\nvoid call_{n}(const double u[], double y[])\n{{\n    nqvm_{n}(u, y);\n}}\n"
+        for n in names
+    )
     (tmp_path / "both.c").write_text(f'#include "nqvm_networks.c"\n#include "nqvm_networks.c"\n{calls}')
     folder = tmp_path / "nqvm_networks" / "Resources" / "Include"
-    subprocess.run(["gcc", "-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror", "-shared", "-fPIC", f"-I{folder}",
-                    "-o", tmp_path / "both.so", tmp_path / "both.c", "-lm"], check=True)  # fmt: skip
+    subprocess.run(
+        [
+            "gcc",
+            "-std=c99",
+            "-O2",
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Wconversion",
+            "-Wshadow",
+            "-Werror",
+            "-shared",
+            "-fPIC",
+            f"-I{folder}",
+            "-o",
+            tmp_path / "both.so",
+            tmp_path / "both.c",
+            "-lm",
+        ],
+        check=True,
+    )
     library = ctypes.CDLL(str(tmp_path / "both.so"))
     for name in names:
         network = nqvm.sets["default"].networks[name]
@@ -109,11 +137,19 @@ def test_networks_as_c_beside_one_another(nqvm: Any, tmp_path: Path) -> None:
 
 def same(a: Any, b: Any) -> bool:
     """Equal to the bit."""
+
     def parts(layer: Any) -> list[np.ndarray]:
         return [layer.shift, layer.factor] if isinstance(layer, Affine) else [layer.weights, layer.bias]
 
-    ranges = all(np.array_equal(x, y) if x is not None and y is not None else x is y for x, y in ((a.input_min, b.input_min), (a.input_max, b.input_max)))
-    return a.architecture == b.architecture and ranges and all(np.array_equal(x, y) for p, q in zip(a.layers, b.layers) for x, y in zip(parts(p), parts(q)))
+    ranges = all(
+        np.array_equal(x, y) if x is not None and y is not None else x is y
+        for x, y in ((a.input_min, b.input_min), (a.input_max, b.input_max))
+    )
+    return (
+        a.architecture == b.architecture
+        and ranges
+        and all(np.array_equal(x, y) for p, q in zip(a.layers, b.layers) for x, y in zip(parts(p), parts(q)))
+    )
 
 
 @pytest.mark.parametrize("chosen", ["default", "altered_friction"])
@@ -134,8 +170,10 @@ def test_what_was_exported_is_imported_with_the_same_bits(nqvm: Any, tmp_path: P
 
 
 def test_a_record_alone_gets_its_activations_from_the_option() -> None:
-    text = ("record W parameter Real [2, 1] layer_1_weights = {{1}, {-2.5e-1}}; parameter Real [2] layer_1_bias = {0, 1};\n"
-            "parameter Real layer_2_weights[1, 2](each min=0) = {{3, 4}} \"words; }\"; parameter Real layer_2_bias[1] = {.5}; /* end W; */ end W;")  # fmt: skip
+    text = (
+        "record W parameter Real [2, 1] layer_1_weights = {{1}, {-2.5e-1}}; parameter Real [2] layer_1_bias = {0, 1};\n"
+        'parameter Real layer_2_weights[1, 2](each min=0) = {{3, 4}} "words; }"; parameter Real layer_2_bias[1] = {.5}; /* end W; */ end W;'
+    )
     network = modelica.networks(text, Path("n.mo"), Options("tanh"))["W"]
     assert [layer.activation for layer in network.layers] == ["tanh", "identity"]
     assert network.evaluate([2.0])[0] == pytest.approx(3 * np.tanh(2.0) + 4 * np.tanh(0.5) + 0.5, rel=1e-15)
@@ -145,18 +183,37 @@ def test_a_record_alone_gets_its_activations_from_the_option() -> None:
     ("text", "line"),
     [
         ("", "n.mo: there is no record with parameters layer_1_weights and layer_1_bias; name a file that has one"),
-        ("record W parameter Real layer_1_weights[1,1] = {{1}};", "n.mo: line 1: the record W has no end; the file is incomplete; export it again"),
-        ("record W\nparameter Real layer_1_weights[2,1] = {{1}}; end W;", "n.mo: line 2: layer_1_weights is declared with [2, 1], but has values of the shape [1, 1]; make them equal"),
-        ("record W parameter Real layer_1_weights[2,2] = {{1,2},{3}}; end W;", "n.mo: line 1: layer_1_weights has rows of different lengths; give every row one number a column"),
-        ("record W parameter Real layer_1_weights[1,1] = {{n}}; end W;", "n.mo: line 1: 'n' stands where a number or { is expected; export the record again"),
-        ("record W parameter Real layer_1_weights[1,1] = {{1e999}}; end W;", "n.mo: line 1: layer_1_weights has a number too large for a double; train or export the network again"),
+        (
+            "record W parameter Real layer_1_weights[1,1] = {{1}};",
+            "n.mo: line 1: the record W has no end; the file is incomplete; export it again",
+        ),
+        (
+            "record W\nparameter Real layer_1_weights[2,1] = {{1}}; end W;",
+            "n.mo: line 2: layer_1_weights is declared with [2, 1], but has values of the shape [1, 1]; make them equal",
+        ),
+        (
+            "record W parameter Real layer_1_weights[2,2] = {{1,2},{3}}; end W;",
+            "n.mo: line 1: layer_1_weights has rows of different lengths; give every row one number a column",
+        ),
+        (
+            "record W parameter Real layer_1_weights[1,1] = {{n}}; end W;",
+            "n.mo: line 1: 'n' stands where a number or { is expected; export the record again",
+        ),
+        (
+            "record W parameter Real layer_1_weights[1,1] = {{1e999}}; end W;",
+            "n.mo: line 1: layer_1_weights has a number too large for a double; train or export the network again",
+        ),
         ("record W parameter Real layer_1_weights[1,1] = {{1}}; end W;", "n.mo: record W: layer_1_bias is missing; add it"),
-        ("record W parameter Real layer_2_weights[1,1] = {{1}}; parameter Real layer_2_bias[1] = {1}; end W;",
-         "n.mo: record W: the layers are numbered 2; number them 1, 2, 3 ... without a gap"),
-        ("record W parameter Real layer_1_weights[1,1] = {{1}}; parameter Real layer_1_bias[2] = {1,2}; end W;",
-         "n.mo: record W: layer_1: weights [1, 1] and bias [2] do not fit; they must be [n, m] and [n]"),
+        (
+            "record W parameter Real layer_2_weights[1,1] = {{1}}; parameter Real layer_2_bias[1] = {1}; end W;",
+            "n.mo: record W: the layers are numbered 2; number them 1, 2, 3 ... without a gap",
+        ),
+        (
+            "record W parameter Real layer_1_weights[1,1] = {{1}}; parameter Real layer_1_bias[2] = {1,2}; end W;",
+            "n.mo: record W: layer_1: weights [1, 1] and bias [2] do not fit; they must be [n, m] and [n]",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_in_a_record_is_one_line(text: str, line: str) -> None:
     with pytest.raises(ImportProblem) as found:
         modelica.networks(text, Path("n.mo"), Options())
@@ -168,17 +225,30 @@ def damaged(text: str, rng: random.Random) -> str:
     at, length = rng.randrange(len(text)), rng.randrange(1, 200)
     piece = text[at : at + length]
     other = rng.randrange(len(text))
-    return rng.choice([
-        text[:at], text[:at] + chr(rng.choice([0, 34, 40, 44, 47, 59, 91, 92, 101, 123, 125, 0xD800 - 1, rng.randrange(1, 0x2FF)])) + text[at + 1 :],
-        text[:at] + text[at + length :], text[:at] + piece * rng.randrange(2, 20) + text[at:], text[:other] + piece + text[other:],
-        text[:at] + rng.choice("{([") * rng.choice([5, 5000]) + text[at:], piece, text.replace(rng.choice(["record", "end", "parameter", "{", ";", "."]), rng.choice(["", "end", "{{", "-"])),
-    ])  # fmt: skip
+    return rng.choice(
+        [
+            text[:at],
+            text[:at]
+            + chr(rng.choice([0, 34, 40, 44, 47, 59, 91, 92, 101, 123, 125, 0xD800 - 1, rng.randrange(1, 0x2FF)]))
+            + text[at + 1 :],
+            text[:at] + text[at + length :],
+            text[:at] + piece * rng.randrange(2, 20) + text[at:],
+            text[:other] + piece + text[other:],
+            text[:at] + rng.choice("{([") * rng.choice([5, 5000]) + text[at:],
+            piece,
+            text.replace(rng.choice(["record", "end", "parameter", "{", ";", "."]), rng.choice(["", "end", "{{", "-"])),
+        ]
+    )
 
 
 def check_damaged(nqvm: Any, seeds: range) -> None:
     """Each damaged file is read, or refused with one line; nothing else is raised."""
     small = "\n".join(line for line in export(nqvm, "library").splitlines() if not re.match(r" {8}\{.*\},?$", line) or "{{" in line)
-    texts = [export(nqvm, "library"), small, "record W parameter Real layer_1_weights[1,1] = {{1}}; parameter Real layer_1_bias[1] = {1}; end W;"]
+    texts = [
+        export(nqvm, "library"),
+        small,
+        "record W parameter Real layer_1_weights[1,1] = {{1}}; parameter Real layer_1_bias[1] = {1}; end W;",
+    ]
     refused = 0
     for seed in seeds:
         rng = random.Random(seed)
@@ -202,16 +272,26 @@ def test_1000_damaged_files_are_refused_with_a_line(nqvm: Any) -> None:
 
 def test_other_models_and_what_has_no_form(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
-    path.write_text('[model]\nname = "m"\nsample_time = "1 ms"\n[parameters]\nk = { value = 3, unit = "1" }\n[inputs]\nu = { unit = "m" }\n'
-                    '[actuators]\nlate = { input = "u", law = "delay", samples = 3 }\n[outputs]\ny = { value = "k*late", unit = "m" }\n')  # fmt: skip
+    path.write_text(
+        '[model]\nname = "m"\nsample_time = "1 ms"\n[parameters]\nk = { value = 3, unit = "1" }\n[inputs]\nu = { unit = "m" }\n'
+        '[actuators]\nlate = { input = "u", law = "delay", samples = 3 }\n[outputs]\ny = { value = "k*late", unit = "m" }\n'
+    )
     with pytest.raises(exports.ExportError, match="'late': an actuator that works on samples has no form in continuous Modelica"):
         export(penode_gen.load(path), "model")
     with pytest.raises(exports.ExportError, match="the model has no network; use --form model"):
         export(penode_gen.load(path), "library")
-    path.write_text('[model]\nname = "m"\nsample_time = "1 ms"\n[states]\nx = { unit = "1", start = 0.5 }\n[equations]\n'
-                    'q = "der(x) = where(x < 0.2, sigmoid(x), -max(x, 0)^2 + sqrt(abs(x)) + sign(x)*softplus(x) - 3*atan(x)/2)/T"\n'
-                    '[parameters]\nT = { value = 2, unit = "s" }\n[outputs]\ny = { value = "x", unit = "1" }\n')  # fmt: skip
+    path.write_text(
+        '[model]\nname = "m"\nsample_time = "1 ms"\n[states]\nx = { unit = "1", start = 0.5 }\n[equations]\n'
+        'q = "der(x) = where(x < 0.2, sigmoid(x), -max(x, 0)^2 + sqrt(abs(x)) + sign(x)*softplus(x) - 3*atan(x)/2)/T"\n'
+        '[parameters]\nT = { value = 2, unit = "s" }\n[outputs]\ny = { value = "x", unit = "1" }\n'
+    )
     text = export(penode_gen.load(path), "model")
     equation = next(line for line in text.splitlines() if "der(x) =" in line)
-    for part in ("noEvent(if x < 0.2 then (1.0/(1.0 + exp(-(x))))", "noEvent(if x > 0.0 then 1.0 elseif", "sqrt(noEvent(abs(x)))", "max(", "log(1.0 + exp("):
+    for part in (
+        "noEvent(if x < 0.2 then (1.0/(1.0 + exp(-(x))))",
+        "noEvent(if x > 0.0 then 1.0 elseif",
+        "sqrt(noEvent(abs(x)))",
+        "max(",
+        "log(1.0 + exp(",
+    ):
         assert part in equation

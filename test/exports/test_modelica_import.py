@@ -75,12 +75,14 @@ def test_a_motor_and_a_load_that_turn(tmp_path: Path) -> None:
 def test_a_quarter_vehicle_is_that_of_elements(tmp_path: Path) -> None:
     """The model file that an engineer would write, over a step of the road; the force of the tyre is an output."""
     path = tmp_path / "elements.toml"
-    path.write_text('[model]\nname = "elements"\nsample_time = "1 ms"\n[inputs]\nz_road = { unit = "m" }\n'
-                    '[bodies]\nbody = { mass = "380 kg" }\nwheel = { mass = "36 kg" }\n[elements]\n'
-                    'spring = { between = ["body", "wheel"], law = "linear_spring", stiffness = "21 kN/m" }\n'
-                    'damper = { between = ["body", "wheel"], law = "linear_damper", damping = "1500 N*s/m" }\n'
-                    'tyre = { between = ["wheel", "z_road"], law = "linear_spring", stiffness = "190 kN/m" }\n'
-                    '[outputs]\nz = { value = "z_body", unit = "m" }\nF = { value = "F_tyre", unit = "N" }\n')  # fmt: skip
+    path.write_text(
+        '[model]\nname = "elements"\nsample_time = "1 ms"\n[inputs]\nz_road = { unit = "m" }\n'
+        '[bodies]\nbody = { mass = "380 kg" }\nwheel = { mass = "36 kg" }\n[elements]\n'
+        'spring = { between = ["body", "wheel"], law = "linear_spring", stiffness = "21 kN/m" }\n'
+        'damper = { between = ["body", "wheel"], law = "linear_damper", damping = "1500 N*s/m" }\n'
+        'tyre = { between = ["wheel", "z_road"], law = "linear_spring", stiffness = "190 kN/m" }\n'
+        '[outputs]\nz = { value = "z_body", unit = "m" }\nF = { value = "F_tyre", unit = "N" }\n'
+    )
     u = np.where(np.arange(SAMPLES) < 100, 0.0, 0.02)[:, None]
     ours, by_hand = (Sil(m, np.float64).run(u).y for m in (imported("Quarter", tmp_path), penode_gen.load(path)))
     assert np.ptp(ours[:, 0]) > 0.02
@@ -88,7 +90,9 @@ def test_a_quarter_vehicle_is_that_of_elements(tmp_path: Path) -> None:
     assert np.abs(ours[:, 0] - by_hand[:, 0]).max() < 1e-12 and np.abs(np.abs(ours[:, 1]) - np.abs(by_hand[:, 1])).max() < 1e-7
 
 
-HEAD = 'model M\n  parameter Real k(unit = "N/m") = 2;\n  Real x(unit = "m", start = 1);\n  Real v(unit = "m/s");\nequation\n  v = der(x);\n'
+HEAD = (
+    'model M\n  parameter Real k(unit = "N/m") = 2;\n  Real x(unit = "m", start = 1);\n  Real v(unit = "m/s");\nequation\n  v = der(x);\n'
+)
 REFUSED = {
     "  when x > 1 then\n    reinit(v, 0);\n  end when;\n  1.0*der(v) = -k*x;\n": "M has events",
     "  der(v) = if x > 0 then -k*x else 0;\n": "M has events",
@@ -126,7 +130,10 @@ def test_files_beside_it_do_not_count(tmp_path: Path) -> None:
 
 
 def test_options_of_the_other_kind(tmp_path: Path) -> None:
-    for words, line in ((["-o", "m.toml", "--activation", "relu"], "--activation: it is for a network"), (["-o", "m.json", "--model", "M"], "--model: it is for a model")):
+    for words, line in (
+        (["-o", "m.toml", "--activation", "relu"], "--activation: it is for a network"),
+        (["-o", "m.json", "--model", "M"], "--model: it is for a model"),
+    ):
         done = CliRunner().invoke(cli, ["import", str(LIBRARY), *words], standalone_mode=False)
         assert done.exception is not None and line in done.exception.problems[0]
 

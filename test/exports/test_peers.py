@@ -47,7 +47,9 @@ def test_an_efmu_of_others_is_read(folder: Path, tmp_path: Path) -> None:
     """Valid against its own schemas, its manifests are those that it lists; a changed byte of one is found."""
     files = files_of(folder)
     assert Schemas(files, tmp_path).errors_of_all(files) == []
-    listed = [(f"{part.get('name')}/{part.get('manifest')}", part.get("checksum")) for part in ElementTree.fromstring(files["__content.xml"])]
+    listed = [
+        (f"{part.get('name')}/{part.get('manifest')}", part.get("checksum")) for part in ElementTree.fromstring(files["__content.xml"])
+    ]
     assert listed and all(sha1(files[name]) == checksum for name, checksum in listed)
     assert sha1(files[listed[0][0]] + b" ") != listed[0][1]
 
@@ -56,7 +58,14 @@ def test_an_efmu_of_others_is_read(folder: Path, tmp_path: Path) -> None:
 def test_our_efmu_is_valid_against_the_schemas_of_theirs(folder: Path, nqvm: Any, tmp_path: Path) -> None:
     """In the dialect of the tool that made it."""
     schemas = folder / "schemas"
-    version = next((v for v, d in (("0.10.0", "dymola"), ("0.11.0", "beta1")) if f'fixed="{v}"'.encode() in (schemas / "efmiContainerManifest.xsd").read_bytes()), None)
+    version = next(
+        (
+            v
+            for v, d in (("0.10.0", "dymola"), ("0.11.0", "beta1"))
+            if f'fixed="{v}"'.encode() in (schemas / "efmiContainerManifest.xsd").read_bytes()
+        ),
+        None,
+    )
     assert version, "a dialect that penode does not know"
     files = contents(export(nqvm, tmp_path, dialect="dymola" if version == "0.10.0" else "beta1", schemas=str(schemas)))
     assert Schemas(files, tmp_path).errors_of_all(files) == []

@@ -62,7 +62,9 @@ def test_every_file_is_valid(ssp: Path) -> None:
         if Path(name).suffix in kinds:
             schema = xmlschema.XMLSchema11(str(folder / f"SystemStructure{kinds[Path(name).suffix]}.xsd"))
             assert [str(e.reason) for e in schema.iter_errors(data.decode())] == []
-            assert not schema.is_valid(data.decode().replace("version=", "versions=", 2).replace('versions="1.0" enc', 'version="1.0" enc'))  # a seeded fault
+            assert not schema.is_valid(
+                data.decode().replace("version=", "versions=", 2).replace('versions="1.0" enc', 'version="1.0" enc')
+            )  # a seeded fault
             checked += 1
     assert checked == 4
     own = xmlschema.XMLSchema(files["extra/penode/parameter-schedule.xsd"].decode())
@@ -150,10 +152,13 @@ def test_ecos_plays_it(nqvm: Any, held: Any, tmp_path: Path) -> None:
         ({"schedule": "2"}, "--schedule: '2' is no exchange; write a time in seconds, a colon and a set, such as 2.5:default"),
         ({"schedule": "2:other"}, "--schedule: the model file has no set 'other'; use one of: default, altered_friction"),
         ({"schedule": "2:default,1:default"}, "--schedule: 1 s does not come after 2 s; give the times in order"),
-        ({"schedule": "0.0005:default"}, "--schedule: 0.0005 s is no multiple of the sample time, 0.001 s; a set comes into force between two samples"),
+        (
+            {"schedule": "0.0005:default"},
+            "--schedule: 0.0005 s is no multiple of the sample time, 0.001 s; a set comes into force between two samples",
+        ),
         ({"set": "other"}, "--set: the model file has no set 'other'; use one of: default, altered_friction"),
     ],
-)  # fmt: skip
+)
 def test_options_that_do_not_fit_are_one_line(nqvm: Any, options: dict[str, Any], line: str) -> None:
     with pytest.raises(exports.ExportError) as found:
         exports.export(nqvm, "ssp", Path("n.ssp"), {"source_only": True, **options})
@@ -174,10 +179,26 @@ def test_what_is_wrong_in_an_ssp_is_one_line(ssp: Path, tmp_path: Path) -> None:
     to = tmp_path / "wrong.ssp"
     for name, swap, line in (
         ("extra/penode/schedule.xml", ('time="1.0"', 'time="soon"'), "extra/penode/schedule.xml: 'soon' is no number; mend it"),
-        ("extra/penode/schedule.xml", ('time="1.0"', 'time="9"'), "extra/penode/schedule.xml: an exchange at 1.5 s; times are 0 or more and ascend"),
-        ("extra/penode/schedule.xml", ('element="nqvm"', 'element="other"'), "extra/penode/schedule.xml: there is no component 'other'; the system has 'nqvm'"),
-        ("extra/penode/schedule.xml", (f"resources/{SET}.ssv", "resources/no.ssv"), "extra/penode/schedule.xml: there is no 'resources/no.ssv' in the archive; export it again"),
-        ("extra/penode/schedule.xml", ('version="1.0">', 'version="2.0">'), "extra/penode/schedule.xml: version 2.0; this player reads version 1"),
+        (
+            "extra/penode/schedule.xml",
+            ('time="1.0"', 'time="9"'),
+            "extra/penode/schedule.xml: an exchange at 1.5 s; times are 0 or more and ascend",
+        ),
+        (
+            "extra/penode/schedule.xml",
+            ('element="nqvm"', 'element="other"'),
+            "extra/penode/schedule.xml: there is no component 'other'; the system has 'nqvm'",
+        ),
+        (
+            "extra/penode/schedule.xml",
+            (f"resources/{SET}.ssv", "resources/no.ssv"),
+            "extra/penode/schedule.xml: there is no 'resources/no.ssv' in the archive; export it again",
+        ),
+        (
+            "extra/penode/schedule.xml",
+            ('version="1.0">', 'version="2.0">'),
+            "extra/penode/schedule.xml: version 2.0; this player reads version 1",
+        ),
         ("SystemStructure.ssd", ("<ssd:Component ", "<ssd:Components "), "SystemStructure.ssd: no XML that can be read: mismatched tag"),
         ("SystemStructure.ssd", ('source="resources/nqvm.fmu"', ""), "SystemStructure.ssd: Component has no attribute source; add it"),
     ):
@@ -252,8 +273,13 @@ def test_an_input_without_a_column_keeps_what_the_ssp_binds_to_it(ssp: Path, tmp
 def test_tables_and_options_that_do_not_fit_are_one_line(ssp: Path, tmp_path: Path) -> None:
     pytest.importorskip("fmpy")
     record, output = tmp_path / "r.csv", tmp_path / "o.csv"
-    for text, part in (("", "no column time"), ("time\n0,1\n", "does not fit"), ("time,z_road\n0,a\n", "could not convert"), ("time,z_road\n0,0\n0,0\n", "do not ascend"),
-                       ("time,z_road\n0,1\n1\n", "as many numbers")):  # fmt: skip
+    for text, part in (
+        ("", "no column time"),
+        ("time\n0,1\n", "does not fit"),
+        ("time,z_road\n0,a\n", "could not convert"),
+        ("time,z_road\n0,0\n0,0\n", "do not ascend"),
+        ("time,z_road\n0,1\n1\n", "as many numbers"),
+    ):
         record.write_text(text)
         with pytest.raises(UserError) as found:
             play("--ssp", str(ssp), "--input", str(record), "-o", str(output))

@@ -23,7 +23,9 @@ from penode_sil.targets import Sil
 
 COMPILER, READER = "x86_64-w64-mingw32-gcc", "x86_64-w64-mingw32-objdump"
 SYSTEM = {"KERNEL32.dll", "msvcrt.dll"}  # every Windows has them
-pytestmark = pytest.mark.skipif(shutil.which(COMPILER) is None or shutil.which(READER) is None, reason=f"{COMPILER} is not installed: no Windows binary is checked")
+pytestmark = pytest.mark.skipif(
+    shutil.which(COMPILER) is None or shutil.which(READER) is None, reason=f"{COMPILER} is not installed: no Windows binary is checked"
+)
 
 
 def library_of(unpacked: Unpacked) -> Path:
@@ -37,7 +39,11 @@ def problems(library: Path, version: int) -> list[str]:
     text = subprocess.run([READER, "-p", library], capture_output=True, text=True, check=True).stdout
     exported = set(re.findall(r"^\s*\[ *\d+\] (?:\+base\[ *\d+\] +\w+ )?(\w+)$", text.partition("[Ordinal/Name Pointer] Table")[2], re.M))
     needed = set(re.findall(r"DLL Name: (\S+)", text))
-    stamps = {stamp for stamp in re.findall(r"^Time/Date(?: stamp)?\s+(.+)", text, re.M) if stamp not in ("0", "00000000", "Thu Jan  1 00:00:00 1970")}
+    stamps = {
+        stamp
+        for stamp in re.findall(r"^Time/Date(?: stamp)?\s+(.+)", text, re.M)
+        if stamp not in ("0", "00000000", "Thu Jan  1 00:00:00 1970")
+    }
     standard = {f.name for f in functions(version)}
     found = [f"not exported: {name}" for name in standard - exported] + [f"not of the standard: {name}" for name in exported - standard]
     return found + [f"needs {name}" for name in needed - SYSTEM] + [f"time stamp {stamp}" for stamp in stamps]
@@ -69,11 +75,17 @@ def test_faults_of_a_binary_are_found(unpacked: Unpacked, tmp_path: Path) -> Non
     text = (sources / name).read_text()
     build(sources, tmp_path, version, **{name: text + "\n__declspec(dllexport) int helper(void);\nint helper(void)\n{\n    return 1;\n}\n"})
     assert problems(tmp_path / "made.dll", version) == ["not of the standard: helper"]
-    renamed = {file: path.read_text().replace(f"fmi{version}Reset", "fmiReset") for file in (name, f"fmi{version}_api.h") if (path := sources / file)}
+    renamed = {
+        file: path.read_text().replace(f"fmi{version}Reset", "fmiReset")
+        for file in (name, f"fmi{version}_api.h")
+        if (path := sources / file)
+    }
     build(sources, tmp_path, version, **renamed)
     assert sorted(problems(tmp_path / "made.dll", version)) == [f"not exported: fmi{version}Reset", "not of the standard: fmiReset"]
     files = [str(path) for path in sources.glob("*.c")]
-    subprocess.run([COMPILER, "-shared", "-O0", f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX", "-o", tmp_path / "clock.dll", *files], check=True)
+    subprocess.run(
+        [COMPILER, "-shared", "-O0", f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX", "-o", tmp_path / "clock.dll", *files], check=True
+    )
     assert any(line.startswith("time stamp") for line in problems(tmp_path / "clock.dll", version))
 
 
@@ -91,7 +103,21 @@ def test_it_computes_the_same_in_wine(unpacked: Unpacked, held: Any, tmp_path: P
     version, refer = unpacked.version, unpacked.reference
     master = tmp_path / "master.exe"
     source = Path(__file__).with_name("windows_master.c")
-    subprocess.run([COMPILER, "-std=c99", "-O2", "-Wall", "-Werror", f"-DFMI_VERSION={version}", f"-I{unpacked.folder / 'sources'}", source, "-o", master], check=True)
+    subprocess.run(
+        [
+            COMPILER,
+            "-std=c99",
+            "-O2",
+            "-Wall",
+            "-Werror",
+            f"-DFMI_VERSION={version}",
+            f"-I{unpacked.folder / 'sources'}",
+            source,
+            "-o",
+            master,
+        ],
+        check=True,
+    )
     u = chirp(60.0)
     u[:-1].astype("<f8").tofile(tmp_path / "in.bin")
     prefix = Path(os.environ.get("WINEPREFIX", ROOT / "build" / "wine"))  # kept: to make it takes 10 s

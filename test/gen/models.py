@@ -108,8 +108,17 @@ def network_file(path: Path, sizes: list[int], activations: list[str], seed: int
     return data
 
 
-def rich(folder: Path, method: str = "rk4", h: float = 1e-3, input: str = "linear", outside: str = "extrapolate",
-         substeps: int = 1, activation: str = "tanh", low: float = -1.0, high: float = 1.0) -> Path:
+def rich(
+    folder: Path,
+    method: str = "rk4",
+    h: float = 1e-3,
+    input: str = "linear",
+    outside: str = "extrapolate",
+    substeps: int = 1,
+    activation: str = "tanh",
+    low: float = -1.0,
+    high: float = 1.0,
+) -> Path:
     """Write the rich model and its network; the damper to the foot needs the input's rate, so a held input has none."""
     damper = 'foot_d = { between = ["mass", "z"], law = "linear_damper", damping = "3 N*s/m" }' if input != "held" else ""
     network_file(folder / "n2.json", [2, 5, 7, 1], [activation, "softplus", "identity"], 5, low, high)
@@ -121,8 +130,12 @@ def rich(folder: Path, method: str = "rk4", h: float = 1e-3, input: str = "linea
 def activate(name: str, x: np.ndarray) -> np.ndarray:
     """Activations by NumPy."""
     return {
-        "relu": lambda: np.maximum(x, 0.0), "identity": lambda: x, "tanh": lambda: np.tanh(x), "step": lambda: np.where(x < 0, 0.0, 1.0),
-        "sigmoid": lambda: 1.0 / (1.0 + np.exp(-x)), "softplus": lambda: np.log1p(np.exp(-np.abs(x))) + np.maximum(x, 0.0),
+        "relu": lambda: np.maximum(x, 0.0),
+        "identity": lambda: x,
+        "tanh": lambda: np.tanh(x),
+        "step": lambda: np.where(x < 0, 0.0, 1.0),
+        "sigmoid": lambda: 1.0 / (1.0 + np.exp(-x)),
+        "softplus": lambda: np.log1p(np.exp(-np.abs(x))) + np.maximum(x, 0.0),
     }[name]()
 
 

@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 from onnx.reference import ReferenceEvaluator
+
 from penode_gen.network_files import read_network
 from penode_gen.networks import Network, NetworkError
 
@@ -29,12 +30,7 @@ def node(op: str, inputs: str, output: str, **attributes: Any) -> NodeProto:
 
 
 def model(
-    nodes: list[NodeProto],
-    constants: Constants,
-    shape: list[Any] | None = None,
-    dtype: int = DOUBLE,
-    opset: int = 17,
-    extra: str = "",
+    nodes: list[NodeProto], constants: Constants, shape: list[Any] | None = None, dtype: int = DOUBLE, opset: int = 17, extra: str = ""
 ) -> onnx.ModelProto:
     """Graph from x to y. Constants of float64 take the type of the graph."""
     real = helper.tensor_dtype_to_np_dtype(dtype)

@@ -40,7 +40,9 @@ def main() -> None:
     print("| operator | cases read | of |\n|---|---|---|")
     for kind in sorted(read):
         print(f"| {kind} | {read[kind]} | {cases[kind]} |")
-    print(f"\n{len(set(cases) - set(read))} other operators have cases with such an input. Why cases are refused:\n\n| reason | cases |\n|---|---|")
+    print(
+        f"\n{len(set(cases) - set(read))} other operators have cases with such an input. Why cases are refused:\n\n| reason | cases |\n|---|---|"
+    )
     for text, count in why.most_common(12):
         print(f"| {text} | {count} |")
 

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from models import RICH, network_file
 
 import penode_gen
-from models import RICH, network_file
 from penode_gen import exports, layout
 from penode_gen.exports import a2l, elf_types
 from penode_sil.calibration import a2l_read, virtual
@@ -51,7 +51,12 @@ def text(rich: tuple[penode_gen.Model, dict], program: Path) -> str:
 
 def in_elf(program: Path, address: int, n: int) -> bytes:
     """Bytes of the program's file, by objdump: no code of ours."""
-    shown = subprocess.run(["objdump", "-s", f"--start-address={address}", f"--stop-address={address + n}", program], capture_output=True, text=True, check=True)
+    shown = subprocess.run(
+        ["objdump", "-s", f"--start-address={address}", f"--stop-address={address + n}", program],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     rows = [line[1:].split("  ")[0].split()[1:] for line in shown.stdout.splitlines() if re.match(r" [0-9a-f]+ ", line)]
     return bytes.fromhex("".join("".join(row) for row in rows))
 
@@ -78,12 +83,21 @@ def test_blocks_are_the_weights_of_the_file(rich: tuple[penode_gen.Model, dict],
 
 def test_units_limits_and_signals(text: str) -> None:
     a2l = a2l_read.parse(text, "a2l")
-    assert {name: a2l.measurements[name].unit for name in ("q", "a", "F", "v", "F_lag", "w")} == {"q": "m", "a": "m/s^2", "F": "N", "v": "m/s", "F_lag": "N", "w": "N"}
+    assert {name: a2l.measurements[name].unit for name in ("q", "a", "F", "v", "F_lag", "w")} == {
+        "q": "m",
+        "a": "m/s^2",
+        "F": "N",
+        "v": "m/s",
+        "F_lag": "N",
+        "w": "N",
+    }
     assert a2l.epk is not None and a2l.epk[0].startswith("rich ")
 
 
 @pytest.mark.skipif(not A2LTOOL.exists(), reason="a2ltool is not installed: pip install a2ltool")
-@pytest.mark.parametrize("transport", ["tcp:127.0.0.1:5555", "udp:10.0.0.1:5555", "serial:115200", "can:0x100:0x101", "canfd:0x18DA00F1:0x18DAF100"])
+@pytest.mark.parametrize(
+    "transport", ["tcp:127.0.0.1:5555", "udp:10.0.0.1:5555", "serial:115200", "can:0x100:0x101", "canfd:0x18DA00F1:0x18DAF100"]
+)
 def test_a2ltool_has_nothing_to_say(rich: tuple[penode_gen.Model, dict], program: Path, tmp_path: Path, transport: str) -> None:
     path, kept = tmp_path / "x.a2l", tmp_path / "kept.a2l"
 
@@ -116,11 +130,16 @@ def test_a2ltool_finds_the_same_addresses_in_the_elf(program: Path, text: str, t
 def test_a2ltool_makes_the_same_measurements_out_of_the_types_in_the_elf(program: Path, text: str, tmp_path: Path) -> None:
     """The second way: types, sizes and addresses without us. It does not carry to the set, which is one array in C: one block without names."""
     made = tmp_path / "made.a2l"
-    links = {name: re.search(rf'MEASUREMENT {re.escape(name)} .*?SYMBOL_LINK "(.*?)"', text, re.S)[1] for name in a2l_read.parse(text, "a2l").measurements}
+    links = {
+        name: re.search(rf'MEASUREMENT {re.escape(name)} .*?SYMBOL_LINK "(.*?)"', text, re.S)[1]
+        for name in a2l_read.parse(text, "a2l").measurements
+    }
     words = [word for link in links.values() for word in ("--measurement", link)] + ["--characteristic", "rich_value_default"]
     subprocess.run([A2LTOOL, "--create", "--elffile", program, *words, "-o", made], check=True, capture_output=True)
     ours, theirs = a2l_read.parse(text, "ours"), a2l_read.parse(made.read_text(), "theirs")
-    assert {name: (e.address, e.type) for name, e in ours.measurements.items()} == {name: (theirs.measurements[link].address, theirs.measurements[link].type) for name, link in links.items()}
+    assert {name: (e.address, e.type) for name, e in ours.measurements.items()} == {
+        name: (theirs.measurements[link].address, theirs.measurements[link].type) for name, link in links.items()
+    }
     (whole,) = theirs.characteristics.values()
     assert (whole.address, whole.size) == ours.segment
 
@@ -137,12 +156,19 @@ def test_pya2l_reads_it(text: str, tmp_path: Path) -> None:
         assert all(f'"{name}"' in json for name in a2l_read.parse(text, "a2l").characteristics)
         return (done.stdout + done.stderr).splitlines()
 
-    inside = [(text.count("\n", 0, m.start()) + 1, text.count("\n", 0, m.end()) + 1) for m in re.finditer(r"/begin IF_DATA.*?/end IF_DATA", text, re.S)]
+    inside = [
+        (text.count("\n", 0, m.start()) + 1, text.count("\n", 0, m.end()) + 1)
+        for m in re.finditer(r"/begin IF_DATA.*?/end IF_DATA", text, re.S)
+    ]
     for line in remarks(text):
         at, what = re.fullmatch(r"(\d+):\d+ (.*)", line).groups()
         assert "may be used at most once here" in what and any(first <= int(at) <= last for first, last in inside), line
     assert remarks(re.sub(r"/begin IF_DATA.*?/end IF_DATA", "", text, flags=re.S)) == []
-    (only,) = remarks(re.sub(r"/begin IF_DATA.*?/end IF_DATA", "", text, flags=re.S).replace("/end MODULE", "/begin IF_DATA XCP /begin PAG 0x01 /end PAG /end IF_DATA /end MODULE"))
+    (only,) = remarks(
+        re.sub(r"/begin IF_DATA.*?/end IF_DATA", "", text, flags=re.S).replace(
+            "/end MODULE", "/begin IF_DATA XCP /begin PAG 0x01 /end PAG /end IF_DATA /end MODULE"
+        )
+    )
     assert only.endswith("PAG may be used at most once here, only the last occurrence is kept")
 
 
@@ -183,7 +209,9 @@ def test_what_is_wrong_is_one_line(rich: tuple[penode_gen.Model, dict], program:
     assert len(refused.value.problems) == 1 and line in refused.value.problems[0]
 
 
-def test_program_of_another_model_or_without_debug_information_is_refused(rich: tuple[penode_gen.Model, dict], program: Path, tmp_path: Path) -> None:
+def test_program_of_another_model_or_without_debug_information_is_refused(
+    rich: tuple[penode_gen.Model, dict], program: Path, tmp_path: Path
+) -> None:
     with pytest.raises(exports.ExportError, match="no variable nqvm_set_default"):
         exports.export(penode_gen.load(NQVM), "a2l", Path("x.a2l"), {"elf": program})
     stripped = tmp_path / "stripped"
@@ -200,11 +228,17 @@ def test_program_of_another_model_or_without_debug_information_is_refused(rich: 
 @pytest.mark.parametrize("dwarf", [2, 3, 4, 5])
 def test_members_that_have_no_type_in_a2l_are_left_out_and_the_others_lie_where_they_are(tmp_path: Path, dwarf: int) -> None:
     source, elf = tmp_path / "shown.c", tmp_path / "shown"
-    source.write_text("struct { unsigned a : 3, b : 5; float c; long double d; __int128 e; short f[2]; } shown = { .c = 1.5F, .f = { 7, -8 } };\nint main(void) { return 0; }\n")
+    source.write_text(
+        "struct { unsigned a : 3, b : 5; float c; long double d; __int128 e; short f[2]; } shown = { .c = 1.5F, .f = { 7, -8 } };\nint main(void) { return 0; }\n"
+    )
     subprocess.run(["gcc", f"-gdwarf-{dwarf}", "-gstrict-dwarf", "-no-pie", source, "-o", elf], check=True)
     program = elf_types.read_program(elf)
     found = {place.path: (place.kind, in_elf(elf, place.address, place.size)) for place in program.numbers(program.find("shown"))}
-    assert found == {"shown.c": ("float", struct.pack("<f", 1.5)), "shown.f[0]": ("signed", struct.pack("<h", 7)), "shown.f[1]": ("signed", struct.pack("<h", -8))}
+    assert found == {
+        "shown.c": ("float", struct.pack("<f", 1.5)),
+        "shown.f[0]": ("signed", struct.pack("<h", 7)),
+        "shown.f[1]": ("signed", struct.pack("<h", -8)),
+    }
 
 
 @pytest.mark.parametrize("text", ['a \\"b\\"', "a  b", "a\\\\b", ""])

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from models import RICH, network_file
 
 import penode_gen
-from models import RICH, network_file
 from penode_gen import exports
 from penode_gen.exports import a2l, a2l_lists, elf_types
 from penode_sil.calibration import a2l_read, measure, virtual
@@ -48,7 +48,9 @@ def scaled(tmp_path_factory: pytest.TempPathFactory) -> tuple[penode_gen.Model, 
     folder = tmp_path_factory.mktemp("scaled")
     network_file(folder / "n2.json", [2, 5, 1], ["relu", "identity"], seed=5)
     text = RICH.format(h="0.0000625", method="rk4", substeps=1, input="held", outside="extrapolate", foot_damper="")
-    text = text.replace('m = { value = 2, unit = "kg"', 'm = { value = 2000, unit = "g"').replace('F = { unit = "N" }', 'F = { unit = "kN", min = -2, max = 3 }', 1)
+    text = text.replace('m = { value = 2, unit = "kg"', 'm = { value = 2000, unit = "g"').replace(
+        'F = { unit = "N" }', 'F = { unit = "kN", min = -2, max = 3 }', 1
+    )
     text = text.replace('q = { value = "q", unit = "m" }', 'q = { value = "q", unit = "mm" }\nspeed = { value = "v", unit = "km/h" }')
     (folder / "scaled.toml").write_text(text)
     model = penode_gen.load(folder / "scaled.toml")
@@ -68,9 +70,18 @@ def test_lists_are_those_of_the_constants(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("const int penode_daq_lists = 3; int main(void) { return 0; }", "of the type int; make it a constant of the type pen_xcp_statics_t"),
-        ('#include "penode/pen_xcp_static.h"\nconst pen_xcp_statics_t penode_daq_lists = { 1U, NULL }; int main(void) { return 0; }', "make it, its lists and their entries constants"),
-        ('#include "penode/pen_xcp_static.h"\nconst pen_xcp_statics_t penode_daq_lists = { 1U, (const pen_xcp_static_t *)16 }; int main(void) { return 0; }', "is not in the file"),
+        (
+            "const int penode_daq_lists = 3; int main(void) { return 0; }",
+            "of the type int; make it a constant of the type pen_xcp_statics_t",
+        ),
+        (
+            '#include "penode/pen_xcp_static.h"\nconst pen_xcp_statics_t penode_daq_lists = { 1U, NULL }; int main(void) { return 0; }',
+            "make it, its lists and their entries constants",
+        ),
+        (
+            '#include "penode/pen_xcp_static.h"\nconst pen_xcp_statics_t penode_daq_lists = { 1U, (const pen_xcp_static_t *)16 }; int main(void) { return 0; }',
+            "is not in the file",
+        ),
     ],
 )
 def test_what_is_no_list_is_one_line(tmp_path: Path, text: str, line: str) -> None:
@@ -108,9 +119,11 @@ def test_units_of_the_model_file_are_shown(scaled: tuple[penode_gen.Model, Path]
     found = a2l_read.parse(text, "a2l")
     entries = found.measurements | found.characteristics
     assert OURS <= {entry.unit for entry in entries.values()}
-    assert {name: entries[name].shown(1.0) for name in ("q", "speed", "F", "m", "a")} == pytest.approx({"q": 1e3, "speed": 3.6, "F": 1e-3, "m": 1e3, "a": 1.0}, rel=1e-15)
+    assert {name: entries[name].shown(1.0) for name in ("q", "speed", "F", "m", "a")} == pytest.approx(
+        {"q": 1e3, "speed": 3.6, "F": 1e-3, "m": 1e3, "a": 1.0}, rel=1e-15
+    )
     assert entries["state.q"].unit == "m" and entries["a"].shown(np.float32(0.1)) == np.float32(0.1)
-    assert "F \"\" FLOAT32_IEEE unit_kN 0 0 -2 3" in text.replace("-2.0000000000000000", "-2")
+    assert 'F "" FLOAT32_IEEE unit_kN 0 0 -2 3' in text.replace("-2.0000000000000000", "-2")
     log = measure.Log(np.zeros(2), {"q": np.array([0.0, 0.25], np.float32), "a": np.array([0.1, 0.2], np.float32)}, 0, 1e-3)
     columns = {column.name: column for column in measure.columns(log, found)}
     assert (columns["q"].unit, *columns["q"].values) == ("mm", 0.0, 250.0) and columns["a"].values.dtype == np.float32
@@ -130,9 +143,17 @@ def test_conversions_of_other_tools_are_read() -> None:
 
 def test_period_of_the_event_is_exact_or_not_stated(scaled: tuple[penode_gen.Model, Path]) -> None:
     model, program = scaled
-    assert 'DAQ 0x04 0 0 0x00' in virtual.describe(model, program, "tcp:127.0.0.1:5555")  # 62.5 us: 625 times 100 ns
+    assert "DAQ 0x04 0 0 0x00" in virtual.describe(model, program, "tcp:127.0.0.1:5555")  # 62.5 us: 625 times 100 ns
     assert virtual.period(model) == 62500
-    for seconds, coded in ((1e-3, (1, 6)), (2.5e-4, (25, 4)), (333e-6, (0, 0)), (3.2e-6, (32, 2)), (260e-6, (26, 4)), (10.0, (10, 9)), (300.0, (0, 0))):
+    for seconds, coded in (
+        (1e-3, (1, 6)),
+        (2.5e-4, (25, 4)),
+        (333e-6, (0, 0)),
+        (3.2e-6, (32, 2)),
+        (260e-6, (26, 4)),
+        (10.0, (10, 9)),
+        (300.0, (0, 0)),
+    ):
         assert a2l._cycle(seconds) == coded
     for seconds in (1.0 / 3000.0, 1e-7):
         with pytest.raises(UserError, match="is no whole number of nanoseconds"):

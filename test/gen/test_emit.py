@@ -18,8 +18,7 @@ import models
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import penode_gen
 from penode_gen import c_text, emit_c, expressions, sets, write
@@ -103,15 +102,18 @@ def test_lines_fit(tmp_path):
             assert not re.search(r"[ \t]$|\t", text, re.MULTILINE) and text.endswith("\n") and not text.endswith("\n\n")
 
 
-@pytest.mark.parametrize("line", [
-    "    const pen_real_t a = " + " + ".join(f"(word{i} * word{i})" for i in range(12)) + "; /* a remark that goes above */",
-    "    f(" + ", ".join(f"argument_{i}" for i in range(20)) + ");",
-    "/* " + "word " * 40 + "*/",
-    "/** " + "word " * 40 + "*/",
-    "#define A_CONSTANT 1.0F /* " + "word " * 30 + "*/",
-    "    " + ", ".join(["-0.123456789F"] * 12) + ",",
-    "x = " + "a" * 150 + ";",  # cannot be broken
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "line",
+    [
+        "    const pen_real_t a = " + " + ".join(f"(word{i} * word{i})" for i in range(12)) + "; /* a remark that goes above */",
+        "    f(" + ", ".join(f"argument_{i}" for i in range(20)) + ");",
+        "/* " + "word " * 40 + "*/",
+        "/** " + "word " * 40 + "*/",
+        "#define A_CONSTANT 1.0F /* " + "word " * 30 + "*/",
+        "    " + ", ".join(["-0.123456789F"] * 12) + ",",
+        "x = " + "a" * 150 + ";",  # cannot be broken
+    ],
+)
 def test_folded_lines_say_the_same(line):
     """Only white space changes, and the place of a remark; comments stay comments."""
     folded = c_text.fold(line)
@@ -119,7 +121,11 @@ def test_folded_lines_say_the_same(line):
 
     def words(text: str, comment: bool) -> list[str]:
         remarks = "".join(re.findall(r"/\*.*?\*/", text, re.DOTALL))
-        return re.sub(r"/\*\*?|\*/|^ \* ", " ", remarks, flags=re.MULTILINE).split() if comment else re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).split()
+        return (
+            re.sub(r"/\*\*?|\*/|^ \* ", " ", remarks, flags=re.MULTILINE).split()
+            if comment
+            else re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).split()
+        )
 
     assert words(folded, True) == words(line, True) and words(folded, False) == words(line, False)
 
@@ -140,17 +146,26 @@ def test_no_warnings(tmp_path, method):
         penode_gen.generate(model, folders[-1])
     turn = METHODS.index(method)
     with ThreadPoolExecutor(2) as pool:
-        assert not [c for found in pool.map(lambda k: complaints(folders[k], "rich", in_turn(turn + k)), range(len(folders))) for c in found]
+        assert not [
+            c for found in pool.map(lambda k: complaints(folders[k], "rich", in_turn(turn + k)), range(len(folders))) for c in found
+        ]
 
 
 SPARSE = {
-    "constant rate": ('der(T)*t = 1', "T"), "input only": ("der(T)*t = u", "u"), "state only": ("der(T)*t = -T", "2*T + 1"),
-    "tunable": ("der(T)*t = k*T", "k"), "constant output": ("der(T)*t = T", "0.5"), "network of state": ("der(T)*t = n(T)", "T"),
-    "network of input": ("der(T)*t = n(u)", "u*T"), "network of a parameter": ("der(T)*t = n(k)*T", "T"),
-    "network of a constant": ("der(T)*t = n(c)*n(1)*T", "T"), "kinks": ("der(T)*t = abs(max(T, u)) + min(T, 0)", "sign(T)"),
-    "branches": ("der(T)*t = where(T < u, T*u, T - u)", "where(T < u, T, u)"), "curved": ("der(T)*t = exp(T*u) + tanh(T)*softplus(u)*sigmoid(T)", "T^2*u"),
+    "constant rate": ("der(T)*t = 1", "T"),
+    "input only": ("der(T)*t = u", "u"),
+    "state only": ("der(T)*t = -T", "2*T + 1"),
+    "tunable": ("der(T)*t = k*T", "k"),
+    "constant output": ("der(T)*t = T", "0.5"),
+    "network of state": ("der(T)*t = n(T)", "T"),
+    "network of input": ("der(T)*t = n(u)", "u*T"),
+    "network of a parameter": ("der(T)*t = n(k)*T", "T"),
+    "network of a constant": ("der(T)*t = n(c)*n(1)*T", "T"),
+    "kinks": ("der(T)*t = abs(max(T, u)) + min(T, 0)", "sign(T)"),
+    "branches": ("der(T)*t = where(T < u, T*u, T - u)", "where(T < u, T, u)"),
+    "curved": ("der(T)*t = exp(T*u) + tanh(T)*softplus(u)*sigmoid(T)", "T^2*u"),
     "names": ("der(T)*t = x*p*u*h + status", "x + y + fx + node + rates + t1"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -162,7 +177,11 @@ def test_no_warnings_where_little_is_used(tmp_path, method):
     turn = METHODS.index(method)  # each model with each input, in one method or the next
     for name, input in [*((n, INPUTS[(i + turn) % 2]) for i, n in enumerate(SPARSE)), *curved]:
         equation, output = SPARSE[name]
-        own = "".join(f'{n} = {{ unit = "1" }}\n' for n in ("x", "y", "p", "fx", "node", "rates", "status", "h", "t1")) if name == "names" else ""
+        own = (
+            "".join(f'{n} = {{ unit = "1" }}\n' for n in ("x", "y", "p", "fx", "node", "rates", "status", "h", "t1"))
+            if name == "names"
+            else ""
+        )
         equations = "".join(f'e{i} = "{n} = {i}*T"\n' for i, n in enumerate(re.findall(r"^\w+", own, re.MULTILINE)))
         path = tmp_path / "sparse.toml"
         path.write_text(f"""
@@ -194,7 +213,9 @@ n = "n.json"
         folders.append(tmp_path / f"{name} {input}".replace(" ", "_"))
         penode_gen.generate(penode_gen.load(path), folders[-1])
     with ThreadPoolExecutor(2) as pool:
-        assert not [c for found in pool.map(lambda f: complaints(f, "sparse", [(compiler, []) for compiler in COMPILERS]), folders) for c in found]
+        assert not [
+            c for found in pool.map(lambda f: complaints(f, "sparse", [(compiler, []) for compiler in COMPILERS]), folders) for c in found
+        ]
 
 
 def test_another_abi_is_refused_at_compile_time(tmp_path, monkeypatch):
@@ -233,8 +254,17 @@ def test_all_files_or_none(tmp_path, monkeypatch):
 
     with pytest.raises(OSError):
         penode_gen.generate(model, tmp_path / "n2.json" / "below a file")
-    assert [p.name for p in penode_gen.generate(model, out)] == ["rich.h", "rich.c", "rich_sets.h", "rich_params.c", "rich_selftest.c", "rich_layout.json"]
-    assert sorted(p.name for p in out.iterdir()) == sorted(["rich.c", "rich.h", "rich_sets.h", "rich_params.c", "rich_selftest.c", "rich_layout.json"])
+    assert [p.name for p in penode_gen.generate(model, out)] == [
+        "rich.h",
+        "rich.c",
+        "rich_sets.h",
+        "rich_params.c",
+        "rich_selftest.c",
+        "rich_layout.json",
+    ]
+    assert sorted(p.name for p in out.iterdir()) == sorted(
+        ["rich.c", "rich.h", "rich_sets.h", "rich_params.c", "rich_selftest.c", "rich_layout.json"]
+    )
     assert all(p.stat().st_mode & 0o777 == 0o644 for p in out.iterdir())
 
 
@@ -267,7 +297,13 @@ def value_of(text: str) -> float:
 
 
 @settings(derandomize=True, deadline=None, database=None, max_examples=500)
-@given(st.one_of(st.floats(allow_nan=False, allow_infinity=False), st.floats(width=32, allow_nan=False, allow_infinity=False), st.integers(-(10**9), 10**9)))
+@given(
+    st.one_of(
+        st.floats(allow_nan=False, allow_infinity=False),
+        st.floats(width=32, allow_nan=False, allow_infinity=False),
+        st.integers(-(10**9), 10**9),
+    )
+)
 def test_literals_are_exact(value):
     """The double comes back to the bit (a zero may lose its sign), and F stands only where a float holds it all."""
     for text in (c_text.literal(value), c_text.real(value)):
@@ -289,7 +325,13 @@ def test_literals_of_an_array_are_those_of_its_numbers():
     rng = np.random.default_rng(1)
     powers = np.array([0.0, *(10.0**k for k in range(-9, 10))])
     singles = powers.astype(np.float32)
-    near = np.concatenate([f(p, edge).astype(float) for p in (powers, singles) for f, edge in ((np.nextafter, p.dtype.type(0)), (np.nextafter, p.dtype.type(np.inf)), (np.fmax, p))])
+    near = np.concatenate(
+        [
+            f(p, edge).astype(float)
+            for p in (powers, singles)
+            for f, edge in ((np.nextafter, p.dtype.type(0)), (np.nextafter, p.dtype.type(np.inf)), (np.fmax, p))
+        ]
+    )
     with np.errstate(invalid="ignore"):
         bits = rng.integers(0, 2**32, 2000, np.uint32).view(np.float32).astype(float)
     drawn = np.concatenate([bits, rng.integers(0, 2**63, 1000).view(float), rng.standard_normal(500)])
@@ -312,12 +354,44 @@ def test_every_expression_means_what_it_says(tmp_path):
     """The printer's text, read back by Python as C would read it, is the expression: precedence, signs, divisions."""
     a, b, c = (sp.Symbol(n, real=True) for n in "abc")
     cases = [
-        a - (b - c), a - (b + c), -(a + b), -a * b, a / (b * c), a / b / c, a / (b / c), 1 / a, a**-2, (a + b) ** 2, -(a**2), (-a) ** 3, 2 * a / 3,
-        sp.Rational(1, 3) * a, a * (b + c) / (a - b), -a / b, -(a - b) / c, a - b * c + 1, sp.Max(a, b, c), sp.Min(a, -b), expressions.Absolute(a - b),
-        sp.Piecewise((a, a < b), (b, True)) * c - 1, sp.Piecewise((a, b < 0), (sp.Piecewise((b, a >= 1), (c, True)), True)), a * sp.Float("1e-9"), a - sp.Float(-2.5),
-        -sp.exp(-a) * sp.tanh(-b), (a / b) ** 3, a / (2 * b), 3 / (a + 1) ** 2,
-    ]  # fmt: skip
-    scope = {"pen_max": max, "pen_min": min, "pen_port_abs": abs, "pen_exp": np.exp, "pen_tanh": np.tanh, "pen_where": lambda c, x, y: x if c else y}
+        a - (b - c),
+        a - (b + c),
+        -(a + b),
+        -a * b,
+        a / (b * c),
+        a / b / c,
+        a / (b / c),
+        1 / a,
+        a**-2,
+        (a + b) ** 2,
+        -(a**2),
+        (-a) ** 3,
+        2 * a / 3,
+        sp.Rational(1, 3) * a,
+        a * (b + c) / (a - b),
+        -a / b,
+        -(a - b) / c,
+        a - b * c + 1,
+        sp.Max(a, b, c),
+        sp.Min(a, -b),
+        expressions.Absolute(a - b),
+        sp.Piecewise((a, a < b), (b, True)) * c - 1,
+        sp.Piecewise((a, b < 0), (sp.Piecewise((b, a >= 1), (c, True)), True)),
+        a * sp.Float("1e-9"),
+        a - sp.Float(-2.5),
+        -sp.exp(-a) * sp.tanh(-b),
+        (a / b) ** 3,
+        a / (2 * b),
+        3 / (a + 1) ** 2,
+    ]
+    scope = {
+        "pen_max": max,
+        "pen_min": min,
+        "pen_port_abs": abs,
+        "pen_exp": np.exp,
+        "pen_tanh": np.tanh,
+        "pen_where": lambda c, x, y: x if c else y,
+    }
     draw = np.random.default_rng(1)
     for expr in cases:
         text = c_text.Printer(lambda s: s.name)(expr)
@@ -374,10 +448,13 @@ def test_names_that_look_like_those_of_the_generated_code(tmp_path):
     """Elements called net, net_1, net_in, net_slope: a network of two inputs among them."""
     text = (
         models.RICH.format(method="rk4", h=1e-3, input="held", outside="extrapolate", substeps=1, foot_damper="")
-        .replace('net = { between', 'net_1 = { between = ["mass", "ground"], law = "network", network = "n1" }\nnet_in = { between = ["mass", "ground"], law = "linear_spring", stiffness = "k" }\nnet_slope = { between = ["mass", "ground"], law = "linear_damper", damping = "3 N*s/m" }\nnet = { between')
+        .replace(
+            "net = { between",
+            'net_1 = { between = ["mass", "ground"], law = "network", network = "n1" }\nnet_in = { between = ["mass", "ground"], law = "linear_spring", stiffness = "k" }\nnet_slope = { between = ["mass", "ground"], law = "linear_damper", damping = "3 N*s/m" }\nnet = { between',
+        )
         .replace('output = "N" }\n', 'output = "N" }\nn1 = { inputs = ["m"], output = "N" }\n', 1)
         .replace('n2 = "n2.json"', 'n2 = "n2.json"\nn1 = "n1.json"')
-    )  # fmt: skip
+    )
     models.network_file(tmp_path / "n2.json", [2, 5, 1], ["tanh", "identity"], 5)
     models.network_file(tmp_path / "n1.json", [1, 5, 1], ["relu", "identity"], 6)
     (tmp_path / "names.toml").write_text(text)
@@ -393,6 +470,8 @@ def test_no_warnings_when_folded(tmp_path, more):
     base = ROOT / "gen" / "nqvm" / "nqvm.toml"
     for method in METHODS:
         path = tmp_path / f"{method}.toml"
-        path.write_text(f'[model]\nextends = "{os.path.relpath(base, tmp_path)}"\nname = "{method}"\nmethod = "{method}"\npieces = 96\nmore_pieces = "{more}"\n')
+        path.write_text(
+            f'[model]\nextends = "{os.path.relpath(base, tmp_path)}"\nname = "{method}"\nmethod = "{method}"\npieces = 96\nmore_pieces = "{more}"\n'
+        )
         penode_gen.generate(penode_gen.load(path), tmp_path / method)
         assert complaints(tmp_path / method, method) == []

@@ -27,9 +27,11 @@ NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm" / "nqvm.toml"
 def formats(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Two formats of the test's own, each a module with an EXPORTER."""
     shout = exports.Exporter(
-        "the name of the model, loud", (".txt",), lambda model, options: (model.name.upper() * int(options["times"])).encode(),
+        "the name of the model, loud",
+        (".txt",),
+        lambda model, options: (model.name.upper() * int(options["times"])).encode(),
         options=(exports.Option("times", "how often", "number", default=1), exports.Option("as_is", "not read", "flag")),
-    )  # fmt: skip
+    )
     absent = exports.Exporter("needs what is nowhere", (".txt",), lambda model, options: b"", needs=("no_such_package",))
     for name, exporter in (("shout", shout), ("absent", absent)):
         module = types.ModuleType(f"penode_gen.exports.{name}")
@@ -65,11 +67,14 @@ def test_a_format_is_a_module_and_a_line(tmp_path: Path) -> None:
     [
         (["--format", "shot", "-o", "n.txt"], '--format: "shot" is not known; did you mean "shout"?'),
         (["--format", "absent", "--as-is", "-o", "n.txt"], "--as-is: the format absent has no such option; leave it out"),
-        (["--format", "absent", "-o", "n.txt"], "--format absent: it needs the Python package no_such_package, which is not installed; pip install no_such_package"),
+        (
+            ["--format", "absent", "-o", "n.txt"],
+            "--format absent: it needs the Python package no_such_package, which is not installed; pip install no_such_package",
+        ),
         (["--format", "shout", "-o", "n.bin"], 'n.bin: a file of the format shout does not end in ".bin"; end its name in .txt'),
         (["--format", "shout", "-o", "no/n.txt"], "no/n.txt: there is no directory no; create it or name another file"),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_is_one_line_and_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], line: str) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises((UserError, ModelError)) as found:

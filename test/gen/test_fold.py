@@ -241,10 +241,15 @@ def test_the_slope_is_that_of_the_layers(tmp_path):
 
 ZIGZAG = Network(
     (Dense(np.ones((40, 1)), -np.linspace(-1.0, 1.0, 40), "relu"), Dense((-1.0) ** np.arange(40)[None, :], np.zeros(1), "identity")),
-    np.array([-1.0]), np.array([1.0]), "zigzag",
-)  # fmt: skip
+    np.array([-1.0]),
+    np.array([1.0]),
+    "zigzag",
+)
 PLAIN = Network(
-    (Dense(np.ones((40, 1)), np.full(40, 9.0), "relu"), Dense(np.ones((1, 40)), np.zeros(1), "identity")), np.array([-1.0]), np.array([1.0]), "plain"
+    (Dense(np.ones((40, 1)), np.full(40, 9.0), "relu"), Dense(np.ones((1, 40)), np.zeros(1), "identity")),
+    np.array([-1.0]),
+    np.array([1.0]),
+    "plain",
 )
 
 

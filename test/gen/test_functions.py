@@ -14,8 +14,7 @@ import sympy as sp
 from test_selftest import check
 
 import penode_gen
-from penode_gen import expressions as ex
-from penode_gen import functions, units
+from penode_gen import expressions as ex, functions, units
 from penode_gen.emit_batch import render_batch
 from penode_gen.emit_c import render
 from penode_gen.kernels import Kernels
@@ -52,10 +51,15 @@ def test_known_answers_are_those_of_the_c(tmp_path, method):
     """All five at once, in float and in double."""
     text = (ROOT / "test" / "sil" / "models" / "functions.toml").read_text()
     path = tmp_path / "functions.toml"
-    path.write_text(text.replace('method = "ros2"', f'method = "{method}"').replace(
-        'height = { value = "length*(1 - cos(phi))", unit = "m" }',
-        'height = { value = "length*(1 - cos(phi))", unit = "m" }\nturn = { value = "atan(omega/drag)", unit = "rad" }\n'
-        'pressure = { value = "log(level/one)", unit = "1" }').replace('\npressure = { value = "log(level/one)", unit = "1", noise = 0.001 }', ""))
+    path.write_text(
+        text.replace('method = "ros2"', f'method = "{method}"')
+        .replace(
+            'height = { value = "length*(1 - cos(phi))", unit = "m" }',
+            'height = { value = "length*(1 - cos(phi))", unit = "m" }\nturn = { value = "atan(omega/drag)", unit = "rad" }\n'
+            'pressure = { value = "log(level/one)", unit = "1" }',
+        )
+        .replace('\npressure = { value = "log(level/one)", unit = "1", noise = 0.001 }', "")
+    )
     check(penode_gen.load(path), tmp_path)
 
 
@@ -96,7 +100,16 @@ def test_units():
         of("sqrt(A) + t")
 
 
-@pytest.mark.parametrize(("text", "what"), [("sqrt(-2)", "square root of -2"), ("log(0)", "logarithm of 0"), ("log(1 - 3)", "logarithm of -2"), ("sin()", "takes 1"), ("atan(x, 2)", "takes 1")])
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("sqrt(-2)", "square root of -2"),
+        ("log(0)", "logarithm of 0"),
+        ("log(1 - 3)", "logarithm of -2"),
+        ("sin()", "takes 1"),
+        ("atan(x, 2)", "takes 1"),
+    ],
+)
 def test_what_has_no_value_is_refused(text, what):
     with pytest.raises(ex.ExpressionError, match=what):
         ex.parse(text, ["x"], {})

@@ -11,12 +11,12 @@ from pathlib import Path
 import models
 import numpy as np
 import pytest
+from test_emit import COMPILERS, REALS, STRICT
 
 import penode_gen
-from penode_sil.status import BIT, names
 from penode_sil.building import ROOT
+from penode_sil.status import BIT, names
 from penode_sil.targets import Sil
-from test_emit import COMPILERS, REALS, STRICT
 
 NQVM = ROOT / "gen" / "nqvm"
 HISTORY = {"held": 0, "linear": 1, "parabola": 2, "cubic": 3}  # inputs before this one that rates depend on
@@ -383,7 +383,21 @@ def test_shared_sets_are_the_same_whoever_writes_them(sharing):
 def test_three_methods_link_into_one_program(sharing, tmp_path, real):
     (tmp_path / "main.c").write_text(MAIN)
     sources = [*sorted(sharing.glob("*.c")), *sorted((ROOT / "src").glob("*.c")), tmp_path / "main.c"]
-    subprocess.run(["gcc", "-std=c99", "-O1", *real, f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{sharing}", *map(str, sources), "-o", str(tmp_path / "a.out")], check=True)
+    subprocess.run(
+        [
+            "gcc",
+            "-std=c99",
+            "-O1",
+            *real,
+            f"-I{ROOT}/inc",
+            f"-I{ROOT}/port/gnu",
+            f"-I{sharing}",
+            *map(str, sources),
+            "-o",
+            str(tmp_path / "a.out"),
+        ],
+        check=True,
+    )
     subprocess.run([tmp_path / "a.out"], check=True)
     table = subprocess.run(["nm", tmp_path / "a.out"], check=True, capture_output=True, text=True).stdout
     for name in ("set_default", "set_altered_friction", "value_default", "value_altered_friction"):

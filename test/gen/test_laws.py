@@ -103,15 +103,10 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
         {"force": "4 N", "begin": "500 ms", "time": "300 ms"},
         lambda s, v, own: (4.0 / (1.0 + np.exp(-2.0 * (own[0] - 0.5) / 0.3)), [1.0]),
     ),
-    "hardening_bushing": (
-        {"cubic": "2e4 N/m^3", "relaxation": "60 ms"}, lambda s, v, own: (2e4 * own[0] ** 3, [v - own[0] / 0.06])
-    ),
+    "hardening_bushing": ({"cubic": "2e4 N/m^3", "relaxation": "60 ms"}, lambda s, v, own: (2e4 * own[0] ** 3, [v - own[0] / 0.06])),
     "bouc_wen_loop": (
         {"force": "9 N", "presliding": "10 mm", "bend": "0.7", "share": "0.6"},
-        lambda s, v, own: (
-            9.0 * own[0],
-            [(v - (0.6 * abs(v) * own[0] + 0.4 * v * abs(own[0])) * (0.3 + 0.7 * abs(own[0]))) / 0.01],
-        ),
+        lambda s, v, own: (9.0 * own[0], [(v - (0.6 * abs(v) * own[0] + 0.4 * v * abs(own[0])) * (0.3 + 0.7 * abs(own[0]))) / 0.01]),
     ),
     "slack_friction": ({"force": "9 N", "presliding": "10 mm"}, lambda s, v, own: (9.0 * own[0] ** 5, bouc_wen(s, v, own)[1])),
     "aerated_damper": ({"damping": "6 N*s/m", "pocket": "3 mm", "rate": "0.5 m/s"}, aerated_damper),
@@ -119,7 +114,7 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
     "maxwell_bushing": ({"stiffness": "300 N/m", "relaxation": "60 ms"}, lambda s, v, own: (own[0], [300.0 * v - own[0] / 0.06])),
     "absorber": ({"mass": "0.4 kg", "stiffness": "90 N/m", "cubic": "2e4 N/m^3", "damping": "0.8 N*s/m"}, absorber),
     "tuned_mass": ({"mass": "0.3 kg", "omega": "14 1/s", "loss": "0.1 1"}, tuned_mass),
-}  # fmt: skip
+}
 
 
 def test_every_law_is_here():

@@ -21,7 +21,14 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # Sizes of a network, with or without scaling of inputs and output. Layers of 10 and 20 are cut into 4, 4, 1, 1 and 16, 4 rows; one of 256
 # into 16 blocks of 16; one of 23 into all three kinds.
-NETWORKS = [([2, 10, 20, 1], True), ([1, 256, 1], True), ([3, 5, 1], True), ([3, 5, 1], False), ([2, 23, 1], False), ([1, 16, 16, 16, 1], True)]
+NETWORKS = [
+    ([2, 10, 20, 1], True),
+    ([1, 256, 1], True),
+    ([3, 5, 1], True),
+    ([3, 5, 1], False),
+    ([2, 23, 1], False),
+    ([1, 16, 16, 16, 1], True),
+]
 
 TUNABLE = """
 [model]
@@ -53,7 +60,10 @@ net = "other.json"
 def load(folder: Path, sizes: list[int], scaled: bool, unit: str = "m/s") -> tuple[penode_gen.Model, dict[str, dict]]:
     """A model with a network of these sizes, two tunable parameters, and two sets; and what the network files hold, by set."""
     activations = ["relu"] * (len(sizes) - 2) + ["identity"]
-    data = {"default": models.network_file(folder / "net.json", sizes, activations, 3, -1.0, 2.0), "other": models.network_file(folder / "other.json", sizes, activations, 4, -0.5, 1.0)}
+    data = {
+        "default": models.network_file(folder / "net.json", sizes, activations, 3, -1.0, 2.0),
+        "other": models.network_file(folder / "other.json", sizes, activations, 4, -0.5, 1.0),
+    }
     if not scaled:
         for name, of_set in (("net.json", "default"), ("other.json", "other")):
             data[of_set] = {k: v for k, v in data[of_set].items() if "normalise" not in k}
@@ -110,7 +120,9 @@ def test_scatter_is_the_inverse(case):
 def test_each_value_belongs_to_one_array(case):
     _, model, _ = case
     found = np.concatenate([a.indices().reshape(-1) for a in layout.arrays(model)])
-    assert np.array_equal(np.sort(found), np.arange(layout.length(model))) and layout.length(model) == len(penode_gen.set_values(model, "default"))
+    assert np.array_equal(np.sort(found), np.arange(layout.length(model))) and layout.length(model) == len(
+        penode_gen.set_values(model, "default")
+    )
     blocks = sorted((b.at, b.rows * (a.shape[1] if len(a.shape) > 1 else 1)) for a in layout.arrays(model) for b in a.blocks)
     assert [at for at, _ in blocks] == [0, *np.cumsum([n for _, n in blocks])[:-1]]
 
@@ -118,8 +130,12 @@ def test_each_value_belongs_to_one_array(case):
 def test_blocks_by_hand():
     """Of a layer of n rows, as penode/pen_net.h states them."""
     assert [sets.dense_rows(n) for n in (1, 5, 10, 20, 23)] == [
-        [(0, 1)], [(0, 4), (4, 1)], [(0, 4), (4, 4), (8, 1), (9, 1)], [(0, 16), (16, 4)], [(0, 16), (16, 4), (20, 1), (21, 1), (22, 1)],
-    ]  # fmt: skip
+        [(0, 1)],
+        [(0, 4), (4, 1)],
+        [(0, 4), (4, 4), (8, 1), (9, 1)],
+        [(0, 16), (16, 4)],
+        [(0, 16), (16, 4), (20, 1), (21, 1), (22, 1)],
+    ]
     assert sets.dense_rows(256) == [(16 * i, 16) for i in range(16)]
 
 
@@ -131,13 +147,19 @@ def test_units_and_places_of_a_small_one(tmp_path):
     assert table["layout"] == {"float": sets.layout(model), "double": sets.layout(model, float)}
     rows = {a["name"]: (a["shape"], a["unit"], [(b["first_row"], b["rows"], b["at"]) for b in a["blocks"]]) for a in table["arrays"]}
     assert rows == {
-        "lift": ([], "m", [(0, 1, 0)]), "shift": ([], "N", [(0, 1, 1)]),
-        "net.input_min": ([3], "m/s", [(0, 3, 2)]), "net.input_max": ([3], "m/s", [(0, 3, 5)]),
-        "net.shift_1": ([3], "", [(0, 3, 8)]), "net.factor_1": ([3], "", [(0, 3, 11)]),
-        "net.bias_1": ([5], "", [(0, 4, 14), (4, 1, 30)]), "net.weights_1": ([5, 3], "", [(0, 4, 18), (4, 1, 31)]),
-        "net.bias_2": ([1], "", [(0, 1, 34)]), "net.weights_2": ([1, 5], "", [(0, 1, 35)]),
-        "net.factor_2": ([1], "", [(0, 1, 40)]), "net.shift_2": ([1], "", [(0, 1, 41)]),
-    }  # fmt: skip
+        "lift": ([], "m", [(0, 1, 0)]),
+        "shift": ([], "N", [(0, 1, 1)]),
+        "net.input_min": ([3], "m/s", [(0, 3, 2)]),
+        "net.input_max": ([3], "m/s", [(0, 3, 5)]),
+        "net.shift_1": ([3], "", [(0, 3, 8)]),
+        "net.factor_1": ([3], "", [(0, 3, 11)]),
+        "net.bias_1": ([5], "", [(0, 4, 14), (4, 1, 30)]),
+        "net.weights_1": ([5, 3], "", [(0, 4, 18), (4, 1, 31)]),
+        "net.bias_2": ([1], "", [(0, 1, 34)]),
+        "net.weights_2": ([1, 5], "", [(0, 1, 35)]),
+        "net.factor_2": ([1], "", [(0, 1, 40)]),
+        "net.shift_2": ([1], "", [(0, 1, 41)]),
+    }
 
 
 def test_map_in_the_header_names_each_block(case):
@@ -160,9 +182,15 @@ def test_committed_table_is_the_generated_one():
     assert (ROOT / "gen" / "nqvm" / "c" / "nqvm_layout.json").read_text() == layout.to_json(model)
 
 
-@pytest.mark.parametrize("sizes, scaled, dtype", [
-    ([2, 10, 20, 1], True, np.float32), ([2, 10, 20, 1], True, np.float64), ([1, 256, 1], True, np.float32), ([2, 23, 1], False, np.float32),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "sizes, scaled, dtype",
+    [
+        ([2, 10, 20, 1], True, np.float32),
+        ([2, 10, 20, 1], True, np.float64),
+        ([1, 256, 1], True, np.float32),
+        ([2, 23, 1], False, np.float32),
+    ],
+)
 def test_the_c_goes_by_this_table(tmp_path, sizes, scaled, dtype):
     """A set made anew by scattering random arrays by the table of the JSON, staged into the C: its outputs are those of these matrices."""
     model, _ = load(tmp_path, sizes, scaled)

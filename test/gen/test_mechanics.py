@@ -167,7 +167,11 @@ def expect_refused(path: Path, text: str, what: str) -> None:
 @pytest.mark.parametrize(
     "old, new, what",
     [
-        ('["front", "wheel"]', '["pitch", "wheel"]', "'pitch' turns and 'wheel' moves along a line; write a point with the lever arm in [points], such as"),
+        (
+            '["front", "wheel"]',
+            '["pitch", "wheel"]',
+            "'pitch' turns and 'wheel' moves along a line; write a point with the lever arm in [points], such as",
+        ),
         ('stiffness = "50 N*m/rad"', 'stiffness = "50 N/m"', "'50 N/m' is not measured in N*m/rad; give a quantity in N*m/rad"),
         ('inertia = "0.3 kg*m^2"', 'inertia = "0.3 kg"', "'0.3 kg' is not measured in kg*m^2"),
         ('inertia = "0.3 kg*m^2"', 'inertia = "-0.3 kg*m^2"', "inertia '-0.3 kg*m^2' is not above zero"),

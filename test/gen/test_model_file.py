@@ -12,8 +12,7 @@ from pathlib import Path
 
 import models
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 import penode_gen
 from penode_gen import expressions, units
@@ -161,7 +160,12 @@ FAULTS = [
     ('g = { unit = "N" }', 'F_foot = { unit = "N" }', "'F_foot' is taken by the variable of that name", at("foot =")),
     ('velocity = "w"', 'velocity = "q"', "bodies.mass.velocity: 'q' is taken by the position of that name"),
     ("F_lag = {", "z = {", "'z' is taken by the input of that name"),
-    ("[elements]", '[bodies.F]\nmass = "1 kg"\nposition = "q2"\nvelocity = "w2"\n[elements]', "'F' is taken by the body of that name", at("F = {")),
+    (
+        "[elements]",
+        '[bodies.F]\nmass = "1 kg"\nposition = "q2"\nvelocity = "w2"\n[elements]',
+        "'F' is taken by the body of that name",
+        at("F = {"),
+    ),
     ("tau = {", 'K = { value = 1, unit = "1" }\ntau = {', "parameters.K: its C constant GOOD_K is already taken"),
     ("tau = {", 'k_inverse = { value = 1, unit = "1" }\ntau = {', "parameters.k_inverse: its C constant GOOD_K_INVERSE"),
     ("tau = {", 'set_length = { value = 1, unit = "1" }\ntau = {', "GOOD_SET_LENGTH is already taken"),
@@ -176,19 +180,47 @@ FAULTS = [
     ('unit = "N/mm"', 'unit = "N/mm; import os"', "unknown unit"),
     ('unit = "N/mm"', 'unit = "3 N/mm"', "unknown unit"),
     ('unit = "N/mm"', 'unit = "N*s/mm"', "elements.foot.stiffness: 'k' is in N*s/mm, needed is N/m", at("foot =")),
-    ('unit = "kg"', 'unit = "g*m"', "bodies.mass.mass: 'm' is in g*m, needed is kg", at("mass ="), "sets.heavy.m: '4 kg' is not measured in g*m"),
+    (
+        'unit = "kg"',
+        'unit = "g*m"',
+        "bodies.mass.mass: 'm' is in g*m, needed is kg",
+        at("mass ="),
+        "sets.heavy.m: '4 kg' is not measured in g*m",
+    ),
     ('damping = "3 N*s/m"', 'damping = "3 N/m"', "elements.damp.damping: '3 N/m' is not measured in N*s/m"),
     ('damping = "3 N*s/m"', 'damping = "3"', "'3' is not measured in N*s/m"),
     ('damping = "3 N*s/m"', 'damping = "three N*s/m"', "'three N*s/m' is not a number with a unit"),
     ('damping = "3 N*s/m"', 'damping = "nan N*s/m"', "is not a number with a unit"),
     ('sample_time = "1 ms"', 'sample_time = "1 mm"', "model.sample_time: '1 mm' is not measured in s"),
     ('start_position = "10 mm"', 'start_position = "10 mm/s"', "bodies.mass.start_position: '10 mm/s' is not measured in m"),
-    ('z = { unit = "m" }', 'z = { unit = "kg" }', "elements.foot.between: input 'z' is in kg, an end needs a position", at("foot ="), "elements.damp.between: input 'z' is in kg"),
-    ('F_lag = { unit = "N"', 'F_lag = { unit = "Pa"', "elements.push: .. combines m^-1*kg*s^-2 with m*kg*s^-2", at("push ="), "equations.lag: .. combines"),
-    ('tau = { value = 50, unit = "ms"', 'tau = { value = 50, unit = "mm"', "equations.lag: m^2*kg*s^-3 is set equal to m*kg*s^-2", at("lag =")),
+    (
+        'z = { unit = "m" }',
+        'z = { unit = "kg" }',
+        "elements.foot.between: input 'z' is in kg, an end needs a position",
+        at("foot ="),
+        "elements.damp.between: input 'z' is in kg",
+    ),
+    (
+        'F_lag = { unit = "N"',
+        'F_lag = { unit = "Pa"',
+        "elements.push: .. combines m^-1*kg*s^-2 with m*kg*s^-2",
+        at("push ="),
+        "equations.lag: .. combines",
+    ),
+    (
+        'tau = { value = 50, unit = "ms"',
+        'tau = { value = 50, unit = "mm"',
+        "equations.lag: m^2*kg*s^-3 is set equal to m*kg*s^-2",
+        at("lag ="),
+    ),
     ('inputs = ["m", "m/s"]', 'inputs = ["m", "N"]', "elements.net.inputs: the network takes N, but rate is in m/s", at("net =")),
     ('inputs = ["m", "m/s"]', 'inputs = ["mm", "m/s"]', "networks.net2: a network in mm .. declare m"),
-    ('inputs = ["m", "m/s"], output = "N"', 'inputs = ["m", "m/s"], output = "m"', "network 'net2' gives m, an element needs a force", at("net =")),
+    (
+        'inputs = ["m", "m/s"], output = "N"',
+        'inputs = ["m", "m/s"], output = "m"',
+        "network 'net2' gives m, an element needs a force",
+        at("net ="),
+    ),
     ('value = "q", unit = "mm"', 'value = "q", unit = "mm/s"', "outputs.q: m*s^-1 is set equal to m"),
     ('value = "F_foot", unit = "N"', 'value = "q + 1", unit = "m"', "sensors.load: 'q + 1' combines"),
     ('value = "F_foot", unit = "N"', 'value = "exp(F_foot)", unit = "1"', "the argument has the unit m*kg*s^-2"),
@@ -229,7 +261,11 @@ FAULTS = [
     ('law = "linear_damper"', 'law = "linear_dampr"', "elements.damp.law: law 'linear_dampr' is unknown; did you mean 'linear_damper'?"),
     ('stiffness = "k"', 'stiffnes = "k"', "unknown key; did you mean 'stiffness'?", "'stiffness' is missing"),
     ('stiffness = "k"', 'stiffness = "kk"', "'kk' is no parameter; did you mean 'k'?"),
-    ('["mass", "z"], law = "linear_spring"', '["mess", "z"], law = "linear_spring"', "end 'mess' is no body, point, input or ground; did you mean 'mass'?"),
+    (
+        '["mass", "z"], law = "linear_spring"',
+        '["mess", "z"], law = "linear_spring"',
+        "end 'mess' is no body, point, input or ground; did you mean 'mass'?",
+    ),
     ('["mass", "z"], law = "linear_spring"', '["mass", "mass"], law = "linear_spring"', "does not name two different ends"),
     ('["mass", "z"], law = "linear_spring"', '["mass"], law = "linear_spring"', "does not name two different ends"),
     ('network = "net2"', 'network = "net3"', "network 'net3' is not declared; did you mean 'net2'?"),
@@ -288,11 +324,28 @@ FAULTS = [
     ("2*g - F = 0.5*g", "2*g - F = g*g/F", "'loop' form an algebraic loop that is not linear in g"),
     ("2*g - F = 0.5*g", "2*g - F = abs(g)", "'loop' form an algebraic loop that is not linear in g"),
     ("2*g - F = 0.5*g", "2*g - F = where(g > F, 1, 2)*F", "not linear in g"),
-    ('g = { unit = "N" }', 'g = { unit = "N" }\nh = { unit = "N" }', "equations 'more', 'loop' have no unique solution for h, g; check", at("more ="), ("loop = \"2*g - F = 0.5*g", "more = \"2*g + 2*h = F\"\nloop = \"h - F = -g")),
-    ('g = { unit = "N" }', 'g = { unit = "N" }\nh = { unit = "N" }', "variables.h: no equation determines h; add one to [equations]", at("h =")),
+    (
+        'g = { unit = "N" }',
+        'g = { unit = "N" }\nh = { unit = "N" }',
+        "equations 'more', 'loop' have no unique solution for h, g; check",
+        at("more ="),
+        ('loop = "2*g - F = 0.5*g', 'more = "2*g + 2*h = F"\nloop = "h - F = -g'),
+    ),
+    (
+        'g = { unit = "N" }',
+        'g = { unit = "N" }\nh = { unit = "N" }',
+        "variables.h: no equation determines h; add one to [equations]",
+        at("h ="),
+    ),
     ("loop =", 'more = "g = F"\nloop =', "equations.loop: nothing is left that this equation could determine", at("loop =")),
     ("F_lag - F", "F_lag - s", "elements.push: .. combines"),
-    ("F_lag - F", "where(v < 0, F_lag, F)", "elements.push: 'v' is the rate of this element, and a name of the model", ('velocity = "w"', 'velocity = "v"'), ("der(w)", "der(v)")),
+    (
+        "F_lag - F",
+        "where(v < 0, F_lag, F)",
+        "elements.push: 'v' is the rate of this element, and a name of the model",
+        ('velocity = "w"', 'velocity = "v"'),
+        ("der(w)", "der(v)"),
+    ),
     # TOML
     ('name = "good"', "name = good", "is not valid TOML (Invalid value); mend the syntax there"),
     ('name = "good"', 'name = "good', "is not valid TOML"),
@@ -362,10 +415,17 @@ def test_fault(folder, case):
 def test_all_faults_at_once(folder):
     """Ten faults in ten places, each reported once, in any order."""
     edits = [
-        ("method =", "metod ="), ("substeps = 2", "substeps = 0"), ('unit = "N/mm"', 'unit = "N/mn"'), ("min = -5", "min = 6"),
-        ('start_position = "10 mm"', 'start_position = "10 s"'), ('"linear_damper"', '"linear_dumper"'), ("start = 0.5", "start = inf"),
-        ('unit = "m/s^2"', 'unit = "m/s^^2"'), ('net2 = "net2.json"', 'net2 = "gone.json"'), ("2*g - F =", "2*g - F/0 ="),
-    ]  # fmt: skip
+        ("method =", "metod ="),
+        ("substeps = 2", "substeps = 0"),
+        ('unit = "N/mm"', 'unit = "N/mn"'),
+        ("min = -5", "min = 6"),
+        ('start_position = "10 mm"', 'start_position = "10 s"'),
+        ('"linear_damper"', '"linear_dumper"'),
+        ("start = 0.5", "start = inf"),
+        ('unit = "m/s^2"', 'unit = "m/s^^2"'),
+        ('net2 = "net2.json"', 'net2 = "gone.json"'),
+        ("2*g - F =", "2*g - F/0 ="),
+    ]
     text = GOOD
     for old, new in edits:
         assert text.count(old) == 1
@@ -377,10 +437,14 @@ def test_all_faults_at_once(folder):
 
 
 def test_no_outputs(folder):
-    text = re.sub(r"\[outputs\][^[]*\n(?=\[)", "", models.BARE.format(outside="clamp", inputs="u = { unit = '1' }", units="['1']", names="u"))
+    text = re.sub(
+        r"\[outputs\][^[]*\n(?=\[)", "", models.BARE.format(outside="clamp", inputs="u = { unit = '1' }", units="['1']", names="u")
+    )
     (folder / "net.json").write_text((folder / "one.json").read_text())
     (folder / "bad.toml").write_text(text)
-    assert problems(folder / "bad.toml") == [f"{folder}/bad.toml:1: outputs: the model has no outputs; add [outputs]: the C needs at least one"]
+    assert problems(folder / "bad.toml") == [
+        f"{folder}/bad.toml:1: outputs: the model has no outputs; add [outputs]: the C needs at least one"
+    ]
 
 
 def test_no_states(folder):
@@ -443,9 +507,13 @@ def test_extends(folder):
 
 def test_lines_are_found_in_any_layout(folder):
     """Keys in lists over several lines, strings that look like headers, quoted keys, dotted keys, sub-tables, CRLF."""
-    text = GOOD.replace('"mass on a moving foot"', '"""\\\n[parameters]\\\n"""').replace(
-        'm = { value = 2, unit = "kg", tunable = true }', '[parameters.m]\nvalue = 2\nunit = "kg" # [x]\ntunable = true\n[parameters]'
-    ).replace('tau = { value = 50, unit = "ms", tolerance = 0.1 }', 'tau.value = 50\n"tau".unit = "ms"\ntau."tolerance" = -2')
+    text = (
+        GOOD.replace('"mass on a moving foot"', '"""\\\n[parameters]\\\n"""')
+        .replace(
+            'm = { value = 2, unit = "kg", tunable = true }', '[parameters.m]\nvalue = 2\nunit = "kg" # [x]\ntunable = true\n[parameters]'
+        )
+        .replace('tau = { value = 50, unit = "ms", tolerance = 0.1 }', 'tau.value = 50\n"tau".unit = "ms"\ntau."tolerance" = -2')
+    )
     text = text.replace('["m", "m/s"]', '[\n  "m",\n  "mm/s", # ]\n]')
     text = text.replace("[parameters]\n[parameters.m]", "[parameters.m]").replace("[parameters]\nk =", "[parameters]\nk =")
     for newline in ("\n", "\r\n"):
@@ -474,13 +542,46 @@ def test_command_says_it_in_lines(folder, monkeypatch, capsys):
 
 FUZZ = settings(derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck))
 PIECES = {  # stretches of the good file that an edit takes away, and what may come in their place
-    "text": (r'(?<=")[^"\n]*(?=")', ["", "nan", "-1", "0 kg", "1e400 m", "9" * 30, "é", "der(q)", "der(z)", "where(q < z, q, z)", "net2(q, w)", "exp(1)",
-                                    "*/", "x", "s", "v", "1/s", "degC", "\\u0000", "net2(net2(q, w), w)", "a = b", "g = F", "../x.onnx", "."]),
-    "number": (r"(?<= )-?\d[\d.]*(?=[ ,\n])", ["0", "-1", "nan", "inf", "1e400", "9" * 30, "true", "1e-50", "[]", "{}", "2020-01-01", '"1"', "1_0", "0xF"]),
-    "name": (r"(?m)^[\w]+(?= =)|(?<=, )\w+(?= =)|(?<=\{ )\w+(?= =)", ["x", "s", "v", "p", "t1", "int", "H", "extends", '"a b"', "a.b", "status", "F_lag_in"]),
+    "text": (
+        r'(?<=")[^"\n]*(?=")',
+        [
+            "",
+            "nan",
+            "-1",
+            "0 kg",
+            "1e400 m",
+            "9" * 30,
+            "é",
+            "der(q)",
+            "der(z)",
+            "where(q < z, q, z)",
+            "net2(q, w)",
+            "exp(1)",
+            "*/",
+            "x",
+            "s",
+            "v",
+            "1/s",
+            "degC",
+            "\\u0000",
+            "net2(net2(q, w), w)",
+            "a = b",
+            "g = F",
+            "../x.onnx",
+            ".",
+        ],
+    ),
+    "number": (
+        r"(?<= )-?\d[\d.]*(?=[ ,\n])",
+        ["0", "-1", "nan", "inf", "1e400", "9" * 30, "true", "1e-50", "[]", "{}", "2020-01-01", '"1"', "1_0", "0xF"],
+    ),
+    "name": (
+        r"(?m)^[\w]+(?= =)|(?<=, )\w+(?= =)|(?<=\{ )\w+(?= =)",
+        ["x", "s", "v", "p", "t1", "int", "H", "extends", '"a b"', "a.b", "status", "F_lag_in"],
+    ),
     "line": (r"(?m)^.+$", ["", "x = 1", "[x]", "[[model]]", "[model]", "[sets.x]", "{", "é = 1"]),
     "token": (r"[\w./*^-]+|\S|\n", ['"', "=", "{", "]", "\\", "\0", "\x7f", "#", "\ud800"]),
-}  # fmt: skip
+}
 
 
 @st.composite
@@ -512,16 +613,20 @@ def test_edited_files(folder, text):
 
 UNARY = [name for name, (count, _) in expressions.FUNCTIONS.items() if count == 1]
 EXPRESSIONS = st.recursive(
-    st.sampled_from(["q", "w", "F", "z", "k", "m", "F_lag", "F_foot", "g", "0", "1", "2.5", "-3", "1e-3", "(T*der(F))", "(T*der(w))", "(T*der(q))"]),
+    st.sampled_from(
+        ["q", "w", "F", "z", "k", "m", "F_lag", "F_foot", "g", "0", "1", "2.5", "-3", "1e-3", "(T*der(F))", "(T*der(w))", "(T*der(q))"]
+    ),
     lambda inner: st.one_of(
         st.tuples(inner, st.sampled_from(["+", "-", "*", "/"]), inner).map(lambda t: f"({t[0]} {t[1]} {t[2]})"),
         st.tuples(inner, st.sampled_from(["2", "3", "-1", "-2", "8"])).map(lambda t: f"({t[0]})^{t[1]}"),
         st.tuples(st.sampled_from([*UNARY, "one"]), inner).map(lambda t: f"{t[0]}({t[1]})"),
         st.tuples(st.sampled_from(["min", "max", "net2"]), inner, inner).map(lambda t: f"{t[0]}({t[1]}, {t[2]})"),
-        st.tuples(inner, st.sampled_from(["<", "<=", ">", ">="]), inner, inner, inner).map(lambda t: f"where({t[0]} {t[1]} {t[2]}, {t[3]}, {t[4]})"),
+        st.tuples(inner, st.sampled_from(["<", "<=", ">", ">="]), inner, inner, inner).map(
+            lambda t: f"where({t[0]} {t[1]} {t[2]}, {t[3]}, {t[4]})"
+        ),
     ),
     max_leaves=7,
-)  # fmt: skip
+)
 
 
 @settings(FUZZ, max_examples=150)

@@ -10,16 +10,15 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+import promise_check
+import promise_nets
+import promise_reference as reference
 import pytest
 
 import penode_gen
 from penode_gen import exact, promises
 from penode_gen.model import NetworkPort, Promises
 from penode_gen.networks import Affine, Dense, Network
-
-import promise_check
-import promise_nets
-import promise_reference as reference
 
 PROVE = Path(promise_check.__file__).parent
 
@@ -48,7 +47,10 @@ net = "other.json"
 
 def bow(a: float, b: float, c: float = 0.0, activation: str = "relu") -> str:
     """max(0, v) a + max(0, -v) b + c on -2 to 2."""
-    layers = [{"activation": activation, "weights": [[1.0], [-1.0]], "bias": [0.0, 0.0]}, {"activation": "identity", "weights": [[a, b]], "bias": [c]}]
+    layers = [
+        {"activation": activation, "weights": [[1.0], [-1.0]], "bias": [0.0, 0.0]},
+        {"activation": "identity", "weights": [[a, b]], "bias": [c]},
+    ]
     return str({"layers": layers, "trained_range": {"min": [-2.0], "max": [2.0]}}).replace("'", '"')
 
 
@@ -60,12 +62,16 @@ def load(folder: Path, says: str, net: str = bow(3.0, -2.0), other: str = bow(3.
 
 
 def test_what_is_promised_is_read_in_si_and_printed(tmp_path):
-    model = load(tmp_path, 'monotone = true, dissipative = true, max_slope = "4 N*s/mm", max_force = "9 N", zero_at_zero = true', outside="clamp")
+    model = load(
+        tmp_path, 'monotone = true, dissipative = true, max_slope = "4 N*s/mm", max_force = "9 N", zero_at_zero = true', outside="clamp"
+    )
     port = model.networks["net"]
     assert port.promises == Promises(increasing=True, dissipative=0.0, max_slope=4000.0, max_force=9.0, zero_at_zero=True)
     kinds = "INCREASING DISSIPATIVE MAX_SLOPE MAX_FORCE ZERO_AT_ZERO".split()
     assert promises.initialiser(port, 2) == "{ " + " | ".join(f"PEN_PROMISE_{kind}" for kind in kinds) + ", 96U, 0.0F, 4000.0F, 9.0F }"
-    assert load(tmp_path, 'monotone = "increasing", dissipative = "0.1 N"').networks["net"].promises == Promises(increasing=True, dissipative=0.1)
+    assert load(tmp_path, 'monotone = "increasing", dissipative = "0.1 N"').networks["net"].promises == Promises(
+        increasing=True, dissipative=0.1
+    )
     assert not load(tmp_path, "monotone = false, dissipative = false, zero_at_zero = false").networks["net"].promises
 
 
@@ -97,7 +103,9 @@ def test_what_cannot_be_promised(tmp_path, says, message):
 def test_networks_of_which_nothing_can_be_proven(tmp_path):
     with pytest.raises(penode_gen.ModelError, match="for networks of one input with ReLU activations only; remove them"):
         load(tmp_path, "monotone = true", bow(3.0, -2.0, activation="tanh"), bow(3.0, -2.0, activation="tanh"))
-    with pytest.raises(penode_gen.ModelError, match="a network that fades is not piecewise linear: its promises cannot be proven; choose outside"):
+    with pytest.raises(
+        penode_gen.ModelError, match="a network that fades is not piecewise linear: its promises cannot be proven; choose outside"
+    ):
         load(tmp_path, "monotone = true", outside="fade")
 
 
@@ -117,7 +125,13 @@ def test_networks_of_which_nothing_can_be_proven(tmp_path):
 )
 def test_a_set_that_breaks_a_promise_is_named(tmp_path, says, net, outside, message):
     with pytest.raises(penode_gen.ModelError) as caught:
-        load(tmp_path, says, other=net, net=net if "decreasing" in says else bow(0.5, -0.5, 0.0) if outside == "clamp" else bow(3.0, -2.0), outside=outside)
+        load(
+            tmp_path,
+            says,
+            other=net,
+            net=net if "decreasing" in says else bow(0.5, -0.5, 0.0) if outside == "clamp" else bow(3.0, -2.0),
+            outside=outside,
+        )
     assert f"sets.other.net: {message}" in str(caught.value) and "train the network to keep its promises" in str(caught.value)
 
 
@@ -130,9 +144,13 @@ def test_pieces_are_the_exact_ones():
             continue
         checked += 1
         layers = [
-            Affine(la.weights[0], la.bias, "centre") if la.kind == "centre" else Affine(la.bias, la.weights[0], "rescale") if la.kind == "rescale"
-            else Dense(la.weights, la.bias, "relu" if la.kind == "relu" else "identity") for la in net.layers
-        ]  # fmt: skip
+            Affine(la.weights[0], la.bias, "centre")
+            if la.kind == "centre"
+            else Affine(la.bias, la.weights[0], "rescale")
+            if la.kind == "rescale"
+            else Dense(la.weights, la.bias, "relu" if la.kind == "relu" else "identity")
+            for la in net.layers
+        ]
         line = reference.Line(net)
         found = list(exact.pieces(Network(tuple(layers), None, None, "random")))
         assert found[0].start is None and found[-1].end is None
@@ -148,5 +166,10 @@ def test_pieces_are_the_exact_ones():
 
 def test_a_sample_of_the_proof(capfd):
     """Some 3000 sets that break a promise, 300 that keep one; the faults in the C are a matter of `make prove-promise`."""
-    assert subprocess.run([sys.executable, PROVE / "promise_check.py", "--bad", "3000", "--good", "300", "--jobs", "1", "--as", "none", "--no-faults"]).returncode == 0
+    assert (
+        subprocess.run(
+            [sys.executable, PROVE / "promise_check.py", "--bad", "3000", "--good", "300", "--jobs", "1", "--as", "none", "--no-faults"]
+        ).returncode
+        == 0
+    )
     assert promise_check.FAULTS

@@ -12,8 +12,8 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
+
 from penode_gen.network_files import read_network
 from penode_gen.networks import ACTIVATIONS, Affine, Dense, Network, NetworkError
 
@@ -77,6 +77,7 @@ def test_jacobian_is_the_derivative_of_evaluate(activation: str) -> None:
         j = net.jacobian(x)
         for i in range(3):
             for k in range(2):
+
                 def along(t: mpmath.mpf, i: int = i, k: int = k, x: list[float] = x) -> mpmath.mpf:
                     return exact(net, [t if m == k else v for m, v in enumerate(x)])[i]
 
@@ -193,9 +194,7 @@ def test_json_is_scaled_as_documented(tmp_path: Path) -> None:
     net = read(tmp_path, document(trained_range={"min": [0.0], "max": [8.0]}))
     # x = 3: h = (3 - 1) / 4 = 1/2; relu(1/2 + 1/2) = 1, relu(1 - 1/2) = 1/2; 1 - 1/2 + 1/4 = 3/4; 3/4 * 20 - 10 = 5
     assert net.evaluate([3.0]).tolist() == [5.0]
-    assert net.architecture == (
-        ("affine", "centre", 1), ("dense", "relu", 1, 2), ("dense", "identity", 2, 1), ("affine", "rescale", 1),
-    )  # fmt: skip
+    assert net.architecture == (("affine", "centre", 1), ("dense", "relu", 1, 2), ("dense", "identity", 2, 1), ("affine", "rescale", 1))
     assert (net.input_min.tolist(), net.input_max.tolist(), net.source) == ([0.0], [8.0], "net.json")
 
 

@@ -16,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 from onnx import numpy_helper
 from onnx.reference import ReferenceEvaluator
+
 from penode_gen.network_files import read_network
 
 NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm"
@@ -38,11 +39,7 @@ def friction(f_brk: float, f_c: float) -> Law:
     return law
 
 
-CASES = {
-    "spring": (spring, 0.08),
-    "damper": (friction(45.0, 35.0), 1.5),
-    "damper_altered": (friction(90.0, 70.0), 1.5),
-}
+CASES = {"spring": (spring, 0.08), "damper": (friction(45.0, 35.0), 1.5), "damper_altered": (friction(90.0, 70.0), 1.5)}
 
 
 def forces(name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -109,9 +109,7 @@ F = { value = "total", unit = "N" }
 rub = { value = "F_rub", unit = "kN" }
 """,
     lambda x, u, r: [],
-    lambda x, u, r: [
-        (30 * (u[0] + 0.04)) ** 2 - (30 * 0.04) ** 2 + 3 * np.tanh(r[0] / 0.02) + 5 * max(r[0], 0) + 8 * min(r[0], 0) - 250.0
-    ],
+    lambda x, u, r: [(30 * (u[0] + 0.04)) ** 2 - (30 * 0.04) ** 2 + 3 * np.tanh(r[0] / 0.02) + 5 * max(r[0], 0) + 8 * min(r[0], 0) - 250.0],
     lambda x, u, r: [3 * np.tanh(r[0] / 0.02)],
     (),
 )
@@ -165,9 +163,11 @@ def _thermal(x: Vector, u: Vector) -> list[float]:
 
 def _mix(x: Vector, u: Vector) -> float:
     return (
-        np.log1p(np.exp(x[0] / 10.0)) - 1.0 / (1.0 + np.exp(x[1])) + np.exp(-u[0] ** 2) / 3.0
+        np.log1p(np.exp(x[0] / 10.0))
+        - 1.0 / (1.0 + np.exp(x[1]))
+        + np.exp(-(u[0] ** 2)) / 3.0
         + np.sign(x[0] - x[1]) * max(min(x[0], 2.0), -1.0) ** 3
-    )  # fmt: skip
+    )
 
 
 # Algebraic loops: a network of resistors with a switch (three unknowns), and an acceleration that acts on itself.
@@ -228,7 +228,9 @@ def loaded(folder: Path, name: str, method: str = "rk4") -> penode_gen.Model:
 def points(case: Case, model: penode_gen.Model, n: int) -> list[tuple[Vector, Vector, Vector]]:
     """Random states, inputs and input rates, of all signs and of the size of 1."""
     draw = np.random.default_rng(3)
-    return [(draw.normal(size=len(case.states)), draw.normal(size=len(model.inputs)), draw.normal(size=len(model.inputs))) for _ in range(n)]
+    return [
+        (draw.normal(size=len(case.states)), draw.normal(size=len(model.inputs)), draw.normal(size=len(model.inputs))) for _ in range(n)
+    ]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -302,7 +304,8 @@ def test_networks_in_equations(tmp_path):
     data = models.network_file(tmp_path / "net.json", [1, 4, 1], ["tanh", "identity"], 2)
     path = tmp_path / "calls.toml"
     path.write_text(
-        HEAD.format(method="heun") + """
+        HEAD.format(method="heun")
+        + """
 [inputs]
 u = { unit = "1" }
 n_1 = { unit = "1" }

@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 from onnx.reference import ReferenceEvaluator
-from onnx_graphs import (
-    B1, B2, DOUBLE, FACTOR, FLOAT, MLP, MLP_CONSTANTS, RNG, SHIFT, W1, W2, Constants, model, node, refused, same, save,
-)  # fmt: skip
+from onnx_graphs import B1, B2, DOUBLE, FACTOR, FLOAT, MLP, MLP_CONSTANTS, RNG, SHIFT, W1, W2, Constants, model, node, refused, same, save
+
 from penode_gen.network_files import read_network
 from penode_gen.networks import Affine, Dense, NetworkError
 
 # ---- dense layers ----
+
 
 @pytest.mark.parametrize("dtype", [FLOAT, DOUBLE])
 def test_gemm_network(tmp_path: Path, dtype: int) -> None:
@@ -40,9 +39,12 @@ def test_weights_are_taken_over_exactly(tmp_path: Path) -> None:
 @pytest.mark.parametrize("activation", ["Relu", "Tanh", "Sigmoid", "Softplus"])
 def test_matmul_with_bias_in_either_order(tmp_path: Path, activation: str) -> None:
     nodes = [
-        node("MatMul", "x w1", "a"), node("Add", "b1 a", "b"), node(activation, "b", "c"),
-        node("MatMul", "c w2", "d"), node("Add", "d b2", "y"),
-    ]  # fmt: skip
+        node("MatMul", "x w1", "a"),
+        node("Add", "b1 a", "b"),
+        node(activation, "b", "c"),
+        node("MatMul", "c w2", "d"),
+        node("Add", "d b2", "y"),
+    ]
     net = same(tmp_path, model(nodes, MLP_CONSTANTS))
     assert net.architecture == (("dense", activation.lower(), 3, 5), ("dense", "identity", 5, 2))
 
@@ -74,11 +76,10 @@ def test_activations_without_a_dense_layer(tmp_path: Path) -> None:
         ([node("MatMul", "x w", "a"), node("Tanh", "a", "y")], {"w": W1}),
         ([node("MatMul", "w x", "a"), node("Tanh", "a", "y")], {"w": W1.T}),
         ([node("MatMul", "x v", "y")], {"v": SHIFT}),
-        ([node("Mul", "x v", "a"), node("Unsqueeze", "a i", "b"), node("Gemm", "b w", "y")],
-         {"v": SHIFT, "i": np.array([0]), "w": W1}),
+        ([node("Mul", "x v", "a"), node("Unsqueeze", "a i", "b"), node("Gemm", "b w", "y")], {"v": SHIFT, "i": np.array([0]), "w": W1}),
         ([node("Mul", "x row", "a"), node("Gemm", "a w", "y")], {"row": SHIFT[np.newaxis, :], "w": W1}),
     ],
-)  # fmt: skip
+)
 def test_input_of_one_axis(tmp_path: Path, nodes: list[NodeProto], constants: Constants) -> None:
     for x in RNG.normal(size=(5, 3)):
         same(tmp_path, model(nodes, constants, shape=[3]), x)
@@ -101,12 +102,10 @@ def test_input_of_one_axis(tmp_path: Path, nodes: list[NodeProto], constants: Co
         ([node("Add", "x one", "y")], ["centre"]),
         ([node("Mul", "x one", "y")], ["rescale"]),
         ([node("Sub", "x s", "a"), node("Sub", "a f", "y")], ["centre"]),
-        ([node("Sub", "x s", "a"), node("Div", "a f", "b"), node("Mul", "b f", "c"), node("Add", "c s", "y")],
-         ["centre", "centre"]),
-        ([node("Mul", "x f", "a"), node("Add", "a s", "b"), node("Mul", "b f", "c"), node("Add", "c s", "y")],
-         ["rescale"]),
+        ([node("Sub", "x s", "a"), node("Div", "a f", "b"), node("Mul", "b f", "c"), node("Add", "c s", "y")], ["centre", "centre"]),
+        ([node("Mul", "x f", "a"), node("Add", "a s", "b"), node("Mul", "b f", "c"), node("Add", "c s", "y")], ["rescale"]),
     ],
-)  # fmt: skip
+)
 def test_scaling_merges_into_few_layers(tmp_path: Path, nodes: list[NodeProto], forms: list[str]) -> None:
     net = same(tmp_path, model(nodes, {"s": SHIFT, "f": FACTOR, "one": np.array(1.5)}))
     assert [layer.form for layer in net.layers if isinstance(layer, Affine)] == forms
@@ -130,10 +129,7 @@ def test_sets_with_other_numbers_have_the_same_architecture(tmp_path: Path) -> N
 
 def test_alignment_of_old_files(tmp_path: Path) -> None:
     # before version 7 an attribute said which axis of the first operand a constant starts at
-    nodes = [
-        node("Unsqueeze", "x", "a", axes=[2]), node("Add", "a s", "b", broadcast=1, axis=1),
-        node("Squeeze", "b", "y", axes=[2]),
-    ]  # fmt: skip
+    nodes = [node("Unsqueeze", "x", "a", axes=[2]), node("Add", "a s", "b", broadcast=1, axis=1), node("Squeeze", "b", "y", axes=[2])]
     net = read_network(save(tmp_path, model(nodes, {"s": SHIFT}, opset=6)))
     assert net.evaluate([1.0, 2.0, 3.0]).tolist() == [1.0 + SHIFT[0], 2.0 + SHIFT[1], 3.0 + SHIFT[2]]
 
@@ -173,10 +169,17 @@ def test_scaler_of_the_ml_domain(tmp_path: Path) -> None:
 )
 def test_no_ops_are_dropped(tmp_path: Path, nodes: list[NodeProto]) -> None:
     constants = {
-        "w": W1, "s": SHIFT, "full": np.array([-1, 3]), "copy": np.array([0, -1]), "deep": np.array([0, 3, 1, -1]),
-        "zero": np.array([0]), "one": np.array([1]), "last": np.array([-1]), "ratio": np.array(0.5),
+        "w": W1,
+        "s": SHIFT,
+        "full": np.array([-1, 3]),
+        "copy": np.array([0, -1]),
+        "deep": np.array([0, 3, 1, -1]),
+        "zero": np.array([0]),
+        "one": np.array([1]),
+        "last": np.array([-1]),
+        "ratio": np.array(0.5),
         "false": np.array(False),
-    }  # fmt: skip
+    }
     x = np.random.default_rng(1).integers(-8, 8, (20, 3)) / 4.0  # a cast to float changes none of these
     same(tmp_path, model([*nodes, node("Gemm", "a w", "y")], constants), x)
 
@@ -189,9 +192,12 @@ def test_output_without_its_axis_of_one(tmp_path: Path, tail: list[NodeProto]) -
 
 def test_scalars_may_go_on_without_their_axis(tmp_path: Path) -> None:
     nodes = [
-        node("MatMul", "x v", "a"), node("Mul", "a two", "b"), node("Tanh", "b", "c"), node("Unsqueeze", "c last", "d"),
+        node("MatMul", "x v", "a"),
+        node("Mul", "a two", "b"),
+        node("Tanh", "b", "c"),
+        node("Unsqueeze", "c last", "d"),
         node("MatMul", "d w", "y"),
-    ]  # fmt: skip
+    ]
     same(tmp_path, model(nodes, {"v": SHIFT, "two": np.array([2.0]), "last": np.array([-1]), "w": W1[:1]}))
 
 
@@ -208,9 +214,11 @@ def test_weights_behind_constant_nodes_and_constant_operators(tmp_path: Path) ->
     nodes = [
         node("Transpose", "w1t", "w1", perm=[1, 0]),
         helper.make_node("Constant", [], ["raw"], value=numpy_helper.from_array(B1.astype(np.float32))),
-        node("Cast", "raw", "b1", to=DOUBLE), node("Reshape", "w2flat", "w2"), node("Identity", "b2same", "b2"),
+        node("Cast", "raw", "b1", to=DOUBLE),
+        node("Reshape", "w2flat", "w2"),
+        node("Identity", "b2same", "b2"),
         *MLP,
-    ]  # fmt: skip
+    ]
     nodes[3] = node("Reshape", "w2flat shape", "w2")
     constants = {"w1t": W1.T, "w2flat": W2.ravel(), "shape": np.array([5, 2]), "b2same": B2}
     same(tmp_path, model(nodes, constants))
@@ -300,9 +308,12 @@ def test_faulty_range_is_refused(tmp_path: Path, low: str | None, high: str | No
 
 def torch_softplus(beta: float, threshold: float, compared: str) -> tuple[list[NodeProto], Constants]:
     nodes = [
-        node("Mul", "x beta", "bx"), node("Softplus", "bx", "s"), node("Div", "s beta", "d"),
-        node("Greater", f"{compared} threshold", "c"), node("Where", "c x d", "y"),
-    ]  # fmt: skip
+        node("Mul", "x beta", "bx"),
+        node("Softplus", "bx", "s"),
+        node("Div", "s beta", "d"),
+        node("Greater", f"{compared} threshold", "c"),
+        node("Where", "c x d", "y"),
+    ]
     return nodes, {"beta": np.array(beta), "threshold": np.array(threshold)}
 
 
@@ -318,12 +329,9 @@ def test_softplus_of_pytorch(tmp_path: Path, beta: float, compared: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("beta", "threshold", "change"),
-    [(1.0, 5.0, {}), (-1.0, 40.0, {}), (0.0, 40.0, {}), (1.0, 40.0, {2: node("Mul", "s four", "d")})],
+    ("beta", "threshold", "change"), [(1.0, 5.0, {}), (-1.0, 40.0, {}), (0.0, 40.0, {}), (1.0, 40.0, {2: node("Mul", "s four", "d")})]
 )
-def test_softplus_that_is_none_is_refused(
-    tmp_path: Path, beta: float, threshold: float, change: dict[int, NodeProto]
-) -> None:
+def test_softplus_that_is_none_is_refused(tmp_path: Path, beta: float, threshold: float, change: dict[int, NodeProto]) -> None:
     nodes, constants = torch_softplus(beta, threshold, "bx")
     for i, other in change.items():
         nodes[i] = other

@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from onnx import ModelProto, numpy_helper
 from onnx.backend.test.case.node import collect_testcases
+
 from penode_gen.network_files import read_network
 from penode_gen.networks import Network, NetworkError
 

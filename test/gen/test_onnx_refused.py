@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 from onnx_graphs import B1, MLP, MLP_CONSTANTS, SHIFT, W1, Constants, model, node, refused, save
+
 from penode_gen.network_files import read_network
 from penode_gen.networks import NetworkError
 
@@ -72,7 +72,7 @@ W = {"w": W1}
         ([node("Add", "x c", "y")], {"c": SHIFT.astype(np.float16)}, ["node 1 (Add)", "float16"]),
         ([node("Dropout", "x r t", "y")], {"r": np.array(0.5), "t": np.array(True)}, ["node 1 (Dropout)", "training"]),
     ],
-)  # fmt: skip
+)
 def test_graph_is_refused(tmp_path: Path, nodes: list[NodeProto], constants: Constants, parts: list[str]) -> None:
     refused(tmp_path, model(nodes, constants), *parts)
 
@@ -140,13 +140,8 @@ GOOD = model(GOOD_NODES, MLP_CONSTANTS | {"s": SHIFT}).SerializeToString()
 
 
 @settings(max_examples=500, deadline=None)
-@given(
-    cut=st.integers(0, len(GOOD)),
-    changes=st.lists(st.tuples(st.integers(0, len(GOOD) - 1), st.integers(0, 255)), max_size=4),
-)
-def test_broken_file_never_ends_in_another_exception(
-    tmp_path_factory: Any, cut: int, changes: list[tuple[int, int]]
-) -> None:
+@given(cut=st.integers(0, len(GOOD)), changes=st.lists(st.tuples(st.integers(0, len(GOOD) - 1), st.integers(0, 255)), max_size=4))
+def test_broken_file_never_ends_in_another_exception(tmp_path_factory: Any, cut: int, changes: list[tuple[int, int]]) -> None:
     content = bytearray(GOOD)
     for at, value in changes:
         content[at] = value

@@ -70,7 +70,11 @@ def test_clip_at_zero_is_relu(limit: tuple[str, ...], tmp_path: Path) -> None:
 
 
 def branch(source: str, name: str, activation: str = "Tanh") -> list[onnx.NodeProto]:
-    return [node("Gemm", f"{source} w1 b1", f"h{name}"), node(activation, f"h{name}", f"a{name}"), node("Gemm", f"a{name} w2 b2", f"f{name}")]
+    return [
+        node("Gemm", f"{source} w1 b1", f"h{name}"),
+        node(activation, f"h{name}", f"a{name}"),
+        node("Gemm", f"a{name} w2 b2", f"f{name}"),
+    ]
 
 
 def test_zero_at_zero_by_subtraction(tmp_path: Path) -> None:
@@ -108,7 +112,17 @@ def test_odd_by_subtraction(activation: str, tmp_path: Path) -> None:
     ],
 )
 def test_refused_with_a_way_out(nodes: list[onnx.NodeProto], says: str, tmp_path: Path) -> None:
-    constants = PLAIN | BN | {"column": RANDOM.normal(size=(5, 1)), "cube": np.ones((1, 1, 1)), "narrow": W1[:, :1], "zeros": np.zeros(5), "far": np.array(np.inf)}
+    constants = (
+        PLAIN
+        | BN
+        | {
+            "column": RANDOM.normal(size=(5, 1)),
+            "cube": np.ones((1, 1, 1)),
+            "narrow": W1[:, :1],
+            "zeros": np.zeros(5),
+            "far": np.array(np.inf),
+        }
+    )
     path = save(tmp_path, nodes, {n: v for n, v in constants.items() if any(n in k.input for k in nodes)})
     with pytest.raises(NetworkError) as caught:
         read_network(path)

@@ -9,8 +9,9 @@ import zlib
 from pathlib import Path
 
 import numpy as np
-import penode_gen
 import pytest
+
+import penode_gen
 from penode_sil.status import BIT
 from penode_sil.targets import Set, Sil
 

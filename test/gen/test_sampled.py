@@ -97,7 +97,9 @@ def by_hand(tau: list[float], z: list[float]) -> list[tuple[float, float, float,
 def test_c_batch_and_evaluator_agree_to_the_bit(load, tmp_path, method, input, substeps):
     """And their signals are the samples of the inputs themselves, bit by bit."""
     text = drive(method, input, substeps)
-    model = load(text if input != "held" else text.replace('damper = { between = ["load", "road"]', 'damper = { between = ["load", "ground"]'))
+    model = load(
+        text if input != "held" else text.replace('damper = { between = ["load", "road"]', 'damper = { between = ["load", "ground"]')
+    )
     u = inputs(80)
     dtype = np.float32 if method == "euler" else np.float64
     run, batch = Sil(model, dtype).run(u), Batch(model, dtype).run(np.stack([u, u[::-1]]), outputs=["stage", "bus"], states=model.states)
@@ -149,7 +151,10 @@ def test_the_exact_solution_is_what_smaller_steps_come_to(load):
 def test_a_delay_of_a_smooth_input_is_that_input_later(load):
     """The exact solution with a chirp is the solution without the delay, later by it: the load is at rest until then."""
     text = drive().replace('start_position = "10 mm"', 'start_position = "0 mm"')
-    model, undelayed = load(text), load(text.replace('input = "z", law = "delay", samples = 7', 'input = "z", law = "gain", gain = "1"'), "u")
+    model, undelayed = (
+        load(text),
+        load(text.replace('input = "z", law = "delay", samples = 7', 'input = "z", law = "gain", gain = "1"'), "u"),
+    )
     times, late = np.arange(200) * 2e-3, 14e-3
     signals = {"tau": Chirp(0.0, 1.0, 0.0, 0.0), "z": Chirp(0.01, 2.0, 3.0, 0.0)}
     plan = scenario.Instance("late", "default")
@@ -238,7 +243,10 @@ def test_the_jacobian_is_that_of_differences(load):
         found = (after(k - late, 1, by) - after(k - late, 1, -by))[:n_x] / (2 * by)
         earlier = np.zeros(n_x)
         if late > 7:  # and through the state before, which the Jacobian of this step has in x_x
-            run = [sil.run(np.where((np.arange(40) == k - late)[:, None] & np.array([False, True]), u + sign * by, u)[:k]).x[-1] for sign in (1, -1)]
+            run = [
+                sil.run(np.where((np.arange(40) == k - late)[:, None] & np.array([False, True]), u + sign * by, u)[:k]).x[-1]
+                for sign in (1, -1)
+            ]
             earlier = flat[: n_x * n_x].reshape(n_x, n_x) @ ((run[0] - run[1]) / (2 * by))
         assert np.max(np.abs(found - earlier - columns[:, width - 1])) < 1e-6
     held = (after(k - 1, 0, by) - after(k - 1, 0, -by))[:n_x] / (2 * by)
@@ -306,7 +314,9 @@ def test_faults_are_found(load, runtime, tmp_path, fault):
     sources = [str(tmp_path / name) for name in ("late.c", "late_params.c", "main.c")]
     subprocess.run([*DOUBLE, *include, str(runtime), *sources, "-o", str(program)], check=True)
     u = np.insert(inputs(40), [2, 9, 9], [[np.nan, 0.0]], axis=0)
-    lines = subprocess.run([str(program)], input="".join(f"{a!r} {b!r}\n" for a, b in u.tolist()), text=True, capture_output=True, check=True).stdout
+    lines = subprocess.run(
+        [str(program)], input="".join(f"{a!r} {b!r}\n" for a, b in u.tolist()), text=True, capture_output=True, check=True
+    ).stdout
     found = [tuple(map(float, line.split())) for line, good in zip(lines.splitlines(), np.isfinite(u).all(axis=1)) if good]
     assert (found == [(w[1], w[0]) for w in by_hand(*inputs(40).T.tolist())]) is (fault is None)
 
@@ -340,12 +350,20 @@ int main(void)
         ("samples = 4", 'samples = 4, start = "1 N*m"', "the law 'held' has no start; remove it"),
         ('gain = "k_t"', 'gain = "k_t", samples = 2', "the law 'gain' has no samples"),
         ('gain = "k_t"', 'gain = "k_t", start = "1 N*m"', "the law 'gain' has no start"),
-        ('road = {{ input = "z"', 'road = {{ input = "smooth"', "'smooth' is made by the law 'lag', and 'delay' acts on the samples of an input; let smooth act on what 'road' makes"),
-        ('between = ["load", "road"]', 'between = ["load", "stair"]', "the model uses the rate of 'stair', which moves in steps; put a lag behind it"),
+        (
+            'road = {{ input = "z"',
+            'road = {{ input = "smooth"',
+            "'smooth' is made by the law 'lag', and 'delay' acts on the samples of an input; let smooth act on what 'road' makes",
+        ),
+        (
+            'between = ["load", "road"]',
+            'between = ["load", "stair"]',
+            "the model uses the rate of 'stair', which moves in steps; put a lag behind it",
+        ),
         ('road = {{ input = "z"', 'drum = {{ input = "z"', "'drum' is taken by the body of that name"),
         ('road = {{ input = "z"', 'smooth_slip = {{ input = "z"', "is no body, point, input or ground"),
     ],
-)  # fmt: skip
+)
 def test_refused(tmp_path, old, new, what):
     path = tmp_path / "bad.toml"
     text = DRIVE.replace('road = {{ input = "z"', 'stair = {{ input = "z", law = "held", samples = 2 }}\nroad = {{ input = "z"')

@@ -28,7 +28,11 @@ ROOT = Path(__file__).resolve().parents[2]
 NQVM = ROOT / "gen" / "nqvm" / "c"
 REALS = {np.float32: [], np.float64: ["-DPEN_REAL_DOUBLE"]}
 FLUSH, ROUNDING, REAL, CONTRACTED, ANSWER, SET = 0x01, 0x02, 0x04, 0x08, 0x10, 0x20
-METHODS, INPUTS, OUTSIDE = ("euler", "heun", "rk4", "ros1", "ros2"), ("held", "linear", "parabola", "cubic"), ("extrapolate", "clamp", "fade")
+METHODS, INPUTS, OUTSIDE = (
+    ("euler", "heun", "rk4", "ros1", "ros2"),
+    ("held", "linear", "parabola", "cubic"),
+    ("extrapolate", "clamp", "fade"),
+)
 ACTIVATIONS = ("tanh", "relu", "sigmoid", "softplus", "step", "identity")
 
 # Every method with every interpolation, the rest spread over them.
@@ -119,18 +123,27 @@ def bare(folder: Path, sizes: list[int], activation: str, outside: str, more: st
     models.network_file(folder / "net.json", sizes, [activation] * (len(sizes) - 2) + ["identity"], sum(sizes), low)
     names = [f"x{i}" for i in range(sizes[0])]
     text = models.BARE.format(
-        outside=outside, inputs="\n".join(f'{n} = {{ unit = "1", min = -1, max = 1.5 }}' for n in names), units=["1"] * sizes[0], names=", ".join(names)
+        outside=outside,
+        inputs="\n".join(f'{n} = {{ unit = "1", min = -1, max = 1.5 }}' for n in names),
+        units=["1"] * sizes[0],
+        names=", ".join(names),
     )
     (folder / "bare.toml").write_text(text.replace("fade_width", f"{more}\nfade_width"))
     return penode_gen.load(folder / "bare.toml")
 
 
 SHAPES = [
-    ([1, 16, 16, 1], "relu", "clamp", ""), ([1, 16, 16, 16, 1], "relu", "fade", ""), ([3, 21, 10, 1], "relu", "fade", ""),
-    ([1, 10, 20, 1], "tanh", "extrapolate", ""), ([2, 37, 4, 1], "softplus", "clamp", ""), ([1, 5, 1], "relu", "extrapolate", ""),
-    ([1, 16, 16, 1], "relu", "extrapolate", "pieces = 64"), ([1, 9, 7, 1], "relu", "clamp", "pieces = 48"),
-    ([1, 16, 16, 1], "relu", "clamp", 'pieces = 4\nmore_pieces = "layers"'), ([1, 21, 1], "relu", "clamp", 'pieces = 64\nmore_pieces = "layers"'),
-]  # fmt: skip
+    ([1, 16, 16, 1], "relu", "clamp", ""),
+    ([1, 16, 16, 16, 1], "relu", "fade", ""),
+    ([3, 21, 10, 1], "relu", "fade", ""),
+    ([1, 10, 20, 1], "tanh", "extrapolate", ""),
+    ([2, 37, 4, 1], "softplus", "clamp", ""),
+    ([1, 5, 1], "relu", "extrapolate", ""),
+    ([1, 16, 16, 1], "relu", "extrapolate", "pieces = 64"),
+    ([1, 9, 7, 1], "relu", "clamp", "pieces = 48"),
+    ([1, 16, 16, 1], "relu", "clamp", 'pieces = 4\nmore_pieces = "layers"'),
+    ([1, 21, 1], "relu", "clamp", 'pieces = 64\nmore_pieces = "layers"'),
+]
 
 
 def test_networks_of_every_shape(tmp_path, short):
@@ -173,7 +186,16 @@ def test_input_stays_in_its_range_and_reaches_the_envelope(monkeypatch):
 
 def test_levels_are_exact_and_inside():
     """Every level is a float and inside of the range, wherever that lies."""
-    for low, high, share in [(-0.3, 0.3, 1.0), (0.0, 1e-3, 1.0), (273.0, 400.0, 0.125), (-1e6, 5.0, 1.0), (99.0, 99.001, 1.0), (-64.0, 64.0, 2.0**-11), (5.0, 5.0, 1.0), (0.0, 1e-37, 1.0)]:
+    for low, high, share in [
+        (-0.3, 0.3, 1.0),
+        (0.0, 1e-3, 1.0),
+        (273.0, 400.0, 0.125),
+        (-1e6, 5.0, 1.0),
+        (99.0, 99.001, 1.0),
+        (-64.0, 64.0, 2.0**-11),
+        (5.0, 5.0, 1.0),
+        (0.0, 1e-37, 1.0),
+    ]:
         v = selftest.Levels.within(low, high, share)
         values = [v.low + v.step * k for k in (0, 1, 127, 255)]
         assert all(low <= x <= high and float(np.float32(x)) == x for x in values), (low, high, values)
@@ -181,7 +203,9 @@ def test_levels_are_exact_and_inside():
 
 def test_runtime_answers_are_the_evaluated_ones():
     source = (ROOT / "src" / "pen_selftest.c").read_text()
-    assert [int(x, 16) for x in re.findall(r"#define ANSWER (0x[0-9a-f]{8})U", source)] == [selftest.runtime_answer(r) for r in (np.float64, np.float32)]
+    assert [int(x, 16) for x in re.findall(r"#define ANSWER (0x[0-9a-f]{8})U", source)] == [
+        selftest.runtime_answer(r) for r in (np.float64, np.float32)
+    ]
 
 
 def test_a_line_that_the_evaluator_does_not_know_is_refused():
@@ -190,7 +214,9 @@ def test_a_line_that_the_evaluator_does_not_know_is_refused():
         with pytest.raises(translate.Untranslated, match=re.escape(line)):
             translate.function("f", ["v_x", "v_y", "v_z"], [line], {}, np.float32)
     assert translate.expression("(pen_real_t)(1.0 / 3.0)", {}, np.float32) == np.float32(1.0 / 3.0)  # divided as doubles
-    assert translate.expression("(pen_real_t)0.1 * (pen_real_t)0.2 - -(pen_real_t)3", {}, np.float32) == np.float32(0.1) * np.float32(0.2) + np.float32(3)
+    assert translate.expression("(pen_real_t)0.1 * (pen_real_t)0.2 - -(pen_real_t)3", {}, np.float32) == np.float32(0.1) * np.float32(
+        0.2
+    ) + np.float32(3)
 
 
 # -- broken builds ----------------------------------------------------------------------------------------------------
@@ -211,12 +237,27 @@ FAULTS = {
     "a weight": ("model/nqvm_params.c", "    0.12F", None, SET),
     "a constant of the model": ("model/nqvm.c", "((pen_real_t)10000.0)", "((pen_real_t)10001.0)", ANSWER),
     "the last bit of a constant": ("model/nqvm.c", "(1.0 / 350.0)", "(1.0 / 350.00002)", ANSWER),
-    "the order of a sum of the model": ("model/nqvm.c", "-(F_damper + F_damper_nn + F_spring + F_spring_nn)", "-(F_damper + F_spring + F_damper_nn + F_spring_nn)", ANSWER),
-    "the order of a kernel": ("inc/penode/pen_net16.h", "for (size_t i = 0U; i < 16U; i += 2U)", "for (size_t i = 14U; i < 16U; i -= 2U)", ANSWER),
-    "a layer's last row": ("src/pen_net.c", "    pen_real_t a = w[0];\n\n    for (size_t i = 0U; i < n_in; i++) {", "    pen_real_t a = w[0];\n\n    for (size_t i = n_in - 1U; i < n_in; i--) {", ANSWER),
+    "the order of a sum of the model": (
+        "model/nqvm.c",
+        "-(F_damper + F_damper_nn + F_spring + F_spring_nn)",
+        "-(F_damper + F_spring + F_damper_nn + F_spring_nn)",
+        ANSWER,
+    ),
+    "the order of a kernel": (
+        "inc/penode/pen_net16.h",
+        "for (size_t i = 0U; i < 16U; i += 2U)",
+        "for (size_t i = 14U; i < 16U; i -= 2U)",
+        ANSWER,
+    ),
+    "a layer's last row": (
+        "src/pen_net.c",
+        "    pen_real_t a = w[0];\n\n    for (size_t i = 0U; i < n_in; i++) {",
+        "    pen_real_t a = w[0];\n\n    for (size_t i = n_in - 1U; i < n_in; i--) {",
+        ANSWER,
+    ),
     "a coefficient": ("src/pen_math.c", "0.16666521F", "0.1666658F", ANSWER),
     "the order of a linear solve": ("src/pen_solve.c", "sum * inverse[k - 1U]", "sum / a[((k - 1U) * n) + (k - 1U)]", ANSWER),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -286,8 +327,22 @@ def objects(folder: Path, machine: str, flags: list[str], source: Path = ROOT, m
     """A program that prints the flags of runtime and model, compiled for an emulated core in gcc's own dialect: object by name."""
     folder.mkdir()
     (folder / "main.c").write_text(MAIN)
-    files = [folder / "main.c", *(source / "src" / path.name for path in RUNTIME), *(model / f"nqvm{end}.c" for end in ("", "_params", "_selftest"))]
-    command = [ROOT / "port" / "cortex-m" / "cc", MACHINES[machine], "-std=gnu17", "-O2", "-iquote", source / "inc", f"-I{model}", *flags, "-c"]
+    files = [
+        folder / "main.c",
+        *(source / "src" / path.name for path in RUNTIME),
+        *(model / f"nqvm{end}.c" for end in ("", "_params", "_selftest")),
+    ]
+    command = [
+        ROOT / "port" / "cortex-m" / "cc",
+        MACHINES[machine],
+        "-std=gnu17",
+        "-O2",
+        "-iquote",
+        source / "inc",
+        f"-I{model}",
+        *flags,
+        "-c",
+    ]
     subprocess.run([*command, *files], check=True, cwd=folder)
     return {path.stem: folder / f"{path.stem}.o" for path in files}
 

@@ -53,10 +53,17 @@ def test_refused_with_what_is_wrong(rich):
     values[3] = np.nan
     nan = sealed(good[:32] + values.tobytes(), 20, struct.pack("<I", zlib.crc32(values.tobytes())))
     for bad, words in (
-        (b"", "0 bytes"), (good[:31], "31 bytes"), (b"PENI" + good[4:], "begins with b'PENI'"), (good[:-1], "the head promises"), (good + b"\0", "the head promises"),
-        (sealed(good, 4, b"\2\0"), "version 2"), (sealed(good, 6, b"\2\0"), "2 bytes a value"), (sealed(good, 24, b"\1"), "version"),
-        (good[:40] + bytes([good[40] ^ 1]) + good[41:], "values are damaged"), (nan, "value 3 is NaN"),
-    ):  # fmt: skip
+        (b"", "0 bytes"),
+        (good[:31], "31 bytes"),
+        (b"PENI" + good[4:], "begins with b'PENI'"),
+        (good[:-1], "the head promises"),
+        (good + b"\0", "the head promises"),
+        (sealed(good, 4, b"\2\0"), "version 2"),
+        (sealed(good, 6, b"\2\0"), "2 bytes a value"),
+        (sealed(good, 24, b"\1"), "version"),
+        (good[:40] + bytes([good[40] ^ 1]) + good[41:], "values are damaged"),
+        (nan, "value 3 is NaN"),
+    ):
         with pytest.raises(ValueError, match=words):
             penode_gen.read_serial(bad)
     for bit in range(8 * serial_form.HEAD):

@@ -57,8 +57,12 @@ def test_order_of_convergence(tmp_path, method, input, show):
         damping = 3.0 if input != "held" else 0.0
         exact = solve_ivp(
             lambda t, x: models.rich_by_hand(data, t, x, force, foot, foot_rate, damping),
-            (0.0, duration), [0.01, 0.0, 0.5], method="DOP853", rtol=1e-12, atol=1e-14,
-        ).y[:, -1]  # fmt: skip
+            (0.0, duration),
+            [0.01, 0.0, 0.5],
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+        ).y[:, -1]
         errors.append(np.max(np.abs(run.x[-1] - exact)))
     orders = [math.log2(a / b) for a, b in zip(errors, errors[1:])]
     show(f"{method}, input {input}: error {errors[-1]:.1e} at 1 ms, order {orders[0]:.2f}, {orders[1]:.2f}")
@@ -202,11 +206,19 @@ def test_jacobian_through_relu_networks(tmp_path, method):
 
 
 SHAPES = [
-    ([1, 1], ["identity"]), ([1, 16, 1], ["relu", "identity"]), ([1, 16, 16, 16, 1], ["relu", "relu", "relu", "identity"]),
-    ([1, 16, 1], ["relu", "relu"]), ([3, 5, 1], ["tanh", "identity"]), ([2, 20, 37, 1], ["relu", "relu", "identity"]),
-    ([4, 32, 16, 1], ["sigmoid", "softplus", "identity"]), ([2, 16, 16, 1], ["tanh", "relu", "tanh"]), ([1, 7, 4, 1], ["softplus", "step", "identity"]),
-    ([3, 64, 64, 1], ["relu", "relu", "sigmoid"]), ([1, 256, 1], ["relu", "identity"]), ([8, 4, 4, 4, 4, 4, 1], ["relu"] * 5 + ["identity"]),
-]  # fmt: skip
+    ([1, 1], ["identity"]),
+    ([1, 16, 1], ["relu", "identity"]),
+    ([1, 16, 16, 16, 1], ["relu", "relu", "relu", "identity"]),
+    ([1, 16, 1], ["relu", "relu"]),
+    ([3, 5, 1], ["tanh", "identity"]),
+    ([2, 20, 37, 1], ["relu", "relu", "identity"]),
+    ([4, 32, 16, 1], ["sigmoid", "softplus", "identity"]),
+    ([2, 16, 16, 1], ["tanh", "relu", "tanh"]),
+    ([1, 7, 4, 1], ["softplus", "step", "identity"]),
+    ([3, 64, 64, 1], ["relu", "relu", "sigmoid"]),
+    ([1, 256, 1], ["relu", "identity"]),
+    ([8, 4, 4, 4, 4, 4, 1], ["relu"] * 5 + ["identity"]),
+]
 
 
 def bare(folder, sizes, activations, seed, outside="extrapolate", low=-1.0, high=1.0):
@@ -215,10 +227,12 @@ def bare(folder, sizes, activations, seed, outside="extrapolate", low=-1.0, high
     path = folder / f"bare_{outside}.toml"
     path.write_text(
         models.BARE.format(
-            outside=outside, units=json.dumps(["1"] * sizes[0]), names=", ".join(names),
+            outside=outside,
+            units=json.dumps(["1"] * sizes[0]),
+            names=", ".join(names),
             inputs="\n".join(f'{n} = {{ unit = "1" }}' for n in names),
         )
-    )  # fmt: skip
+    )
     return data, penode_gen.load(path)
 
 

@@ -37,9 +37,15 @@ def run(command: Iterable[object], cwd: Path = ROOT, env: dict[str, str] | None 
     """What a command prints. Raises Fails."""
     words = [str(word) for word in command]
     done = subprocess.run(
-        words, cwd=cwd, env={**os.environ, **(env or {})}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, text=True, timeout=120,
-    )  # fmt: skip
+        words,
+        cwd=cwd,
+        env={**os.environ, **(env or {})},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=120,
+    )
     if done.returncode != 0:
         raise Fails(f"{' '.join(words)}: exit code {done.returncode}\n{done.stdout}")
     return done.stdout
@@ -190,6 +196,5 @@ def pack_files(source: Path) -> dict[str, list[dict[str, str]]]:
 
 
 PACKAGES: dict[str, Callable[[Path, Path], Built]] = {
-    each.__name__: each
-    for each in (subdirectory, find_package, pkg_config, tarball, amalgamated, platformio, zephyr, cmsis_pack)
+    each.__name__: each for each in (subdirectory, find_package, pkg_config, tarball, amalgamated, platformio, zephyr, cmsis_pack)
 }

@@ -11,11 +11,7 @@ import pytest
 from build import CC, ROOT, VERSION, Fails, run
 
 STRICT = ["-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wmissing-prototypes", "-Wredundant-decls", "-Wundef"]
-COMPILERS = {
-    "gcc": CC,
-    "clang": ["clang-19", *CC[1:]],
-    "arm": [ROOT / "port/cortex-m/cc", "mps2-an386", *CC[1:], "-Os"],
-}
+COMPILERS = {"gcc": CC, "clang": ["clang-19", *CC[1:]], "arm": [ROOT / "port/cortex-m/cc", "mps2-an386", *CC[1:], "-Os"]}
 
 
 def one_unit(work: Path, folder: Path, options: list[str], runtime: list[str], compiler: str) -> str:

@@ -75,7 +75,7 @@ FAULTS = {
     "pdsc lacks a header": ("cmsis_pack", edit("TREE/penode.penode.pdsc", r"^.*inc/penode/pen_solve\.h.*\n")),
     "pdsc lists what is not there": ("cmsis_pack", remove("TREE/models/nqvm/nqvm_euler.c")),
     "a weight differs": ("tarball", edit("TREE/models/nqvm/nqvm.c", r"10000\.0", "10000.01")),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -151,8 +151,12 @@ def test_pack_description(tree: Path):
         seen.add(place)
     for needed in pack.iter("require"):
         assert any(needed.get("Cclass") == place[0] and needed.get("Cgroup") == place[1] for place in seen)
-    assert {file["category"] for files in build.pack_files(source.parent).values() for file in files} == \
-        {"doc", "include", "header", "source"}  # fmt: skip
+    assert {file["category"] for files in build.pack_files(source.parent).values() for file in files} == {
+        "doc",
+        "include",
+        "header",
+        "source",
+    }
     if schema := os.environ.get("PACK_XSD"):
         etree.XMLSchema(etree.parse(schema)).assertValid(pack)
 

@@ -30,9 +30,21 @@ def measure(stride: int, source: Path = SOURCE) -> tuple[int, int, dict[str, dic
     WORK.mkdir(parents=True, exist_ok=True)
     elf = WORK / source.stem
     gate.make(
-        ["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-pthread", f"-I{gate.ROOT}/inc", f"-I{gate.ROOT}/port/gnu",
-         "-o", elf, gate.ROOT / "test" / "accuracy" / "pen_math_accuracy.c", source, "-lm"]
-    )  # fmt: skip
+        [
+            "gcc",
+            "-std=c99",
+            "-O2",
+            "-ffp-contract=off",
+            "-pthread",
+            f"-I{gate.ROOT}/inc",
+            f"-I{gate.ROOT}/port/gnu",
+            "-o",
+            elf,
+            gate.ROOT / "test" / "accuracy" / "pen_math_accuracy.c",
+            source,
+            "-lm",
+        ]
+    )
     said = gate.run([elf, stride, 2], limit=7200).stdout
     inputs, bad = re.search(r"^(\d+) inputs, NaN failures (\d+)", said, re.M).groups()
     rows = re.findall(r"^(\w+) +max error ([\d.]+) ulp .*not monotone at (\d+)", said, re.M)

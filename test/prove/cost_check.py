@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import gate
+
 from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "cost"
@@ -56,7 +57,11 @@ def of_selftest() -> list[str]:
             gate.make([PORT / "cc", MACHINES["m4f"], "-std=c99", level, f"-I{folder}", "-c", "-o", out, source])
             columns = gate.run(["arm-none-eabi-size", out]).stdout.split("\n")[1].split()
             size = int(columns[0]) + int(columns[1])
-            found += [] if abs(size - bytes_said) <= 0.02 * bytes_said else [f"{source.name} {level}: {size} bytes, the header says {bytes_said}"]
+            found += (
+                []
+                if abs(size - bytes_said) <= 0.02 * bytes_said
+                else [f"{source.name} {level}: {size} bytes, the header says {bytes_said}"]
+            )
     return found
 
 

@@ -33,11 +33,34 @@ def program(build: str, name: str, test: Path, others: list[Path], words: list[s
     place.mkdir(parents=True, exist_ok=True)
     runner, out = place / f"{name}_runner.c", place / name
     gate.make(["ruby", UNITY / "auto" / "generate_test_runner.rb", test, runner])
-    gate.make([
-        "port/host/cc", "clang-19", "-std=c99", "-O1", "-g", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc",
-        f"-I{MODELS}", "-Itest/unit", "-Itest/prove", f"-I{UNITY}/src", "-include", "unity_config.h", *BUILDS[build], *words,
-        "-o", out, runner, test, UNIT / "unity_output.c", UNITY / "src" / "unity.c", *sorted((gate.ROOT / "src").glob("*.c")), *others,
-    ])  # fmt: skip
+    gate.make(
+        [
+            "port/host/cc",
+            "clang-19",
+            "-std=c99",
+            "-O1",
+            "-g",
+            "-fprofile-instr-generate",
+            "-fcoverage-mapping",
+            "-fcoverage-mcdc",
+            f"-I{MODELS}",
+            "-Itest/unit",
+            "-Itest/prove",
+            f"-I{UNITY}/src",
+            "-include",
+            "unity_config.h",
+            *BUILDS[build],
+            *words,
+            "-o",
+            out,
+            runner,
+            test,
+            UNIT / "unity_output.c",
+            UNITY / "src" / "unity.c",
+            *sorted((gate.ROOT / "src").glob("*.c")),
+            *others,
+        ]
+    )
     done = gate.run([out], env=os.environ | {"LLVM_PROFILE_FILE": f"{out}.profraw"})
     if done.returncode != 0:
         raise SystemExit(f"FAIL  coverage: {name}, {build}\n{done.stdout}{done.stderr}")
@@ -78,8 +101,13 @@ def chosen(model: str, key: str) -> str:
 def told(model: str) -> list[str]:
     """How coverage_model.c is told of a model."""
     range_flags = "(PEN_INPUT_RANGE | PEN_HELD)" if chosen(model, "out_of_range") == "hold" else "PEN_INPUT_RANGE"
-    return [*eva.told(model), f"-DREFUSED(i)={refused(model)}", f"-DUNFELT={unfelt(model)}", f"-DOUT_OF_RANGE={range_flags}",
-            f"-DON_DAMAGE=PEN_DAMAGE_{chosen(model, 'on_damage').upper()}"]  # fmt: skip
+    return [
+        *eva.told(model),
+        f"-DREFUSED(i)={refused(model)}",
+        f"-DUNFELT={unfelt(model)}",
+        f"-DOUT_OF_RANGE={range_flags}",
+        f"-DON_DAMAGE=PEN_DAMAGE_{chosen(model, 'on_damage').upper()}",
+    ]
 
 
 def of_model(build: str, test: Path, model: str) -> tuple[list[Path], list[str]]:

@@ -31,7 +31,15 @@ MODELS = {
     "nqvm_euler": [],
     "nqvm_folded": [],
     "clamped": ['method = "heun"', 'outside = "clamp"', 'input = "held"', "substeps = 2", 'out_of_range = "clamp"'],
-    "implicit": ['method = "ros1"', 'outside = "clamp"', 'input = "parabola"', 'out_of_range = "hold"', 'on_damage = "rollback"', "[elements]", WET],
+    "implicit": [
+        'method = "ros1"',
+        'outside = "clamp"',
+        'input = "parabola"',
+        'out_of_range = "hold"',
+        'on_damage = "rollback"',
+        "[elements]",
+        WET,
+    ],
     "fading": ['method = "ros2"', 'outside = "fade"', "fade_width = 0.5", 'on_damage = "hold"'],
     "folded_or_not": ['method = "euler"', 'outside = "clamp"', "pieces = 96", 'more_pieces = "layers"', 'on_damage = "rollback"'],
 }
@@ -46,7 +54,16 @@ PARTS = ("all_layers", "elements", "elementary", "networks_of_16", "systems", "f
 OF_FILE = {"trial": "promise.c", "promises": "promise.c"} | eva_xcp.ENTRIES
 
 OPTIONS = [
-    *("-eva", "-eva-precision", "3", "-eva-split-return", "full", "-eva-domains-function", "octagon:pen_tuning_write,octagon:pen_tuning_write_bytes,octagon:pen_serial_get_bytes,octagon:pen_serial_put_bytes,octagon:pen_fold", "-eva-octagon-through-calls"),
+    *(
+        "-eva",
+        "-eva-precision",
+        "3",
+        "-eva-split-return",
+        "full",
+        "-eva-domains-function",
+        "octagon:pen_tuning_write,octagon:pen_tuning_write_bytes,octagon:pen_serial_get_bytes,octagon:pen_serial_put_bytes,octagon:pen_fold",
+        "-eva-octagon-through-calls",
+    ),
     *("-eva-slevel-function", "go:1,pen_fold:1"),  # where they write needs no look at each turn: quicker without
     *("-warn-special-float", "none"),  # NaN and Inf are values
     *("-warn-unsigned-downcast", "-warn-signed-downcast", "-eva-no-show-progress", "-eva-msg-key=-final-states"),
@@ -69,7 +86,9 @@ class Run:
     big_endian: bool = False
 
     def __str__(self) -> str:
-        return f"{self.model or 'runtime'}, {self.entry}{', size build' if self.size_build else ''}{', big endian' if self.big_endian else ''}"
+        return (
+            f"{self.model or 'runtime'}, {self.entry}{', size build' if self.size_build else ''}{', big endian' if self.big_endian else ''}"
+        )
 
 
 @dataclass(frozen=True)
@@ -116,14 +135,24 @@ SEEDS = [
     Seed("pen_set.c", "} else if (tuning->previous.value == NULL) {", "} else if (false) {", Run("implicit", "corrupted")),
     Seed("pen_saved.c", "((place - KNOWN) < model->sets)", "((place - KNOWN) <= model->sets)", MODEL),
     Seed("pen_saved.c", "(byte != NULL) && (size == ", "(size == ", MODEL),
-    Seed("pen_saved.c", "(found != NULL) ? found : tuning->initial.value;\n    return none || ((found != NULL) && ", "found;\n    return none || (", ORDER),
+    Seed(
+        "pen_saved.c",
+        "(found != NULL) ? found : tuning->initial.value;\n    return none || ((found != NULL) && ",
+        "found;\n    return none || (",
+        ORDER,
+    ),
     Seed("pen_instance.c", "return (self != NULL) && ", "return ", MODEL),
     Seed("pen_status.c", "i < PEN_STATUS_FLAGS", "i <= PEN_STATUS_FLAGS", MODEL),
     Seed("pen_step.h", "self->scrub % round", "self->scrub", MODEL),
     Seed("nqvm_euler.c", "self->u[1U - (self->head.running & 1U)]", "self->u[1U - self->head.running]", MODEL),
     Seed("nqvm_euler.c", "((u == NULL) || (y == NULL))", "(u == NULL)", MODEL),
     Seed("nqvm_euler.c", "(self != NULL) && ", "", MODEL),
-    Seed("pen_instance.c", "        if (found == PEN_OK) {\n            self->guard.pieces", "        if (true) {\n            self->guard.pieces", ORDER),
+    Seed(
+        "pen_instance.c",
+        "        if (found == PEN_OK) {\n            self->guard.pieces",
+        "        if (true) {\n            self->guard.pieces",
+        ORDER,
+    ),
     Seed("pen_solve.c", "(n <= PEN_SOLVE_MAX) && ", "", Run(None, "systems")),
     Seed("pen_solve.c", "for (size_t i = k + 1U; i < n; i++)", "for (size_t i = k + 1U; i <= n; i++)", Run(None, "systems")),
     Seed("pen_math.c", "UINT32_C(1) << (k & 31U)", "UINT32_C(1) << (k & 63U)", Run(None, "elements")),
@@ -197,7 +226,21 @@ def analyse(run: Run, place: Path) -> Seen:
     last = ["-then", "-metrics", "-metrics-eva-cover"]
     machine = "ppc_32" if run.big_endian else "gcc_x86_32"  # 32 bits, as a Cortex-M
     # Half an hour of processor time, however busy the machine is.
-    command = ["prlimit", f"--cpu={LIMIT}", "frama-c", "-machdep", machine, f"-cpp-extra-args={' '.join(words)}", *split, *files, "-main", run.entry, *OPTIONS, *OPTIONS_OF.get(run.entry, []), *last]
+    command = [
+        "prlimit",
+        f"--cpu={LIMIT}",
+        "frama-c",
+        "-machdep",
+        machine,
+        f"-cpp-extra-args={' '.join(words)}",
+        *split,
+        *files,
+        "-main",
+        run.entry,
+        *OPTIONS,
+        *OPTIONS_OF.get(run.entry, []),
+        *last,
+    ]
     done = gate.run(command, limit=48 * LIMIT)
     text = done.stdout + done.stderr
     alarms = [f"{run}: {' '.join(m.split())}" for m in re.findall(r"^\[eva:alarm\] (.*\n(?:  .*\n)*)", text, re.M)]
@@ -243,7 +286,20 @@ def nan() -> list[str]:
     """What Eva cannot tell about NaN in elementary functions, tried out."""
     program = WORK / "nan"
     sanitize = ["-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
-    gate.make(["gcc", "-O2", "-ffp-contract=off", *sanitize, "-Iinc", "-Iport/template", "-o", program, HARNESS / "nan.c", *map("src/pen_{}.c".format, ("math", "trig", "atan", "log", "root"))])
+    gate.make(
+        [
+            "gcc",
+            "-O2",
+            "-ffp-contract=off",
+            *sanitize,
+            "-Iinc",
+            "-Iport/template",
+            "-o",
+            program,
+            HARNESS / "nan.c",
+            *map("src/pen_{}.c".format, ("math", "trig", "atan", "log", "root")),
+        ]
+    )
     done = gate.run([program])
     return [] if done.returncode == 0 else [done.stdout + done.stderr]
 
@@ -251,7 +307,10 @@ def nan() -> list[str]:
 def main(only: Sequence[str]) -> int:
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
-    runs = [Run(None, part) for part in (*PARTS, *OF_FILE)] + [Run(None, "networks_of_16", size_build=True), Run(None, "serial", big_endian=True)]
+    runs = [Run(None, part) for part in (*PARTS, *OF_FILE)] + [
+        Run(None, "networks_of_16", size_build=True),
+        Run(None, "serial", big_endian=True),
+    ]
     runs += [ORDER, *(Run(model, "corrupted") for model in MODELS)]
     runs = [run for run in runs if not only or str(run) in only]
     if any(run.model for run in runs):
@@ -273,10 +332,17 @@ def main(only: Sequence[str]) -> int:
         found += bool(outcome.alarms)
         name = f"eva: seeded fault in {seed.file}: {' '.join(seed.old.split())} -> {' '.join(seed.new.split()) or 'nothing'}"
         good &= gate.report(name, [] if outcome.alarms else ["not found", *outcome.trouble])
-    gate.keep("eva", {
-        "alarms": sum(len(s.alarms) for s in seen.values()), "runs": len(seen), "statements": total,
-        "functions not wholly reached": len(missing), "faults": len(SEEDS), "faults found": found,
-    })  # fmt: skip
+    gate.keep(
+        "eva",
+        {
+            "alarms": sum(len(s.alarms) for s in seen.values()),
+            "runs": len(seen),
+            "statements": total,
+            "functions not wholly reached": len(missing),
+            "faults": len(SEEDS),
+            "faults found": found,
+        },
+    )
     return int(not good)
 
 

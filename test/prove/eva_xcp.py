@@ -7,10 +7,24 @@ from __future__ import annotations
 # Entry -> its file in eva/.
 ENTRIES = {
     **dict.fromkeys(
-        ("xcp_upload_page", "xcp_upload_region", "xcp_upload_text", "xcp_checksum", "xcp_download_command", "xcp_pages", "xcp_elapse", "xcp_keys", "xcp_dispatch"), "xcp.c"
+        (
+            "xcp_upload_page",
+            "xcp_upload_region",
+            "xcp_upload_text",
+            "xcp_checksum",
+            "xcp_download_command",
+            "xcp_pages",
+            "xcp_elapse",
+            "xcp_keys",
+            "xcp_dispatch",
+        ),
+        "xcp.c",
     ),
-    **dict.fromkeys(("xcp_lists", "xcp_allocate", "xcp_pointer", "xcp_write_entries", "xcp_whole_lists", "xcp_sampling", "xcp_static_lists"), "xcp_lists.c"),
-}  # fmt: skip
+    **dict.fromkeys(
+        ("xcp_lists", "xcp_allocate", "xcp_pointer", "xcp_write_entries", "xcp_whole_lists", "xcp_sampling", "xcp_static_lists"),
+        "xcp_lists.c",
+    ),
+}
 FILES = "pen_xcp*.c"  # no other entry analyses them
 
 # Its loops over bytes are unrolled; states are merged elsewhere. The two contexts share words, each of which only one of them writes, and no
@@ -19,9 +33,17 @@ WORDS = ["-Dvolatile="]
 _KEPT = "pen_tuning_write:40,pen_tuning_write_bytes:40,xcp_at:20,xcp_upload:20,xcp_build_checksum:40"
 _RELATED = "pen_tuning_write,pen_tuning_write_bytes,pen_serial_get_bytes,pen_serial_put_bytes,pen_xcp_download_command"
 OPTIONS = [
-    "-eva-precision", "0", "-eva-plevel", "199", "-eva-min-loop-unroll", "24", "-eva-slevel-function", _KEPT,
-    "-eva-domains-function", ",".join(f"octagon:{name}" for name in _RELATED.split(",")),
-]  # fmt: skip
+    "-eva-precision",
+    "0",
+    "-eva-plevel",
+    "199",
+    "-eva-min-loop-unroll",
+    "24",
+    "-eva-slevel-function",
+    _KEPT,
+    "-eva-domains-function",
+    ",".join(f"octagon:{name}" for name in _RELATED.split(",")),
+]
 UNROLLED = {"xcp_sampling": "70", "xcp_static_lists": "70"}  # entries of an ODT, or of all lists
 
 # File, what becomes of it, and the entry that must see it.
@@ -37,7 +59,7 @@ SEEDS = [
     ("pen_xcp_lists.c", "if (daq->left == 0U) {", "if (false) {", "xcp_write_entries"),
     ("pen_xcp_daq.c", "good = good && (n <= xcp->config->max_cto);", "", "xcp_sampling"),
     ("pen_xcp_static.c", " && (odts <= PEN_XCP_ODTS) && (entries <= PEN_XCP_ENTRIES)", "", "xcp_static_lists"),
-]  # fmt: skip
+]
 
 
 def options(entry: str) -> list[str]:

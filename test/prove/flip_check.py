@@ -14,37 +14,87 @@ from dataclasses import replace
 from pathlib import Path
 
 import gate
+
 import penode_gen
 from penode_sil.building import FLAGS, generated, model_options
 
 WORK = gate.BUILD / "flip"
 MODELS = ("nqvm/nqvm", "nqvm/nqvm_folded", "small/small_rollback")
-GUARDED = {"small": 1, "small_rollback": 1, "small_hold": 1, "small_layers_rollback": 1, "nqvm_folded": 97}  # model, and which bits of its values
+GUARDED = {
+    "small": 1,
+    "small_rollback": 1,
+    "small_hold": 1,
+    "small_layers_rollback": 1,
+    "nqvm_folded": 97,
+}  # model, and which bits of its values
 EVERY = 101  # bits of the banks, and ten times as many of the instance
 
 # File, and fault: see gate.faulty. The first ones are for flip.c, the others for flip_verify.c with a model.
 FAULTS = {
     "an address is written to unchecked": ("pen_set.c", ("(tuning->bank[0] == tuning->bank_check[0]) &&", 0, "")),
-    "waits instead of reporting that a set waits": ("pen_set.c", ("    const bool done = !pen_tuning_pending(tuning);", 0, "    while (pen_tuning_pending(tuning)) {\n    }\n    const bool done = true;")),
-}  # fmt: skip
+    "waits instead of reporting that a set waits": (
+        "pen_set.c",
+        (
+            "    const bool done = !pen_tuning_pending(tuning);",
+            0,
+            "    while (pen_tuning_pending(tuning)) {\n    }\n    const bool done = true;",
+        ),
+    ),
+}
 VERIFY_FAULTS = {
     "pieces not covered": ("small_rollback", "pen_verify.c", ("good = (guard->crc == guard->pieces[guard->slot]);", 0, "good = true;")),
     "the status of a piece left out": ("small_rollback", "pen_verify.c", ("return pen_crc_word(next, piece->status);", 0, "return next;")),
-    "values not compared if a call ends with the last": ("small_layers_rollback", "pen_verify.c", ("if (guard->at == length) {", 0, "if ((guard->at == length) && (*n > 0U)) {")),
-    "the last value left out": ("small_layers_rollback", "pen_verify.c", ("if (guard->at < length) {", 0, "if (guard->at == (length - 1U)) {\n        guard->at = length;\n        *n -= 1U;\n    } else if (guard->at < length) {")),
+    "values not compared if a call ends with the last": (
+        "small_layers_rollback",
+        "pen_verify.c",
+        ("if (guard->at == length) {", 0, "if ((guard->at == length) && (*n > 0U)) {"),
+    ),
+    "the last value left out": (
+        "small_layers_rollback",
+        "pen_verify.c",
+        (
+            "if (guard->at < length) {",
+            0,
+            "if (guard->at == (length - 1U)) {\n        guard->at = length;\n        *n -= 1U;\n    } else if (guard->at < length) {",
+        ),
+    ),
     "which slot the guard is about not compared": ("small_rollback", "pen_verify.c", ("(self->guard.slot != slot) || ", 0, "")),
     "the head not compared": ("small_rollback", "pen_set.c", ("(differences == 0U) && ", 0, "")),
     "the address not compared": ("small_rollback", "pen_set.c", (" && (a->value == b->value)", 0, "")),
-    "the addresses of the banks not compared": ("small_rollback", "pen_verify.c", ("return pen_tuning_banks_known(tuning) && fits", 0, "return fits")),
-    "which slot is active not compared": ("small_rollback", "pen_verify.c", ("(tuning->settled == pen_port_load(&tuning->active))", 0, "true")),
-    "a damaged rollback set taken": ("small_rollback", "pen_set.c", ("status = pen_set_check(&tuning->previous, layout, length);", 0, "status = PEN_OK;")),
+    "the addresses of the banks not compared": (
+        "small_rollback",
+        "pen_verify.c",
+        ("return pen_tuning_banks_known(tuning) && fits", 0, "return fits"),
+    ),
+    "which slot is active not compared": (
+        "small_rollback",
+        "pen_verify.c",
+        ("(tuning->settled == pen_port_load(&tuning->active))", 0, "true"),
+    ),
+    "a damaged rollback set taken": (
+        "small_rollback",
+        "pen_set.c",
+        ("status = pen_set_check(&tuning->previous, layout, length);", 0, "status = PEN_OK;"),
+    ),
     "the set given to init forgotten": ("small_rollback", "model", ("rank < 2U", 0, "rank < 1U")),
-    "pieces of the set to go back to not made": ("small_rollback", "model", ("found = small_rollback_prepare(self, ready.value,", 0, "found = small_rollback_prepare(self, self->head.tuning.slot[0].value,")),
+    "pieces of the set to go back to not made": (
+        "small_rollback",
+        "model",
+        ("found = small_rollback_prepare(self, ready.value,", 0, "found = small_rollback_prepare(self, self->head.tuning.slot[0].value,"),
+    ),
     "reacts while a set is open": ("small_rollback", "pen_verify.c", ("if (tuning->open == 0U) {", 0, "if (true) {")),
     "holds while a set is open": ("small_hold", "pen_verify.c", ("!good && idle &&", 0, "!good &&")),
-    "does not hold without a set to go back to": ("small_rollback", "pen_verify.c", ("        pen_tuning_hold(&self->tuning, true);", 0, "")),
-    "no confirmation": ("small_rollback", "pen_verify.c", ("good = whole(model, &tuning->slot[slot], own, &self->guard, round);", 0, "good = false;")),
-}  # fmt: skip
+    "does not hold without a set to go back to": (
+        "small_rollback",
+        "pen_verify.c",
+        ("        pen_tuning_hold(&self->tuning, true);", 0, ""),
+    ),
+    "no confirmation": (
+        "small_rollback",
+        "pen_verify.c",
+        ("good = whole(model, &tuning->slot[slot], own, &self->guard, round);", 0, "good = false;"),
+    ),
+}
 
 
 def loaded(name: str) -> penode_gen.Model:
@@ -63,10 +113,31 @@ def program(what: str, model: penode_gen.Model, source: Path, src: Path) -> Path
     elf, sets = WORK / f"{what}-{model.name}-{src.parent.name}", ",".join(f"&{model.name}_set_{other}" for other in model.sets)
     elf.parent.mkdir(parents=True, exist_ok=True)
     gate.make(
-        ["clang-19", "-fsanitize=address", *(["-fsanitize-recover=address"] if what == "flip" else []), *FLAGS, "-D_GNU_SOURCE", "-O2", "-g", "-Wall", "-Wextra",
-         f"-I{gate.ROOT}/inc", f"-I{gate.ROOT}/port/gnu", f"-I{source}", *model_options(model), f"-DMODEL_SETS={sets}", f"-DMODEL_ON_DAMAGE={model.guard.on_damage.upper()}",
-         *(["-DMODEL_FOLDED"] if model.pieces else []), "-o", elf, gate.HERE / f"{what}.c", source / f"{model.name}.c", source / f"{model.owner}_params.c", *sorted(src.glob("*.c"))]
-    )  # fmt: skip
+        [
+            "clang-19",
+            "-fsanitize=address",
+            *(["-fsanitize-recover=address"] if what == "flip" else []),
+            *FLAGS,
+            "-D_GNU_SOURCE",
+            "-O2",
+            "-g",
+            "-Wall",
+            "-Wextra",
+            f"-I{gate.ROOT}/inc",
+            f"-I{gate.ROOT}/port/gnu",
+            f"-I{source}",
+            *model_options(model),
+            f"-DMODEL_SETS={sets}",
+            f"-DMODEL_ON_DAMAGE={model.guard.on_damage.upper()}",
+            *(["-DMODEL_FOLDED"] if model.pieces else []),
+            "-o",
+            elf,
+            gate.HERE / f"{what}.c",
+            source / f"{model.name}.c",
+            source / f"{model.owner}_params.c",
+            *sorted(src.glob("*.c")),
+        ]
+    )
     return elf
 
 
@@ -118,12 +189,20 @@ def main() -> int:
         code, said = verify(name, step if given.every > 1 else 1)
         guarded[name] = int(n[1]) if (n := re.search(r"^flips (\d+)$", said, re.M)) else 0
         problems += [f"{name}:\n{said[-3000:]}"] if code or not guarded[name] else []
-    good &= gate.report(f"flip: {sum(guarded.values())} flipped bits of what verify guards: each found in time, and then done as the model file says", problems)
+    good &= gate.report(
+        f"flip: {sum(guarded.values())} flipped bits of what verify guards: each found in time, and then done as the model file says",
+        problems,
+    )
     missed = [f"not found: {what}" for k, (what, fault) in enumerate(FAULTS.items()) if not campaign("nqvm/nqvm", fault=fault, k=str(k))[0]]
-    missed += [f"not found: {what}" for k, (what, (name, *fault)) in enumerate(VERIFY_FAULTS.items()) if not verify(name, 1, fault, f"v{k}")[0]]
+    missed += [
+        f"not found: {what}" for k, (what, (name, *fault)) in enumerate(VERIFY_FAULTS.items()) if not verify(name, 1, fault, f"v{k}")[0]
+    ]
     total = len(FAULTS) + len(VERIFY_FAULTS)
     good &= gate.report(f"flip: {total - len(missed)} of {total} faults found", missed)
-    gate.keep(given.key, figures | {"guarded bits": sum(guarded.values()), "faults": [*FAULTS, *VERIFY_FAULTS], "faults found": total - len(missed)})
+    gate.keep(
+        given.key,
+        figures | {"guarded bits": sum(guarded.values()), "faults": [*FAULTS, *VERIFY_FAULTS], "faults found": total - len(missed)},
+    )
     return int(not good)
 
 

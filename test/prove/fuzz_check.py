@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import gate
+
 import penode_gen
 from penode_sil.building import FLAGS, generated, model_options
 
@@ -34,23 +35,49 @@ FAULTS = {
     "the layout is not compared": ("pen_set.c", ("(head->layout == layout) && ", 0, "")),
     "a set may be begun while one waits": ("pen_set.c", ("!pen_tuning_settle(tuning)", 0, "false")),
     "not adopted while holding": ("pen_set.c", ("if (pending != 0U) {", 0, "if ((status == PEN_OK) && (pending != 0U)) {")),
-    "a withdrawn set is adopted": ("pen_set.c", ("if (pending == command(ADOPT, other)) {", 0, "if ((pending == command(ADOPT, other)) || (pending == command(WITHDRAW, other))) {")),
+    "a withdrawn set is adopted": (
+        "pen_set.c",
+        (
+            "if (pending == command(ADOPT, other)) {",
+            0,
+            "if ((pending == command(ADOPT, other)) || (pending == command(WITHDRAW, other))) {",
+        ),
+    ),
     "a withdrawal is not reported": ("pen_set.c", ("status |= PEN_WITHDRAWN;", 0, "status |= PEN_OK;")),
-    "a withdrawal leaves another rollback set": ("pen_set.c", ("pen_set_copy(&tuning->previous, &tuning->replaced); /* it was", 0, "/* it was")),
+    "a withdrawal leaves another rollback set": (
+        "pen_set.c",
+        ("pen_set_copy(&tuning->previous, &tuning->replaced); /* it was", 0, "/* it was"),
+    ),
     "a copy without its checksum": ("pen_set.c", ("{ layout, length, id, running->head.checksum }", 0, "{ layout, length, id, 0U }")),
     "the checksum to expect is forgotten": ("pen_set.c", (".head.checksum = checksum;", 0, ".head.checksum ^= 0U * checksum;")),
-    "bytes at another place": ("pen_set.c", ("pen_serial_get_bytes(bank, offset, n, byte);", 0, "pen_serial_get_bytes(bank, offset & ~3U, n, byte);")),
+    "bytes at another place": (
+        "pen_set.c",
+        ("pen_serial_get_bytes(bank, offset, n, byte);", 0, "pen_serial_get_bytes(bank, offset & ~3U, n, byte);"),
+    ),
     "damaged bytes are restored": ("pen_saved.c", ("status = PEN_SET_CHECKSUM;", 0, "status = PEN_OK;")),
     "banks are not compared": ("pen_saved.c", ("(pen_serial_get(&byte[12]) != banks) ||", 0, "")),
-    "the set given to init is not compared": ("pen_saved.c", ("(pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||\n               (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) ||", 0, "")),
-    "inputs are not restored": ("pen_saved.c", ("        get_values(inputs, u, byte, &at);", 0, "        at += (size_t)inputs * sizeof(pen_real_t);")),
+    "the set given to init is not compared": (
+        "pen_saved.c",
+        (
+            "(pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||\n               (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) ||",
+            0,
+            "",
+        ),
+    ),
+    "inputs are not restored": (
+        "pen_saved.c",
+        ("        get_values(inputs, u, byte, &at);", 0, "        at += (size_t)inputs * sizeof(pen_real_t);"),
+    ),
     "fill is not restored": ("pen_saved.c", ("tuning->fill = get(byte, at);", 0, "(void)get(byte, at);")),
-    "what a withdrawal brings back is not restored": ("pen_saved.c", ("    get_set(model, tuning, &tuning->replaced, byte, at);", 0, "    *at += 20U;")),
+    "what a withdrawal brings back is not restored": (
+        "pen_saved.c",
+        ("    get_set(model, tuning, &tuning->replaced, byte, at);", 0, "    *at += 20U;"),
+    ),
     "counters are not restored": ("pen_saved.c", ("self->log.count[i] = get(byte, at);", 0, "(void)get(byte, at);")),
     "pieces are not made anew": ("model", ("(void)small_prepare(self, self->head.tuning.slot[i].value, i);", 0, "")),
     "the input before is not set": ("model", ("pen_step_copy(SMALL_N_DRIVE, finite ? input : self->u[0], self->u[0]);", 0, "")),
     "a missing argument is not counted": ("model", ("pen_status_note_step(&self->head.log, status);", 0, "")),
-}  # fmt: skip
+}
 
 
 def program(model: str, fault: tuple[str, tuple[str, int, str]] | None = None, k: str = "") -> Path:
@@ -67,11 +94,32 @@ def program(model: str, fault: tuple[str, tuple[str, int, str]] | None = None, k
         path.write_text(gate.faulty(path.read_text(), change))
     sets = ",".join(f"&{model}_set_{name}" for name in loaded.sets)
     gate.make(
-        ["clang-19", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all", *FLAGS, "-D_GNU_SOURCE", "-O2", "-g", "-Wall", "-Wextra",
-         "-fno-strict-aliasing", f"-I{gate.ROOT}/inc", f"-I{gate.ROOT}/port/gnu", f"-I{source}", *model_options(loaded), f"-DMODEL_SETS={sets}",
-         f"-D{model.upper()}_FOLDS={int(loaded.pieces > 0)}U", "-o", elf,
-         gate.HERE / "fuzz.c", source / f"{model}.c", source / f"{loaded.owner}_params.c", *sorted(src.glob("*.c")), "-lm"]
-    )  # fmt: skip
+        [
+            "clang-19",
+            "-fsanitize=fuzzer,address,undefined",
+            "-fno-sanitize-recover=all",
+            *FLAGS,
+            "-D_GNU_SOURCE",
+            "-O2",
+            "-g",
+            "-Wall",
+            "-Wextra",
+            "-fno-strict-aliasing",
+            f"-I{gate.ROOT}/inc",
+            f"-I{gate.ROOT}/port/gnu",
+            f"-I{source}",
+            *model_options(loaded),
+            f"-DMODEL_SETS={sets}",
+            f"-D{model.upper()}_FOLDS={int(loaded.pieces > 0)}U",
+            "-o",
+            elf,
+            gate.HERE / "fuzz.c",
+            source / f"{model}.c",
+            source / f"{loaded.owner}_params.c",
+            *sorted(src.glob("*.c")),
+            "-lm",
+        ]
+    )
     return elf
 
 
@@ -105,7 +153,9 @@ def seeds(corpus: Path) -> None:
 def fuzz(elf: Path, runs: int, corpus: Path, limit: float = 100_000) -> tuple[int, int, str]:
     """Exit code, runs and words of libFuzzer; new inputs that reach something go into the corpus."""
     seeds(corpus)
-    done = gate.run([elf, f"-runs={runs}", "-seed=1", "-max_len=400", "-print_final_stats=1", f"-artifact_prefix={WORK}/", corpus], limit=limit)
+    done = gate.run(
+        [elf, f"-runs={runs}", "-seed=1", "-max_len=400", "-print_final_stats=1", f"-artifact_prefix={WORK}/", corpus], limit=limit
+    )
     said = done.stdout + done.stderr
     number = re.search(r"number_of_executed_units: (\d+)", said)
     return done.returncode, int(number[1]) if number else 0, said

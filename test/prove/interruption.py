@@ -8,12 +8,12 @@ import os
 import sys
 from pathlib import Path
 
-import numpy as np
-
 import gate
+import numpy as np
 
 sys.path.insert(0, str(gate.ROOT / "test" / "bench"))
 import cycles
+
 from penode_sil.targets import MACHINES, PORT
 
 

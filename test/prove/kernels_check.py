@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import gate
+
 from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "kernels"

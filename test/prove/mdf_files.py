@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+
 from penode_sil.reading import mdf
 
 try:
@@ -41,7 +42,9 @@ def overwritten(data: bytes, pick: random.Random) -> bytes:
     heads = [m.start() for m in re.finditer(rb"##[A-Z][A-Z]", data)] or [0]
     at = pick.choice(heads) + pick.randrange(120) if pick.random() < 0.5 else pick.randrange(len(data) or 1)
     kept = data[at:][:8]
-    new = pick.choice([pick.randbytes(pick.randrange(1, 9)), bytes(len(kept)), b"\xff" * len(kept), kept[::-1], data[pick.choice(heads) :][:8]])
+    new = pick.choice(
+        [pick.randbytes(pick.randrange(1, 9)), bytes(len(kept)), b"\xff" * len(kept), kept[::-1], data[pick.choice(heads) :][:8]]
+    )
     return data[:at] + new[: len(kept)] + data[at + len(new[: len(kept)]) :]
 
 

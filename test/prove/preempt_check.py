@@ -10,9 +10,9 @@ import sys
 from pathlib import Path
 
 import gate
+from interruption import executed, interrupted, never
 
 import penode_gen
-from interruption import executed, interrupted, never
 from penode_sil.building import FLAGS, generated
 from penode_sil.targets import MACHINES, PORT
 
@@ -26,15 +26,31 @@ FAULTS = {
     "begin while a set waits": ("!pen_tuning_settle(tuning)", 0, "false"),
     "select while a set waits": ("!pen_tuning_settle(tuning)", 1, "false"),
     "rollback while a set waits": ("!pen_tuning_settle(tuning)", 2, "false"),
-    "pending before the slot is written": ("    pen_set_copy(&tuning->slot[slot], ready);", 0, "    pen_port_store(&tuning->pending, command(ADOPT, slot));\n    pen_set_copy(&tuning->slot[slot], ready);"),
-    "pending cleared before active is flipped": ("            active = other;", 0, "            pen_port_store(&tuning->pending, 0U);\n            active = other;"),
+    "pending before the slot is written": (
+        "    pen_set_copy(&tuning->slot[slot], ready);",
+        0,
+        "    pen_port_store(&tuning->pending, command(ADOPT, slot));\n    pen_set_copy(&tuning->slot[slot], ready);",
+    ),
+    "pending cleared before active is flipped": (
+        "            active = other;",
+        0,
+        "            pen_port_store(&tuning->pending, 0U);\n            active = other;",
+    ),
     "pending forgotten by publish": ("pen_port_store(&tuning->pending, tuning->published);", 0, ""),
     "active not flipped": ("            active = other;", 0, ""),
     "not adopted while holding": ("if (pending != 0U) {", 0, "if ((status == PEN_OK) && (pending != 0U)) {"),
-    "withdrawn by the tuning context itself": ("pen_port_store(&tuning->pending, command(WITHDRAW, slot));", 0, "pen_port_store(&tuning->pending, 0U);"),
-    "a withdrawal that came too late is granted": ("} else if (pending == command(WITHDRAW, other)) {", 0, "} else if ((pending == command(WITHDRAW, 0U)) || (pending == command(WITHDRAW, 1U))) {"),
+    "withdrawn by the tuning context itself": (
+        "pen_port_store(&tuning->pending, command(WITHDRAW, slot));",
+        0,
+        "pen_port_store(&tuning->pending, 0U);",
+    ),
+    "a withdrawal that came too late is granted": (
+        "} else if (pending == command(WITHDRAW, other)) {",
+        0,
+        "} else if ((pending == command(WITHDRAW, 0U)) || (pending == command(WITHDRAW, 1U))) {",
+    ),
     "a withdrawal taken for granted": ("if (tuning->published == command(ADOPT, active ^ 1U)) {", 0, "if (true) {"),
-}  # fmt: skip
+}
 
 
 def layered() -> Path:
@@ -52,9 +68,25 @@ def program(machine: str, name: str, pen_set: Path, model: Path = gate.HERE / "s
     elf = WORK / f"{machine}-{name}.elf"
     elf.parent.mkdir(parents=True, exist_ok=True)
     gate.make(
-        [PORT / "cc", MACHINES[machine], *FLAGS, "-O2", "-Wall", "-Wextra", "-fno-strict-aliasing", f"-I{source}", f"-I{PORT}",
-         "-o", elf, gate.HERE / "preempt.c", source / "small.c", source / "small_params.c", *SOURCES, pen_set]
-    )  # fmt: skip
+        [
+            PORT / "cc",
+            MACHINES[machine],
+            *FLAGS,
+            "-O2",
+            "-Wall",
+            "-Wextra",
+            "-fno-strict-aliasing",
+            f"-I{source}",
+            f"-I{PORT}",
+            "-o",
+            elf,
+            gate.HERE / "preempt.c",
+            source / "small.c",
+            source / "small_params.c",
+            *SOURCES,
+            pen_set,
+        ]
+    )
     return elf
 
 

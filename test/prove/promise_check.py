@@ -14,9 +14,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
-import numpy as np
-
 import gate
+import numpy as np
 import promise_nets
 from promise_reference import ZERO_AT_ZERO, Line, Margins, Net, Promise, zero_bits
 
@@ -29,15 +28,21 @@ LAYERS = {"dense": 0, "relu": 1, "centre": 2, "rescale": 3}
 # Faults: file, and the change of gate.faulty.
 FAULTS = {
     "no rounding errors": ("pen_cell", ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "ZERO")),
-    "the margin is eight times as wide": ("pen_cell", ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "((pen_real_t)4 * PEN_REAL_EPSILON)")),
+    "the margin is eight times as wide": (
+        "pen_cell",
+        ("((pen_real_t)0.53125F * PEN_REAL_EPSILON)", 0, "((pen_real_t)4 * PEN_REAL_EPSILON)"),
+    ),
     "a promise is not looked at": ("pen_promise", ("broken |= bounded ? 0U : PEN_PROMISE_MAX_SLOPE;", 0, "(void)bounded;")),
     "the outer pieces are not looked at": ("pen_promise", ("broken |= at_edge ? 0U :", 0, "broken |= (at_edge || endless) ? 0U :")),
     "one side only": ("pen_promise", ("broken = travel(&line, promise, start, -ONE, lowest, &looks, &at);", 0, "broken = 0U;")),
     "undecided neurons are off": ("pen_cell", ("(((pattern >> i) & 1U) != 0U)", 0, "false")),
     "undecided neurons are on or off at once": ("pen_cell", ("pattern < ((uint32_t)1U << part->open)", 0, "pattern < 1U")),
-    "many undecided neurons are off": ("pen_cell", ("const pen_real_t most = (high > ZERO) ? high : ZERO;", 0, "const pen_real_t most = ZERO;")),
+    "many undecided neurons are off": (
+        "pen_cell",
+        ("const pen_real_t most = (high > ZERO) ? high : ZERO;", 0, "const pen_real_t most = ZERO;"),
+    ),
     "a cell goes on past the kink": ("pen_cell", ("? ((size - error) / closing)", 0, "? ((pen_real_t)4 * ((size - error) / closing))")),
-}  # fmt: skip
+}
 
 
 def library(real: type, name: str = "right", fault: str = "", changed: tuple[str, int, str] = ("", 0, "")) -> Path:
@@ -50,7 +55,22 @@ def library(real: type, name: str = "right", fault: str = "", changed: tuple[str
         sources = [copy if source.stem == fault else source for source in sources]
     target = WORK / f"{name}-{real.__name__}.so"
     options = ["-DPEN_REAL_DOUBLE"] if real is np.float64 else []
-    gate.make(["gcc", "-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", *options, f"-I{gate.ROOT}/inc", f"-I{gate.ROOT}/port/gnu", "-o", target, *sources])
+    gate.make(
+        [
+            "gcc",
+            "-std=c99",
+            "-O2",
+            "-ffp-contract=off",
+            "-shared",
+            "-fPIC",
+            *options,
+            f"-I{gate.ROOT}/inc",
+            f"-I{gate.ROOT}/port/gnu",
+            "-o",
+            target,
+            *sources,
+        ]
+    )
     return target
 
 
@@ -61,7 +81,13 @@ class Checker:
         number = ctypes.c_float if real is np.float32 else ctypes.c_double
 
         class Made(ctypes.Structure):
-            _fields_ = [("kinds", ctypes.c_uint32), ("looks", ctypes.c_uint32), ("band", number), ("max_slope", number), ("max_force", number)]
+            _fields_ = [
+                ("kinds", ctypes.c_uint32),
+                ("looks", ctypes.c_uint32),
+                ("band", number),
+                ("max_slope", number),
+                ("max_force", number),
+            ]
 
         class Breach(ctypes.Structure):
             _fields_ = [("network", ctypes.c_uint32), ("kind", ctypes.c_uint32), ("at", number)]
@@ -74,7 +100,11 @@ class Checker:
         """Put a network where the C finds it."""
         self.layers = (ctypes.c_uint32 * (3 * len(net.layers)))()
         for i, layer in enumerate(net.layers):
-            self.layers[3 * i : 3 * i + 3] = LAYERS[layer.kind], layer.n_out if layer.kind in ("centre", "rescale") else layer.n_in, layer.n_out
+            self.layers[3 * i : 3 * i + 3] = (
+                LAYERS[layer.kind],
+                layer.n_out if layer.kind in ("centre", "rescale") else layer.n_in,
+                layer.n_out,
+            )
         width = max([1] + [layer.n_out for layer in net.layers])
         neurons = sum(layer.n_out for layer in net.layers if layer.kind == "relu")
 
@@ -91,9 +121,16 @@ class Checker:
         breach = self.breach()
         made = self.made(promise.kind, LOOKS, *(3 * [promise.limit]))
         kept = self.function(
-            ctypes.byref(made), ctypes.byref(self.chain), ctypes.c_void_p(self.values.ctypes.data), ctypes.c_bool(self.clamp), ctypes.c_size_t(0), None,
-            ctypes.c_void_p(self.work.ctypes.data), ctypes.c_void_p(self.active.ctypes.data), ctypes.byref(breach)
-        )  # fmt: skip
+            ctypes.byref(made),
+            ctypes.byref(self.chain),
+            ctypes.c_void_p(self.values.ctypes.data),
+            ctypes.c_bool(self.clamp),
+            ctypes.c_size_t(0),
+            None,
+            ctypes.c_void_p(self.work.ctypes.data),
+            ctypes.c_void_p(self.active.ctypes.data),
+            ctypes.byref(breach),
+        )
         return kept, breach.kind, breach.at
 
 
@@ -165,10 +202,22 @@ def main() -> int:
     with ProcessPoolExecutor(given.jobs) as pool:
         runs = [pool.submit(trial, given.seed * 100_000 + k, -(-given.bad // parts), -(-given.good // parts), paths) for k in range(parts)]
         for done in (run.result() for run in runs):
-            total.bad, total.good, total.between, total.kinds = total.bad + done.bad, total.good + done.good, total.between + done.between, total.kinds + done.kinds
+            total.bad, total.good, total.between, total.kinds = (
+                total.bad + done.bad,
+                total.good + done.good,
+                total.between + done.between,
+                total.kinds + done.kinds,
+            )
             total.wrong += done.wrong
-    good = gate.report(f"promise: 0 of {total.bad} sets that break a promise accepted, 0 of {total.good} that keep it by more than the margin refused", total.wrong[:10])
-    print("    " + ", ".join(f"{n} {what}" for what, n in sorted(total.kinds.items())) + f"; between, accepted {total.between[True]}, refused {total.between[False]}")
+    good = gate.report(
+        f"promise: 0 of {total.bad} sets that break a promise accepted, 0 of {total.good} that keep it by more than the margin refused",
+        total.wrong[:10],
+    )
+    print(
+        "    "
+        + ", ".join(f"{n} {what}" for what, n in sorted(total.kinds.items()))
+        + f"; between, accepted {total.between[True]}, refused {total.between[False]}"
+    )
     if given.no_faults:
         return int(not good)
     missed = []
@@ -177,7 +226,16 @@ def main() -> int:
         missed += [] if wrong else [f"not found: {fault}"]
     good &= gate.report(f"promise: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults found", missed)
     if given.key != "none":
-        gate.keep(given.key, {"bad": total.bad, "good": total.good, "wrong": len(total.wrong), "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
+        gate.keep(
+            given.key,
+            {
+                "bad": total.bad,
+                "good": total.good,
+                "wrong": len(total.wrong),
+                "faults": list(FAULTS),
+                "faults found": len(FAULTS) - len(missed),
+            },
+        )
     return int(not good)
 
 

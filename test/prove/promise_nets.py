@@ -7,7 +7,6 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
-
 from promise_reference import DISSIPATIVE, INCREASING, MAX_FORCE, MAX_SLOPE, ZERO_AT_ZERO, Layer, Line, Net, Promise
 
 DECREASING = 0x2
@@ -72,7 +71,9 @@ def net(draw: np.random.Generator) -> Net:
     elif kind in (4, 5):  # tilted until the least slope is next to 0, on either side
         layers = _through(layers)
         trial = Line(_net(draw, layers, False, real, clamp, low, high))
-        lift = -float(min(trial.slopes if not clamp else trial.slopes[1:-1])) * (1.0 + draw.choice([0.0, eps, 100.0 * eps, 1e-3, 1.0]) * draw.choice([-1.0, 1.0]))
+        lift = -float(min(trial.slopes if not clamp else trial.slopes[1:-1])) * (
+            1.0 + draw.choice([0.0, eps, 100.0 * eps, 1e-3, 1.0]) * draw.choice([-1.0, 1.0])
+        )
         layers[-1][0][0, -2:] = lift, -lift
     elif kind == 6:  # dead neurons, twins
         for w, b in layers[:-1]:
@@ -104,12 +105,16 @@ def net(draw: np.random.Generator) -> Net:
         at = 1.0 + eps * np.cumsum(draw.integers(0, 5, n)) * draw.choice([1.0, 4.0, 1e3])
         up = steep * (-1.0) ** np.arange(n) * (1.0 + 1e-3 * draw.random(n))
         back = 0.3 * steep * draw.choice([-1.0, 1.0])
-        layers = [(np.append(np.ones(n), [1.0, -1.0])[:, None], np.append(-at, [0.0, 0.0])), (np.append(up, [back, -back])[None, :], np.zeros(1))]
+        layers = [
+            (np.append(np.ones(n), [1.0, -1.0])[:, None], np.append(-at, [0.0, 0.0])),
+            (np.append(up, [back, -back])[None, :], np.zeros(1)),
+        ]
     return _net(draw, layers, scaled, real, clamp, low, high)
 
 
 def promises(draw: np.random.Generator, made: Net, line: Line) -> list[Promise]:
     """Some promises that the network keeps or breaks, often by a hair."""
+
     def about(exact: Fraction) -> float:
         by = draw.choice([0.0, 0.5, 8.0, 1e2, 1e4]) * np.finfo(made.real).eps if draw.random() < 0.7 else draw.choice([0.01, 0.5])
         with np.errstate(over="ignore"):

@@ -70,7 +70,7 @@ class Line:
             rows = [_sum(weights, bias, rows, len(places)) for weights, bias in zip(layer.weights, layer.bias)]
             if layer.kind == "relu":
                 places, rows = _rectified(places, rows)
-        (before, values, behind), = rows
+        ((before, values, behind),) = rows
         ends = (Fraction(net.low), Fraction(net.high)) if net.clamp else ()
         wanted = sorted({Fraction(0), *ends, *places})
         values = _at(wanted, places, before, values, behind)
@@ -251,7 +251,9 @@ class Margins:
         self.seen = sorted([(x, Hull(net, x, number)) for x in {*places, *middle}], key=lambda pair: pair[0])
 
         # a slope next to the subnormal numbers is known to their spacing only, which counts along the whole line
-        self.normal = all(h.least == h.most == 0 or max(abs(h.least), abs(h.most)) > smallest for h in [hull for _, hull in self.seen] + list(self.outer))
+        self.normal = all(
+            h.least == h.most == 0 or max(abs(h.least), abs(h.most)) > smallest for h in [hull for _, hull in self.seen] + list(self.outer)
+        )
 
     def keeps(self, promise: Promise) -> bool:
         limit = promise.limit

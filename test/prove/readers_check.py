@@ -27,11 +27,12 @@ import gate
 import mdf_files
 import numpy as np
 import onnx
+import recording_forms
+
 import penode_gen
 from penode_gen.networks import NetworkError
 from penode_gen.read_json import read_json
 from penode_gen.read_onnx import read_onnx
-import recording_forms
 from penode_sil import look, measured, scenario
 from penode_sil.errors import UserError
 from penode_sil.recording import on_raster, read
@@ -41,8 +42,10 @@ LIMIT = 20  # [s] of the processor for one file
 NQVM = gate.ROOT / "gen" / "nqvm"
 WORDS = [
     *"0 -1 1 2 7 1e308 -1e308 1e-320 1e999 nan inf -inf 10000000000000000000000000000000 0x10 1_0 true false null".split(),
-    *'"" " " "m" "N*s/m" "m^99999" "der(v_b)" "1/0" "x**x**x" "((((" "\u00e9" [] {} [[]] [0] [1,2,3] [nan] , ; = \n \t \r\n \0 . - #'.split(" "),
-]  # fmt: skip
+    *'"" " " "m" "N*s/m" "m^99999" "der(v_b)" "1/0" "x**x**x" "((((" "\u00e9" [] {} [[]] [0] [1,2,3] [nan] , ; = \n \t \r\n \0 . - #'.split(
+        " "
+    ),
+]
 
 
 @dataclass
@@ -115,7 +118,9 @@ def regraft(data: bytes, pick: random.Random) -> bytes:
             where = pick.choice((one.input, one.output))
             where.append(pick.choice(names))
             where[pick.randrange(len(where))] = pick.choice(names)
-            one.attribute.extend([onnx.helper.make_attribute(pick.choice(["alpha", "beta", "transA", "transB", "axis"]), pick.choice([0, 1, 2, 0.5]))])
+            one.attribute.extend(
+                [onnx.helper.make_attribute(pick.choice(["alpha", "beta", "transA", "transB", "axis"]), pick.choice([0, 1, 2, 0.5]))]
+            )
     elif part is graph.initializer:
         if way == 2:
             one.dims[:] = [pick.choice([-1, 0, 1, 3, 16, 2**40]) for _ in range(pick.randrange(4))]
@@ -192,12 +197,16 @@ def readers(folder: Path) -> list[Reader]:
         Reader("model", ".toml", lambda path: penode_gen.render(penode_gen.load(path)), models),
         Reader("json", ".json", read_json, [path.read_bytes() for path in sorted((gate.HERE / "small").glob("*.json"))]),
         Reader("onnx", ".onnx", read_onnx, [path.read_bytes() for path in sorted((NQVM / "networks").glob("*.onnx"))]),
-        Reader("scenario", ".toml", lambda path: scenario.load(path, nqvm, length),
-               [path.read_bytes() for path in sorted((gate.ROOT / "sil" / "scenarios").glob("*.toml"))]),
+        Reader(
+            "scenario",
+            ".toml",
+            lambda path: scenario.load(path, nqvm, length),
+            [path.read_bytes() for path in sorted((gate.ROOT / "sil" / "scenarios").glob("*.toml"))],
+        ),
         Reader("recording", ".csv", lambda path: measured.load([path], nqvm), [csv, german]),
         Reader("forms", ".csv", lambda path: (look.look(path, nqvm), _channels(path)), small_forms()),
         *([Reader("mdf", ".mf4", lambda path: measured.load([path], nqvm), mdf_files.good(), share=0.05)] if mdf_files.asammdf else []),
-    ]  # fmt: skip
+    ]
 
 
 def small_forms() -> list[bytes]:
@@ -221,7 +230,9 @@ def check(tries: int, seed: int = 1, only: Collection[str] = ()) -> tuple[list[s
     signal.signal(signal.SIGPROF, _too_long)
     with tempfile.TemporaryDirectory() as place, mdf_files.quick():
         every = [reader for reader in readers(Path(place)) if not only or reader.name in only]
-        good = [f"{reader.name}: a good file is refused" for reader in every if failure(reader, _put(reader, Path(place))) or not reader.taken]
+        good = [
+            f"{reader.name}: a good file is refused" for reader in every if failure(reader, _put(reader, Path(place))) or not reader.taken
+        ]
         found = good + [problem for reader in every for problem in search(reader, tries, Path(place), seed)]
     return found, {r.name: {"files": r.tried, "taken": r.taken, "messages": len(r.messages)} for r in every}
 
@@ -255,15 +266,24 @@ def _hangs(path: Path) -> object:
     return None
 
 
-FAULTS = {"an exception gets out": _raises, "refused without a word": _says_nothing, "a trace instead of words": _shows_a_trace,
-          "goes on with NaN": _computes_nan, "hangs": _hangs}  # fmt: skip
+FAULTS = {
+    "an exception gets out": _raises,
+    "refused without a word": _says_nothing,
+    "a trace instead of words": _shows_a_trace,
+    "goes on with NaN": _computes_nan,
+    "hangs": _hangs,
+}
 
 
 def faults_missed() -> list[str]:
     """Readers that do what none may: those that are not found out."""
     signal.signal(signal.SIGPROF, _too_long)
     with tempfile.TemporaryDirectory() as place:
-        return [f"not found: {fault}" for fault, read in FAULTS.items() if not search(Reader("faulty", ".toml", read, [b"a = 1\n"], limit=1), 3, Path(place))]
+        return [
+            f"not found: {fault}"
+            for fault, read in FAULTS.items()
+            if not search(Reader("faulty", ".toml", read, [b"a = 1\n"], limit=1), 3, Path(place))
+        ]
 
 
 def main() -> int:
@@ -278,7 +298,9 @@ def main() -> int:
     good = gate.report(f"readers: {total} damaged files: all taken or refused in words", problems[:20])
     missed = faults_missed()
     good &= gate.report(f"readers: {len(FAULTS) - len(missed)} of {len(FAULTS)} faulty readers found", missed)
-    gate.keep(given.key, {"files": total} | seen | {"failures": len(problems), "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
+    gate.keep(
+        given.key, {"files": total} | seen | {"failures": len(problems), "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)}
+    )
     return int(not good)
 
 

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import gate
+
 from penode_sil.targets import MACHINES
 
 WORK = gate.BUILD / "rules"
@@ -22,15 +23,30 @@ FAULTS = {
 # What would keep cppcheck from saying something: a comment, code that it does not see, an option but the two that are no rules.
 OFF = re.compile(
     r"cppcheck-suppress|__cppcheck__|--inline-suppr|--suppressions-list|--suppress-xml|--disable=|--file-filter"
-    r"|--suppress=(?!(?:missingIncludeSystem|checkersReport)(?:\s|$))", re.IGNORECASE
-)  # fmt: skip
+    r"|--suppress=(?!(?:missingIncludeSystem|checkersReport)(?:\s|$))",
+    re.IGNORECASE,
+)
 OFF_FAULTS = (
-    "/* cppcheck-suppress misra-c2012-15.5 */", "#ifndef __cppcheck__", "--inline-suppr", "--suppressions-list=list.txt", "--disable=style",
-    "--suppress=misra-c2012-8.9", "--suppress=checkersReport* --suppress=*:src/pen_set.c", "--file-filter=src/pen_set.c",
-)  # fmt: skip
+    "/* cppcheck-suppress misra-c2012-15.5 */",
+    "#ifndef __cppcheck__",
+    "--inline-suppr",
+    "--suppressions-list=list.txt",
+    "--disable=style",
+    "--suppress=misra-c2012-8.9",
+    "--suppress=checkersReport* --suppress=*:src/pen_set.c",
+    "--file-filter=src/pen_set.c",
+)
 # All that cppcheck reads, and all that says how: folder, and which files of it.
-READ = {"src": "*.[ch]", "inc": "*.h", "port": "*.[ch]", "gen/nqvm/c": "*.[ch]", "gen/penode_gen/templates": "*.j2", "sil/firmware": "*.[ch]",
-        "test/misra": "*[!c]", "test": "test.mk"}  # fmt: skip
+READ = {
+    "src": "*.[ch]",
+    "inc": "*.h",
+    "port": "*.[ch]",
+    "gen/nqvm/c": "*.[ch]",
+    "gen/penode_gen/templates": "*.j2",
+    "sil/firmware": "*.[ch]",
+    "test/misra": "*[!c]",
+    "test": "test.mk",
+}
 
 
 def suite(name: str, least: int) -> tuple[int, list[str], list[str]]:
@@ -121,9 +137,21 @@ def main() -> int:
     good &= gate.report(f"rules: {len(outside)} names from outside in {builds} builds", bad + outside)
     missed = [f"not found: {fault}" for fault, code in FAULTS.items() if not needs_a_name(code)]
     good &= gate.report(f"rules: {len(FAULTS) - len(missed)} of {len(FAULTS)} names from outside found", missed)
-    gate.keep("rules", {"readings": programs, "findings": len(found), "suppressed": len(suppressed), "broken by the bad file": broken,
-                        "rules": int(rules), "by the addon": int(by_addon), "builds": builds, "names from outside": len(outside),
-                        "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})  # fmt: skip
+    gate.keep(
+        "rules",
+        {
+            "readings": programs,
+            "findings": len(found),
+            "suppressed": len(suppressed),
+            "broken by the bad file": broken,
+            "rules": int(rules),
+            "by the addon": int(by_addon),
+            "builds": builds,
+            "names from outside": len(outside),
+            "faults": list(FAULTS),
+            "faults found": len(FAULTS) - len(missed),
+        },
+    )
     return int(not good)
 
 

@@ -61,7 +61,7 @@ def search(*, weak: bool, live: bool, mutant: int = 0, limit: float = 3600) -> O
     WORK.mkdir(parents=True, exist_ok=True)
     selects = ["-DSELECT"] if live and weak else []
     gate.make(["spin", *(["-DWEAK"] if weak else []), *selects, f"-DMUTANT={mutant}", "-a", MODEL], WORK)
-    level = "-O0" if mutant else "-O2" # a fault is found sooner than it is compiled
+    level = "-O0" if mutant else "-O2"  # a fault is found sooner than it is compiled
     gate.make(["gcc", level, "-w", "-DCOLLAPSE", *(["-DNFAIR=3"] if live else ["-DSAFETY", "-DNOCLAIM"]), "-o", "pan", "pan.c"], WORK)
     text = gate.run(["./pan", "-m1000000", *(["-a", "-f"] if live else [])], WORK, limit).stdout
     error = re.search(r"^pan:\d+: (.*?)(?: \(at depth.*)?$", text, re.M)
@@ -75,7 +75,9 @@ def differences() -> list[str]:
     body = {m[1]: m[2] for m in re.finditer(r"^\w[^;=\n]*\b(\w+)\([^;]*?\)\n\{\n(.*?)^\}", SOURCE.read_text(), re.M | re.S)}
     body = {name: re.sub(r"\s*/\*.*?\*/", "", text, flags=re.S) for name, text in body.items()}
     text = "".join(part.read_text() for part in PARTS)
-    quoted = {m[1]: re.findall(r"// (.*)$", m[2], re.M) for m in re.finditer(r"^inline (\w+)\(.*?\)[^\n]*\n\{\n(.*?)^\}", text, re.M | re.S)}
+    quoted = {
+        m[1]: re.findall(r"// (.*)$", m[2], re.M) for m in re.finditer(r"^inline (\w+)\(.*?\)[^\n]*\n\{\n(.*?)^\}", text, re.M | re.S)
+    }
     found = []
     for name, lines in quoted.items():
         rest = body.get(name, "")

@@ -12,8 +12,9 @@ import gate
 import numpy as np
 
 sys.path.insert(0, str(gate.ROOT / "test" / "bench"))
-import penode_gen
 import programs
+
+import penode_gen
 from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "stack"
@@ -52,9 +53,16 @@ def main() -> int:
                 for call, used in zip(CALLS, np.fromfile(WORK / "used", "<u4"), strict=True):
                     painted[call] = max(painted[call], int(used))
                 bounds = {call: programs.stack_bound(elf, call) for call in painted}
-                problems += [f"{model.name} {level} {call}: {used} B used, bound {bounds[call]} B" for call, used in painted.items() if used > bounds[call]]
+                problems += [
+                    f"{model.name} {level} {call}: {used} B used, bound {bounds[call]} B"
+                    for call, used in painted.items()
+                    if used > bounds[call]
+                ]
                 problems += [] if min(painted.values()) > 0 else [f"{model.name} {level}: nothing painted"]
-                row[f"{model.name} {level}"] = {name: {"bound": bounds[f"call_{name}"], "painted": painted[f"call_{name}"]} for name in ("step", "step_jacobian", "tune_commit", "verify", "save", "restore")}
+                row[f"{model.name} {level}"] = {
+                    name: {"bound": bounds[f"call_{name}"], "painted": painted[f"call_{name}"]}
+                    for name in ("step", "step_jacobian", "tune_commit", "verify", "save", "restore")
+                }
         good &= gate.report(f"stack: {machine}: {len(set(CALLS))} entries of {len(models)} models: painted within the bound", problems)
         figures[machine] = row
     missed = [f"has a bound: {fault}" for fault, code in FAULTS.items() if not refused(fault, code)]

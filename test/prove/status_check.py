@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import gate
+
 import penode_gen
 from penode_gen.sets import offsets
 from penode_sil.building import FLAGS, generated, model_options
@@ -26,27 +27,47 @@ OUT_OF_RANGE = ("report", "clamp", "hold")
 HOLDS, CLAMPS = "small_rk4_8_or_layers", "small_heun_8_or_layers"
 FAULTS = {
     "input not checked": (HOLDS, "model", ("status |= pen_step_check(SMALL_RK4_8_OR_LAYERS_N_U, u1, PEN_INPUT_NONFINITE);", 0, "")),
-    "state not checked": (HOLDS, "model", ("status |= pen_step_check(SMALL_RK4_8_OR_LAYERS_N_LAST, self->row[PEN_ROW_LAST], PEN_STATE_NONFINITE);", 0, "")),
+    "state not checked": (
+        HOLDS,
+        "model",
+        ("status |= pen_step_check(SMALL_RK4_8_OR_LAYERS_N_LAST, self->row[PEN_ROW_LAST], PEN_STATE_NONFINITE);", 0, ""),
+    ),
     "result not checked": (HOLDS, "pen_step.h", ("pen_step_check(n_last, &row[PEN_ROW_NOW * n_last], PEN_STEP_NONFINITE)", 0, "PEN_OK")),
     "second copy not kept": (HOLDS, "pen_step.h", ("        row[(PEN_ROW_KEPT * n_last) + i] = value;", 0, "")),
     "bad input kept": (HOLDS, "pen_step.h", ("u[(received * n_kept) + i]", 0, "u[n_kept + i]")),
     "steps not counted": (HOLDS, "pen_step.h", ("pen_status_note_step(&self->log, result);", 0, "")),
     "a missing argument not counted": (HOLDS, "model", ("pen_status_note_step(&self->head.log, status);", 0, "")),
-    "a missing argument of a tuning call not counted": (HOLDS, "pen_status.c", ("note(&log->count[PEN_STATUS_STEP], PEN_STATUS_FLAGS - PEN_STATUS_STEP, ", 0, "note(&log->count[PEN_STATUS_STEP], 9U, ")),
+    "a missing argument of a tuning call not counted": (
+        HOLDS,
+        "pen_status.c",
+        ("note(&log->count[PEN_STATUS_STEP], PEN_STATUS_FLAGS - PEN_STATUS_STEP, ", 0, "note(&log->count[PEN_STATUS_STEP], 9U, "),
+    ),
     "values of a set not checked": (HOLDS, "pen_set.c", ("!pen_finite(length, set->value)", 0, "false")),
     "scrub stands still": (HOLDS, "pen_step.h", ("self->scrub = at + 1U;", 0, "")),
     "scrub leaves out the last value": (HOLDS, "pen_step.h", ("self->scrub % round", 0, "self->scrub % (round - 1U)")),
     "scrub leaves out the last piece": (HOLDS, "pen_step.h", ("at % pieces", 0, "at % (pieces - 1U)")),
-    "scrub does not look at the set": (HOLDS, "pen_step.h", ("nonfinite = looked_at - looked_at;", 0, "nonfinite = (pen_real_t)0 * (pen_real_t)(looked_at == looked_at);")),
+    "scrub does not look at the set": (
+        HOLDS,
+        "pen_step.h",
+        ("nonfinite = looked_at - looked_at;", 0, "nonfinite = (pen_real_t)0 * (pen_real_t)(looked_at == looked_at);"),
+    ),
     "scrub does not look at starts": (HOLDS, "pen_step.h", ("nonfinite *= looked_at->start;", 0, "")),
     "finite whatever comes": (HOLDS, "pen_math.h", ("return sum >= (pen_real_t)0;", 0, "return (sum >= (pen_real_t)0) || true;")),
     "above the range not reported": (HOLDS, "pen_step.h", ("(u > most) ? flags : PEN_OK", 0, "(u > most) ? PEN_OK : PEN_OK")),
     "at the edge reported": (HOLDS, "pen_step.h", ("(u < least) ? flags", 0, "(u <= least) ? flags")),
     "an input out of range not held": (HOLDS, "model", ("PEN_INPUT_RANGE | PEN_HELD", 0, "PEN_INPUT_RANGE")),
-    "an input out of range held and kept": (HOLDS, "model", ("PEN_INPUT_NONFINITE | PEN_INPUT_RANGE, status", 0, "PEN_INPUT_NONFINITE, status")),
+    "an input out of range held and kept": (
+        HOLDS,
+        "model",
+        ("PEN_INPUT_NONFINITE | PEN_INPUT_RANGE, status", 0, "PEN_INPUT_NONFINITE, status"),
+    ),
     "an input above its range not moved": (CLAMPS, "pen_step.h", ("(raised > most) ? most : raised", 0, "raised")),
-    "Inf moved into the range unseen": (CLAMPS, "model", ("    status |= pen_step_check(SMALL_HEUN_8_OR_LAYERS_N_U, u1, PEN_INPUT_NONFINITE);\n", 0, "")),
-}  # fmt: skip
+    "Inf moved into the range unseen": (
+        CLAMPS,
+        "model",
+        ("    status |= pen_step_check(SMALL_HEUN_8_OR_LAYERS_N_U, u1, PEN_INPUT_NONFINITE);\n", 0, ""),
+    ),
+}
 
 
 def models() -> Iterator[penode_gen.Model]:
@@ -74,16 +95,41 @@ def ranges(model: penode_gen.Model) -> str:
     return ",".join(f"{{(pen_real_t){least},(pen_real_t){most}}}" for least, most in edges)
 
 
-def campaign(model: penode_gen.Model, source: Path, runs: int, inc: Path = gate.ROOT / "inc", src: Path = gate.ROOT / "src") -> tuple[int, str]:
+def campaign(
+    model: penode_gen.Model, source: Path, runs: int, inc: Path = gate.ROOT / "inc", src: Path = gate.ROOT / "src"
+) -> tuple[int, str]:
     """Exit code and words of status.c for a model."""
     elf = WORK / model.name
     sets = ",".join(f"&{model.name}_set_{name}" for name in model.sets)
     gate.make(
-        ["gcc", *FLAGS, "-D_GNU_SOURCE", "-O2", "-Wall", "-Wextra", "-fno-strict-aliasing", f"-I{inc}", f"-I{gate.ROOT}/port/gnu", f"-I{source}",
-         *model_options(model), *(["-DMODEL_FOLDED"] if model.pieces else []), f"-D{model.name.upper()}_FOLDS={int(model.pieces > 0)}U",
-         f"-D{model.name.upper()}_READS_SET={int(not model.pieces or model.more_pieces == 'layers')}U", f"-DMODEL_SETS={sets}", f"-DMODEL_BOUNDS={bounds(model)}", f"-DMODEL_RANGES={ranges(model)}", f"-DMODEL_OUT_OF_RANGE={model.guard.out_of_range.upper()}", "-o", elf, gate.HERE / "status.c", source / f"{model.name}.c", source / f"{model.owner}_params.c",
-         *sorted(src.glob("*.c")), "-lm"]
-    )  # fmt: skip
+        [
+            "gcc",
+            *FLAGS,
+            "-D_GNU_SOURCE",
+            "-O2",
+            "-Wall",
+            "-Wextra",
+            "-fno-strict-aliasing",
+            f"-I{inc}",
+            f"-I{gate.ROOT}/port/gnu",
+            f"-I{source}",
+            *model_options(model),
+            *(["-DMODEL_FOLDED"] if model.pieces else []),
+            f"-D{model.name.upper()}_FOLDS={int(model.pieces > 0)}U",
+            f"-D{model.name.upper()}_READS_SET={int(not model.pieces or model.more_pieces == 'layers')}U",
+            f"-DMODEL_SETS={sets}",
+            f"-DMODEL_BOUNDS={bounds(model)}",
+            f"-DMODEL_RANGES={ranges(model)}",
+            f"-DMODEL_OUT_OF_RANGE={model.guard.out_of_range.upper()}",
+            "-o",
+            elf,
+            gate.HERE / "status.c",
+            source / f"{model.name}.c",
+            source / f"{model.owner}_params.c",
+            *sorted(src.glob("*.c")),
+            "-lm",
+        ]
+    )
     done = gate.run([elf, runs, 1], limit=3600)
     return done.returncode, done.stdout + done.stderr
 
@@ -117,8 +163,18 @@ def main() -> int:
     named = {model.name: model for model in every}
     missed = [f"not found: {fault}" for fault, (name, file, change) in FAULTS.items() if with_fault(named[name], file, change)[0] == 0]
     good &= gate.report(f"status: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults found", missed)
-    gate.keep(given.key, {"runs": total, "models": len(every), "failures": len(problems), "found by the scrub": scrubbed, "until then another piece used because a start is damaged": misplaced,
-                          "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})  # fmt: skip
+    gate.keep(
+        given.key,
+        {
+            "runs": total,
+            "models": len(every),
+            "failures": len(problems),
+            "found by the scrub": scrubbed,
+            "until then another piece used because a start is damaged": misplaced,
+            "faults": list(FAULTS),
+            "faults found": len(FAULTS) - len(missed),
+        },
+    )
     return int(not good)
 
 

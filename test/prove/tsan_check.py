@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import gate
+
 import penode_gen
 from penode_sil.building import FLAGS, generated, model_options
 
@@ -24,7 +25,11 @@ FAULTS = {
     "begin while a set waits": ("    return done;", 0, "    return done || true;"),
     "slot written after pending": (LATE[0], 0, LATE[1] + STORE + WRITE) if LATE else (WRITE + STORE, 0, ""),
     "active not flipped": ("            active = other;", 0, ""),
-    "withdrawn by the tuning context itself": ("pen_port_store(&tuning->pending, command(WITHDRAW, slot));", 0, "pen_port_store(&tuning->pending, 0U);"),
+    "withdrawn by the tuning context itself": (
+        "pen_port_store(&tuning->pending, command(WITHDRAW, slot));",
+        0,
+        "pen_port_store(&tuning->pending, 0U);",
+    ),
 }  # of pen_set.c: see gate.faulty
 
 
@@ -34,10 +39,27 @@ def torture(model: str, sets: int, port: str = "gnu", pen_set: Path = SET, limit
     source, elf = generated(loaded), WORK / f"{model}-{port}-{pen_set.stem}"
     elf.parent.mkdir(parents=True, exist_ok=True)
     gate.make(
-        ["clang-19", "-fsanitize=thread", *FLAGS, "-D_GNU_SOURCE", "-O2", "-g", "-pthread", f"-I{gate.ROOT}/inc", f"-I{gate.ROOT}/port/{port}",
-         f"-I{source}", *model_options(loaded), "-o", elf,
-         gate.HERE / "tsan.c", source / f"{model}.c", source / f"{loaded.owner}_params.c", *SOURCES, pen_set]
-    )  # fmt: skip
+        [
+            "clang-19",
+            "-fsanitize=thread",
+            *FLAGS,
+            "-D_GNU_SOURCE",
+            "-O2",
+            "-g",
+            "-pthread",
+            f"-I{gate.ROOT}/inc",
+            f"-I{gate.ROOT}/port/{port}",
+            f"-I{source}",
+            *model_options(loaded),
+            "-o",
+            elf,
+            gate.HERE / "tsan.c",
+            source / f"{model}.c",
+            source / f"{loaded.owner}_params.c",
+            *SOURCES,
+            pen_set,
+        ]
+    )
     done = gate.run([elf, sets], limit=limit, env=os.environ | {"TSAN_OPTIONS": "halt_on_error=1"})
     return done.returncode, done.stdout + done.stderr
 
@@ -50,8 +72,16 @@ def main() -> int:
     for model in ("small", "small_layers"):
         code, said = torture(model, sets, limit=3600)
         counts = [int(n) for n in re.findall(r"(\d+) (?:adopted|steps|torn|withdrawn)", said)]
-        good &= gate.report(f"tsan: {model}: {sets} sets, no race, none torn, lost or out of order", [said] if code or counts[:1] != [sets] or counts[3:] == [0] else [])
-        figures[model] = {"sets": sets, "races": int(code == RACE), "torn": counts[2] if len(counts) == 4 else None, "withdrawn": counts[3] if len(counts) == 4 else None}
+        good &= gate.report(
+            f"tsan: {model}: {sets} sets, no race, none torn, lost or out of order",
+            [said] if code or counts[:1] != [sets] or counts[3:] == [0] else [],
+        )
+        figures[model] = {
+            "sets": sets,
+            "races": int(code == RACE),
+            "torn": counts[2] if len(counts) == 4 else None,
+            "withdrawn": counts[3] if len(counts) == 4 else None,
+        }
     faults = {"plain volatile instead of the port's atomic words": torture("small_layers", 2000, "template")[0]}
     for k, (fault, change) in enumerate(FAULTS.items()):
         copy = WORK / f"fault{k}.c"

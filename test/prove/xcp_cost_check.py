@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import gate
+
 from penode_sil.building import FLAGS
 from penode_sil.targets import MACHINES, PORT
 
@@ -23,7 +24,9 @@ def measured(level: str) -> dict[str, int]:
     WORK.mkdir(parents=True, exist_ok=True)
     elf = WORK / f"cost{level}.elf"
     sources = [*sorted((gate.ROOT / "src").glob("*.c")), folder / "nqvm.c", folder / "nqvm_params.c"]
-    gate.make([PORT / "cc", MACHINES["m4f"], *FLAGS, level, "-Wall", "-Wextra", f"-I{folder}", "-o", elf, gate.HERE / "xcp_cost.c", *sources])
+    gate.make(
+        [PORT / "cc", MACHINES["m4f"], *FLAGS, level, "-Wall", "-Wextra", f"-I{folder}", "-o", elf, gate.HERE / "xcp_cost.c", *sources]
+    )
     done = gate.run([PORT / "run", MACHINES["m4f"], elf], WORK)
     rows = dict(re.findall(r"^(.+) (\d+)$", done.stdout, re.M))
     if done.returncode != 0 or "refused" in rows or not rows:
@@ -42,8 +45,9 @@ def problems(said: dict[str, tuple[int, int]], found: dict[str, tuple[int, int]]
     wrong = [f"{name}: {found.get(name)}, the page says {said.get(name)}" for name in sorted(found.keys() ^ said.keys())]
     return wrong + [
         f"{name}: {found[name]}, the page says {said[name]}"
-        for name in found if name in said and any(abs(a - b) > SHARE * b for a, b in zip(found[name], said[name]))
-    ]  # fmt: skip
+        for name in found
+        if name in said and any(abs(a - b) > SHARE * b for a, b in zip(found[name], said[name]))
+    ]
 
 
 def main() -> int:
@@ -52,9 +56,13 @@ def main() -> int:
     if "--print" in sys.argv:
         print("\n".join(f"| {name} | {f'{a:,} | {b:,}'.replace(',', ' ')} |" for name, (a, b) in found.items()))
     text = PAGE.read_text(encoding="utf-8")
-    good = gate.report(f"xcp-cost: {len(found)} kinds of packet take the instructions that port/xcp/README.md states", problems(stated(text), found))
+    good = gate.report(
+        f"xcp-cost: {len(found)} kinds of packet take the instructions that port/xcp/README.md states", problems(stated(text), found)
+    )
     worse = {name: (2 * a, b) for name, (a, b) in found.items()}
-    good &= gate.report("xcp-cost: packets that take twice as many are found", [] if len(problems(stated(text), worse)) == len(found) else ["not found"])
+    good &= gate.report(
+        "xcp-cost: packets that take twice as many are found", [] if len(problems(stated(text), worse)) == len(found) else ["not found"]
+    )
     gate.keep("xcp-cost", {name: {"-O2": a, "-Os": b} for name, (a, b) in found.items()})
     return int(not good)
 

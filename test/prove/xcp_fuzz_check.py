@@ -22,26 +22,57 @@ FAULTS = {
     "a region is read past its end": ("pen_xcp_memory.c", ("(offset <= size) && (n <= (size - offset))", 0, "(offset <= size)")),
     "an address below is taken": ("pen_xcp_memory.c", ("(offset <= size) && ", 0, "")),
     "a packet is read past its end": ("pen_xcp_memory.c", ("} else if (n < now) {", 0, "} else if (false) {")),
-    "a number is read past the end of a short packet": ("pen_xcp_daq.c", ("(n >= 4U) ? pen_xcp_get(&in[2], 2U) : 0U", 0, "pen_xcp_get(&in[2], 2U)")),
-    "the flash page is written to the working page": ("pen_xcp_cal.c", ("    if (xcp->page == XCP_WORKING) {\n        error = xcp_open", 0, "    if (true) {\n        error = xcp_open")),
-    "a refused commit is answered as done": ("pen_xcp_cal.c", ("error = xcp_error_of(xcp, config->commit());", 0, "(void)config->commit(); error = PEN_XCP_DONE;")),
+    "a number is read past the end of a short packet": (
+        "pen_xcp_daq.c",
+        ("(n >= 4U) ? pen_xcp_get(&in[2], 2U) : 0U", 0, "pen_xcp_get(&in[2], 2U)"),
+    ),
+    "the flash page is written to the working page": (
+        "pen_xcp_cal.c",
+        ("    if (xcp->page == XCP_WORKING) {\n        error = xcp_open", 0, "    if (true) {\n        error = xcp_open"),
+    ),
+    "a refused commit is answered as done": (
+        "pen_xcp_cal.c",
+        ("error = xcp_error_of(xcp, config->commit());", 0, "(void)config->commit(); error = PEN_XCP_DONE;"),
+    ),
     "half a block is committed": ("pen_xcp_cal.c", ("    if (!xcp->torn) {", 0, "    if (true) {")),
-    "an edit changes the running set": ("pen_xcp_cal.c", ("    if (!xcp_open(xcp)) {\n        const pen_set_head_t head", 0, "    if (!xcp_open(xcp) && xcp_on_reference(xcp)) {\n        const pen_set_head_t head")),
+    "an edit changes the running set": (
+        "pen_xcp_cal.c",
+        (
+            "    if (!xcp_open(xcp)) {\n        const pen_set_head_t head",
+            0,
+            "    if (!xcp_open(xcp) && xcp_on_reference(xcp)) {\n        const pen_set_head_t head",
+        ),
+    ),
     "the working page is lost on the reference": ("pen_xcp_cal.c", ("            xcp->kept = kept;", 0, "            (void)kept;")),
     "reconnecting keeps the open set": ("pen_xcp_cal.c", ("    (void)pen_tuning_abort(xcp->tuning);\n    xcp->kept", 0, "    xcp->kept")),
     "every packet of a refused block is answered": ("pen_xcp_memory.c", ("            xcp->refused = (error != PEN_XCP_DONE);", 0, "")),
     "the sequence of a block is not compared": ("pen_xcp_memory.c", ("(in[0] == 0xefU) && (total != xcp->block)", 0, "false")),
-    "the checksum of another page": ("pen_xcp_cal.c", ("return (xcp->page == XCP_WORKING) ? xcp_working(xcp)", 0, "return (xcp->page != XCP_WORKING) ? xcp_working(xcp)")),
+    "the checksum of another page": (
+        "pen_xcp_cal.c",
+        ("return (xcp->page == XCP_WORKING) ? xcp_working(xcp)", 0, "return (xcp->page != XCP_WORKING) ? xcp_working(xcp)"),
+    ),
     "an entry past the last one is written": ("pen_xcp_lists.c", ("    if (daq->left == 0U) {", 0, "    if (false) {")),
     "an ODT that no packet has room for": ("pen_xcp_daq.c", ("good = good && (n <= xcp->config->max_cto);", 0, "")),
     "the ring is filled past its end": ("pen_xcp_daq.c", ("if ((head + list->odts) < (tail + ahead)) {", 0, "if (true) {")),
     "an entry without address is sampled": ("pen_xcp_daq.c", ("good = good && (entry->byte != NULL);", 0, "")),
     "lists change while they run": ("pen_xcp_daq.c", ("        if (pen_port_load(&xcp->sampling) != 0U) {", 0, "        if (false) {")),
-}  # fmt: skip
+}
 
 
-COMPILER = ("clang-19", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all", "-std=c99", "-ffp-contract=off", "-O1", "-g", "-Wall",
-            "-Wextra", "-fno-strict-aliasing", f"-I{gate.ROOT}/inc", f"-I{gate.ROOT}/port/gnu")  # fmt: skip
+COMPILER = (
+    "clang-19",
+    "-fsanitize=fuzzer,address,undefined",
+    "-fno-sanitize-recover=all",
+    "-std=c99",
+    "-ffp-contract=off",
+    "-O1",
+    "-g",
+    "-Wall",
+    "-Wextra",
+    "-fno-strict-aliasing",
+    f"-I{gate.ROOT}/inc",
+    f"-I{gate.ROOT}/port/gnu",
+)
 
 
 def compiled(source: Path, to: Path) -> Path:
@@ -93,7 +124,16 @@ def main() -> int:
             missed.append(name)
         good &= gate.report(f"xcp fuzz: seeded fault: {name}", ["not found"] if name in missed else [])
     if chosen.keep:
-        gate.keep(chosen.key, {"sequences": chosen.runs, "packets": packets, "failures": int(bool(found)), "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
+        gate.keep(
+            chosen.key,
+            {
+                "sequences": chosen.runs,
+                "packets": packets,
+                "failures": int(bool(found)),
+                "faults": list(FAULTS),
+                "faults found": len(FAULTS) - len(missed),
+            },
+        )
     return int(not good)
 
 

@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import gate
+from interruption import executed, interrupted, never
 
 import penode_gen
-from interruption import executed, interrupted, never
 from penode_sil.building import FLAGS, generated
 from penode_sil.targets import MACHINES, PORT
 
@@ -21,10 +21,17 @@ MACHINE = "m4f"
 # Faults of the slave: file, and what gate.faulty makes of it.
 FAULTS = {
     "a set that waits is taken for one that runs": ("pen_xcp_cal.c", ("pen_tuning_settle(tuning) ?", 0, "true ?")),
-    "a sample can be sent before it is whole": ("pen_xcp_daq.c", ("        uint32_t n = 2U;\n        if (list->mode", 0, "        uint32_t n = 2U;\n        pen_port_store(&daq->head, (head + 1U) % daq->slots);\n        if (list->mode")),
+    "a sample can be sent before it is whole": (
+        "pen_xcp_daq.c",
+        (
+            "        uint32_t n = 2U;\n        if (list->mode",
+            0,
+            "        uint32_t n = 2U;\n        pen_port_store(&daq->head, (head + 1U) % daq->slots);\n        if (list->mode",
+        ),
+    ),
     "lists change while a sample is taken": ("pen_xcp_daq.c", ("pen_port_store(&daq->busy, 1U);", 0, "")),
     "lists change while they run": ("pen_xcp_daq.c", ("    if (code == 0xd6U) {", 0, "    if (false) {")),
-}  # fmt: skip
+}
 
 
 def program(name: str, replaced: dict[str, Path], *options: str) -> Path:
@@ -34,9 +41,25 @@ def program(name: str, replaced: dict[str, Path], *options: str) -> Path:
     elf.parent.mkdir(parents=True, exist_ok=True)
     runtime = [replaced.get(path.name, path) for path in sorted((gate.ROOT / "src").glob("*.c"))]
     gate.make(
-        [PORT / "cc", MACHINES[MACHINE], *FLAGS, "-O2", "-Wall", "-Wextra", "-fno-strict-aliasing", f"-I{source}", f"-I{PORT}", *options,
-         "-o", elf, gate.HERE / "xcp_preempt.c", source / "small.c", source / "small_params.c", *runtime]
-    )  # fmt: skip
+        [
+            PORT / "cc",
+            MACHINES[MACHINE],
+            *FLAGS,
+            "-O2",
+            "-Wall",
+            "-Wextra",
+            "-fno-strict-aliasing",
+            f"-I{source}",
+            f"-I{PORT}",
+            *options,
+            "-o",
+            elf,
+            gate.HERE / "xcp_preempt.c",
+            source / "small.c",
+            source / "small_params.c",
+            *runtime,
+        ]
+    )
     return elf
 
 
@@ -59,7 +82,16 @@ def main() -> int:
         copy.write_text(gate.faulty((gate.ROOT / "src" / file).read_text(), change))
         missed += [f"not found: {fault}"] if interrupted(WORK, MACHINE, program(f"fault{k}", {file: copy}))[1] == 0 else []
     good &= gate.report(f"xcp-preempt: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults of the slave found", missed)
-    gate.keep("xcp-preempt", {"runs": seen, "addresses": addresses, "failures": int(code != 0), "faults": list(FAULTS), "faults found": len(FAULTS) - len(missed)})
+    gate.keep(
+        "xcp-preempt",
+        {
+            "runs": seen,
+            "addresses": addresses,
+            "failures": int(code != 0),
+            "faults": list(FAULTS),
+            "faults found": len(FAULTS) - len(missed),
+        },
+    )
     return int(not good)
 
 

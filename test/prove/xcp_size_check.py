@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import gate
+
 from penode_sil.building import FLAGS
 from penode_sil.targets import MACHINES, PORT
 
@@ -73,9 +74,11 @@ def problems(said: dict[str, tuple[int, str, int]], found: Sizes) -> list[str]:
         (code, ram), most = found[name], ROWS[name][2]
         limit = f"{most:,}".replace(",", " ") if most else "-"
         wrong += [f"{name}: {code} B of code, at most {most}"] if most and code > most else []
-        wrong += [f"{name}: {code} B of code, at most {limit}, {ram} B of RAM, the page says {said[name]}"] if (
-            abs(code - said[name][0]) > SHARE * said[name][0] or (limit, ram) != said[name][1:]
-        ) else []  # fmt: skip
+        wrong += (
+            [f"{name}: {code} B of code, at most {limit}, {ram} B of RAM, the page says {said[name]}"]
+            if (abs(code - said[name][0]) > SHARE * said[name][0] or (limit, ram) != said[name][1:])
+            else []
+        )
     return wrong
 
 
@@ -95,7 +98,9 @@ def with_a_variable() -> Path:
 def main() -> int:
     text = PAGE.read_text(encoding="utf-8")
     found = measured()
-    good = gate.report(f"xcp-size: {len(found)} parts of the slave are as large as port/xcp/README.md states", problems(stated(text), found))
+    good = gate.report(
+        f"xcp-size: {len(found)} parts of the slave are as large as port/xcp/README.md states", problems(stated(text), found)
+    )
     larger = problems(stated(text), measured("-O2"))
     faults = {
         "code above the promise": any("at most 2048" in line for line in larger) and any("at most 3584" in line for line in larger),
@@ -104,10 +109,14 @@ def main() -> int:
     }
     for name, seen in faults.items():
         good &= gate.report(f"xcp-size: seeded fault: {name}", [] if seen else ["not found"])
-    gate.keep("xcp-size", {
-        **{name: {"code": code, "at most": ROWS[name][2], "RAM": ram} for name, (code, ram) in found.items()},
-        "faults": list(faults), "faults found": sum(faults.values()),
-    })  # fmt: skip
+    gate.keep(
+        "xcp-size",
+        {
+            **{name: {"code": code, "at most": ROWS[name][2], "RAM": ram} for name, (code, ram) in found.items()},
+            "faults": list(faults),
+            "faults found": sum(faults.values()),
+        },
+    )
     return int(not good)
 
 

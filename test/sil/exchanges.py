@@ -30,7 +30,11 @@ def drive(model: Any, n: int = 2000) -> np.ndarray:
 def sil_with_exchange(model: Any, u: np.ndarray, steps: int, adopting: int, name: str) -> np.ndarray:
     """Outputs [steps, n_y] of a SiL run whose step `adopting`, counted from 1, adopts a set."""
     values = np.asarray(penode_gen.set_values(model, name))
-    calls = [Call(adopting - 1, "begin", head=penode_gen.set_head(model, name)), Call(adopting - 1, "write", values=values), Call(adopting - 1, "commit")]
+    calls = [
+        Call(adopting - 1, "begin", head=penode_gen.set_head(model, name)),
+        Call(adopting - 1, "write", values=values),
+        Call(adopting - 1, "commit"),
+    ]
     driven = np.tile(u, (steps // len(u) + 1, 1))[:steps]
     return np.asarray(Sil(model).run(driven, calls).y)
 
@@ -69,13 +73,23 @@ def check_measurements(model: Any, u: np.ndarray, a2l: A2l, log: Log) -> None:
     x, y, z, status = (np.asarray(of)[sample - 1] for of in (run.x, run.y, run.z, run.status))
     layout, running = penode_gen.set_head(model, "default")[0], model.sets["default"].id
     expected = {
-        "sample": sample, "step_status": status, "set_in_force": running, "adopted_at": 0,
-        "set.layout": layout, "set.active": 0, "set.id_0": running, "set.id_1": running,
-    } | {f"count.{flag}": np.cumsum((run.status & bit) != 0)[sample - 1] for flag, bit in BIT.items()}  # fmt: skip
-    expected |= {output.name: y[:, n] for n, output in enumerate(model.outputs)} | {i.name: u[(sample - 1) % len(u), n] for n, i in enumerate(model.inputs)}
+        "sample": sample,
+        "step_status": status,
+        "set_in_force": running,
+        "adopted_at": 0,
+        "set.layout": layout,
+        "set.active": 0,
+        "set.id_0": running,
+        "set.id_1": running,
+    } | {f"count.{flag}": np.cumsum((run.status & bit) != 0)[sample - 1] for flag, bit in BIT.items()}
+    expected |= {output.name: y[:, n] for n, output in enumerate(model.outputs)} | {
+        i.name: u[(sample - 1) % len(u), n] for n, i in enumerate(model.inputs)
+    }
     expected |= {f"state.{name}" if name in expected else name: x[:, n] for n, name in enumerate(model.states)}
     expected |= {sensor.name: z[:, n] for n, sensor in enumerate(model.sensors)}
     assert expected.keys() | {"late_steps"} == log.values.keys() == a2l.measurements.keys()  # late steps are those of the machine
     for name, values in expected.items():
         assert (log.values[name] == values).all(), name
-    assert all(len(np.unique(log.values[entry.name])) > 1 for entry in (*model.inputs, *model.outputs, *model.sensors))  # nothing stands still
+    assert all(
+        len(np.unique(log.values[entry.name])) > 1 for entry in (*model.inputs, *model.outputs, *model.sensors)
+    )  # nothing stands still

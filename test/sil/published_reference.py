@@ -21,9 +21,7 @@ class Network:
         data = json.loads(path.read_text())
         self.low, self.high = float(data["normalise"]["min"][0]), float(data["normalise"]["max"][0])
         self.out_low, self.out_high = float(data["denormalise"]["min"][0]), float(data["denormalise"]["max"][0])
-        self.layers = [
-            (np.array(layer["weights"]), np.array(layer["bias"]), layer["activation"]) for layer in data["layers"]
-        ]
+        self.layers = [(np.array(layer["weights"]), np.array(layer["bias"]), layer["activation"]) for layer in data["layers"]]
         weights, bias, activation = self.layers[-1]
         self.layers[-1] = (last * weights, bias, activation)
 

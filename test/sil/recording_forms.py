@@ -135,7 +135,14 @@ FORMS: dict[str, Form] = {
     "keys and values": Form(table(between=";", decimal=",", before="Rate;200\nDate;30.11.2023\nChannels;5\n\n")),
     "as wide as the table": Form(table(before="a,b,c,d,e\nx,1,y,2,z\n\n")),
     "header as a comment": Form(table(["# " + SI[0], *SI[1:]])),
-    "several headers": Form(table(BARE, "\t", units=["s", "m", "m/s^2", "rad/s", "N*m"], before="Writer\t2\n***End_of_Header***\n\nSamples\t401\n***End_of_Header***\n")),
+    "several headers": Form(
+        table(
+            BARE,
+            "\t",
+            units=["s", "m", "m/s^2", "rad/s", "N*m"],
+            before="Writer\t2\n***End_of_Header***\n\nSamples\t401\n***End_of_Header***\n",
+        )
+    ),
     "comment at the end": Form(table() + b"# end\n\n"),
     # headers
     "parentheses": Form(table(_PARENS)),
@@ -144,14 +151,18 @@ FORMS: dict[str, Form] = {
     "in": Form(table(["time in s", "x_in in mm", "acc in m/s2", "turning in 1/min", "tau in Nm"], scale=(1, 1e3, 1, TURN, 1))),
     "units in names": Form(table(["t_ms", "x_in_mm", "acc_m_s2", "turning_rpm", "tau_Nm"], scale=(1e3, 1e3, 1, TURN, 1))),
     "units in row two": Form(table(BARE, units=["s", "m", "m/s^2", "rad/s", "N*m"])),
-    "units in row two, in brackets": Form(table(BARE, ";", ",", (1, 1e3, 1 / G, DEGREE, 1e-3), units=["[s]", "[mm]", "[g]", "[deg/s]", "[kNm]"])),
+    "units in row two, in brackets": Form(
+        table(BARE, ";", ",", (1, 1e3, 1 / G, DEGREE, 1e-3), units=["[s]", "[mm]", "[g]", "[deg/s]", "[kNm]"])
+    ),
     "units and types below names": Form(table(BARE, units=["s", "m", "m/s^2", "rad/s", "N*m\nfloat,float,float,float,float"])),
     "units above names": Form(table(BARE, before="s,m,m/s^2,rad/s,N*m\n")),
     "line ends within names": Form(table([name.replace(" ", "\n") for name in SI], quoted=True)),
     "other letters": Form(table(["TIME [s]", "X_In [m]", "Acc [m/s^2]", "TURNING [rad/s]", "Tau [N*m]"])),
     "devices behind names": Form(table(_INCA)),
     "names of their own": Form(table(_OTHERS, scale=(1, 1e3, 1 / G, TURN, 1)), _CALLED),
-    "no header": Form(table().split(b"\n", 1)[1], tuple(f"{name}=column {k} [{unit}]" for k, (name, unit) in enumerate({"time": "s", **UNITS}.items(), 1))),
+    "no header": Form(
+        table().split(b"\n", 1)[1], tuple(f"{name}=column {k} [{unit}]" for k, (name, unit) in enumerate({"time": "s", **UNITS}.items(), 1))
+    ),
     # units
     "units of DBC and A2L": Form(table(_named("ms", "mm", "m/s2", "1/min", "Nm"), scale=(1e3, 1e3, 1, TURN, 1))),
     "units of sensors": Form(table(_named("us", "cm", "mg", "dps", "Ncm"), scale=(1e6, 1e2, 1e3 / G, DEGREE, 1e2))),
@@ -163,24 +174,32 @@ FORMS: dict[str, Form] = {
     "dates with points": Form(table(BARE[:1] + SI[1:], ";", ",", stamp=_german)),
     "times of day": Form(table(stamp=lambda time: _iso(time)[11:])),
     "dates beside times of day": Form(table(["Date;Time", *SI[1:]], ";", ",", stamp=lambda time: _german(time).replace(" ", ";"))),
-    "seconds since 1970": Form(table(stamp=lambda time: f"{1.7e9 + time:.3f}"), tolerance=1e-5),  # 2.4e-7 s of 1.7e9 s, times 8 rad/s, 6 values
+    "seconds since 1970": Form(
+        table(stamp=lambda time: f"{1.7e9 + time:.3f}"), tolerance=1e-5
+    ),  # 2.4e-7 s of 1.7e9 s, times 8 rad/s, 6 values
     "rows without a clock": Form(table(["nr", *SI[1:]], stamp=lambda time: str(round(time / STEP))), ("time=@5ms",)),
-    "a number for each row": Form(b"\n".join(b",".join((str(k - 1).encode() if k else b"", line)) for k, line in enumerate(table().strip().split(b"\n")))),
+    "a number for each row": Form(
+        b"\n".join(b",".join((str(k - 1).encode() if k else b"", line)) for k, line in enumerate(table().strip().split(b"\n")))
+    ),
     # columns that nobody needs, rasters
     "text": Form(table([*SI, "state", "note"], more=("RUN", "n. a."))),
     "names that are there twice": Form(table([*SI, "q [V]", "q [V]"], more=("1", "2"))),
     "a column with a time of its own": Form(_two_clocks(), tolerance=_lined(STEP)),
     "half as many rows": Form(table(step=2 * STEP), tolerance=_lined(2 * STEP)),
-}  # fmt: skip
+}
 
 # what is refused, a word of the reason, and what mends it: options, or the file as it is exported anew
 DOUBTFUL: dict[str, tuple[Form, str, Form]] = {
     "no units": (Form(table(BARE)), "has no unit", Form(table(BARE), tuple(f"{n}={n} [{u}]" for n, u in {"time": "s", **UNITS}.items()))),
     "commas for everything": (Form(table(decimal=",")), "commas part columns and decimals", Form(table(between=";", decimal=","))),
     "two that differ": (
-        Form(table([*SI, "acc [m/s^2]"], more=("1",))), "is there twice", Form(table([*SI, "acc [m/s^2]"], more=("1",)), ("acc=acc#1",)),
+        Form(table([*SI, "acc [m/s^2]"], more=("1",))),
+        "is there twice",
+        Form(table([*SI, "acc [m/s^2]"], more=("1",)), ("acc=acc#1",)),
     ),
     "1/s for an angular rate": (
-        Form(table(_named("s", "m", "m/s^2", "1/s", "Nm"))), "may be rad/s or", Form(table(_named("s", "m", "m/s^2", "1/s", "Nm")), ("turning=turning [rad/s]",)),
+        Form(table(_named("s", "m", "m/s^2", "1/s", "Nm"))),
+        "may be rad/s or",
+        Form(table(_named("s", "m", "m/s^2", "1/s", "Nm")), ("turning=turning [rad/s]",)),
     ),
-}  # fmt: skip
+}

@@ -30,8 +30,10 @@ NETWORK = Network(
         Dense(PICK.normal(0, 0.1, (1, 8)), np.zeros(1), "identity"),
         Affine(np.array([-500.0]), np.array([1000.0]), "rescale"),
     ),
-    np.array([-0.03]), np.array([0.03]), "spring",
-)  # fmt: skip
+    np.array([-0.03]),
+    np.array([0.03]),
+    "spring",
+)
 
 
 def test_derivatives_are_those_of_differences():
@@ -60,7 +62,9 @@ def test_what_is_written_is_what_was_learnt(tmp_path):
 
 def test_the_running_code_has_room_for_the_pieces_of_what_was_learnt():
     """pen_fold refuses a set with more of them, so such a one is not offered."""
-    learnt = Network((Dense(np.array([[1.0]] * 3), np.arange(3.0), "relu"), Dense(np.ones((1, 3)), np.zeros(1), "identity")), None, None, "x")
+    learnt = Network(
+        (Dense(np.array([[1.0]] * 3), np.arange(3.0), "relu"), Dense(np.ones((1, 3)), np.zeros(1), "identity")), None, None, "x"
+    )
     assert fold.pieces(learnt) == 5  # three kinks, four lines, and the one at the centre
     rooms = {(0, "refuse"): True, (4, "refuse"): False, (4, "layers"): True, (5, "refuse"): True}
     for (pieces, more), fits in rooms.items():

@@ -35,14 +35,17 @@ def screen(d):
     return " ".join(" ".join(lines).split())
 
 
-@pytest.mark.parametrize("posteriors, left", [
-    ({}, []),
-    ({RUB: 0.96, PEAK: 0.04}, [RUB]),
-    ({RUB: 0.6, PEAK: 0.4}, [RUB, PEAK]),
-    ({RUB: 0.3, PEAK: 0.5, LOOP: 0.15}, [PEAK, RUB, LOOP]),  # 80 of 95 without the last
-    ({RUB: 0.6, PEAK: 0.38, LOOP: 0.02}, [RUB, PEAK]),
-    ({RUB: 0.0}, [RUB]),
-])
+@pytest.mark.parametrize(
+    "posteriors, left",
+    [
+        ({}, []),
+        ({RUB: 0.96, PEAK: 0.04}, [RUB]),
+        ({RUB: 0.6, PEAK: 0.4}, [RUB, PEAK]),
+        ({RUB: 0.3, PEAK: 0.5, LOOP: 0.15}, [PEAK, RUB, LOOP]),  # 80 of 95 without the last
+        ({RUB: 0.6, PEAK: 0.38, LOOP: 0.02}, [RUB, PEAK]),
+        ({RUB: 0.0}, [RUB]),
+    ],
+)
 def test_sets_that_hold_95_percent_are_left(posteriors, left):
     assert [x["causes"] for x in likely(said(posteriors=posteriors))] == [[{"kind": n.kind, "where": n.where}] for n in left]
 
@@ -62,7 +65,10 @@ def test_what_is_the_same_in_all_sets_is_not_told_either():
     d = said("explained", cause("constant_force", "body", alternatives=(offset,)), posteriors={RUB: 0.99})
     assert [x.others for x in doubts(d)] == [((offset, None),)]
     assert "or input offset at u: the recordings do not tell which" in screen(d)
-    assert d.advice[0] == "tell constant force at body from input offset at u: switch the actuator off: a load remains, an offset of the input does not"
+    assert (
+        d.advice[0]
+        == "tell constant force at body from input offset at u: switch the actuator off: a load remains, an offset of the input does not"
+    )
 
 
 def test_what_is_told_has_no_rivals():
@@ -75,21 +81,33 @@ def test_pairs_of_the_catalogue_are_of_its_kinds():
     assert separating("coulomb_friction", []) == "" and separating("coulomb_friction", ["tyre_damping", "backlash"]) == OTHERWISE
 
 
-@pytest.mark.parametrize("d, parts", [
-    (said("no_discrepancy", gain={}), ["keep the model", "hold out a recording"]),
-    (said("no_discrepancy"), ["use model_extended.toml: it is the model as fitted"]),  # the file only guessed, and missed the hold-out
-    (said("not_identifiable"), ["record again with more excitation"]),
-    (said("explained", cause()), ["use model_extended.toml"]),
-    (said("explained", cause(), gain={}), ["use model_extended.toml", "--holdout"]),
-    (said("explained", cause(), gain={"a": replace(GAIN["a"], after_rmse=0.11)}), ["do not use model_extended.toml yet: on the hold-out its error of a is larger"]),
-    (said("explained", cause(), gain={"a": replace(GAIN["a"], outside=0.3)}), ["use model_extended.toml", "30% of its samples go beyond"]),
-    (said("explained", cause("sensor_scale", "a")), ["check a: the sensor is at fault"]),
-    (said("explained", cause("sensor_scale", "a"), cause()), ["check a: the sensor is at fault", "use model_extended.toml"]),
-    (said("explained", cause("input_delay", "u")), ["check actuator and channel of u", "use model_extended.toml"]),
-    (said("partly_explained", cause(), explained=0.7), ["use model_extended.toml", "look for the rest: 30%"]),
-    (said("unexplained", Cause(OUTSIDE, "", {}, 0.5)), ["compare signals"]),
-    (said("unexplained", residual={"places": [{"place": "spring", "share": 0.9}, {"place": "tyre", "share": 0.4}]}), ["look at spring first"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "d, parts",
+    [
+        (said("no_discrepancy", gain={}), ["keep the model", "hold out a recording"]),
+        (said("no_discrepancy"), ["use model_extended.toml: it is the model as fitted"]),  # the file only guessed, and missed the hold-out
+        (said("not_identifiable"), ["record again with more excitation"]),
+        (said("explained", cause()), ["use model_extended.toml"]),
+        (said("explained", cause(), gain={}), ["use model_extended.toml", "--holdout"]),
+        (
+            said("explained", cause(), gain={"a": replace(GAIN["a"], after_rmse=0.11)}),
+            ["do not use model_extended.toml yet: on the hold-out its error of a is larger"],
+        ),
+        (
+            said("explained", cause(), gain={"a": replace(GAIN["a"], outside=0.3)}),
+            ["use model_extended.toml", "30% of its samples go beyond"],
+        ),
+        (said("explained", cause("sensor_scale", "a")), ["check a: the sensor is at fault"]),
+        (said("explained", cause("sensor_scale", "a"), cause()), ["check a: the sensor is at fault", "use model_extended.toml"]),
+        (said("explained", cause("input_delay", "u")), ["check actuator and channel of u", "use model_extended.toml"]),
+        (said("partly_explained", cause(), explained=0.7), ["use model_extended.toml", "look for the rest: 30%"]),
+        (said("unexplained", Cause(OUTSIDE, "", {}, 0.5)), ["compare signals"]),
+        (
+            said("unexplained", residual={"places": [{"place": "spring", "share": 0.9}, {"place": "tyre", "share": 0.4}]}),
+            ["look at spring first"],
+        ),
+    ],
+)
 def test_advice_for_each_verdict(d, parts):
     assert len(d.advice) == len(parts) and all(part in text for part, text in zip(parts, d.advice)), d.advice
     text = screen(d)

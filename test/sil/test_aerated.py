@@ -7,8 +7,9 @@ from __future__ import annotations
 import json
 
 import numpy as np
-import penode_gen
 import pytest
+
+import penode_gen
 from penode_sil.diagnosis import driven, plant, real
 from penode_sil.diagnosis.catalogue.form import Moved, Part
 from penode_sil.measured import load

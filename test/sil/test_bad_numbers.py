@@ -178,10 +178,7 @@ def refused(instance, call, flag):
 def test_refused_sets_say_why_and_change_nothing(sil):
     model, dtype = sil.model, sil.dtype
     instance, twin = sil.instance(), sil.instance()
-    values, head = (
-        penode_gen.set_values(model, "altered_friction", dtype),
-        penode_gen.set_head(model, "altered_friction", dtype),
-    )
+    values, head = (penode_gen.set_values(model, "altered_friction", dtype), penode_gen.set_head(model, "altered_friction", dtype))
     layout, length, number, checksum = head
 
     refused(instance, lambda: instance.write(0, values), "set_closed")  # before begin

@@ -106,11 +106,22 @@ def network(path: Path, sizes: list[int], activations: list[str]) -> None:
         for m, n, a in zip(sizes, sizes[1:], activations)
     ]
     n = sizes[0]
-    scaling = {"normalise": {"kind": "min-max", "min": [-0.5] * n, "max": [1.5] * n}, "denormalise": {"kind": "min-max", "min": [0.5], "max": [3.0]}}
+    scaling = {
+        "normalise": {"kind": "min-max", "min": [-0.5] * n, "max": [1.5] * n},
+        "denormalise": {"kind": "min-max", "min": [0.5], "max": [3.0]},
+    }
     path.write_text(json.dumps(scaling | {"layers": layers, "trained_range": {"min": [-0.3] * n, "max": [0.3] * n}}))
 
 
-def rich(folder: Path, method: str = "rk4", input: str = "linear", outside: str = "extrapolate", substeps: int = 1, activation: str = "tanh", folding: str = "") -> penode_gen.Model:
+def rich(
+    folder: Path,
+    method: str = "rk4",
+    input: str = "linear",
+    outside: str = "extrapolate",
+    substeps: int = 1,
+    activation: str = "tanh",
+    folding: str = "",
+) -> penode_gen.Model:
     network(folder / "two.json", [2, 5, 7, 1], [activation, "softplus", "identity"])
     network(folder / "one.json", [1, 21, 16, 3, 1], ["relu", "relu", "relu", "identity"])
     damper = 'foot_d = { between = ["mass", "z"], law = "linear_damper", damping = "3 N*s/m" }' if input != "held" else ""
@@ -159,7 +170,9 @@ CHOICES = [
 ]
 
 
-@pytest.mark.parametrize("choices, dtype", sample([(choices, dtype) for dtype in TYPES for choices in CHOICES], *zip(CHOICES, TYPES * len(CHOICES))))
+@pytest.mark.parametrize(
+    "choices, dtype", sample([(choices, dtype) for dtype in TYPES for choices in CHOICES], *zip(CHOICES, TYPES * len(CHOICES)))
+)
 def test_each_lane_has_the_bits_of_the_step(tmp_path, choices, dtype):
     model = rich(tmp_path, *choices)
     u = drive(600)
@@ -209,7 +222,11 @@ def test_a_parameter_in_a_lane_is_that_parameter_in_the_model_file(tmp_path, osc
     run = Batch(oscillator, dtype).run(u, parameters=values, **everything(oscillator))
     text = (HERE / "models" / "oscillator.toml").read_text()
     for lane, (m, c, d) in enumerate(zip(*values.values())):
-        varied = text.replace("value = 2,", f"value = {m},").replace("value = 800,", f"value = {c},").replace('d = "4 N*s/m"', f'd = "{d} N*s/m"')
+        varied = (
+            text.replace("value = 2,", f"value = {m},")
+            .replace("value = 800,", f"value = {c},")
+            .replace('d = "4 N*s/m"', f'd = "{d} N*s/m"')
+        )
         (tmp_path / "varied.toml").write_text(varied)
         same(run, lane, Sil(penode_gen.load(tmp_path / "varied.toml"), dtype).run(u))
 
@@ -257,7 +274,8 @@ def test_a_run_that_fails_is_told_and_disturbs_no_other(oscillator):
 
 
 @pytest.mark.parametrize(
-    "choices", [("rk4", "linear", "clamp", 4, "softplus"), ("ros2", "linear", "fade", 1, "tanh"), ("rk4", "held", "clamp", 1, "relu", "pieces = 96")]
+    "choices",
+    [("rk4", "linear", "clamp", 4, "softplus"), ("ros2", "linear", "fade", 1, "tanh"), ("rk4", "held", "clamp", 1, "relu", "pieces = 96")],
 )
 def test_fused_steps_differ_by_rounding_only(tmp_path, choices):
     """And tell what is not finite as the exact ones do. 600 steps of about 1 000 roundings of 1e-16 each, if all add up."""
@@ -302,7 +320,10 @@ def test_central_differences_over_lanes(oscillator, show):
     h, t = 1e-5, np.arange(1000) * 1e-3
     u = (0.01 * np.sin(11.0 * t))[:, None]
     nominal = {"m": 2.0, "c": 800.0, "d": 4.0}
-    steps = {name: value * (1.0 + h * np.array([(i == j // 2) * (1 - 2 * (j % 2)) for j in range(6)])) for i, (name, value) in enumerate(nominal.items())}
+    steps = {
+        name: value * (1.0 + h * np.array([(i == j // 2) * (1 - 2 * (j % 2)) for j in range(6)]))
+        for i, (name, value) in enumerate(nominal.items())
+    }
     z = Batch(oscillator).run(u, parameters=steps, sensors=("a",)).z[:, :, 0]
     worst = 0.0
     for i, name in enumerate(nominal):

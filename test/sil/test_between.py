@@ -10,11 +10,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from penode_gen.model import Parameter
 from scipy import signal
 from test_innovations import swing
 
 import penode_gen
+from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
 from penode_sil.diagnosis import adopting, applied, clipping, plant
 from penode_sil.diagnosis.between import joined, parts, straight
@@ -100,7 +100,9 @@ def test_an_observer_counts_the_samples_that_are_kept(tmp_path):
     assert np.max(np.abs(halves.z - whole.z)) < 1e-13
     assert np.max(np.abs(whole.z - Batch(replace(model, substeps=2)).run(e.u).z)) > 1e-6  # it does follow
     with pytest.raises(ValueError, match=r"must be \[kept, n_z\] = \[100, 1\]"):
-        Batch(replace(model, sample_time=0.5 * model.sample_time)).run(between, observer=Observer(4, np.zeros((2 * n - 1, 1)), follow), every=2)
+        Batch(replace(model, sample_time=0.5 * model.sample_time)).run(
+            between, observer=Observer(4, np.zeros((2 * n - 1, 1)), follow), every=2
+        )
 
 
 def test_a_scale_of_a_sensor_does_not_tune_the_filter(tmp_path):
@@ -126,7 +128,10 @@ def test_a_limit_that_nothing_reaches_is_none(tmp_path):
 
 
 def test_a_constant_beside_a_friction_is_a_cause_of_its_own():
-    slides, load = Part("coulomb_friction", ("force", "N"), {"transition": (0.1, "m/s")}), Part("constant_force", ("force", "N"), kind="constant_force")
+    slides, load = (
+        Part("coulomb_friction", ("force", "N"), {"transition": (0.1, "m/s")}),
+        Part("constant_force", ("force", "N"), kind="constant_force"),
+    )
     names = ("x0_0_0", "x0_0_1")
     free = tuple(Free(f"{n}_{k}", 1.0, 1.0) for n, k in (("x0_0_0", "force"), ("x0_0_0", "transition"), ("x0_0_1", "force")))
     first, second = adopting.apart(Term(Form("coulomb_friction", "guide", "force", 0, (slides, load), "with a constant"), names, free))
@@ -158,8 +163,9 @@ def test_what_is_wrong_with_one_input_stands_in_a_row(tmp_path):
     found = applied._driven(model, Values, [term("input_offset"), term("input_gain"), term("input_delay")], {"tau_offset", "tau_acts"})
     assert found.left == ["input_delay of tau is 3.20 samples; the model file has 3"]
     assert found.actuators == [
-        'tau_acts_2 = { input = "tau", law = "delay", samples = 3 }', 'tau_acts_3 = { input = "tau_acts_2", law = "gain", gain = "tau_gain" }',
-    ]  # fmt: skip
+        'tau_acts_2 = { input = "tau", law = "delay", samples = 3 }',
+        'tau_acts_3 = { input = "tau_acts_2", law = "gain", gain = "tau_gain" }',
+    ]
     assert [x.split(" = ")[0] for x in found.parameters] == ["tau_offset_2", "tau_gain"]
     assert found.through(seen.expression) == "phi + 0.1*(tau_acts_3 + tau_offset_2) + 0.01*der(tau_acts_3)"
     (motor,) = applied._redirected(model, found)["elements"]

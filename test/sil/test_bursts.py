@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from penode_sil.diagnosis import dropouts
-from penode_sil.diagnosis.dropouts import bursts, repeats
 from penode_sil.diagnosis.broken import WILD, still_wild
+from penode_sil.diagnosis.dropouts import bursts, repeats
 from penode_sil.diagnosis.noise import Experiment
 
 STEP, N = 2e-3, 10_000

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exchanges import EIGHT, check_characteristics, check_log, check_measurements, drive
 
 import penode_gen
-from exchanges import EIGHT, check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, link as links, measure, pages, stage, virtual
 from penode_sil.calibration.codes import Page, Slave, Who
 from penode_sil.errors import UserError
@@ -31,7 +31,8 @@ SIGNALS = ["z_b", "z_w", "sample", "set_in_force", "adopted_at"]
 CAN_MASTER, CAN_SLAVE = 0x100, 0x101
 
 pytestmark = pytest.mark.skipif(
-    not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")), reason="pyxcp or pyelftools is not installed: pip install penode[xcp]"
+    not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")),
+    reason="pyxcp or pyelftools is not installed: pip install penode[xcp]",
 )
 
 
@@ -73,7 +74,15 @@ def reached(kind: str, model: Any, u: np.ndarray) -> Iterator[tuple[address.Addr
         channel = found.address
         bridge = Bridge(channel, int(found.address.rpartition(":")[2]))
         bridge.start()
-        settings = {"CAN": {"interface": "virtual", "channel": channel, "can_id_master": CAN_MASTER, "can_id_slave": CAN_SLAVE, "max_dlc_required": True}}
+        settings = {
+            "CAN": {
+                "interface": "virtual",
+                "channel": channel,
+                "can_id_master": CAN_MASTER,
+                "can_id_slave": CAN_SLAVE,
+                "max_dlc_required": True,
+            }
+        }
         try:
             yield address.Address(found.address, "can", settings), found
         finally:
@@ -86,7 +95,9 @@ EVERY = 20  # on CAN: a sample of 28 bytes takes 5 frames, and the virtual bus o
 
 
 @pytest.mark.parametrize(
-    ("kind", "path", "every"), [("tcp", NQVM, 1), ("udp", NQVM, 1), ("can", NQVM, EVERY), ("tcp", FOLDED, 1)], ids=["tcp", "udp", "can", "folded"]
+    ("kind", "path", "every"),
+    [("tcp", NQVM, 1), ("udp", NQVM, 1), ("can", NQVM, EVERY), ("tcp", FOLDED, 1)],
+    ids=["tcp", "udp", "can", "folded"],
 )
 def test_log_is_that_of_a_sil_run_with_the_exchange_where_it_shows_the_new_id(kind: str, path: Path, every: int) -> None:
     model = penode_gen.load(path)
@@ -155,7 +166,10 @@ def test_refused_set_changes_nothing_and_says_why() -> None:
 def test_quiet_commits_edits_of_the_working_page_while_that_runs() -> None:
     model = penode_gen.load(NQVM)
     chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
-    with virtual.served(model, "tcp", "127.0.0.1", 0, drive(model), quiet=200) as found, links.connected(address.parse(found.address)) as link:
+    with (
+        virtual.served(model, "tcp", "127.0.0.1", 0, drive(model), quiet=200) as found,
+        links.connected(address.parse(found.address)) as link,
+    ):
         a2l = a2l_read.parse(found.a2l, "served")
         first, (running, status) = pages.segment(a2l)[0], (a2l.measurements[name] for name in ("set_in_force", "count.set_nonfinite"))
 

@@ -30,7 +30,8 @@ DEFAULT = 1  # id of the set in flash
 ALL = 1 << 30  # bytes: no cut
 
 pytestmark = pytest.mark.skipif(
-    not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")), reason="pyxcp or pyelftools is not installed: pip install penode[xcp]"
+    not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")),
+    reason="pyxcp or pyelftools is not installed: pip install penode[xcp]",
 )
 
 
@@ -120,7 +121,12 @@ def served() -> Iterator[tuple[int, a2l_read.A2l, pages.ChosenSet, int]]:
     default = np.asarray(penode_gen.set_values(model, "default"), "<f4")
     with virtual.served(model, "tcp", "127.0.0.1", 0, np.zeros((1, 1), np.float32)) as found:
         port = int(found.address.rpartition(":")[2])
-        yield port, a2l_read.parse(found.a2l, "served"), pages.choose(f"{NQVM}:altered_friction", np.dtype("f4")), zlib.crc32(default.tobytes())
+        yield (
+            port,
+            a2l_read.parse(found.a2l, "served"),
+            pages.choose(f"{NQVM}:altered_friction", np.dtype("f4")),
+            zlib.crc32(default.tobytes()),
+        )
 
 
 def through(cable: Cable, a2l: a2l_read.A2l, chosen: pages.ChosenSet, patience: float) -> str:
@@ -191,7 +197,9 @@ def test_measurement_that_breaks_off_leaves_the_log_of_what_came(served: tuple, 
     out = tmp_path / "log.mf4"
     cable = Cable(served[0], answered=20_000, connections=2)  # the A2L comes over the first
     cable.start()
-    done = CliRunner().invoke(cli, ["measure", "--signals", "z_b,sample", "--to", cable.address.text, "-o", str(out)], standalone_mode=False)
+    done = CliRunner().invoke(
+        cli, ["measure", "--signals", "z_b,sample", "--to", cable.address.text, "-o", str(out)], standalone_mode=False
+    )
     assert isinstance(done.exception, UserError) and "has fallen silent" in str(done.exception)
     with MDF(out) as log:
         sample = log.get("sample").samples.astype(int)

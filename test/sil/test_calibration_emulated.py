@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from exchanges import EIGHT, check_characteristics, check_log, check_measurements, drive
 
 import penode_gen
-from exchanges import EIGHT, check_characteristics, check_log, check_measurements, drive
 from penode_sil.calibration import a2l_read, address, emulated, link as links, measure, pages, stage
 from penode_sil.errors import UserError
 
@@ -21,9 +21,13 @@ NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm" / "nqvm.toml"
 
 pytestmark = [
     pytest.mark.skipif(
-        not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")), reason="pyxcp or pyelftools is not installed: pip install penode[xcp]"
+        not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")),
+        reason="pyxcp or pyelftools is not installed: pip install penode[xcp]",
     ),
-    pytest.mark.skipif(not (shutil.which("qemu-system-arm") and shutil.which("arm-none-eabi-gcc")), reason="qemu-system-arm or arm-none-eabi-gcc is not installed"),
+    pytest.mark.skipif(
+        not (shutil.which("qemu-system-arm") and shutil.which("arm-none-eabi-gcc")),
+        reason="qemu-system-arm or arm-none-eabi-gcc is not installed",
+    ),
 ]
 
 
@@ -48,7 +52,9 @@ def test_every_entry_and_then_an_exchange(running: tuple) -> None:
     check_measurements(model, u, a2l, log)
     chosen = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
     every = 10  # 23 bytes and a head each 10 ms of the emulated time
-    log = measure.record(where, a2l, ["z_b", "z_w", "sample", "set_in_force", "adopted_at"], 0.3, every, lambda link: stage.stage_set(link, a2l, chosen))
+    log = measure.record(
+        where, a2l, ["z_b", "z_w", "sample", "set_in_force", "adopted_at"], 0.3, every, lambda link: stage.stage_set(link, a2l, chosen)
+    )
     check_log(model, u, log, every)
 
 
@@ -66,5 +72,8 @@ def test_line_carries_eight_signals_each_step(running: tuple) -> None:
 
 def test_inputs_that_it_cannot_hold_are_refused() -> None:
     model = penode_gen.load(NQVM)
-    with pytest.raises(UserError, match="holds the inputs of 262.144 s, not of 262.145 s"), emulated.emulated(model, "m4f", "127.0.0.1", 0, np.zeros((262145, 1), np.float32)):
+    with (
+        pytest.raises(UserError, match="holds the inputs of 262.144 s, not of 262.145 s"),
+        emulated.emulated(model, "m4f", "127.0.0.1", 0, np.zeros((262145, 1), np.float32)),
+    ):
         pass

@@ -23,7 +23,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "sil" / "CALIBRATION.md").read_text(encoding="utf-8")
 
 pytestmark = pytest.mark.skipif(
-    not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")), reason="pyxcp or pyelftools is not installed: pip install penode[xcp]"
+    not (importlib.util.find_spec("pyxcp") and importlib.util.find_spec("elftools")),
+    reason="pyxcp or pyelftools is not installed: pip install penode[xcp]",
 )
 
 

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from conftest import HERE, ROOT
 
-
 MODEL = HERE / "models" / "oscillator.toml"
 NQVM = ROOT / "gen" / "nqvm" / "nqvm.toml"
 SCENARIO = """
@@ -133,7 +132,7 @@ WRONG = [
     (["generate", MODEL, "-o", "no/such/place"], "there is no directory"),
     (["simulate", MODEL, "--scenario", "set.toml", "-o", "o.csv"], 'instance[2].exchange[1].set: "softer" is not known'),
     (["frobnicate"], "No such command"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("words, expected", WRONG, ids=[expected[:40] for _, expected in WRONG])

@@ -49,7 +49,9 @@ def test_a_held_channel_shows_its_samples(every, quantum):
     assert found.values[1:-1] == pytest.approx(samples[here], rel=1e-8, abs=1e-8)
 
 
-@pytest.mark.parametrize("every, shift, digits", [(2, 0.0, 17), (3, 0.0, 9), (5, 0.0, 17), (3, 7e-4, 9), (3.5, 0.0, 5), (4.37, 7e-4, 9), (33.3, 7e-4, 9)])
+@pytest.mark.parametrize(
+    "every, shift, digits", [(2, 0.0, 17), (3, 0.0, 9), (5, 0.0, 17), (3, 7e-4, 9), (3.5, 0.0, 5), (4.37, 7e-4, 9), (33.3, 7e-4, 9)]
+)
 def test_a_channel_joined_by_lines_shows_its_samples(every, shift, digits):
     """Corners in rows and between them, which are where lines meet."""
     instants, samples = slow(every, shift)
@@ -180,7 +182,13 @@ def test_coarse_stamps_are_spread_evenly(exact, stamps, step):
 def test_stamps_that_are_fine_or_of_no_clock_stay():
     draw = np.random.default_rng(3)
     jitter = TIME + draw.uniform(-3e-4, 3e-4, N)
-    for stamps in (TIME, np.round(1.024 * TIME, 5), jitter, np.round(np.cumsum(draw.exponential(STEP, N)), 2), np.sort(np.r_[TIME, TIME[700]])):
+    for stamps in (
+        TIME,
+        np.round(1.024 * TIME, 5),
+        jitter,
+        np.round(np.cumsum(draw.exponential(STEP, N)), 2),
+        np.sort(np.r_[TIME, TIME[700]]),
+    ):
         assert evened(stamps) is None
 
 

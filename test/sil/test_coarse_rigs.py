@@ -68,7 +68,9 @@ def diagnosed(folder, penode, model: str, records) -> dict:
 def waves(rng, count: int, low: float, high: float, n: int, h: float):
     """A sum of `count` sines between two frequencies [Hz] of rms 1, at every fine step [n FINE]."""
     t = np.arange(n * FINE) * h / FINE
-    return sum(np.sin(2 * math.pi * f * t + p) for f, p in zip(rng.uniform(low, high, count), rng.uniform(0, 7, count))) / math.sqrt(0.5 * count)
+    return sum(np.sin(2 * math.pi * f * t + p) for f, p in zip(rng.uniform(low, high, count), rng.uniform(0, 7, count))) / math.sqrt(
+        0.5 * count
+    )
 
 
 def kinds(found: dict) -> list[str]:
@@ -145,7 +147,9 @@ def test_a_converter_that_holds_its_output_is_a_delay(tmp_path, penode):
     records, model = converters((7, 8), 1e-3)
     found = diagnosed(tmp_path, penode, model, records)
     assert kinds(found) in (["sensor_delay"], ["input_delay"])  # the same to a plant that does not change
-    assert abs(found["causes"][0]["parameters"]["delay"]["value"] / 4.875e-3 - 1.0) < 0.01  # half a sample, less half a fine step: there the steps rise
+    assert (
+        abs(found["causes"][0]["parameters"]["delay"]["value"] / 4.875e-3 - 1.0) < 0.01
+    )  # half a sample, less half a fine step: there the steps rise
     assert {found["causes"][0]["kind"], found["causes"][0]["alternatives"][0]["kind"]} == {"sensor_delay", "input_delay"}
 
 

@@ -20,20 +20,22 @@ STEP, SAMPLES, G = 2e-3, 3000, 9.80665
 NOISE = {"a_body": 0.02, "a_wheel": 0.1, "deflection": 1e-4}
 CAR = {"m_b": 400.0, "m_w": 45.0, "c": 22e3, "d": 1500.0, "c_t": 210e3}
 UNITS = {"m_b": "kg", "m_w": "kg", "c": "N/m", "d": "N*s/m", "c_t": "N/m"}
-MODEL = "\n".join([
-    '[model]\nname = "car"\nsample_time = "2 ms"\n[parameters]',
-    *(f'{name} = {{ value = {value}, unit = "{UNITS[name]}", tolerance = 0.02 }}' for name, value in CAR.items()),
-    '[inputs]\nz_road = { unit = "m" }',
-    '[bodies]\nbody = { mass = "m_b", position = "z_b", velocity = "v_b" }',
-    'wheel = { mass = "m_w", position = "z_w", velocity = "v_w" }',
-    '[elements]\nspring = { between = ["body", "wheel"], law = "linear_spring", stiffness = "c" }',
-    'damper = { between = ["body", "wheel"], law = "linear_damper", damping = "d" }',
-    'tyre = { between = ["wheel", "z_road"], law = "linear_spring", stiffness = "c_t" }',
-    '[outputs]\nz_b = { value = "z_b", unit = "m" }',
-    f'[sensors]\na_body = {{ value = "der(v_b)", unit = "m/s^2", noise = {NOISE["a_body"]} }}',
-    f'a_wheel = {{ value = "der(v_w)", unit = "m/s^2", noise = {NOISE["a_wheel"]} }}',
-    f'deflection = {{ value = "z_b - z_w", unit = "m", noise = {NOISE["deflection"]} }}',
-])  # fmt: skip
+MODEL = "\n".join(
+    [
+        '[model]\nname = "car"\nsample_time = "2 ms"\n[parameters]',
+        *(f'{name} = {{ value = {value}, unit = "{UNITS[name]}", tolerance = 0.02 }}' for name, value in CAR.items()),
+        '[inputs]\nz_road = { unit = "m" }',
+        '[bodies]\nbody = { mass = "m_b", position = "z_b", velocity = "v_b" }',
+        'wheel = { mass = "m_w", position = "z_w", velocity = "v_w" }',
+        '[elements]\nspring = { between = ["body", "wheel"], law = "linear_spring", stiffness = "c" }',
+        'damper = { between = ["body", "wheel"], law = "linear_damper", damping = "d" }',
+        'tyre = { between = ["wheel", "z_road"], law = "linear_spring", stiffness = "c_t" }',
+        '[outputs]\nz_b = { value = "z_b", unit = "m" }',
+        f'[sensors]\na_body = {{ value = "der(v_b)", unit = "m/s^2", noise = {NOISE["a_body"]} }}',
+        f'a_wheel = {{ value = "der(v_w)", unit = "m/s^2", noise = {NOISE["a_wheel"]} }}',
+        f'deflection = {{ value = "z_b - z_w", unit = "m", noise = {NOISE["deflection"]} }}',
+    ]
+)
 HEADER = {"time": "s", "z_road": "m", "a_body": "m/s^2", "a_wheel": "m/s^2", "deflection": "m"}
 TIME = np.arange(SAMPLES) * STEP
 
@@ -120,7 +122,9 @@ def test_a_wrong_unit_of_the_hold_out_is_an_error_too(diagnose, tmp_path):
     assert "h.csv: a_body is 1/9.807 of what fits the model" in line
 
 
-@pytest.mark.parametrize("ratio, unit, known", [(9.0, "m/s^2", 9.80665), (1.1e-3, "m", 1e-3), (9.8, "m", None), (1.9, "m", None), (0.4, "N", None)])
+@pytest.mark.parametrize(
+    "ratio, unit, known", [(9.0, "m/s^2", 9.80665), (1.1e-3, "m", 1e-3), (9.8, "m", None), (1.9, "m", None), (0.4, "N", None)]
+)
 def test_only_known_factors_within_a_seventh_are_taken_for_wrong_units(ratio, unit, known):
     found = mixed(ratio, unit)
     assert (found and found[0]) == known

@@ -20,13 +20,30 @@ from scipy.signal import lfilter, lsim
 import penode_gen
 from penode_sil import diagnosis
 from penode_sil.diagnosis import (
-    build, dropouts, echo, effects, explaining, explanation, extension, hypotheses, measuring, noise, plant, pursuit, refining, score, sized, steady, study, textbook,
-)  # fmt: skip
+    build,
+    dropouts,
+    echo,
+    effects,
+    explaining,
+    explanation,
+    extension,
+    hypotheses,
+    measuring,
+    noise,
+    plant,
+    pursuit,
+    refining,
+    score,
+    sized,
+    steady,
+    study,
+    textbook,
+)
 from penode_sil.diagnosis.build import Term
-from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.compiling import longest
-from penode_sil.diagnosis.fit import Problem
+from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.faulty import delayed, railed
+from penode_sil.diagnosis.fit import Problem
 from penode_sil.diagnosis.late import fastest, poles
 from penode_sil.measured import load
 from penode_sil.targets import Sil
@@ -104,7 +121,9 @@ def studied(path: Path, model: penode_gen.Model) -> study.Study:
 
 def moved(tmp_path: Path, z: np.ndarray, force: np.ndarray) -> tuple[penode_gen.Model, Path]:
     """A model of the damper alone on a prescribed motion, and its recording."""
-    text = MODEL[: MODEL.index("[inputs]")] + """[inputs]
+    text = (
+        MODEL[: MODEL.index("[inputs]")]
+        + """[inputs]
 z_road = { unit = "m" }
 [elements]
 damper = { between = ["z_road", "ground"], law = "linear_damper", damping = "d" }
@@ -113,6 +132,7 @@ F = { value = "F_damper", unit = "N" }
 [sensors]
 force = { value = "F_damper", unit = "N", noise = 2 }
 """
+    )
     (tmp_path / "law.toml").write_text(text)
     columns = np.stack([np.arange(len(z)) * STEP, z, force], axis=1)
     np.savetxt(tmp_path / "law.csv", columns, delimiter=",", header="time [s],z_road [m],force [N]", comments="", fmt="%.9g")
@@ -162,7 +182,9 @@ def test_thinned_signals_have_the_same_spectra(n, band):
     assert np.max(np.abs(thin(signals, good) - want[:, :, :band])) < 1e-6 * np.max(np.abs(want[:, :, -n // 4 :]))
     plain = np.fft.rfft(signals[:, :, 0], axis=0)
     rates = np.fft.rfft(np.gradient(signals[:, :, 0], STEP, axis=0), axis=0).T[:, :band]  # central differences are sines by the spectra
-    assert np.max(np.abs(thin.rates(signals[:, :, 0], thin(signals, None)[:, 0], STEP) - rates)) < 1e-6 / STEP * np.max(np.abs(plain[-n // 4 :]))
+    assert np.max(np.abs(thin.rates(signals[:, :, 0], thin(signals, None)[:, 0], STEP) - rates)) < 1e-6 / STEP * np.max(
+        np.abs(plain[-n // 4 :])
+    )
 
 
 def test_a_fit_ends_at_its_bounds(model, sound):
@@ -170,8 +192,12 @@ def test_a_fit_ends_at_its_bounds(model, sound):
     one = study.null_study(model, [experiment(m, model) for m in sound])
     problem = Problem(model, one.experiments, one.metrics, fastest=one.linear.fastest)
     low = 1.004 * one.null.value("d")
-    bound, held = ([replace(f, **change) if f.target == "d" else f for f in one.nuisances] for change in ({"low": low}, {"low": low, "high": low}))
-    bound, held = (problem.solve([replace(f, value=float(np.clip(f.value, f.low, f.high))) for f in free], 20, 1e-4) for free in (bound, held))
+    bound, held = (
+        [replace(f, **change) if f.target == "d" else f for f in one.nuisances] for change in ({"low": low}, {"low": low, "high": low})
+    )
+    bound, held = (
+        problem.solve([replace(f, value=float(np.clip(f.value, f.low, f.high))) for f in free], 20, 1e-4) for free in (bound, held)
+    )
     assert bound.value("d") == low
     assert abs(bound.cost - held.cost) < 1e-2
 
@@ -357,7 +383,10 @@ def test_effects_are_weighed_as_least_squares_do(tmp_path, model):
     """Slopes, correlations and what is left, against a solution in double by NumPy with free values and their priors as further
     columns and rows; and again with fewer of them free, against another residual."""
     z = road(1)
-    one, _ = study.begin(model, [experiment(m, model) for m in load([record(tmp_path / "r.csv", z, drive(z, lambda s, v: 9e3 * max(s - 0.006, 0.0)), 2)], model)])
+    one, _ = study.begin(
+        model,
+        [experiment(m, model) for m in load([record(tmp_path / "r.csv", z, drive(z, lambda s, v: 9e3 * max(s - 0.006, 0.0)), 2)], model)],
+    )
     candidates, rows = effects.collect(model, one.experiments, one.metrics, study.look(one, one.null), one.places, list(NOISE), 1)
     rows[5] *= 1e-25  # of which the square is none in single
     double = rows.astype(float)
@@ -402,8 +431,14 @@ def test_simulation_between_close_samples_is_exact(tmp_path, step, damping):
     """Against SciPy on a road of sines up to 20 Hz that begins at rest, with and without a tyre that feels its rate. A parabola
     through samples 1 ms apart misses (omega h)^3/24 = 8e-5 of the input on average; a cubic, where the rate is felt, less of it, and
     (omega h)^3/4 of the rate at its end, the worst place: 5e-4 at 20 Hz, of which a tyre's damper passes a part."""
-    text = MODEL.replace('"2 ms"', f'"{step * 1e3:g} ms"').replace("[outputs]", 'rubber = { between = ["wheel", "z_road"], law = "linear_damper", damping = "d_t" }\n[outputs]')
-    (tmp_path / "car.toml").write_text(text.replace("[inputs]", f'd_t = {{ value = {damping}, unit = "N*s/m" }}\n[inputs]') if damping else MODEL.replace('"2 ms"', f'"{step * 1e3:g} ms"'))
+    text = MODEL.replace('"2 ms"', f'"{step * 1e3:g} ms"').replace(
+        "[outputs]", 'rubber = { between = ["wheel", "z_road"], law = "linear_damper", damping = "d_t" }\n[outputs]'
+    )
+    (tmp_path / "car.toml").write_text(
+        text.replace("[inputs]", f'd_t = {{ value = {damping}, unit = "N*s/m" }}\n[inputs]')
+        if damping
+        else MODEL.replace('"2 ms"', f'"{step * 1e3:g} ms"')
+    )
     omega = 2.0 * np.pi * np.array([0.7, 2.3, 6.1, 12.9, 20.0])
     size, phase = 0.01 / omega, np.arange(5.0)
 
@@ -457,7 +492,10 @@ def test_every_second_of_close_samples_says_the_same(tmp_path, tyre):
     assert longest(short) < 1e-3
 
 
-@pytest.mark.parametrize("friction, whole", [("", True), ('rubs = { between = ["body", "wheel"], law = "dahl_friction", force = "40 N", presliding = "1 mm" }', False)])
+@pytest.mark.parametrize(
+    "friction, whole",
+    [("", True), ('rubs = { between = ["body", "wheel"], law = "dahl_friction", force = "40 N", presliding = "1 mm" }', False)],
+)
 def test_fits_begin_with_longer_steps_than_laws_allow(tmp_path, friction, whole):
     """Friction that yields over a millimetre moves on by 0.3 of that in a step of 1 ms at 0.3 m/s, and is followed in steps of 0.25 ms: a
     quarter of the work leads to where at most chi2 of the numbers that are fitted is left to gain."""
@@ -668,9 +706,16 @@ def test_hysteresis_under_prescribed_motion():
     t = np.linspace(0.0, 1.0, 2001)
     s = 0.01 * np.sin(2.0 * np.pi * 3.0 * t)
     want = solve_ivp(
-        lambda time, x: [(0.06 * np.pi * np.cos(6.0 * np.pi * time) * (1.0 - (x[0] ** 2 if np.cos(6.0 * np.pi * time) * x[0] > 0 else 0.0))) / 4e-3],
-        (0.0, 1.0), [0.0], t_eval=t, rtol=1e-8, atol=1e-10, max_step=1e-3,
-    ).y[0]  # fmt: skip
+        lambda time, x: [
+            (0.06 * np.pi * np.cos(6.0 * np.pi * time) * (1.0 - (x[0] ** 2 if np.cos(6.0 * np.pi * time) * x[0] > 0 else 0.0))) / 4e-3
+        ],
+        (0.0, 1.0),
+        [0.0],
+        t_eval=t,
+        rtol=1e-8,
+        atol=1e-10,
+        max_step=1e-3,
+    ).y[0]
     assert np.max(np.abs(hypotheses.slips(s, [4e-3])[0] - want)) < 1e-3
 
 
@@ -724,14 +769,19 @@ def test_what_is_foretold_is_as_good_as_the_true_law(tmp_path, model):
     """A damping force that grows like no law on the list, large against the noise: its name needs fewer laws than its
     curve. Measure is the same C with the law that the plant has. The laws that name it leave 14 % more than that in a_wheel: 8 % are
     about half."""
-    paths = [record(tmp_path / f"{seed}.csv", road(seed), drive(road(seed), lambda s, v: 4000.0 * v * abs(v) / (0.1 + abs(v))), seed) for seed in (5, 6)]
+    paths = [
+        record(tmp_path / f"{seed}.csv", road(seed), drive(road(seed), lambda s, v: 4000.0 * v * abs(v) / (0.1 + abs(v))), seed)
+        for seed in (5, 6)
+    ]
     train, held = load(paths[:1], model), load(paths[1:], model)
     found = diagnosis.diagnose(model, train, held, tmp_path / "out")
     assert [(c.kind, c.where) for c in found.causes] == [("quadratic_damper", "damper")]
     law = 'more = { between = ["body", "wheel"], law = "expression", force = "strong*v_more*abs(v_more)/(fast + abs(v_more))" }'
     sizes = 'strong = { value = 4000, unit = "N*s/m" }\nfast = { value = 0.1, unit = "m/s" }'
     (tmp_path / "true.toml").write_text(
-        MODEL.replace("[inputs]", f"{sizes}\n[inputs]").replace("[outputs]", f"{law}\n[outputs]").replace("[parameters]", 'input = "parabola"\n[parameters]')
+        MODEL.replace("[inputs]", f"{sizes}\n[inputs]")
+        .replace("[outputs]", f"{law}\n[outputs]")
+        .replace("[parameters]", 'input = "parabola"\n[parameters]')
     )
     true = Sil(penode_gen.load(tmp_path / "true.toml")).instance().run(road(6)[:, None]).z
     for (name, gain), said in zip(found.gain.items(), true.T):
@@ -822,8 +872,16 @@ def test_two_bends_of_a_sensor_are_one_cube_in_the_file(model, sound):
 SHARE, LATE = np.linspace(0.0, 1.0, SAMPLES), 12e-3  # s
 FAULTS = {  # sensor, what it shows, and its kind
     "late": ("a_body", lambda y: CubicSpline(SHARE, y)(np.maximum(SHARE - LATE / (STEP * (SAMPLES - 1)), 0.0)), "sensor_delay"),
-    "a little late": ("a_body", lambda y: CubicSpline(SHARE, y)(np.maximum(SHARE - 0.08 * LATE / (STEP * (SAMPLES - 1)), 0.0)), "sensor_delay"),
-    "behind a filter": ("a_body", lambda y: lsim(([1.0], [LATE**2 / 36.0, LATE / 3.0, 1.0]), y, STEP * np.arange(SAMPLES))[1], "sensor_delay"),
+    "a little late": (
+        "a_body",
+        lambda y: CubicSpline(SHARE, y)(np.maximum(SHARE - 0.08 * LATE / (STEP * (SAMPLES - 1)), 0.0)),
+        "sensor_delay",
+    ),
+    "behind a filter": (
+        "a_body",
+        lambda y: lsim(([1.0], [LATE**2 / 36.0, LATE / 3.0, 1.0]), y, STEP * np.arange(SAMPLES))[1],
+        "sensor_delay",
+    ),
     "warming up": ("deflection", lambda y: y + 2e-3 * (1.0 - 0.3 * np.exp(-3.0 * SHARE)), "sensor_bias"),
     "wandering": ("deflection", lambda y: y + 2e-3 * (1.0 + 0.2 * np.sin(5.0 * SHARE + 1.0)), "sensor_bias"),
     "drifting gain": ("a_body", lambda y: y * (1.1 + 0.04 * (SHARE - 0.5)), "sensor_scale"),
@@ -843,7 +901,10 @@ def test_a_delay_is_written_as_it_was_fitted(roll_off):
     written = late + direct * (1.0 - late) - own * x * late
     t = step * np.arange(n)
     wave = np.exp(x * t / delay)
-    shown = sum(part * delayed(f(wave)[:, None], np.array([delay]), np.array([roll_off * delay**2]), step)[2000, 0] for part, f in ((1.0, np.real), (1.0j, np.imag)))
+    shown = sum(
+        part * delayed(f(wave)[:, None], np.array([delay]), np.array([roll_off * delay**2]), step)[2000, 0]
+        for part, f in ((1.0, np.real), (1.0j, np.imag))
+    )
     most = {0.0: 1e-4 / 720, 0.05: 1e-4 * (1 / 720 + 0.05**2 / 2), 0.3: 0.0, 0.49: 0.01 * 1e-2}[roll_off]
     assert abs(written - shown / wave[2000]) < 1.1 * most + 1e-9
 
@@ -871,7 +932,9 @@ def test_rails_are_written_as_they_were_fitted(sharpness):
 def test_loads_that_cancel_each_other_count_in_full(model):
     """A start in motion of a quarter vehicle of 445 kg, explained by loads of 191 kN and -229 kN."""
     terms = [SimpleNamespace(candidate=SimpleNamespace(kind="constant_force"), gain=g) for g in (-190.8e3, 228.8e3)]
-    assert explanation.loaded(SimpleNamespace(terms=terms)) == pytest.approx(419.6e3) and explanation.weight(model) == pytest.approx(9.80665 * (M_B + M_W))
+    assert explanation.loaded(SimpleNamespace(terms=terms)) == pytest.approx(419.6e3) and explanation.weight(model) == pytest.approx(
+        9.80665 * (M_B + M_W)
+    )
 
 
 def test_a_delay_beyond_the_recording_leaves_its_start():
@@ -957,7 +1020,9 @@ def test_noise_of_the_road_before_and_after_a_bump_does_not_change_a_vehicle(tmp
 def test_a_damper_does_not_fade_farther_than_to_nothing(model, loss):
     """Gained in a first part of a fall only, a loss of ten times the damping would drive the vehicle on a hotter road."""
     place = plant.places(model)[0]
-    law = hypotheses.Basis("damper_fading", 0, "heating_damper", ("damping", "N*s/m"), {"work": (1.0, "m^2/s"), "cooling": (9.0, "s")}, -1, ())
+    law = hypotheses.Basis(
+        "damper_fading", 0, "heating_damper", ("damping", "N*s/m"), {"work": (1.0, "m^2/s"), "cooling": (9.0, "s")}, -1, ()
+    )
     term = Term(score.Candidate("damper_fading", "damper", -1, False, law), -loss)
     _, parameters, free = build.element(term, place, "x", model)
     (damping,) = (f for f in free if f.target == "x_damping")
@@ -968,7 +1033,7 @@ def test_a_start_in_motion_is_the_start(tmp_path):
     """Free oscillation of a mass: at sample k the C is at cos(omega k h). A sample late it would be off by omega h = 0.06; float
     rounds 1000 sums to 1000 2^-24 = 6e-5 at most, RK4 leaves (omega h)^4/120 omega t = 7e-6."""
     path = tmp_path / "swing.toml"
-    path.write_text('''
+    path.write_text("""
 [model]
 name = "swing"
 sample_time = "2 ms"
@@ -985,7 +1050,7 @@ spring = { between = ["mass", "foot"], law = "linear_spring", stiffness = "c" }
 z = { value = "z", unit = "m" }
 [sensors]
 z = { value = "z", unit = "m" }
-''')
+""")
     model = penode_gen.load(path)
     still = SimpleNamespace(u=np.zeros((1000, 1)), held=None)
     z = measuring.deployed(model, still, np.array([1.0, 0.0]), "default")[:, 0]

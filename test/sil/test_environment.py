@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from penode_sil.environment import LAST, problems
 from penode_sil.building import build_directory
+from penode_sil.environment import LAST, problems
 
 COMMAND = [sys.executable, "-m", "penode_sil", "--version"]
 
@@ -55,5 +55,7 @@ def test_a_build_directory_that_is_empty_or_relative(name: str, tmp_path: Path, 
 
 def test_variables_that_libraries_read_do_no_harm() -> None:
     variables = {"MPLBACKEND": "foo", "MATPLOTLIBRC": "/nonexistent", "COLUMNS": "abc", "XDG_CACHE_HOME": ""}
-    done = subprocess.run([sys.executable, "-c", "import penode_sil.cli, penode_sil.plots"], env=os.environ | variables, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", "import penode_sil.cli, penode_sil.plots"], env=os.environ | variables, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr

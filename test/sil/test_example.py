@@ -23,36 +23,14 @@ def test_example_recalibrates_under_a_timer_interrupt(nqvm, machine, tmp_path, s
         if shutil.which(program) is None:
             pytest.skip(f"{program} is not installed; make test installs it")
     source, port, elf = generated(nqvm), ROOT / "port" / "cortex-m", tmp_path / "example.elf"
-    files = [
-        ROOT / "sil" / "firmware" / "example.c",
-        source / "nqvm.c",
-        source / "nqvm_params.c",
-        *sorted((ROOT / "src").glob("*.c")),
-    ]
+    files = [ROOT / "sil" / "firmware" / "example.c", source / "nqvm.c", source / "nqvm_params.c", *sorted((ROOT / "src").glob("*.c"))]
     subprocess.run(
-        [
-            port / "cc",
-            MACHINES[machine],
-            "-std=c99",
-            "-O2",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            f"-I{source}",
-            *files,
-            "-o",
-            elf,
-        ],
-        check=True,
+        [port / "cc", MACHINES[machine], "-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", f"-I{source}", *files, "-o", elf], check=True
     )
     # 2 ns an instruction: a millisecond holds 500 000, a step on the M3 takes 300 000
     environment = os.environ | {"SHIFT": "1", "LIMIT": "30"}
     result = subprocess.run(
-        [port / "run", MACHINES[machine], elf],
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
+        [port / "run", MACHINES[machine], elf], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
     if machine == "m4f":
         for line in result.stdout.splitlines():

@@ -8,11 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import penode_gen
 import pytest
 from one_mass import STEP, model
 from scipy.signal import StateSpace, lsim
 
+import penode_gen
 from penode_sil.batch import Batch
 from penode_sil.diagnosis import applied, driven, plant, real
 from penode_sil.diagnosis.holding import held
@@ -21,8 +21,8 @@ from penode_sil.measured import load
 
 FINE, SAMPLES = 8, 4000  # steps of the plant in a sample, samples
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 6.0
-SENSORS = '''x_mass = { value = "x", unit = "m", noise = 1e-6 }
-a_mass = { value = "der(v)", unit = "m/s^2", noise = 1e-3 }'''
+SENSORS = """x_mass = { value = "x", unit = "m", noise = 1e-6 }
+a_mass = { value = "der(v)", unit = "m/s^2", noise = 1e-3 }"""
 MODEL = model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS)
 
 
@@ -84,7 +84,9 @@ def test_a_hold_is_named_with_its_period_and_written_down(answer, tmp_path):
     found = answer("hold", 0.0235, 1)
     (cause,) = found.causes
     assert (cause.kind, cause.where) == ("input_hold", "push")
-    assert cause.parameters["period"].value == pytest.approx(0.0235, abs=1e-5)  # 8 s resolve 1/8 Hz of 43 Hz; looked at in twentieths: 3.5e-6 s
+    assert cause.parameters["period"].value == pytest.approx(
+        0.0235, abs=1e-5
+    )  # 8 s resolve 1/8 Hz of 43 Hz; looked at in twentieths: 3.5e-6 s
     low, high = cause.parameters["period"].ci95
     assert low < 0.0235 < high
     nominal = penode_gen.load(tmp_path / "rig.toml")
@@ -97,7 +99,9 @@ def test_a_hold_is_named_with_its_period_and_written_down(answer, tmp_path):
 def test_a_hold_of_a_slow_force(answer, top):
     """Innovations are means over about half of a period: in them a hold is hardly more than a delay."""
     (cause,) = answer("hold", 0.04325, 2, top).causes
-    assert cause.kind == "input_hold" and cause.parameters["period"].value == pytest.approx(0.04325, abs=5e-5)  # looked at in steps of 8e-5 s
+    assert cause.kind == "input_hold" and cause.parameters["period"].value == pytest.approx(
+        0.04325, abs=5e-5
+    )  # looked at in steps of 8e-5 s
 
 
 def test_a_late_sensor_is_late_in_the_extended_model(answer, tmp_path):
@@ -124,4 +128,6 @@ def test_an_offset_of_an_accelerometer_is_no_load(answer):
 def test_a_delay_is_no_hold(answer):
     (cause,) = answer("delay", 0.0235, 1).causes
     assert (cause.kind, cause.where) == ("input_delay", "push")
-    assert abs(cause.parameters["delay"].value - 0.01175) < 0.03 / np.sqrt(STIFFNESS / MASS)  # what waves of 3 % do, where they go with the rate
+    assert abs(cause.parameters["delay"].value - 0.01175) < 0.03 / np.sqrt(
+        STIFFNESS / MASS
+    )  # what waves of 3 % do, where they go with the rate

@@ -61,6 +61,7 @@ def swing(folder, torque, seed=1, k=0.64, tolerance=", tolerance = 0.05", second
     for i in range(n):
         seen.append(x[0])
         for j in range(fine):
+
             def rate(y, share):
                 tau = drive[i] + (drive[i + 1] - drive[i]) * (j + share) / fine
                 return np.array([y[1], (tau - 0.64 * y[0] - 0.004 * y[1] - torque(y[0], y[1])) / 0.01])

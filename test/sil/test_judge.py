@@ -18,10 +18,11 @@ STUDY = SimpleNamespace(
     null=SimpleNamespace(residual=np.zeros(ROWS), cost=5.0 * ROWS),
     experiments=[SimpleNamespace(good=np.ones((ROWS, 1), bool))],
     model=SimpleNamespace(
-        sample_time=1e-3, parameters={"c": SimpleNamespace(value=100.0, tolerance=0.01), "m": SimpleNamespace(value=400.0)},
+        sample_time=1e-3,
+        parameters={"c": SimpleNamespace(value=100.0, tolerance=0.01), "m": SimpleNamespace(value=400.0)},
         bodies=[SimpleNamespace(name="body", mass="m")],
     ),
-)  # fmt: skip
+)
 QUIET = SimpleNamespace(**vars(STUDY) | {"null": SimpleNamespace(residual=np.zeros(ROWS), cost=float(ROWS))})
 DROPOUT = Cause("sensor_dropout", "a", {"share": Value(0.01, "1", (0.009, 0.011))}, 0.99)
 SIGMA = np.sqrt(2.0 * ROWS)  # of chi2
@@ -118,7 +119,13 @@ def test_what_changes_is_no_small_part_of_the_whole(values):
 
 @pytest.mark.parametrize(
     "kind, size",
-    [("tyre_damping", "damping"), ("coulomb_friction", "force"), ("bouc_wen", "force"), ("maxwell_bushing", "stiffness"), ("hidden_resonance", "frequency")],
+    [
+        ("tyre_damping", "damping"),
+        ("coulomb_friction", "force"),
+        ("bouc_wen", "force"),
+        ("maxwell_bushing", "stiffness"),
+        ("hidden_resonance", "frequency"),
+    ],
 )
 def test_a_size_that_may_be_zero_stands_for_something_else(values, kind, size):
     others = {"mass": (5.0, 4.0, 6.0), "damping_ratio": (0.1, 0.0, 0.2)} if kind == "hidden_resonance" else {}
@@ -130,7 +137,13 @@ def test_a_size_that_may_be_zero_stands_for_something_else(values, kind, size):
 
 @pytest.mark.parametrize(
     "gains, together, out",
-    [((320.0,), 0.0, False), ((200.0,), 0.0, True), ((200.0, 200.0), -0.9, False), ((200.0, 200.0), 0.9, True), ((200.0, -200.0), 0.9, False)],
+    [
+        ((320.0,), 0.0, False),
+        ((200.0,), 0.0, True),
+        ((200.0, 200.0), -0.9, False),
+        ((200.0, 200.0), 0.9, True),
+        ((200.0, -200.0), 0.9, False),
+    ],
 )
 def test_laws_that_are_sure_make_up_for_a_size_that_is_not(values, gains, together, out):
     """A stiffness over a time that is hardly known; gains are known to 100 N s/m each, and two as far as they go `together`. Of a
@@ -213,7 +226,9 @@ def test_a_rail_may_be_met_once(high, model, kinds):
     y, at = np.zeros(ROWS), slice(5000, 5015)
     y[100], y[at] = min(high, 2.4) if high < 9.0 else high, 2.5
     quality = SimpleNamespace(rows=ROWS, low=None, high=None, quantum=0.0, held=0, missing=0, spikes=0)
-    measured = SimpleNamespace(z={"a": y}, mask={"a": np.ones(ROWS, bool)}, shown={"a": np.ones(ROWS, bool)}, quality=SimpleNamespace(channels={"a": quality}))
+    measured = SimpleNamespace(
+        z={"a": y}, mask={"a": np.ones(ROWS, bool)}, shown={"a": np.ones(ROWS, bool)}, quality=SimpleNamespace(channels={"a": quality})
+    )
     study = SimpleNamespace(experiments=[SimpleNamespace(time=np.arange(ROWS))], levels=[np.full((1, 1), 1e-4)])
     sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
     simulated, burst = y.copy(), np.zeros((ROWS, 1), bool)
@@ -231,7 +246,9 @@ def test_between_two_rails_a_sensor_goes_on(lost):
     y = np.zeros(ROWS)
     y[5000:5020] = np.clip(np.linspace(-7.0, 7.0, 20), -2.5, 2.5)
     quality = SimpleNamespace(rows=ROWS, low=None, high=None, quantum=0.0, held=0, missing=0, spikes=0)
-    measured = SimpleNamespace(z={"a": y}, mask={"a": np.ones(ROWS, bool)}, shown={"a": np.ones(ROWS, bool)}, quality=SimpleNamespace(channels={"a": quality}))
+    measured = SimpleNamespace(
+        z={"a": y}, mask={"a": np.ones(ROWS, bool)}, shown={"a": np.ones(ROWS, bool)}, quality=SimpleNamespace(channels={"a": quality})
+    )
     study = SimpleNamespace(experiments=[SimpleNamespace(time=np.arange(ROWS))], levels=[np.full((1, 1), 1e-4)])
     sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
     simulated, burst = y.copy(), np.zeros((ROWS, 1), bool)
@@ -283,7 +300,9 @@ def test_few_samples_that_are_far_off_are_enough(held, away, quantum, told):
     y, mask = np.full(ROWS, away) + 0.01 * np.random.default_rng(1).normal(size=ROWS), np.ones(ROWS, bool)
     y[5000 : 5000 + held], mask[5000 : 5000 + held] = 0.0, False
     quality = SimpleNamespace(rows=ROWS, low=None, high=None, quantum=quantum, held=held, missing=0, spikes=0)
-    measured = SimpleNamespace(z={"a": y}, mask={"a": mask}, shown={"a": np.ones(ROWS, bool)}, quality=SimpleNamespace(channels={"a": quality}))
+    measured = SimpleNamespace(
+        z={"a": y}, mask={"a": mask}, shown={"a": np.ones(ROWS, bool)}, quality=SimpleNamespace(channels={"a": quality})
+    )
     study = SimpleNamespace(experiments=[SimpleNamespace(time=np.arange(ROWS))], levels=[np.full((1, 1), 1e-4)])
     sensors = SimpleNamespace(sensors=[SimpleNamespace(name="a", unit="m/s^2")])
     found = broken.broken_sensors(sensors, [measured], study, [np.full((ROWS, 1), away)], [np.zeros((ROWS, 1), bool)])

@@ -73,7 +73,9 @@ def model(tmp_path) -> Path:
 def test_simulate(model, tmp_path, on):
     """The speed is that of the loop, in float 1e-5 of some 20 rad/s; a sample more or less of delay would be off by 0.1."""
     speed = measured(tmp_path / "a.csv", 0.0, 1)
-    found = CliRunner().invoke(cli, ["simulate", str(model), "--input", str(tmp_path / "a.csv"), "--on", on, "-o", str(tmp_path / "out.csv")])
+    found = CliRunner().invoke(
+        cli, ["simulate", str(model), "--input", str(tmp_path / "a.csv"), "--on", on, "-o", str(tmp_path / "out.csv")]
+    )
     assert found.exit_code == 0, found.output
     rows = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True)
     assert np.max(np.abs(rows["speed_rads"] - speed)) < 1e-3
@@ -107,8 +109,16 @@ def test_signals():
 @pytest.mark.parametrize(
     "header, channel, what",
     [
-        ("time [s];Winkel (deg)", [], '"penode inspect a.csv swing.toml" lists its columns, then name them, such as --channel angle=COLUMN'),
-        ("t;Winkel (deg)", ["--channel", "angle=Winkel"], 'channel time has no unit; write "t [s]" in the header, or say --channel "time=t [s]"\n'),
+        (
+            "time [s];Winkel (deg)",
+            [],
+            '"penode inspect a.csv swing.toml" lists its columns, then name them, such as --channel angle=COLUMN',
+        ),
+        (
+            "t;Winkel (deg)",
+            ["--channel", "angle=Winkel"],
+            'channel time has no unit; write "t [s]" in the header, or say --channel "time=t [s]"\n',
+        ),
     ],
 )
 def test_a_model_without_inputs_says_what_its_recording_lacks(tmp_path, header, channel, what):
@@ -117,6 +127,8 @@ def test_a_model_without_inputs_says_what_its_recording_lacks(tmp_path, header, 
     swing += '[bodies]\nrotor = { inertia = "J", position = "phi", velocity = "omega" }\n[outputs]\nphi = { value = "phi", unit = "rad" }\n'
     (tmp_path / "swing.toml").write_text(swing.replace("d = {", "# ") + '[sensors]\nangle = { value = "phi", unit = "rad" }\n')
     (tmp_path / "a.csv").write_text("\n".join([header, *(f"{0.001 * k:.3f};{k}" for k in range(50))]))
-    found = CliRunner().invoke(cli, ["simulate", str(tmp_path / "swing.toml"), "--input", str(tmp_path / "a.csv"), *channel, "-o", str(tmp_path / "o.csv")])
+    found = CliRunner().invoke(
+        cli, ["simulate", str(tmp_path / "swing.toml"), "--input", str(tmp_path / "a.csv"), *channel, "-o", str(tmp_path / "o.csv")]
+    )
     said = "".join(getattr(found.exception, "problems", [str(found.exception)])) + "\n"
     assert found.exit_code != 0 and what in said and not (tmp_path / "o.csv").exists()

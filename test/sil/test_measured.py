@@ -114,9 +114,7 @@ def test_unsorted_and_repeated_times(record, oscillator):
     assert re.search(r"r.csv:503: channel time goes back there; rows are sorted", one.quality.problems[0])
     (one,) = load([record(rows=np.insert(np.arange(N), 700, 699))], oscillator)
     assert one.z["a"] == pytest.approx(A, rel=1e-8, abs=1e-12)
-    assert re.search(
-        r"r.csv:702: channel time has the same value as the row before; the first", one.quality.problems[0]
-    )
+    assert re.search(r"r.csv:702: channel time has the same value as the row before; the first", one.quality.problems[0])
     (line,) = problems(record(rows=np.r_[0:N, 0:N]), oscillator)
     assert "split the recording where its clock starts anew" in line
 
@@ -135,10 +133,7 @@ def test_rounded_stamps_are_a_regular_clock_and_scattered_ones_are_said(record, 
     time = T + 2e-4 * np.random.default_rng(1).uniform(-1.0, 1.0, N)
     foot, z = (size * np.sin(2.0 * np.pi * 1.5 * time + phase) for size, phase in ((10.0, 1.0), (12.0, 0.7)))
     (one,) = load([record(time=time, foot=foot, z=z)], oscillator)
-    assert any(
-        re.search(r"time stamps are off a regular clock of [\d.]+ s by up to \d+ %", line)
-        for line in one.quality.problems
-    )
+    assert any(re.search(r"time stamps are off a regular clock of [\d.]+ s by up to \d+ %", line) for line in one.quality.problems)
     # straight lines of 1.4 ms at most: h^2/8 (2 pi 1.5)^2 12 mm = 2.6e-4 mm; the kernel that moves the even samples to
     # the raster adds less than 1e-5 of 12 mm at this frequency
     assert one.z["z"] * 1e3 == pytest.approx(12.0 * np.sin(2.0 * np.pi * 1.5 * one.time + 0.7), abs=4e-4)
@@ -168,7 +163,9 @@ def test_a_rail_is_known_in_all_recordings_of_a_sensor(record, oscillator):
     rarely = 8.99 * Z / np.max(Z)
     top = int(np.argmax(rarely))
     rarely[top] = 9.0
-    recordings = [load([record(f"{name}.csv", z=z)], oscillator)[0] for name, z in (("long", np.minimum(Z, 9.0)), ("rarely", rarely), ("beyond", Z))]
+    recordings = [
+        load([record(f"{name}.csv", z=z)], oscillator)[0] for name, z in (("long", np.minimum(Z, 9.0)), ("rarely", rarely), ("beyond", Z))
+    ]
     assert recordings[0].quality.channels["z"].high == pytest.approx(9e-3) and recordings[1].mask["z"].all()
     long, short, beyond = with_shared_rails(recordings)
     assert np.array_equal(long.mask["z"], recordings[0].mask["z"]) and beyond.mask["z"].all()
@@ -212,13 +209,9 @@ def test_what_cannot_be_used_is_refused(record, oscillator):
         with np.errstate(over="raise"):
             (line,) = problems(record(time=np.where(np.arange(N) < N - 1, T, end)), oscillator)
         assert "it has far longer gaps than samples" in line
-    assert any(
-        "channel foot has hardly a sound sample" in line for line in problems(record(foot=np.nan * T), oscillator)
-    )
+    assert any("channel foot has hardly a sound sample" in line for line in problems(record(foot=np.nan * T), oscillator))
     lines = problems(record(a=np.full(N, 3.0), z=np.full(N, np.nan)), oscillator)
-    assert "no sensor has 100 sound samples" in lines[0] and "channel a does not change; it is left out" in "\n".join(
-        lines
-    )
+    assert "no sensor has 100 sound samples" in lines[0] and "channel a does not change; it is left out" in "\n".join(lines)
     both = problems([record("1.csv", foot=None), record("2.csv", rows=slice(10))], oscillator)
     assert len(both) == 2  # all recordings at once
     (line,) = problems(record(), oscillator, "feet=foot")

@@ -26,9 +26,7 @@ def transition(d: float, t: float) -> np.ndarray:
 def forced(d: float, amplitude: float, omega: float, t: np.ndarray) -> np.ndarray:
     """From rest, foot = amplitude * sin(omega t): the steady answer and the free one that cancels it at 0, [n, 2]."""
     answer = C * amplitude / complex(C - M * omega**2, d * omega)
-    steady = np.column_stack(
-        [(answer * np.exp(1j * omega * t)).imag, (1j * omega * answer * np.exp(1j * omega * t)).imag]
-    )
+    steady = np.column_stack([(answer * np.exp(1j * omega * t)).imag, (1j * omega * answer * np.exp(1j * omega * t)).imag])
     return steady - np.array([transition(d, time) @ steady[0] for time in t])
 
 

@@ -69,8 +69,13 @@ def test_a_knee_at_the_lowest_rates_is_friction(share, kind):
 @pytest.mark.parametrize("damping", [-10.0, 0.0, 30.0])
 def test_the_force_of_friction_is_where_its_line_begins(damping):
     """However much of the damper beside it is in its curve."""
-    laws = [("coulomb_friction", "coulomb_friction", {"force": 20.0, "transition": 1e-3}), ("coulomb_friction", "linear_damper", {"damping": damping})]
-    terms = [term("coulomb_friction", law, next(iter(shapes)), {k: x for k, x in shapes.items() if k == "transition"}) for _, law, shapes in laws]
+    laws = [
+        ("coulomb_friction", "coulomb_friction", {"force": 20.0, "transition": 1e-3}),
+        ("coulomb_friction", "linear_damper", {"damping": damping}),
+    ]
+    terms = [
+        term("coulomb_friction", law, next(iter(shapes)), {k: x for k, x in shapes.items() if k == "transition"}) for _, law, shapes in laws
+    ]
     values = {f"x{i}_{k}": x for i, (_, _, shapes) in enumerate(laws) for k, x in shapes.items()}
     study = SimpleNamespace(model=None, places=[None])
     e = SimpleNamespace(terms=terms, built=SimpleNamespace(names=["x0", "x1"]))

@@ -37,9 +37,7 @@ def road() -> np.ndarray:
 
 
 def bumps() -> np.ndarray:
-    return sum(
-        np.where(np.abs(T - at) < 0.15, 0.03 * (1.0 + np.cos(np.pi * (T - at) / 0.15)), 0.0) for at in (6.0, 15.0)
-    )
+    return sum(np.where(np.abs(T - at) < 0.15, 0.03 * (1.0 + np.cos(np.pi * (T - at) / 0.15)), 0.0) for at in (6.0, 15.0))
 
 
 def sensors(u: np.ndarray) -> np.ndarray:

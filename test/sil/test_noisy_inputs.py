@@ -6,12 +6,13 @@ whose foot is moved, integrated exactly from row to row by this file."""
 from __future__ import annotations
 
 import numpy as np
-import penode_gen
 import pytest
+from scipy import signal
+
+import penode_gen
 from penode_sil.diagnosis import engine
 from penode_sil.diagnosis.input_noise import with_noise_of_inputs
 from penode_sil.measured import load
-from scipy import signal
 
 RIG = """
 [model]

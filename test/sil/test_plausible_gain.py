@@ -16,8 +16,9 @@ def plant(unit: str = "N", inputs: int = 1, tolerance: float = 0.03) -> SimpleNa
     """A mass on spring and damper, each known to 3 %."""
     return SimpleNamespace(
         parameters={k: SimpleNamespace(value=v, tolerance=tolerance) for k, v in {"m": 50.0, "c": 3e4, "d": 900.0}.items()},
-        bodies=[SimpleNamespace(mass="m")], inputs=[SimpleNamespace(name="push", unit=unit)] * inputs,
-    )  # fmt: skip
+        bodies=[SimpleNamespace(mass="m")],
+        inputs=[SimpleNamespace(name="push", unit=unit)] * inputs,
+    )
 
 
 def wrong(model: SimpleNamespace, **factors: float) -> tuple[Cause, ...]:

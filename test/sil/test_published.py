@@ -55,9 +55,7 @@ def test_runge_kutta_with_linear_input(published, table, show):
 
 def test_four_substeps_leave_the_error_of_the_sampled_road(published, table, show):
     largest, rms = errors(published("rk4", "linear", 4), table, "exact")
-    show(
-        f"RK4 1 ms, linear, 4 substeps, float32 C against the continuous solution: max {largest:.2e} m, RMS {rms:.2e} m"
-    )
+    show(f"RK4 1 ms, linear, 4 substeps, float32 C against the continuous solution: max {largest:.2e} m, RMS {rms:.2e} m")
     assert largest < 4.5e-6  # the straight lines of the road set 3.9e-6 m, float adds less than 4e-8 m
 
 

@@ -56,9 +56,7 @@ def test_a_healthy_sensor_has_no_faults(move, noise):
         assert not faults.any.any() and faults.low is None and faults.high is None and not faults.constant
 
 
-CASES = [
-    (move, noise, quantum) for move in (chirp, random) for noise in (0.0, 1e-3, 0.05) for quantum in (0.0, 1e-3, 1e-2)
-]
+CASES = [(move, noise, quantum) for move in (chirp, random) for noise in (0.0, 1e-3, 0.05) for quantum in (0.0, 1e-3, 1e-2)]
 
 
 def measured(move, noise: float, quantum: float) -> tuple[np.ndarray, np.random.Generator]:

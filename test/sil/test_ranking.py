@@ -80,7 +80,10 @@ def test_a_cause_whose_interval_holds_0_has_no_size(low, high, unsized):
 def test_what_may_be_nothing_is_not_named_beside_other_causes():
     """Fitted sizes only: not the share of lost samples, which is counted, nor a parameter of the file; and not the only cause."""
     wide = (-1e-5, 3e-4)
-    play, lost = Cause("backlash", "spring", {"gap": Value(1e-4, "m", wide)}, 0.9), Cause("sensor_dropout", "x", {"share": Value(1e-4, "1", (0.0, 3e-4))}, 0.9)
+    play, lost = (
+        Cause("backlash", "spring", {"gap": Value(1e-4, "m", wide)}, 0.9),
+        Cause("sensor_dropout", "x", {"share": Value(1e-4, "1", (0.0, 3e-4))}, 0.9),
+    )
     own = Cause("wrong_parameter", "k", {"k": Value(1e-4, "N/m", wide)}, 0.9)
     study = SimpleNamespace(model=SimpleNamespace(parameters={"k": None}))
     best = SimpleNamespace(groups=(("backlash", "spring"), ("wrong_parameter", "k")))

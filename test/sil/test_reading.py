@@ -25,16 +25,61 @@ from penode_sil.units import UnitError
 TURN, DEGREE, G = math.tau, math.tau / 360.0, 9.80665
 # as written in a file; what the model asks for; SI units per unit
 UNITS = [
-    *((text, "m/s^2", 1.0) for text in ("m/s2", "m/s²", "m/s/s", "m s-2", "m.s^-2", "ms-2", "m·s⁻²", "m/(s^2)", "m/sec2", "M/S^2", "m/s**2", "m/(s*s)", "ms2", "mps2")),
-    *((text, "m/s^2", G) for text in ("g", "G", "gn", "gee")), ("mg", "m/s^2", 1e-3 * G), ("g", "kg", 1e-3), ("mg", "kg", 1e-6),
-    *((text, "N*m", 1.0) for text in ("Nm", "N m", "N.m", "N-m", "NM", "J")), ("kNm", "N*m", 1e3), ("mNm", "N*m", 1e-3), ("Nmm", "N*m", 1e-3),
-    ("nm", "m", 1e-9), ("Nm/deg", "N*m/rad", 1.0 / DEGREE), ("Nms/rad", "N*m*s/rad", 1.0), ("Ns/m", "N*s/m", 1.0), ("N/(m/s)", "N*s/m", 1.0),
+    *(
+        (text, "m/s^2", 1.0)
+        for text in (
+            "m/s2",
+            "m/s²",
+            "m/s/s",
+            "m s-2",
+            "m.s^-2",
+            "ms-2",
+            "m·s⁻²",
+            "m/(s^2)",
+            "m/sec2",
+            "M/S^2",
+            "m/s**2",
+            "m/(s*s)",
+            "ms2",
+            "mps2",
+        )
+    ),
+    *((text, "m/s^2", G) for text in ("g", "G", "gn", "gee")),
+    ("mg", "m/s^2", 1e-3 * G),
+    ("g", "kg", 1e-3),
+    ("mg", "kg", 1e-6),
+    *((text, "N*m", 1.0) for text in ("Nm", "N m", "N.m", "N-m", "NM", "J")),
+    ("kNm", "N*m", 1e3),
+    ("mNm", "N*m", 1e-3),
+    ("Nmm", "N*m", 1e-3),
+    ("nm", "m", 1e-9),
+    ("Nm/deg", "N*m/rad", 1.0 / DEGREE),
+    ("Nms/rad", "N*m*s/rad", 1.0),
+    ("Ns/m", "N*s/m", 1.0),
+    ("N/(m/s)", "N*s/m", 1.0),
     *((text, "rad/s", TURN / 60.0) for text in ("1/min", "rpm", "RPM", "U/min", "min-1", "min^-1", "/min", "rev/min", "r/min")),
-    *((text, "rad/s", DEGREE) for text in ("deg/s", "°/s", "dps", "deg/sec", "Grad/s")), ("rev/s", "rad/s", TURN), ("Hz", "rad/s", TURN),
-    ("1/min", "Hz", 1.0 / 60.0), ("rpm", "Hz", 1.0 / 60.0), ("1/s", "Hz", 1.0), ("rpm/s", "rad/s^2", TURN / 60.0), ("deg/s2", "rad/s^2", DEGREE),
-    *((text, "m/s", 1.0 / 3.6) for text in ("km/h", "kph", "kmh", "km/hr", "KM/H")), *((text, "m/s", 1.0) for text in ("mps", "m/sec")), ("%", "1", 0.01), ("pct", "1", 0.01), ("-", "1", 1.0), ("", "1", 1.0),
-    ("µs", "s", 1e-6), ("msec", "s", 1e-3), ("S", "s", 1.0), ("KN", "N", 1e3), ("kgm2", "kg*m^2", 1.0), ("N/mm", "N/m", 1e3), ("Grad", "rad", DEGREE),
-]  # fmt: skip
+    *((text, "rad/s", DEGREE) for text in ("deg/s", "°/s", "dps", "deg/sec", "Grad/s")),
+    ("rev/s", "rad/s", TURN),
+    ("Hz", "rad/s", TURN),
+    ("1/min", "Hz", 1.0 / 60.0),
+    ("rpm", "Hz", 1.0 / 60.0),
+    ("1/s", "Hz", 1.0),
+    ("rpm/s", "rad/s^2", TURN / 60.0),
+    ("deg/s2", "rad/s^2", DEGREE),
+    *((text, "m/s", 1.0 / 3.6) for text in ("km/h", "kph", "kmh", "km/hr", "KM/H")),
+    *((text, "m/s", 1.0) for text in ("mps", "m/sec")),
+    ("%", "1", 0.01),
+    ("pct", "1", 0.01),
+    ("-", "1", 1.0),
+    ("", "1", 1.0),
+    ("µs", "s", 1e-6),
+    ("msec", "s", 1e-3),
+    ("S", "s", 1.0),
+    ("KN", "N", 1e3),
+    ("kgm2", "kg*m^2", 1.0),
+    ("N/mm", "N/m", 1e3),
+    ("Grad", "rad", DEGREE),
+]
 
 
 @pytest.mark.parametrize("given, asked, expected", UNITS)
@@ -44,9 +89,17 @@ def test_units_are_read_by_what_the_model_asks_for(given, asked, expected):
 
 @pytest.mark.parametrize(
     "given, asked, why",
-    [("1/s", "rad/s", "may be rad/s or"), ("grad", "rad", "may be deg or grad"), ("-", "rad", "is no angle"), ("g", "m", "cannot be turned"),
-     ("Nm", "m", "cannot be turned"), ("1/min", "s", "cannot be turned"), ("wug", "m", "unknown unit"), ("m/s2", "m/s", "m/s2|cannot")],
-)  # fmt: skip
+    [
+        ("1/s", "rad/s", "may be rad/s or"),
+        ("grad", "rad", "may be deg or grad"),
+        ("-", "rad", "is no angle"),
+        ("g", "m", "cannot be turned"),
+        ("Nm", "m", "cannot be turned"),
+        ("1/min", "s", "cannot be turned"),
+        ("wug", "m", "unknown unit"),
+        ("m/s2", "m/s", "m/s2|cannot"),
+    ],
+)
 def test_units_that_do_not_fit_are_refused(given, asked, why):
     with pytest.raises(UnitError, match=why):
         scale(given, asked)
@@ -78,7 +131,15 @@ def test_rows_without_a_clock_may_be_given_one(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "header", ["time_sec,x_cm,y_m_s2", "time_s_,x_cm_,y_m_s_2_", "Time_[s],X_[cm],y_[m/s2]", "t (s),x; cm,y m/s²", "s,cm,m/s^2\ntime,x,y", "time,x,y\ns,cm,m/s2\nbool,digits,n. a."]
+    "header",
+    [
+        "time_sec,x_cm,y_m_s2",
+        "time_s_,x_cm_,y_m_s_2_",
+        "Time_[s],X_[cm],y_[m/s2]",
+        "t (s),x; cm,y m/s²",
+        "s,cm,m/s^2\ntime,x,y",
+        "time,x,y\ns,cm,m/s2\nbool,digits,n. a.",
+    ],
 )
 def test_headers_of_other_programs(tmp_path, header):
     (tmp_path / "r.csv").write_text(f"{header}\n0,10,1\n1,20,2\n2,30,3\n", encoding="utf-8")
@@ -98,7 +159,14 @@ def test_the_option_is_asked_before_anything_is_refused(tmp_path):
     with pytest.raises(UserError, match="kg cannot be turned into m") as caught:
         channel(path, "x", "m")
     assert '--channel "x=x [m]"' in str(caught.value)
-    for option, expected in (("x=x [mm]", 3e-3), ("x=x_mm", 2e-3), ("x=x_m [cm]", 1e-2), ("x = a=b [c]", 4e-3), ("x=a=b [c] [mm]", 4e-3), ("x=a=b [c] [m]", 4.0)):
+    for option, expected in (
+        ("x=x [mm]", 3e-3),
+        ("x=x_mm", 2e-3),
+        ("x=x_m [cm]", 1e-2),
+        ("x = a=b [c]", 4e-3),
+        ("x=a=b [c] [mm]", 4e-3),
+        ("x=a=b [c] [m]", 4.0),
+    ):
         assert channel(path, "x", "m", option)[0] == pytest.approx(expected, rel=1e-15), option
     with pytest.raises(UserError, match=r'there is no column "x_cm" for --channel "x=x_cm"; did you mean "x_m'):
         channel(path, "x", "m", "x=x_cm")
@@ -106,8 +174,14 @@ def test_the_option_is_asked_before_anything_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     "text, first",
-    [("time [s];x [m]\n0;1,5\n1;-\n", 1.5), ("time [s];x [m]\n0;1.5\n1;n/a\n", 1.5), ("time [s];x [m]\n0;1,25D-1\n1;\n", 0.125), ("time [s];x [m]\n0,5;1'234,5\n1,5;-\n", 1234.5), ("time [s],x [m]\n0,\u22121.5\n1,#N/A\n", -1.5)],
-)  # fmt: skip
+    [
+        ("time [s];x [m]\n0;1,5\n1;-\n", 1.5),
+        ("time [s];x [m]\n0;1.5\n1;n/a\n", 1.5),
+        ("time [s];x [m]\n0;1,25D-1\n1;\n", 0.125),
+        ("time [s];x [m]\n0,5;1'234,5\n1,5;-\n", 1234.5),
+        ("time [s],x [m]\n0,\u22121.5\n1,#N/A\n", -1.5),
+    ],
+)
 def test_signs_for_missing_values_and_other_notations(tmp_path, text, first):
     (tmp_path / "r.csv").write_text(text, encoding="utf-8")
     (table,) = read(tmp_path / "r.csv")
@@ -195,7 +269,9 @@ def test_numpy_warns_nobody(tmp_path):
 
 def test_a_channel_that_is_not_found_gets_an_option_that_works(tmp_path):
     path = write(tmp_path, "time [s],Ground z [mm],q [V],y\n0,1,2,3\n1,2,3,4\n")
-    with pytest.raises(UserError, match=r'there is no channel z_road; use one of: Ground z, q, y, or say --channel "z_road=Ground z" if it is that'):
+    with pytest.raises(
+        UserError, match=r'there is no channel z_road; use one of: Ground z, q, y, or say --channel "z_road=Ground z" if it is that'
+    ):
         pick(read(path), "z_road", "m")
     with pytest.raises(UserError, match=r'there is no channel w; .*, or say --channel "w=COLUMN" if it is one of these'):
         pick(read(path), "w", "rad/s")

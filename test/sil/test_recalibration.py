@@ -9,10 +9,9 @@ import pytest
 from conftest import ROOT
 
 import penode_gen
-from penode_sil import mil
-from penode_sil import scenario as scenarios
-from penode_sil.schedule import exchange_calls, instance_calls
+from penode_sil import mil, scenario as scenarios
 from penode_sil.scenario import Exchange, Instance
+from penode_sil.schedule import exchange_calls, instance_calls
 from penode_sil.status import BIT, counts
 from penode_sil.targets import Sil
 

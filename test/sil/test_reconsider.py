@@ -15,14 +15,24 @@ from penode_sil.diagnosis.reconsider import reconsidered
 from penode_sil.diagnosis.rounds import Accepted, Grown
 from penode_sil.diagnosis.terms import Term, Trial
 
-NAMES = {"friction": "coulomb_friction", "stribeck": "stribeck_friction", "asymmetric": "asymmetric_damper", "degressive": "degressive_damper",
-         "constant": "constant_force", "cubic": "cubic_spring", "stop": "bump_stop", "both": "coulomb_friction"}  # fmt: skip
+NAMES = {
+    "friction": "coulomb_friction",
+    "stribeck": "stribeck_friction",
+    "asymmetric": "asymmetric_damper",
+    "degressive": "degressive_damper",
+    "constant": "constant_force",
+    "cubic": "cubic_spring",
+    "stop": "bump_stop",
+    "both": "coulomb_friction",
+}
 VALUES = {"stribeck": 3, "degressive": 2, "stop": 2, "both": 2}
 
 
 def trial(name: str, nats: float, whole: float = 0.0) -> Trial:
     """A trial with a total score of `nats` over all blocks, which takes the share `whole` of the misfit."""
-    parts = (Part("coulomb_friction", ("force", "N")), Part("constant_force", ("force", "N"), kind="constant_force")) if name == "both" else ()
+    parts = (
+        (Part("coulomb_friction", ("force", "N")), Part("constant_force", ("force", "N"), kind="constant_force")) if name == "both" else ()
+    )
     form = Form(NAMES[name], "spring", "force", 0, parts)
     free = tuple(Free(f"{name}_{k}", 1.0, 1.0) for k in range(VALUES.get(name, 1)))
     return Trial(form, Term(form, (), free), None, 0.0, None, whole=whole, blocks=np.full(4, nats / 4.0))
@@ -43,7 +53,12 @@ def kinds(forms: Sequence[Accepted]) -> tuple[str, ...]:
 class Rounds:
     """Stub of `Rounds`: looks up scores and good trials by set of causes instead of simulating."""
 
-    def __init__(self, scores: dict[tuple[str, ...], float], good: dict[tuple[str, ...], Sequence[Trial]], grow: Callable[[list[Accepted]], list[Accepted]] = lambda forms: forms):
+    def __init__(
+        self,
+        scores: dict[tuple[str, ...], float],
+        good: dict[tuple[str, ...], Sequence[Trial]],
+        grow: Callable[[list[Accepted]], list[Accepted]] = lambda forms: forms,
+    ):
         self.scores, self.beside_good, self.more, self.log = scores, good, grow, lambda text: None
 
     def beside(self, forms: Sequence[Accepted]) -> tuple[tuple[str, ...], np.ndarray, list[Accepted]]:
@@ -65,8 +80,16 @@ def grown(forms: Sequence[Accepted], scores: dict[tuple[str, ...], float], rest:
 def test_a_first_choice_that_stood_in_for_two_is_exchanged():
     """Friction and an asymmetric damper look like a degressive one, until the asymmetry is known; then friction takes most of what is left."""
     first, second = accepted(0, trial("degressive", 600.0)), accepted(1, trial("asymmetric", 1300.0))
-    scores = {("degressive_damper", "asymmetric_damper"): 1300.0, ("asymmetric_damper",): 100.0, ("coulomb_friction", "asymmetric_damper"): 1700.0, ("coulomb_friction",): 600.0}
-    good = {("asymmetric_damper",): [trial("friction", 1700.0), trial("degressive", 1300.0)], ("coulomb_friction",): [trial("asymmetric", 1700.0)]}
+    scores = {
+        ("degressive_damper", "asymmetric_damper"): 1300.0,
+        ("asymmetric_damper",): 100.0,
+        ("coulomb_friction", "asymmetric_damper"): 1700.0,
+        ("coulomb_friction",): 600.0,
+    }
+    good = {
+        ("asymmetric_damper",): [trial("friction", 1700.0), trial("degressive", 1300.0)],
+        ("coulomb_friction",): [trial("asymmetric", 1700.0)],
+    }
     rounds = Rounds(scores, good)
     end = reconsidered(rounds, grown([first, second], scores, [trial("friction", 1700.0, whole=0.8)]))
     assert kinds(end.accepted) == ("coulomb_friction", "asymmetric_damper")
@@ -76,7 +99,9 @@ def test_a_first_choice_that_stood_in_for_two_is_exchanged():
 def test_what_the_others_do_as_well_is_left_out():
     first, second = accepted(0, trial("constant", 600.0)), accepted(1, trial("asymmetric", 1300.0))
     scores = {("constant_force", "asymmetric_damper"): 1300.0, ("asymmetric_damper",): 1295.0}  # 5 nats, of 10 that a cause has to gain
-    assert kinds(reconsidered(Rounds(scores, {}), grown([first, second], scores, [trial("cubic", 1500.0, whole=0.8)])).accepted) == ("asymmetric_damper",)
+    assert kinds(reconsidered(Rounds(scores, {}), grown([first, second], scores, [trial("cubic", 1500.0, whole=0.8)])).accepted) == (
+        "asymmetric_damper",
+    )
 
 
 def test_nothing_is_tried_again_where_nothing_is_in_doubt():
@@ -89,17 +114,32 @@ def test_nothing_is_tried_again_where_nothing_is_in_doubt():
 def test_a_shape_chosen_before_the_others_were_known_goes_and_the_last_choice_with_it():
     """Truth: Coulomb friction and a cubic spring. Taken alone a Stribeck curve predicts better; beside that, a bump stop does."""
     first, second = accepted(0, trial("stribeck", 600.0), [trial("friction", 560.0)]), accepted(1, trial("stop", 1300.0))
-    scores = {("stribeck_friction", "bump_stop"): 1300.0, ("bump_stop",): 300.0, ("coulomb_friction",): 560.0,
-              ("coulomb_friction", "bump_stop"): 1296.0, ("coulomb_friction", "cubic_spring"): 1500.0}  # fmt: skip
-    good = {("bump_stop",): [trial("friction", 1296.0), trial("stribeck", 1300.0)], ("coulomb_friction",): [trial("cubic", 1500.0), trial("stop", 1400.0)]}
+    scores = {
+        ("stribeck_friction", "bump_stop"): 1300.0,
+        ("bump_stop",): 300.0,
+        ("coulomb_friction",): 560.0,
+        ("coulomb_friction", "bump_stop"): 1296.0,
+        ("coulomb_friction", "cubic_spring"): 1500.0,
+    }
+    good = {
+        ("bump_stop",): [trial("friction", 1296.0), trial("stribeck", 1300.0)],
+        ("coulomb_friction",): [trial("cubic", 1500.0), trial("stop", 1400.0)],
+    }
     end = reconsidered(Rounds(scores, good), grown([first, second], scores))
     assert kinds(end.accepted) == ("coulomb_friction", "cubic_spring")
 
 
 def test_no_simpler_form_that_predicts_much_worse_and_no_end_that_is_worse():
     first, second = accepted(0, trial("stribeck", 600.0), [trial("friction", 560.0)]), accepted(1, trial("stop", 1300.0))
-    scores = {("stribeck_friction", "bump_stop"): 1300.0, ("bump_stop",): 300.0, ("coulomb_friction",): 560.0, ("coulomb_friction", "bump_stop"): 900.0}
-    worse = Rounds(scores, {("bump_stop",): [trial("friction", 1000.0)]})  # 300 of the 1000 nats that Stribeck gains, of 200 that a form may lose
+    scores = {
+        ("stribeck_friction", "bump_stop"): 1300.0,
+        ("bump_stop",): 300.0,
+        ("coulomb_friction",): 560.0,
+        ("coulomb_friction", "bump_stop"): 900.0,
+    }
+    worse = Rounds(
+        scores, {("bump_stop",): [trial("friction", 1000.0)]}
+    )  # 300 of the 1000 nats that Stribeck gains, of 200 that a form may lose
     assert kinds(reconsidered(worse, grown([first, second], scores)).accepted) == ("stribeck_friction", "bump_stop")
     promised = Rounds(scores, {("bump_stop",): [trial("friction", 1310.0)], ("coulomb_friction",): []})  # fitted again, it ends at 900
     assert kinds(reconsidered(promised, grown([first, second], scores)).accepted) == ("stribeck_friction", "bump_stop")
@@ -108,7 +148,12 @@ def test_no_simpler_form_that_predicts_much_worse_and_no_end_that_is_worse():
 def test_what_is_needed_is_judged_beside_what_was_exchanged():
     """The last form is worth 405 nats beside the friction, 5 of which show against the score of the set before."""
     first, second = accepted(0, trial("stribeck", 600.0), [trial("friction", 560.0)]), accepted(1, trial("cubic", 1300.0))
-    scores = {("stribeck_friction", "cubic_spring"): 1300.0, ("cubic_spring",): 300.0, ("coulomb_friction",): 1295.0, ("coulomb_friction", "cubic_spring"): 1700.0}
+    scores = {
+        ("stribeck_friction", "cubic_spring"): 1300.0,
+        ("cubic_spring",): 300.0,
+        ("coulomb_friction",): 1295.0,
+        ("coulomb_friction", "cubic_spring"): 1700.0,
+    }
     rounds = Rounds(scores, {("cubic_spring",): [trial("friction", 1700.0)], ("coulomb_friction",): [trial("cubic", 1700.0)]})
     assert kinds(reconsidered(rounds, grown([first, second], scores)).accepted) == ("coulomb_friction", "cubic_spring")
 

@@ -36,7 +36,7 @@ WRONG = [
     ("", r"it is empty; the first row must be a header"),
     ("time [s],z [m],z [m]\n0,0,0\n1,1,2\n", r':1: channel z is there twice; rename or remove one, or say --channel "z=z#1" or'),
     ("time [s]\n0\n1\n", r": there is no channel z; use one of: time"),
-    ("time [s],z_b [m]\n0,0\n1,1\n", r': there is no channel z; use one of: time, z_b'),
+    ("time [s],z_b [m]\n0,0\n1,1\n", r": there is no channel z; use one of: time, z_b"),
     ("time [s],z\n0,0\n1,1\n", r':1: channel z has no unit; write "z \[m\]"'),
     ("time [s],z [kg]\n0,0\n1,1\n", r":1: channel z: kg cannot be turned into m; give it in m"),
     ("time [s],z [wug]\n0,0\n1,1\n", r":1: channel z: .*wug"),
@@ -48,7 +48,7 @@ WRONG = [
     ("time [s],z [m]\n0,0\n2,0\n1,0\n3,0\n", r":4: channel time goes back; sort the rows by time"),
     ("time [s],z [m]\n0,0\n1,0\n1,0\n2,0\n", r":4: channel time has the same value as the row before; remove"),
     ("time [s],z [m]\n0,0\n1,0\n2,0\n5,0\n6,0\n", r":5: channel time has a gap \(rows are usually 1 s apart\); split"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("text, expected", WRONG, ids=[expected[:40] for _, expected in WRONG])
@@ -120,7 +120,7 @@ HABITS = [
     ("time [s],a [g]\n0,1\n1,4\n", {"a": ("m/s^2", 9.80665)}),
     ("\ufefftime [s],x [m]\r\n0,1\r\n1,4\r\n", {"x": ("m", 1.0)}),
     ("time [s],x [mm\n0,1\n1,4\n", {"x": ("m", 1e-3)}),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("text, first", HABITS)
@@ -140,7 +140,7 @@ DOUBTS = [
     ("time [s],x\n0,1\n1,4\n", r'channel x has no unit; write "x \[m\]"'),
     ("time [s];x [m]\n0;1.000,5\n1;4\n", r':2: channel x: "1.000,5" is no number'),
     ("time [s],x [g]\n0,1\n1,4\n", r":1: channel x: g cannot be turned into m"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("text, expected", DOUBTS)
@@ -184,9 +184,7 @@ T = np.arange(500) * 1e-3
 
 @pytest.mark.parametrize("name, version", [("r.mf4", "4.10"), ("r.mf4", "4.20"), ("r.mdf", "3.30"), ("r.bin", "4.10")])
 def test_mdf_gives_what_csv_gives(mdf, name, version):
-    path = mdf(
-        (T, {"z_road": ("mm", 1e3 * T), "count": ("V", np.arange(500, dtype=np.uint8))}), name=name, version=version
-    )
+    path = mdf((T, {"z_road": ("mm", 1e3 * T), "count": ("V", np.arange(500, dtype=np.uint8))}), name=name, version=version)
     (table,) = read(path)
     assert table.time() == pytest.approx(T) and table.channel("z_road", "m") == pytest.approx(T)
     assert table.channel("count", "V").tolist() == (np.arange(500) % 256).tolist()
@@ -262,17 +260,13 @@ def readable(path: Path) -> None:
 
 
 @settings(SLOW, max_examples=300)
-@given(
-    st.one_of(st.binary(max_size=200), st.text(max_size=200).map(lambda text: text.encode("utf-8", "surrogatepass")))
-)
+@given(st.one_of(st.binary(max_size=200), st.text(max_size=200).map(lambda text: text.encode("utf-8", "surrogatepass"))))
 def test_any_bytes_are_read_or_refused(tmp_path, data):
     (tmp_path / "r.csv").write_bytes(data)
     readable(tmp_path / "r.csv")
 
 
-CELL = st.one_of(
-    st.floats(-2.0, 2.0).map(repr), st.sampled_from(["", "nan", "-inf", "1e400", "x", "1,5", '"', "1_0", " 2 ", "\x00"])
-)
+CELL = st.one_of(st.floats(-2.0, 2.0).map(repr), st.sampled_from(["", "nan", "-inf", "1e400", "x", "1,5", '"', "1_0", " 2 ", "\x00"]))
 
 
 @settings(SLOW, max_examples=300)

@@ -17,7 +17,20 @@ from test_diagnosis import MODEL, SAMPLES, STEP, drive, record, road
 import penode_gen
 from penode_sil import building
 from penode_sil.cli import cli
-from penode_sil.diagnosis import advice, catalogue, files, noise, reliability, report, report_figure as fig, report_price, residual, restoring, result, terminal
+from penode_sil.diagnosis import (
+    advice,
+    catalogue,
+    files,
+    noise,
+    reliability,
+    report,
+    report_figure as fig,
+    report_price,
+    residual,
+    restoring,
+    result,
+    terminal,
+)
 from penode_sil.diagnosis.report_figure import Axis
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
@@ -69,22 +82,11 @@ def found(model):
     s, v = 0.02 * rng.standard_normal((2, n))
     edges = (np.linspace(-0.06, 0.06, restoring.BINS + 1),) * 2
     surface = restoring.Surface(
-        "spring",
-        ("spring", "damper"),
-        s,
-        v,
-        22e3 * s + 60.0 * np.sign(v),
-        22e3 * s,
-        22e3 * s + 61.3 * np.tanh(v / 4e-3),
-        edges,
+        "spring", ("spring", "damper"), s, v, 22e3 * s + 60.0 * np.sign(v), 22e3 * s, 22e3 * s + 61.3 * np.tanh(v / 4e-3), edges
     )
     shown = residual.Shown(tuple(train), tuple(held), (surface,))
     cause = result.Cause(
-        "coulomb_friction",
-        "damper",
-        {"force": result.Value(61.3, "N", (59.8, 62.9))},
-        0.87,
-        (result.Named("stribeck_friction", "damper"),),
+        "coulomb_friction", "damper", {"force": result.Value(61.3, "N", (59.8, 62.9))}, 0.87, (result.Named("stribeck_friction", "damper"),)
     )
     cause = replace(cause, separate=catalogue.separating("coulomb_friction", ["stribeck_friction"]))
     gain = {
@@ -94,12 +96,30 @@ def found(model):
     data = (result.Recorded(RECORDING, "training", n, 6.0, ("deflection: 12 samples are missing",)),)
     numerics = {"a_body": {"rms_error": 1.25e-3, "unit": "m/s^2", "share_of_signal": 0.0021}}
     notes = (f"{RECORDING}: 31.0% of the samples move farther or faster than in training",)
-    known = {"source": "100 cases of seed 7", "cases": 100, "deciles": [{"from": 0.8, "to": 0.9, "named": 60, "right": 51, "ci95": [0.739, 0.92]}]}
-    sets = tuple({"causes": [{"kind": f"{k}_friction", "where": "damper"}], "posterior": p} for k, p in (("coulomb", 0.87), ("stribeck", 0.13)))
+    known = {
+        "source": "100 cases of seed 7",
+        "cases": 100,
+        "deciles": [{"from": 0.8, "to": 0.9, "named": 60, "right": 51, "ci95": [0.739, 0.92]}],
+    }
+    sets = tuple(
+        {"causes": [{"kind": f"{k}_friction", "where": "damper"}], "posterior": p} for k, p in (("coulomb", 0.87), ("stribeck", 0.13))
+    )
     d = result.Diagnosis(
-        verdict="explained", causes=(cause,), gain=gain, numerics=numerics, explained=0.991, evidence=512.0, alike=0.0,
-        notes=notes, data=data, residual=shown.numbers(), seconds=7.5, shown=shown,
-        explanations=sets, reliability=known, )  # fmt: skip
+        verdict="explained",
+        causes=(cause,),
+        gain=gain,
+        numerics=numerics,
+        explained=0.991,
+        evidence=512.0,
+        alike=0.0,
+        notes=notes,
+        data=data,
+        residual=shown.numbers(),
+        seconds=7.5,
+        shown=shown,
+        explanations=sets,
+        reliability=known,
+    )
     return replace(d, advice=advice.advice(d))
 
 
@@ -194,15 +214,7 @@ def test_figures_have_titles_units_and_words(tree, page):
     assert all(len(f["data-x"].split()) == 3 and "|" in f["data-units"] for f in figures)
     plots = [a for a in tree.of("svg") if a.get("class") == "plot"]
     assert len(plots) == len(figures) and all(a["role"] == "img" and " over " in a["aria-label"] for a in plots)
-    for axis in (
-        "residual in",
-        "time in s",
-        "frequency in Hz",
-        "coherence",
-        "deflection in mm",
-        "rate in m/s",
-        "force in N",
-    ):
+    for axis in ("residual in", "time in s", "frequency in Hz", "coherence", "deflection in mm", "rate in m/s", "force in N"):
         assert axis in page
 
 
@@ -219,9 +231,7 @@ def test_values_can_be_read_back_from_paths(found):
     factor = f.y.unit.startswith("µ") and 1e6 or f.y.unit == "mm" and 1e3 or 1.0
     low, high = f.y.low, f.y.high
     assert np.allclose(np.array(x) / fig.WIDE * f.x.high, c.time, atol=0.51 / fig.WIDE * f.x.high)
-    assert np.allclose(
-        high - np.array(y) / fig.HIGH * (high - low), factor * c.before.values, atol=0.51 / fig.HIGH * (high - low)
-    )
+    assert np.allclose(high - np.array(y) / fig.HIGH * (high - low), factor * c.before.values, atol=0.51 / fig.HIGH * (high - low))
 
 
 def test_thinning_keeps_the_extremes():
@@ -249,14 +259,10 @@ def test_thinning_keeps_the_extremes():
 )
 def test_ticks_are_few_round_and_inside(axis):
     ticks = axis.ticks()
-    assert (
-        2 <= len(ticks) <= 12 and all(0.0 <= at <= 1.0 for at, _ in ticks) and len({t for _, t in ticks}) == len(ticks)
-    )
+    assert 2 <= len(ticks) <= 12 and all(0.0 <= at <= 1.0 for at, _ in ticks) and len({t for _, t in ticks}) == len(ticks)
     powers = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
     for at, text in ticks:
-        mantissa, _, power = (
-            text.partition("10") if "10" in text and re.search("[⁰¹²³⁴⁵⁶⁷⁸⁹]", text) else (text, "", "0")
-        )
+        mantissa, _, power = text.partition("10") if "10" in text and re.search("[⁰¹²³⁴⁵⁶⁷⁸⁹]", text) else (text, "", "0")
         number = float((mantissa.rstrip("·") or "1").translate(powers)) * 10.0 ** int(power.translate(powers))
         assert axis.share(number) == pytest.approx(at, abs=1e-6)
 
@@ -328,12 +334,19 @@ def test_summary_fits_one_screen(model, found, tmp_path):
         assert len(lines) <= 24 and all(len(line) <= 80 or "report.html" in line for line in lines)
         assert "explained" in lines[0] and lines[-1].endswith("report.html")
     text = terminal.sentences(model, found, tmp_path)
-    assert "or Stribeck friction at damper (13%): the recordings do not tell which" in text and "next: tell Coulomb friction at damper from Str" in text
+    assert (
+        "or Stribeck friction at damper (13%): the recordings do not tell which" in text
+        and "next: tell Coulomb friction at damper from Str" in text
+    )
     assert "61.3 N" in text and "[59.8, 62.9]" in text and "Stribeck friction at damper" in text and "0.0203" in text
 
 
 def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path, monkeypatch):
-    table = {"source": "100 cases of seed 7", "cases": 100, "deciles": [{"from": 0.9, "to": 1.0, "named": 60, "right": 51, "ci95": [0.74, 0.92]}]}
+    table = {
+        "source": "100 cases of seed 7",
+        "cases": 100,
+        "deciles": [{"from": 0.9, "to": 1.0, "named": 60, "right": 51, "ci95": [0.74, 0.92]}],
+    }
     (tmp_path / "table.json").write_text(json.dumps(table))
     monkeypatch.setattr(reliability, "TABLE", tmp_path / "table.json")
     (tmp_path / "car.toml").write_text(MODEL)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy import stats
-from test_diagnosis import C, D, SAMPLES, STEP, MODEL, drive, record, road
+from test_diagnosis import MODEL, SAMPLES, STEP, C, D, drive, record, road
 
 import penode_gen
 from penode_sil.diagnosis import noise, residual, study
@@ -43,21 +43,15 @@ def test_coherence_of_a_gain_in_noise():
         got, limit, chance = residual.coherence(2.0 * x + size * n, x[:, None], H, LENGTH)
         # bias (1 - want)^2/K; 500 values of deviation (1 - want) sqrt(2 want/K), a third of them independent: 4 of
         # those
-        assert abs(np.mean(got[2:-2]) - want - (1.0 - want) ** 2 / SEGMENTS) < 4.0 * (1.0 - want) * np.sqrt(
-            2.0 * want / SEGMENTS / 150.0
-        )
-        assert chance == pytest.approx(1.0 / SEGMENTS) and limit == pytest.approx(
-            1.0 - 0.05 ** (1.0 / (SEGMENTS - 1.0))
-        )
+        assert abs(np.mean(got[2:-2]) - want - (1.0 - want) ** 2 / SEGMENTS) < 4.0 * (1.0 - want) * np.sqrt(2.0 * want / SEGMENTS / 150.0)
+        assert chance == pytest.approx(1.0 / SEGMENTS) and limit == pytest.approx(1.0 - 0.05 ** (1.0 / (SEGMENTS - 1.0)))
 
 
 def test_coherence_with_several_inputs_counts_all_of_them():
     rng = np.random.default_rng(3)
     u = rng.standard_normal((N, 2))
     y = u[:, 0] - 3.0 * np.roll(u[:, 1], 2)
-    assert (
-        np.min(residual.coherence(y, u, H, LENGTH)[0][2:-2]) > 0.99
-    )  # 2 samples of LENGTH are lost to the other segment
+    assert np.min(residual.coherence(y, u, H, LENGTH)[0][2:-2]) > 0.99  # 2 samples of LENGTH are lost to the other segment
     one = residual.coherence(y, u[:, :1], H, LENGTH)[0]
     assert np.mean(one) == pytest.approx(0.1, abs=0.03)  # 1/(1 + 9), bias 0.8/K = 0.01, deviation of the mean 0.01
 
@@ -186,11 +180,7 @@ def test_bad_samples_change_no_level():
     class Model:
         sensors = (type("Sensor", (), {"name": "a", "unit": "m/s^2"}),)
 
-    (c,) = residual.channels(
-        e, Model, np.zeros((n, 1)), None, (e.frequencies, np.full((len(e.frequencies), 1), sigma**2))
-    )
-    assert np.mean(c.before.density) == pytest.approx(
-        2.0 * H * sigma**2, rel=0.1
-    )  # 4 of 2.4 %: 4000 samples, 0.4 of the band
+    (c,) = residual.channels(e, Model, np.zeros((n, 1)), None, (e.frequencies, np.full((len(e.frequencies), 1), sigma**2)))
+    assert np.mean(c.before.density) == pytest.approx(2.0 * H * sigma**2, rel=0.1)  # 4 of 2.4 %: 4000 samples, 0.4 of the band
     assert c.before.white.level == pytest.approx(1.0, abs=0.1) and c.noise == pytest.approx(sigma)
     assert residual.rms(c.before.values[c.good]) == pytest.approx(sigma, rel=4.0 / np.sqrt(2 * 4000))

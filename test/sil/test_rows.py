@@ -46,7 +46,9 @@ travel = { value = "z_b - z_w", unit = "m", noise = 0.000115 }
 def road(time: np.ndarray) -> np.ndarray:
     """0.3 to 25 Hz, from rest."""
     draw = np.random.default_rng(3)
-    waves = (np.sin(2.0 * np.pi * f * time + draw.uniform(0.0, 6.28)) / np.sqrt(f / 0.3) / (1.0 + f / 6.0) for f in np.geomspace(0.3, 25.0, 50))
+    waves = (
+        np.sin(2.0 * np.pi * f * time + draw.uniform(0.0, 6.28)) / np.sqrt(f / 0.3) / (1.0 + f / 6.0) for f in np.geomspace(0.3, 25.0, 50)
+    )
     start = np.clip(time / 0.5, 0.0, 1.0)
     return 0.004 * sum(waves) * start**3 * (10.0 - 15.0 * start + 6.0 * start**2)
 

@@ -42,7 +42,11 @@ def wide(folder: Path, sizes: list[int], activation: str = "relu", seed: int = 1
     """A model that is one network with random weights."""
     draw = np.random.default_rng(seed)
     layers = [
-        {"activation": activation if n > 1 else "identity", "weights": (draw.standard_normal((n, m)) / m**0.5).tolist(), "bias": draw.standard_normal(n).tolist()}
+        {
+            "activation": activation if n > 1 else "identity",
+            "weights": (draw.standard_normal((n, m)) / m**0.5).tolist(),
+            "bias": draw.standard_normal(n).tolist(),
+        }
         for m, n in zip(sizes, sizes[1:])
     ]
     folder.mkdir(exist_ok=True)
@@ -63,7 +67,17 @@ def instructions(model: penode_gen.Model) -> int:
 def text(model: penode_gen.Model, folder: Path) -> int:
     """Bytes of the model's own code on the Cortex-M4F."""
     penode_gen.generate(model, folder / "c")
-    cc = [str(ROOT / "port" / "cortex-m" / "cc"), "mps2-an386", "-std=c99", "-O2", f"-I{folder}/c", "-c", f"{folder}/c/wide.c", "-o", f"{folder}/wide.o"]
+    cc = [
+        str(ROOT / "port" / "cortex-m" / "cc"),
+        "mps2-an386",
+        "-std=c99",
+        "-O2",
+        f"-I{folder}/c",
+        "-c",
+        f"{folder}/c/wide.c",
+        "-o",
+        f"{folder}/wide.o",
+    ]
     subprocess.run(cc, check=True)
     found = subprocess.run(["arm-none-eabi-size", "-A", f"{folder}/wide.o"], check=True, capture_output=True, text=True).stdout
     return sum(int(n) for n in re.findall(r"^\.text\S*\s+(\d+)", found, re.M))
@@ -74,10 +88,21 @@ def work(sizes: list[int]) -> tuple[int, int]:
     return sum(m * n for m, n in zip(sizes, sizes[1:])), sum(sizes[1:])
 
 
-SIZES = [[1, 16, 16, 16, 1], [2, 64, 64, 1], [3, 128, 128, 1], [4, 256, 256, 1], [2, 32, 32, 32, 32, 32, 32, 1], [1, 4, 1], [6, 256, 1], [2, 20, 37, 1]]
+SIZES = [
+    [1, 16, 16, 16, 1],
+    [2, 64, 64, 1],
+    [3, 128, 128, 1],
+    [4, 256, 256, 1],
+    [2, 32, 32, 32, 32, 32, 32, 1],
+    [1, 4, 1],
+    [6, 256, 1],
+    [2, 20, 37, 1],
+]
 
 
-@pytest.mark.parametrize("sizes", sample(SIZES, [1, 16, 16, 16, 1], [4, 256, 256, 1], [1, 4, 1], [2, 20, 37, 1]), ids=lambda sizes: "-".join(map(str, sizes)))
+@pytest.mark.parametrize(
+    "sizes", sample(SIZES, [1, 16, 16, 16, 1], [4, 256, 256, 1], [1, 4, 1], [2, 20, 37, 1]), ids=lambda sizes: "-".join(map(str, sizes))
+)
 def test_the_step_costs_its_multiply_adds_and_nothing_else(tmp_path, sizes, show):
     """A multiply-add is a multiplication and an addition, 2 instructions, and a load: an instruction of its own, or 1/8 of
     one in the port's kernel for layers of 16; with 1/16 to 1/4 of a loop's overhead of about 8. A neuron is stored, loaded

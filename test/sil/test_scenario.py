@@ -112,16 +112,16 @@ WRONG = [
     ('duration = "3 s"', 'duration = "3 kg"', r"duration: .*kg.*; give it in s"),
     ('duration = "3 s"', "", r'duration: is missing; add duration = "1 s"'),
     ('duration = "3 s"', 'duration = "-3 s"', r"duration: '-3 s' is negative; give more than 0 s"),
-    ('title =', 'titel =', r'titel: is not known here; did you mean "title"\?'),
+    ("title =", "titel =", r'titel: is not known here; did you mean "title"\?'),
     ("[input.foot]\nkind", "[input.food]\nkind", r'input.food: is not known here; did you mean "foot"'),
     ('kind = "road"', 'kind = "raod"', r'input.foot.terms\[3\].kind: "raod" is not known; did you mean "road"\?'),
     ('class = "B"', 'class = "X"', r'terms\[3\].class: "X" is not known; use one of: A, B, C, D'),
     ('speed = "72 km/h"', 'speed = "72 km"', r"terms\[3\].speed: .*; give it in m/s"),
-    ('seed = 4', 'seed = -4', r"terms\[3\].seed: -4 is no whole number of at least 0"),
-    ('seed = 4', 'sead = 4', r'terms\[3\].sead: is not known here; did you mean "seed"\?'),
-    ('amplitude = "1 cm"', 'amplitude = 1', r"terms\[2\].amplitude: .*plain number.*mm"),
+    ("seed = 4", "seed = -4", r"terms\[3\].seed: -4 is no whole number of at least 0"),
+    ("seed = 4", "sead = 4", r'terms\[3\].sead: is not known here; did you mean "seed"\?'),
+    ('amplitude = "1 cm"', "amplitude = 1", r"terms\[2\].amplitude: .*plain number.*mm"),
     ('amplitude = "1 cm"', 'amplitude = "one cm"', r"terms\[2\].amplitude: .*number and its unit"),
-    ('amplitude = "1 cm"', '', r"terms\[2\]: needs exactly one of amplitude and velocity_amplitude"),
+    ('amplitude = "1 cm"', "", r"terms\[2\]: needs exactly one of amplitude and velocity_amplitude"),
     ('v = "-20 mm/s"', 'w = "-20 mm/s"', r"initial.w: is not known here; .*v"),
     ('name = "plain"', 'name = "changed"', r'instance: two are called "changed"'),
     ('set = "stiff"', 'set = "stif"', r'instance\[2\].set: "stif" is not known; did you mean "stiff"\?'),
@@ -131,9 +131,9 @@ WRONG = [
     ('time = "1 s"', 'time = "4 s"', r"exchange\[1\].time: 4 s is not before the end at 3 s"),
     ('time = "1500 ms"', 'time = "500 ms"', r"exchange\[2\].time: staging would begin at 0.5 s, before 1.001 s"),
     ('how = "select"', 'how = "rollback"\nchunk = 3', r"exchange\[1\].how: there is nothing to roll back to"),
-    ('hold = true', 'hold = 1', r"exchange\[3\].hold: 1 is neither true nor false; write true or false"),
-    ('chunk = 1', 'chunk = 0', r"exchange\[3\].chunk: 0 is no whole number of at least 1"),
-]  # fmt: skip
+    ("hold = true", "hold = 1", r"exchange\[3\].hold: 1 is neither true nor false; write true or false"),
+    ("chunk = 1", "chunk = 0", r"exchange\[3\].chunk: 0 is no whole number of at least 1"),
+]
 
 
 @pytest.mark.parametrize("old, new, expected", WRONG, ids=[expected[:40] for *_, expected in WRONG])
@@ -157,9 +157,7 @@ def test_staging_that_would_begin_before_the_start_is_refused(tmp_path, oscillat
 
 
 def test_input_without_a_signal_is_named(tmp_path, oscillator):
-    assert problems(tmp_path, oscillator, 'duration = "1 s"\n') == [
-        "input.foot: is missing; add [input.foot] with a kind"
-    ]
+    assert problems(tmp_path, oscillator, 'duration = "1 s"\n') == ["input.foot: is missing; add [input.foot] with a kind"]
 
 
 def test_missing_and_broken_files(tmp_path, oscillator):
@@ -172,9 +170,7 @@ def test_missing_and_broken_files(tmp_path, oscillator):
 def test_recording_shorter_than_the_scenario_is_refused(tmp_path, oscillator):
     (tmp_path / "r.csv").write_text("time [s],foot [mm]\n0,0\n1,1\n")
     text = 'duration = "2 s"\n[input.foot]\nkind = "recording"\nfile = "r.csv"\n'
-    assert problems(tmp_path, oscillator, text) == [
-        "input.foot.file: r.csv ends after 1 s; shorten the scenario's duration"
-    ]
+    assert problems(tmp_path, oscillator, text) == ["input.foot.file: r.csv ends after 1 s; shorten the scenario's duration"]
 
 
 def test_recording_is_read_in_si(tmp_path, oscillator):

@@ -12,13 +12,13 @@ import pytest
 
 from penode_sil.diagnosis import search
 from penode_sil.diagnosis.build import Term
-from penode_sil.diagnosis.hypotheses import HALVES, Basis
-from penode_sil.diagnosis.score import Candidate, Regression
 from penode_sil.diagnosis.exchange import sprung
 from penode_sil.diagnosis.explaining import acting, heavy
 from penode_sil.diagnosis.explanation import COST, NEW, Explanation, distinct, only_noise, spared
+from penode_sil.diagnosis.hypotheses import HALVES, Basis
 from penode_sil.diagnosis.pursuit import PART, elsewhere, pursue, strongest, terms_of
 from penode_sil.diagnosis.refining import called
+from penode_sil.diagnosis.score import Candidate, Regression
 from penode_sil.diagnosis.singles import rigid, sufficient
 from penode_sil.diagnosis.textbook import halved, weak, whole
 
@@ -78,7 +78,10 @@ def test_a_load_pays_for_looking_like_a_bias_only_once():
 
 def test_form_is_a_part_of_what_formulas_leave():
     """A load takes 150 000 and has no form to mend; a second cause that gains 1 000 beside it is worth nearly that."""
-    alone, both = explanation("constant_force", gain=150_000.0), explanation("constant_force", "tyre_liftoff", gain=151_000.0, formulas=150_000.0)
+    alone, both = (
+        explanation("constant_force", gain=150_000.0),
+        explanation("constant_force", "tyre_liftoff", gain=151_000.0, formulas=150_000.0),
+    )
     assert 900.0 < both.score - alone.score < 950.0  # 50 for the kind, 10 for its number, and thousandths of 1 000
     assert explanation("constant_force", "tyre_liftoff", gain=151_000.0).score < alone.score + 800.0
 
@@ -167,7 +170,11 @@ def test_a_play_of_nothing_takes_away_nothing():
 def test_a_law_that_mends_a_form_leaves_the_name():
     """What the curve of the tyre is called now does not count, also if a law fell out of it; a curve elsewhere keeps its own name."""
     known = explanation("tyre_nonlinear", "tyre_nonlinear", "sensor_bias")
-    for kinds in (("tyre_liftoff", "tyre_liftoff", "sensor_bias"), ("tyre_nonlinear", "tyre_liftoff", "tyre_liftoff", "sensor_bias"), ("tyre_liftoff", "sensor_bias")):
+    for kinds in (
+        ("tyre_liftoff", "tyre_liftoff", "sensor_bias"),
+        ("tyre_nonlinear", "tyre_liftoff", "tyre_liftoff", "sensor_bias"),
+        ("tyre_liftoff", "sensor_bias"),
+    ):
         e = called(explanation(*kinds), known)
         assert e.groups == known.groups and [t.gain for t in e.terms] == [1.0] * len(kinds)
     assert called(explanation("coulomb_friction"), known).groups == (("coulomb_friction", "body"),)
@@ -247,14 +254,28 @@ def test_a_hopeless_search_ends_after_its_round(monkeypatch, hopeless, causes):
 
     def made(n: int) -> SimpleNamespace:
         fit = SimpleNamespace(chi2=0.0)
-        return SimpleNamespace(groups=tuple(("bump_stop", str(i)) for i in range(n)), terms=[], gain=100.0 * n, score=100.0 * n, fit=fit, formulas=0.0)
+        return SimpleNamespace(
+            groups=tuple(("bump_stop", str(i)) for i in range(n)), terms=[], gain=100.0 * n, score=100.0 * n, fit=fit, formulas=0.0
+        )
 
     exchanged = []
-    same = {"owned": lambda study, e, log: e, "plain": lambda study, e, parameters, log: e, "settled": lambda study, e: e, "with_noise_of": lambda study, fit: study,
-            "spared": list, "level": list, "unloaded": lambda e: e.groups, "ranked": lambda study, best, rest, log: [best, *rest], "heavy": lambda e: False,
-            "further": lambda study, e, r: [[0]], "terms_of": lambda r, chosen: [len(r.groups)], "filtered": lambda study, e, r: None,
-            "_refined": lambda study, e, parameters, log: (study, e, e), "explain": lambda study, terms, start, formulas: made(terms[-1] + 1),
-            "exchanged": lambda study, e, parameters, log: exchanged.append(e) or []}  # fmt: skip
+    same = {
+        "owned": lambda study, e, log: e,
+        "plain": lambda study, e, parameters, log: e,
+        "settled": lambda study, e: e,
+        "with_noise_of": lambda study, fit: study,
+        "spared": list,
+        "level": list,
+        "unloaded": lambda e: e.groups,
+        "ranked": lambda study, best, rest, log: [best, *rest],
+        "heavy": lambda e: False,
+        "further": lambda study, e, r: [[0]],
+        "terms_of": lambda r, chosen: [len(r.groups)],
+        "filtered": lambda study, e, r: None,
+        "_refined": lambda study, e, parameters, log: (study, e, e),
+        "explain": lambda study, terms, start, formulas: made(terms[-1] + 1),
+        "exchanged": lambda study, e, parameters, log: exchanged.append(e) or [],
+    }
     for name, stub in same.items():
         monkeypatch.setattr(search, name, stub)
     study = SimpleNamespace(null=SimpleNamespace(free=()))

@@ -43,9 +43,7 @@ def test_slope_is_the_derivative_of_value(signal):
 @pytest.mark.parametrize("signal", SIGNALS[2:6], ids=lambda s: f"{s.frequency} Hz {s.rate} Hz/s")
 def test_velocity_chirp_is_the_integral_of_its_velocity(signal):
     for end in (0.3, 2.0, 7.7):
-        exact, bound = quad(
-            lambda t: float(signal.slope(np.float64(t))), 0.0, end, epsabs=1e-13, epsrel=1e-13, limit=500
-        )
+        exact, bound = quad(lambda t: float(signal.slope(np.float64(t))), 0.0, end, epsabs=1e-13, epsrel=1e-13, limit=500)
         assert abs(float(signal.value(np.float64(end))) - exact) < bound + 1e-13
 
 
@@ -99,9 +97,5 @@ def test_road_starts_at_rest():
 
 def test_bump_and_ramp_end_where_they_should():
     bump, ramp = Bump(0.08, 1.0, 0.4), Ramp(0.05, 1.0, 0.7)
-    assert bump.value(np.array([0.0, 1.0, 1.2, 1.4, 9.0])) == pytest.approx(
-        [0.0, 0.0, 0.08, 0.0, 0.0], abs=1e-17
-    )  # cos(2 pi) is 1 exactly
-    assert ramp.value(np.array([0.0, 1.0, 1.35, 1.7, 9.0])) == pytest.approx(
-        [0.0, 0.0, 0.025, 0.05, 0.05], abs=1e-16
-    )  # some 2^-53
+    assert bump.value(np.array([0.0, 1.0, 1.2, 1.4, 9.0])) == pytest.approx([0.0, 0.0, 0.08, 0.0, 0.0], abs=1e-17)  # cos(2 pi) is 1 exactly
+    assert ramp.value(np.array([0.0, 1.0, 1.35, 1.7, 9.0])) == pytest.approx([0.0, 0.0, 0.025, 0.05, 0.05], abs=1e-16)  # some 2^-53

@@ -9,11 +9,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import penode_gen
 import pytest
 from one_mass import STEP, model
 from scipy.signal import StateSpace, lsim
 
+import penode_gen
 from penode_sil.cli import main
 from penode_sil.diagnosis.still import with_noise_at_rest
 from penode_sil.errors import UserError
@@ -63,7 +63,9 @@ def test_a_wrong_damping_is_found_in_the_noise_of_the_bench_not_in_that_of_the_f
 def test_noise_is_that_of_all_recordings_about_a_drift(rig):
     known = penode_gen.load(rig / "rig.toml")
     t, push, x = np.loadtxt(rig / "still.csv", delimiter=",", skiprows=1).T
-    np.savetxt(rig / "drifts.csv", np.column_stack([t, push, x + 5.0 * t]), delimiter=",", header="time [s],push [N],x_mass [mm]", comments="")
+    np.savetxt(
+        rig / "drifts.csv", np.column_stack([t, push, x + 5.0 * t]), delimiter=",", header="time [s],push [N],x_mass [mm]", comments=""
+    )
     quiet = with_noise_at_rest(known, [rig / "still.csv", rig / "drifts.csv"], (), ())
     assert abs(quiet.sensors[0].noise / NOISE - 1.0) < 4.0 / np.sqrt(2.0 * SAMPLES)  # four deviations of an estimate from so many samples
     assert quiet.inputs == known.inputs  # a push that is exactly zero shows no noise

@@ -16,8 +16,8 @@ from conftest import ROOT
 
 import penode_gen
 from penode_sil.errors import UserError
-from penode_sil.schedule import Call, exchange_calls
 from penode_sil.scenario import Exchange
+from penode_sil.schedule import Call, exchange_calls
 from penode_sil.signals import VelocityChirp
 from penode_sil.status import FLAGS, counts
 from penode_sil.targets import MACHINES, Pil, Sil
@@ -46,20 +46,9 @@ def every_call(model):
     calls += exchange_calls(model, Exchange(0.1, "altered_friction", "write", 64), np.float32)
     calls += exchange_calls(model, Exchange(0.15, "default", "write", 100, hold=True), np.float32)
     calls += [Call(200, "rollback"), Call(250, "select", set="default"), Call(251, "abort"), Call(251, "commit")]
-    calls += [
-        Call(300, "begin", head=(1, 2, 3, 4)),
-        Call(300, "begin", head=penode_gen.set_head(model, "default", np.float32)),
-    ]
-    calls += [
-        Call(301, "write", offset=5, values=np.ones(3, dtype=np.float32)),
-        Call(302, "commit"),
-        Call(303, "abort"),
-    ]
-    calls += [
-        Call(400, "hold", on=True),
-        Call(420, "hold", on=False),
-        Call(500, "state", values=np.full(4, np.nan, np.float32)),
-    ]
+    calls += [Call(300, "begin", head=(1, 2, 3, 4)), Call(300, "begin", head=penode_gen.set_head(model, "default", np.float32))]
+    calls += [Call(301, "write", offset=5, values=np.ones(3, dtype=np.float32)), Call(302, "commit"), Call(303, "abort")]
+    calls += [Call(400, "hold", on=True), Call(420, "hold", on=False), Call(500, "state", values=np.full(4, np.nan, np.float32))]
     return u, calls
 
 
@@ -133,9 +122,7 @@ def test_double_on_the_host_is_close_to_float(nqvm):
 
 def test_flags_are_those_of_the_header():
     text = (ROOT / "inc" / "penode" / "pen_status.h").read_text()
-    flags = {
-        int(value, 16): name.lower() for name, value in re.findall(r"#define PEN_(\w+)\s+UINT32_C\(0x(\w+)\)", text)
-    }
+    flags = {int(value, 16): name.lower() for name, value in re.findall(r"#define PEN_(\w+)\s+UINT32_C\(0x(\w+)\)", text)}
     assert [flags[1 << n] for n in range(len(FLAGS))] == list(FLAGS)
 
 

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from penode_sil.diagnosis.evidence import prior
 from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.worth import own

@@ -29,10 +29,28 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Path:
     elf = tmp_path_factory.mktemp("xcp") / "server"
     model = ROOT / "gen" / "nqvm" / "c"
     subprocess.run(
-        [ROOT / "port/host/cc", "gcc", "-std=c99", "-D_GNU_SOURCE", "-O2", "-Wall", "-Wextra", "-Werror", f"-I{model}", f"-I{ROOT}/port/xcp", "-pthread",
-         "-o", elf, XCP / "server.c", ROOT / "port/xcp/xcp_frame.c", *sorted((ROOT / "src").glob("*.c")), model / "nqvm.c", model / "nqvm_params.c"],
+        [
+            ROOT / "port/host/cc",
+            "gcc",
+            "-std=c99",
+            "-D_GNU_SOURCE",
+            "-O2",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            f"-I{model}",
+            f"-I{ROOT}/port/xcp",
+            "-pthread",
+            "-o",
+            elf,
+            XCP / "server.c",
+            ROOT / "port/xcp/xcp_frame.c",
+            *sorted((ROOT / "src").glob("*.c")),
+            model / "nqvm.c",
+            model / "nqvm_params.c",
+        ],
         check=True,
-    )  # fmt: skip
+    )
     return elf
 
 

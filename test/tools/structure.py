@@ -38,7 +38,9 @@ BUDGETS = ("thresholds of innovations", "settings of training", "runtime lines",
 ELEMENTARY = {"pen_elementary.h", "pen_parts.h", "pen_trig.c", "pen_atan.c", "pen_log.c", "pen_root.c"}
 
 NEWER, TABLE = BUDGETS[:2]
-ROOMS = re.compile(r"sil/penode_sil/diagnosis/(evidence|catalogue)/|sil/penode_sil/diagnosis/(propose|terms|worth|rounds|reconsider|innovate|parameters|real|weighed|beginning)\.py")
+ROOMS = re.compile(
+    r"sil/penode_sil/diagnosis/(evidence|catalogue)/|sil/penode_sil/diagnosis/(propose|terms|worth|rounds|reconsider|innovate|parameters|real|weighed|beginning)\.py"
+)
 
 Found = dict[str, list[str]]
 
@@ -101,8 +103,7 @@ def thresholds(text: str) -> Iterator[int]:
 def python_imports(root: Path, package: Path) -> dict[str, set[str]]:
     """Which modules of a package each of them imports, wherever the import stands."""
     modules = {
-        ".".join(p.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__"): p
-        for p in sorted(package.rglob("*.py"))
+        ".".join(p.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__"): p for p in sorted(package.rglob("*.py"))
     }
     edges: dict[str, set[str]] = {name: set() for name in modules}
     for name, path in modules.items():

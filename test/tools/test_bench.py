@@ -59,11 +59,7 @@ def assembled(text: str, folder: Path, entry: str = "f") -> Path:
         ("vcvt.f32.s32 s0, s0; vmov r0, s0; vmov s0, s1, r0, r1", (1, 2, 2), (1, 2, 2)),
         ("push {r4-r7, lr}; vpush {d8-d9}; vldmia r0!, {s0-s2}", (6, 5, 4), (6, 5, 4)),
         ("mla r0, r1, r2, r3; mul r0, r1, r2; udiv r0, r1, r2", (2, 1, 2), (2, 1, 12)),
-        (
-            "cmp r0, r1; it eq; moveq r0, r1; bls 1f; vmls.f32 s0, s1, s2; 1: bx lr",
-            (1, 0, 1, 1, 3, 1),
-            (1, 1, 1, 1, 3, 1),
-        ),
+        ("cmp r0, r1; it eq; moveq r0, r1; bls 1f; vmls.f32 s0, s1, s2; 1: bx lr", (1, 0, 1, 1, 3, 1), (1, 1, 1, 1, 3, 1)),
     ],
 )
 def test_cycles(code: str, low: tuple[int, ...], high: tuple[int, ...], tmp_path: Path) -> None:
@@ -115,8 +111,15 @@ CASES = [model("nqvm"), model("nqvm_folded"), *worst_case.everything()]
 
 KERNELS = [(machine, case.name) for machine in worst_case.FPU for case in CASES]
 # All models on one core; on each of the others the layered or the folded one, and a model of every law.
-SHORT = [*KERNELS[: len(CASES)], ("m7", "nqvm"), ("m7", "all_laws_rk4_clamp"), ("m33", "nqvm_folded"), ("m33", "all_laws_ros1_clamp"),
-         ("m55", "nqvm"), ("m55", "all_laws_ros1_fade")]  # fmt: skip
+SHORT = [
+    *KERNELS[: len(CASES)],
+    ("m7", "nqvm"),
+    ("m7", "all_laws_rk4_clamp"),
+    ("m33", "nqvm_folded"),
+    ("m33", "all_laws_ros1_clamp"),
+    ("m55", "nqvm"),
+    ("m55", "all_laws_ros1_fade"),
+]
 
 
 @pytest.mark.parametrize("machine, name", sample(KERNELS, *SHORT))
@@ -143,8 +146,7 @@ def test_a_peer_that_computes_something_else_is_found() -> None:
     at = np.unravel_index(np.abs(wrong).argmax(), wrong.shape)
     wrong[at] *= np.float32(1.01)
     other = dataclasses.replace(
-        case,
-        networks=case.networks | {"spring": [case.networks["spring"][0], (wrong, bias), *case.networks["spring"][2:]]},
+        case, networks=case.networks | {"spring": [case.networks["spring"][0], (wrong, bias), *case.networks["spring"][2:]]}
     )
     u = bench.chirp(300)
 
@@ -195,7 +197,10 @@ FILE = re.compile(r"`(\w+\.(?:toml|py))`")
 def tables(text: str) -> list[list[list[str]]]:
     """Each table of a page: rows of cells, the header first."""
     blocks = re.findall(r"(?:^\|.*\n)+", text + "\n", re.M)
-    return [[[cell.strip() for cell in line.strip("|\n ").split("|")] for line in block.splitlines() if "| --- |" not in line] for block in blocks]
+    return [
+        [[cell.strip() for cell in line.strip("|\n ").split("|")] for line in block.splitlines() if "| --- |" not in line]
+        for block in blocks
+    ]
 
 
 def block(name: str) -> str:

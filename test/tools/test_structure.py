@@ -47,7 +47,17 @@ def tree(tmp_path: Path) -> Path:
 
 
 def test_counts_of_a_small_tree(tree: Path) -> None:
-    counts = {"long files": 1, "long functions": 0, "circular imports": 0, "named thresholds": 1, "thresholds of innovations": 0, "settings of training": 0, "runtime lines": 410, "elementary lines": 0, "wire protocol lines": 5}
+    counts = {
+        "long files": 1,
+        "long functions": 0,
+        "circular imports": 0,
+        "named thresholds": 1,
+        "thresholds of innovations": 0,
+        "settings of training": 0,
+        "runtime lines": 410,
+        "elementary lines": 0,
+        "wire protocol lines": 5,
+    }
     assert structure.look(tree)[0] == counts
     assert structure.main(["--root", str(tree)]) == 0
 

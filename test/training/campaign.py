@@ -67,7 +67,10 @@ def model_of(case: Case) -> Model:
     model = penode_gen.load(HERE / ("quarter_two.toml" if case.two else "quarter.toml"))
     shape = {"layers": list(case.layers), "activation": case.activation}
     networks = {n: untrained(shape, len(p.input_units), n) for n, p in model.networks.items()}
-    parameters = {n: replace(p, value=p.value * (case.off or {}).get(n, 1.0), tolerance=0.0 if case.exact else p.tolerance) for n, p in model.parameters.items()}
+    parameters = {
+        n: replace(p, value=p.value * (case.off or {}).get(n, 1.0), tolerance=0.0 if case.exact else p.tolerance)
+        for n, p in model.parameters.items()
+    }
     return replace(model, parameters=parameters, sets={"default": replace(model.sets["default"], networks=networks)})
 
 
@@ -116,12 +119,23 @@ def run(case: Case, seed: int, folder: Path) -> dict[str, object]:
     found = list(judged(case, made, t))
     ratios = [v / generator.PLAIN[n] for n, (v, *_) in t.parameters.items()] or [1.0]
     return {
-        "case": case.name, "seed": seed, "code": code(), "seconds": t.seconds, "loop": 0.5 * (loop + clock.loop()),
-        "forces": {n: e for n, e, _ in found}, "covered": [c for *_, c in found if np.isfinite(c)],
-        "ratios": 100.0 * (max(ratios) / min(ratios) - 1.0), "absolute": 100.0 * max(abs(r - 1.0) for r in ratios),
-        "holdout": 100.0 * (max(e.inside / e.noise for e in t.holdout) - 1.0), "masked": 100.0 * t.masked, "outside": 100.0 * t.outside,
-        "converged": bool(t.converged), "scale": any(u.kind == "scale" for u in t.unknown), "turns": any("turns at once" in n for n in t.notes), "chi2": t.chi2,
-    }  # fmt: skip
+        "case": case.name,
+        "seed": seed,
+        "code": code(),
+        "seconds": t.seconds,
+        "loop": 0.5 * (loop + clock.loop()),
+        "forces": {n: e for n, e, _ in found},
+        "covered": [c for *_, c in found if np.isfinite(c)],
+        "ratios": 100.0 * (max(ratios) / min(ratios) - 1.0),
+        "absolute": 100.0 * max(abs(r - 1.0) for r in ratios),
+        "holdout": 100.0 * (max(e.inside / e.noise for e in t.holdout) - 1.0),
+        "masked": 100.0 * t.masked,
+        "outside": 100.0 * t.outside,
+        "converged": bool(t.converged),
+        "scale": any(u.kind == "scale" for u in t.unknown),
+        "turns": any("turns at once" in n for n in t.notes),
+        "chi2": t.chi2,
+    }
 
 
 def line(rows: list[dict[str, object]]) -> str:
@@ -134,11 +148,18 @@ def line(rows: list[dict[str, object]]) -> str:
     forces = "; ".join(f"{n} {span([r['forces'][n] for r in good])}" for n in (good[0]["forces"] if good else ()))  # type: ignore[index,attr-defined]
     cover = [c for r in good for c in r["covered"]]  # type: ignore[attr-defined]
     cells = [
-        str(rows[0]["case"]), f"{sum(bool(r['converged']) for r in good)} of {len(rows)}", span([r["seconds"] for r in good], ".1f"),  # type: ignore[misc]
-        span([r["seconds"] / r["loop"] for r in good], ".0f"), forces,  # type: ignore[operator,misc]
-        span([r["ratios"] for r in good]), span([r["absolute"] for r in good]), span([r["holdout"] for r in good]), span([r["masked"] for r in good], ".1f"),  # type: ignore[misc]
-        f"{np.mean(cover):.0f}" if cover else "", f"{sum(bool(r['scale']) for r in good)} of {len(good)}",
-    ]  # fmt: skip
+        str(rows[0]["case"]),
+        f"{sum(bool(r['converged']) for r in good)} of {len(rows)}",
+        span([r["seconds"] for r in good], ".1f"),  # type: ignore[misc]
+        span([r["seconds"] / r["loop"] for r in good], ".0f"),
+        forces,  # type: ignore[operator,misc]
+        span([r["ratios"] for r in good]),
+        span([r["absolute"] for r in good]),
+        span([r["holdout"] for r in good]),
+        span([r["masked"] for r in good], ".1f"),  # type: ignore[misc]
+        f"{np.mean(cover):.0f}" if cover else "",
+        f"{sum(bool(r['scale']) for r in good)} of {len(good)}",
+    ]
     return "| " + " | ".join(cells) + " |"
 
 

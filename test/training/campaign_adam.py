@@ -26,7 +26,9 @@ FORCE = 1000.0
 
 def network(found: dict[str, np.ndarray], name: str) -> Network:
     """A network of the rival, with its scalings; what it gives at 0 is taken away."""
-    dense = [Dense(found[f"{name}_w{n}"].astype(float), found[f"{name}_b{n}"].astype(float), "relu" if n < 3 else "identity") for n in range(4)]
+    dense = [
+        Dense(found[f"{name}_w{n}"].astype(float), found[f"{name}_b{n}"].astype(float), "relu" if n < 3 else "identity") for n in range(4)
+    ]
     layers = (Affine(np.zeros(1), np.array([1.0 / SCALE[name]]), "centre"), *dense, Affine(np.zeros(1), np.array([FORCE]), "centre"))
     return Network(layers, None, None, "adam")
 

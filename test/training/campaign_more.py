@@ -44,7 +44,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for noise in (1.0, 5.0):
             rows = [
-                kept(given.out.with_suffix(".jsonl"), [noise, seed], lambda n=noise, k=seed: damping(generator.make(generator.Truth(), k, n), n, Path(folder)))
+                kept(
+                    given.out.with_suffix(".jsonl"),
+                    [noise, seed],
+                    lambda n=noise, k=seed: damping(generator.make(generator.Truth(), k, n), n, Path(folder)),
+                )
                 for seed in range(1, given.seeds + 1)
             ]
             held = sum(abs(v - t) < 2.0 * s for v, s, t in rows)

@@ -60,29 +60,71 @@ def asked(rows: list[Row]) -> list[tuple[str, str, str, bool | None]]:
     for case in ("x1, 1-16-16-1", "x1, 1-16-16-16-1"):
         own = [r for r in rows if r["case"] == case]
         seconds, off = (lambda own=own: most(own, lambda r: r["seconds"])), (lambda own=own: most(own, error))
-        add(case, "5 s of processor time, force error 1 % of span", own, lambda: f"{seconds():.1f} s, {off():.2f} %", lambda: seconds() <= 5.0 and off() <= 1.0)
-    for case, bar, key in (("m_b weighed", "parameters within 1 %", "absolute"), ("nothing weighed", "ratios within 1 %, scale reported", "ratios")):
+        add(
+            case,
+            "5 s of processor time, force error 1 % of span",
+            own,
+            lambda: f"{seconds():.1f} s, {off():.2f} %",
+            lambda: seconds() <= 5.0 and off() <= 1.0,
+        )
+    for case, bar, key in (
+        ("m_b weighed", "parameters within 1 %", "absolute"),
+        ("nothing weighed", "ratios within 1 %, scale reported", "ratios"),
+    ):
         own = of(rows, case)
-        add(f"x5, parameters off 10 %, {case}", f"10 s, 2.5 %, {bar}", own,
-            lambda own=own, key=key: f"{most(own, lambda r: r['seconds']):.1f} s, {most(own, error):.2f} %, {most(own, lambda r: r[key]):.2f} %",
-            lambda own=own, key=key: most(own, lambda r: r["seconds"]) <= 10.0 and most(own, error) <= 2.5 and most(own, lambda r: r[key]) <= 1.0
-            and (key == "absolute" or all(r["scale"] for r in own if "failed" not in r)))
+        add(
+            f"x5, parameters off 10 %, {case}",
+            f"10 s, 2.5 %, {bar}",
+            own,
+            lambda own=own, key=key: (
+                f"{most(own, lambda r: r['seconds']):.1f} s, {most(own, error):.2f} %, {most(own, lambda r: r[key]):.2f} %"
+            ),
+            lambda own=own, key=key: (
+                most(own, lambda r: r["seconds"]) <= 10.0
+                and most(own, error) <= 2.5
+                and most(own, lambda r: r[key]) <= 1.0
+                and (key == "absolute" or all(r["scale"] for r in own if "failed" not in r))
+            ),
+        )
     for noise, bar in (("x1", 2.0), ("x5", 4.0)):
         own = of(rows, f"{noise}, tanh")
         good = [r for r in own if r.get("converged")]
-        add(f"{noise}, tanh 2-16-16-1", f"60 s, {bar:g} %; 9 of 10 seeds converge, others say so", own,
-            lambda good=good, own=own: f"{len(good)} converged, these {most(good, lambda r: r['seconds']):.1f} s, {most(good, error):.2f} %; the others report that they did not",
-            lambda good=good, own=own, bar=bar: most(good, lambda r: r["seconds"]) <= 60.0 and most(good, error) <= bar and len(good) >= 0.9 * len(own))
+        add(
+            f"{noise}, tanh 2-16-16-1",
+            f"60 s, {bar:g} %; 9 of 10 seeds converge, others say so",
+            own,
+            lambda good=good, own=own: (
+                f"{len(good)} converged, these {most(good, lambda r: r['seconds']):.1f} s, {most(good, error):.2f} %; the others report that they did not"
+            ),
+            lambda good=good, own=own, bar=bar: (
+                most(good, lambda r: r["seconds"]) <= 60.0 and most(good, error) <= bar and len(good) >= 0.9 * len(own)
+            ),
+        )
     for what, some, bar in (("curves", [r for r in rows if "tanh" not in r["case"]], 2.0), ("end to end", of(rows, "tanh"), 5.0)):
-        add(f"hold-out inside the trained range, {what}", f"within {bar:g} % of the noise; at most 10 % masked", some,
+        add(
+            f"hold-out inside the trained range, {what}",
+            f"within {bar:g} % of the noise; at most 10 % masked",
+            some,
             lambda some=some: f"{most(some, lambda r: r['holdout']):.2f} %, {most(some, lambda r: r['masked']):.1f} % masked",
-            lambda some=some, bar=bar: most(some, lambda r: r["holdout"]) <= bar and most(some, lambda r: r["masked"]) <= 10.0)
+            lambda some=some, bar=bar: most(some, lambda r: r["holdout"]) <= bar and most(some, lambda r: r["masked"]) <= 10.0,
+        )
     curves = [r for r in rows if r.get("covered") and not r.get("turns")]
-    add("bands of trained curves", "2 sigma cover 90 to 98 %", curves, lambda: f"{2 * len(curves)} curves, {covered(curves):.1f} %", lambda: 90.0 <= covered(curves) <= 98.0)
+    add(
+        "bands of trained curves",
+        "2 sigma cover 90 to 98 %",
+        curves,
+        lambda: f"{2 * len(curves)} curves, {covered(curves):.1f} %",
+        lambda: 90.0 <= covered(curves) <= 98.0,
+    )
     turns = [r for r in rows if r.get("covered") and r.get("turns")]
     if turns:
-        add("the same, beside a turn between two knots, which is reported", "2 sigma cover 90 to 98 %", turns,
-            lambda: f"{2 * len(turns)} curves, {covered(turns):.1f} %", lambda: 90.0 <= covered(turns) <= 98.0)
+        add(
+            "the same, beside a turn between two knots, which is reported",
+            "2 sigma cover 90 to 98 %",
+            turns,
+            lambda: f"{2 * len(turns)} curves, {covered(turns):.1f} %",
+            lambda: 90.0 <= covered(turns) <= 98.0,
+        )
     return found
 
 
@@ -96,19 +138,38 @@ def page(folder: Path) -> str:
     """The whole page."""
     rows = campaign.read(folder / "rows.jsonl")
     marks = {True: "yes", False: "no", None: "open"}
-    lines = ["# Trained networks against plants that are known", "", " ".join((campaign.__doc__ or "").split()).replace("`make campaign-train`: ", "Written by `make campaign-train`: ", 1), ""]
+    lines = [
+        "# Trained networks against plants that are known",
+        "",
+        " ".join((campaign.__doc__ or "").split()).replace("`make campaign-train`: ", "Written by `make campaign-train`: ", 1),
+        "",
+    ]
     lines += ["## What is asked", "", "| what | asked | found | met |", "|---|---|---|---|"]
     lines += [f"| {what} | {bar} | {text} | {marks[good]} |" for what, bar, text, good in asked(rows)]
-    parts = (("rigs", "networks beside the laws of the diagnosis, measured dampers"), ("promises", "promises by exact arithmetic"), ("damping", "damping beside a network"), ("adam", "plain Adam on whole trajectories"))
+    parts = (
+        ("rigs", "networks beside the laws of the diagnosis, measured dampers"),
+        ("promises", "promises by exact arithmetic"),
+        ("damping", "damping beside a network"),
+        ("adam", "plain Adam on whole trajectories"),
+    )
     for name, title in parts:
         found = table(folder, name)
-        lines += [f"| {title}: {label} | | {figure} | {marks[bool(good)]} |" for label, figure, good in found] or [f"| {title} | | {OPEN} | open |"]
-    lines += ["| trained set in the controller | hash of states of SiL and PiL equal; onnxruntime equal within rounding | not of this campaign: `test/training/test_deployed.py`, in `make test` | by test |"]
+        lines += [f"| {title}: {label} | | {figure} | {marks[bool(good)]} |" for label, figure, good in found] or [
+            f"| {title} | | {OPEN} | open |"
+        ]
+    lines += [
+        "| trained set in the controller | hash of states of SiL and PiL equal; onnxruntime equal within rounding | not of this campaign: `test/training/test_deployed.py`, in `make test` | by test |"
+    ]
     lines += ["", STOPS] if of(rows, "stops") else []
     lines += ["", "## By case", "", campaign.HEAD]
     lines += [campaign.line(own) for case in campaign.CASES if (own := [r for r in rows if r["case"] == case.name])]
     versions = {c: sum(r.get("code") == c for r in rows) for c in dict.fromkeys(r.get("code") for r in rows)}
-    lines += ["", "Trainings by digest of the trainer's sources: " + ", ".join(f"{n} by {c}" for c, n in versions.items()) + f"; it is {campaign.code()} now."]
+    lines += [
+        "",
+        "Trainings by digest of the trainer's sources: "
+        + ", ".join(f"{n} by {c}" for c, n in versions.items())
+        + f"; it is {campaign.code()} now.",
+    ]
     earlier = [c.name for c in campaign.CASES if any(r["case"] == c.name and r.get("code") != campaign.code() for r in rows)]
     lines += [f"With trainings by an earlier one: {'; '.join(earlier)}."] if earlier else []
     return "\n".join(lines) + "\n"

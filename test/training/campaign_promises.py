@@ -20,8 +20,8 @@ from fractions import Fraction
 from pathlib import Path
 
 import generator
-import numpy as np
 import kept as parts
+import numpy as np
 
 import penode_gen
 from penode_gen import promises
@@ -88,7 +88,9 @@ def exact(network: Network) -> Exact:
         relu.append(isinstance(layer, Dense) and layer.activation == "relu")
         layers.append(([[(j, Fraction(float(w))) for j, w in enumerate(row) if w] for row in weights], [Fraction(float(b)) for b in bias]))
     over = max(v.denominator for rows, bias in layers for v in (*bias, *(w for row in rows for _, w in row)))  # a power of two: so are all
-    whole = [(tuple(tuple((j, int(w * over)) for j, w in row) for row in rows), tuple(int(b * over) for b in bias)) for rows, bias in layers]
+    whole = [
+        (tuple(tuple((j, int(w * over)) for j, w in row) for row in rows), tuple(int(b * over) for b in bias)) for rows, bias in layers
+    ]
     return Exact(tuple(whole), tuple(relu), over.bit_length() - 1)
 
 
@@ -164,7 +166,10 @@ def trained(count: int, seed: int, folder: Path, promising: bool = True) -> Iter
     model = replace(model, sets={"default": replace(model.sets["default"], networks=shapes)})
     engine = Engine(model, [p.name for p in model.parameters.values() if p.tolerance > 0.0])
     ports = story.ports_of(model, engine)
-    records = [data.record(model, load([generator.make(t, 1, seconds=6.0).write(folder / f"{k}.csv")], model)[0], engine.signals) for k, t in enumerate(PLANTS)]
+    records = [
+        data.record(model, load([generator.make(t, 1, seconds=6.0).write(folder / f"{k}.csv")], model)[0], engine.signals)
+        for k, t in enumerate(PLANTS)
+    ]
     random = np.random.default_rng(seed)
     for _ in range(count):
         given = {p.name: GIVEN[random.integers(len(GIVEN))] for p in ports}
@@ -176,7 +181,11 @@ def trained(count: int, seed: int, folder: Path, promising: bool = True) -> Iter
 def _window(record: data.Record, random: np.random.Generator) -> data.Record:
     """A part of a recording."""
     a = int(random.integers(0, len(record.y) - WINDOW))
-    d = replace(record.drive, u=np.ascontiguousarray(record.drive.u[a : a + WINDOW]), between=np.ascontiguousarray(record.drive.between[a : a + WINDOW - 1]))
+    d = replace(
+        record.drive,
+        u=np.ascontiguousarray(record.drive.u[a : a + WINDOW]),
+        between=np.ascontiguousarray(record.drive.between[a : a + WINDOW - 1]),
+    )
     return replace(record, drive=d, y=record.y[a : a + WINDOW], good=record.good[a : a + WINDOW])
 
 
@@ -250,9 +259,15 @@ def rows(given: argparse.Namespace) -> Iterator[tuple[str, str, bool]]:
     done = given.out.with_suffix(".jsonl")
     some = [parts.kept(done, ["random", k], lambda k=k: random_curves(k, CHUNK)) for k in range(given.curves // CHUNK)]
     before, after, refused = (sum(values) for values in zip(*some))
-    yield "random curves, broken before and after training's limits, refused", f"{before}, {after} and {refused} of {len(some) * CHUNK}", after == 0
+    yield (
+        "random curves, broken before and after training's limits, refused",
+        f"{before}, {after} and {refused} of {len(some) * CHUNK}",
+        after == 0,
+    )
     with tempfile.TemporaryDirectory() as folder:
-        pairs = [parts.kept(done, ["trained", k], lambda k=k: trained_curves(k, FEW, Path(folder))) for k in range(given.trained // (2 * FEW))]
+        pairs = [
+            parts.kept(done, ["trained", k], lambda k=k: trained_curves(k, FEW, Path(folder))) for k in range(given.trained // (2 * FEW))
+        ]
         wild = parts.kept(done, ["free"], lambda: trained_curves(0, FEW, Path(folder), promising=False))
     wrong, none = (sum(values) for values in zip(*pairs))
     every = 2 * FEW * len(pairs)

@@ -88,7 +88,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rigs", type=Path, default=Path("../shared/measured"))
     parser.add_argument("--only", default="")
-    parser.add_argument("--work", type=Path, default=Path("build/campaign-train/rigs"), help="where diagnoses are kept; one that is there is not made again")
+    parser.add_argument(
+        "--work", type=Path, default=Path("build/campaign-train/rigs"), help="where diagnoses are kept; one that is there is not made again"
+    )
     given = parser.parse_args()
     if not given.rigs.is_dir():
         print(f"SKIPPED: {given.rigs} does not exist; name a folder of measured rigs with --rigs")
@@ -100,7 +102,13 @@ def main() -> None:
         causes, found = errors(given.rigs / rig, name, others, place, given.work.resolve() / Path(name).stem)
         for part, laws, networks in found:
             worse = networks > laws * 1.001  # a network at 0 may differ by the rounding of float, far below
-            rows.append((f"{rig}, first half of {name} ({', '.join(causes)}), held out {part}", f"laws {laws:.1f} N, with networks {networks:.1f} N", not worse))
+            rows.append(
+                (
+                    f"{rig}, first half of {name} ({', '.join(causes)}), held out {part}",
+                    f"laws {laws:.1f} N, with networks {networks:.1f} N",
+                    not worse,
+                )
+            )
             print(*rows[-1], flush=True)
         given.work.with_suffix(".json").write_text(json.dumps(rows), encoding="utf-8")
     sys.exit(not all(good for *_, good in rows))

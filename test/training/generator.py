@@ -59,7 +59,15 @@ def _library() -> ctypes.CDLL:
     library = ctypes.CDLL(str(folder / "plant.so"))
     library.force_of.restype = ctypes.c_double
     library.force_of.argtypes = (ctypes.c_void_p, ctypes.c_int, ctypes.c_double, ctypes.c_double)
-    library.measure.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int, ctypes.c_int, ctypes.c_double, ctypes.c_void_p)
+    library.measure.argtypes = (
+        ctypes.c_void_p,
+        ctypes.c_void_p,
+        ctypes.c_void_p,
+        ctypes.c_int,
+        ctypes.c_int,
+        ctypes.c_double,
+        ctypes.c_void_p,
+    )
     return library
 
 
@@ -97,7 +105,14 @@ class Made:
         """As a table with units; the road's rate as input where asked for."""
         name, drive = ("u [m/s]", self.rate) if rate else ("z_road [m]", self.road)
         table = np.stack([self.time, drive, self.a_body, self.a_wheel], axis=1)
-        np.savetxt(path, table, fmt=["%.6f", "%.15g", "%.9g", "%.9g"], delimiter=",", comments="", header=f"time [s],{name},a_body [m/s^2],a_wheel [m/s^2]")
+        np.savetxt(
+            path,
+            table,
+            fmt=["%.6f", "%.15g", "%.9g", "%.9g"],
+            delimiter=",",
+            comments="",
+            header=f"time [s],{name},a_body [m/s^2],a_wheel [m/s^2]",
+        )
         return path
 
 

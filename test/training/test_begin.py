@@ -24,8 +24,14 @@ QUARTER = Path(__file__).with_name("quarter.toml")
 
 def network(activation: str, inputs: int = 2, scaled: bool = True) -> Network:
     random = np.random.default_rng(3)
-    layers = [Dense(random.normal(size=(7, inputs)), random.normal(size=7), activation), Dense(random.normal(size=(1, 7)), random.normal(size=1), "identity")]
-    first, last = Affine(random.normal(size=inputs), random.uniform(1.0, 2.0, inputs), "centre"), Affine(np.array([3.0]), np.array([40.0]), "rescale")
+    layers = [
+        Dense(random.normal(size=(7, inputs)), random.normal(size=7), activation),
+        Dense(random.normal(size=(1, 7)), random.normal(size=1), "identity"),
+    ]
+    first, last = (
+        Affine(random.normal(size=inputs), random.uniform(1.0, 2.0, inputs), "centre"),
+        Affine(np.array([3.0]), np.array([40.0]), "rescale"),
+    )
     return Network((first, *layers, last) if scaled else tuple(layers), None, None, "given")
 
 
@@ -49,7 +55,20 @@ def test_curve_goes_through_the_network_at_its_knots() -> None:
 
 def test_training_goes_on_where_one_ended(trained: Path, recordings: tuple[Path, Path], tmp_path: Path) -> None:
     """Same recording: the same forces, within their own band, and parameters within theirs."""
-    result = CliRunner().invoke(cli, ["train", str(QUARTER), "--data", str(recordings[0]), "-o", str(tmp_path / "on"), "--from", str(trained / "training.json"), "--json"])
+    result = CliRunner().invoke(
+        cli,
+        [
+            "train",
+            str(QUARTER),
+            "--data",
+            str(recordings[0]),
+            "-o",
+            str(tmp_path / "on"),
+            "--from",
+            str(trained / "training.json"),
+            "--json",
+        ],
+    )
     assert result.exit_code == 0, result.output
     found, before = json.loads(result.output), json.loads((trained / "training.json").read_text())
     assert found["converged"]
@@ -75,7 +94,11 @@ def test_what_files_say(trained: Path) -> None:
         ("net.onnx", "", "has no network net"),
         ("old.mat", "", "neither a model file"),
         ("spring_net.onnx", "nonsense", "not an ONNX file"),
-        ("other.toml", '[model]\nname = "o"\nsample_time = "1 ms"\n[parameters]\nq = { value = 1, unit = "kg" }\n[outputs]\ny = { value = "q", unit = "kg" }\n', "no parameter and no network"),
+        (
+            "other.toml",
+            '[model]\nname = "o"\nsample_time = "1 ms"\n[parameters]\nq = { value = 1, unit = "kg" }\n[outputs]\ny = { value = "q", unit = "kg" }\n',
+            "no parameter and no network",
+        ),
     ],
 )
 def test_bad_start_is_one_line(name: str, text: str, says: str, tmp_path: Path) -> None:

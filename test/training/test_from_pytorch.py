@@ -28,13 +28,26 @@ def exported(path: Path) -> None:
     first[0][:4, 0], first[1][:4] = (10.0, 10.0, -10.0, -10.0), (0.0, -1.0, 0.0, -1.0)
     last = np.zeros((1, 16))
     last[0, :4] = 60.0, -60.0, -60.0, 60.0
-    values = {"w1": first[0], "b1": first[1], "w2": np.eye(16), "b2": np.zeros(16), "w3": last, "b3": np.array([5.0]), "origin": np.array([[5.0]])}
+    values = {
+        "w1": first[0],
+        "b1": first[1],
+        "w2": np.eye(16),
+        "b2": np.zeros(16),
+        "w3": last,
+        "b3": np.array([5.0]),
+        "origin": np.array([[5.0]]),
+    }
     constants = [numpy_helper.from_array(v.astype(np.float32), n) for n, v in values.items()]
-    gemm = [helper.make_node("Gemm", [i, f"w{k}", f"b{k}"], [o], f"/layers/{k}/Gemm", transB=1) for k, i, o in ((1, "rate", "h1"), (2, "a1", "h2"), (3, "a2", "f"))]
+    gemm = [
+        helper.make_node("Gemm", [i, f"w{k}", f"b{k}"], [o], f"/layers/{k}/Gemm", transB=1)
+        for k, i, o in ((1, "rate", "h1"), (2, "a1", "h2"), (3, "a2", "f"))
+    ]
     relu = [helper.make_node("Relu", [f"h{k}"], [f"a{k}"], f"/layers/{k}/Relu") for k in (1, 2)]
     nodes = [gemm[0], relu[0], gemm[1], relu[1], gemm[2], helper.make_node("Sub", ["f", "origin"], ["force"], "/Sub")]
     ends = [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["batch", 1]) for n in ("rate", "force")]
-    made = helper.make_model(helper.make_graph(nodes, "main_graph", ends[:1], ends[1:], constants), opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    made = helper.make_model(
+        helper.make_graph(nodes, "main_graph", ends[:1], ends[1:], constants), opset_imports=[helper.make_opsetid("", 17)], ir_version=8
+    )
     path.write_bytes(made.SerializeToString())
 
 

@@ -75,7 +75,13 @@ def test_first_knots_on_both_sides_of_zero_stay_or_go_together() -> None:
 
 
 def test_a_grid_mirrors_itself_about_zero() -> None:
-    for low, high, count, power in ((-1.19, 1.11, 41, 2.0), (-0.066, 0.041, 29, 1.2), (-1.0, 1e-3, 20, 2.0), (0.0, 0.3, 7, 2.0), (-0.3, 0.3, 5, 2.0)):
+    for low, high, count, power in (
+        (-1.19, 1.11, 41, 2.0),
+        (-0.066, 0.041, 29, 1.2),
+        (-1.0, 1e-3, 20, 2.0),
+        (0.0, 0.3, 7, 2.0),
+        (-0.3, 0.3, 5, 2.0),
+    ):
         found = curve.spaced(low, high, count, power)
         assert len(found) == count and found[0] == low and found[-1] == high and np.all(np.diff(found) > 0.0) and np.sum(found == 0.0) == 1
     found = curve.spaced(-1.19, 1.11, 41, 2.0)

@@ -16,8 +16,8 @@ from penode_gen.model import Promises
 from penode_gen.untrained import untrained
 from penode_sil.training import bands, curve, data, dense, drive, promised, story, unfold
 from penode_sil.training.engine import Engine
-from penode_sil.training.solve import Limits, least
 from penode_sil.training.settings import SETTINGS
+from penode_sil.training.solve import Limits, least
 
 HERE = Path(__file__).parent
 
@@ -52,7 +52,11 @@ def test_sensitivities_are_those_of_the_discrete_step(method: str, activation: s
         differences = (moved(step) - moved(-step)) / (2.0 * step)
         # differences: their own error is of second order, 1e-10 of what bends, and rounding of some hundred operations, 1e-14 of the
         # signal, over the step of 1e-5; a relu that switches in between changes what follows by the share of the step, 1e-5, times its kink
-        error = np.max(np.abs(found[:, :, column] - differences)) if activation != "relu" else np.median(np.abs(found[:, :, column] - differences))
+        error = (
+            np.max(np.abs(found[:, :, column] - differences))
+            if activation != "relu"
+            else np.median(np.abs(found[:, :, column] - differences))
+        )
         assert error < (1e-4 if activation == "relu" else 1e-5) * np.max(np.abs(differences)) + 1e-9 * np.max(np.abs(found)), column
 
 
@@ -66,10 +70,14 @@ def test_simulation_is_that_of_the_deployed_step() -> None:
     zero = int(np.flatnonzero(knots == 0.0)[0])
     spring = curve.Curve(knots, 1e3 * knots + 2e5 * knots**2, zero)
     damper = curve.Curve(knots * 20.0, 40.0 * np.tanh(knots * 100.0), zero)
-    networks = {n: unfold.unfold(c, model.sets["default"].networks[n], -1.0, 1.0) for n, c in (("spring_net", spring), ("damper_net", damper))}
+    networks = {
+        n: unfold.unfold(c, model.sets["default"].networks[n], -1.0, 1.0) for n, c in (("spring_net", spring), ("damper_net", damper))
+    }
     u = 0.02 * np.arange(400.0)[:, None] / 400.0
     engine = Engine(model, [])
-    z, _, good = engine.simulate(drive.drive(model, u, False), np.array([p.value for p in model.parameters.values()]), [spring, damper], np.zeros(4))
+    z, _, good = engine.simulate(
+        drive.drive(model, u, False), np.array([p.value for p in model.parameters.values()]), [spring, damper], np.zeros(4)
+    )
     run = Batch(with_networks(model, networks, {}), np.float64).run(u, x0=np.zeros(4), sensors=["a_body", "a_wheel"], outputs=["z_b"])
     assert good
     # the spline of a line is the line; its rate at the very first sample is 0 for the C, so the wheel's acceleration there differs

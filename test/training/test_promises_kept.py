@@ -46,6 +46,8 @@ def test_independent_judge_finds_what_is_broken() -> None:
     rising = np.round(64.0 * knots)
     assert not judged(rising, Promises(increasing=True, max_slope=64.0, dissipative=0.0, zero_at_zero=True))
     dent = rising + np.where(np.arange(9) == 6, 16.5, 0.0)
-    assert judged(dent, Promises(increasing=True)) and judged(dent, Promises(max_slope=100.0)) and not judged(dent, Promises(dissipative=0.0))
+    assert (
+        judged(dent, Promises(increasing=True)) and judged(dent, Promises(max_slope=100.0)) and not judged(dent, Promises(dissipative=0.0))
+    )
     drives = np.where(np.arange(9) == 6, -0.25, rising)
     assert judged(drives, Promises(dissipative=0.125)) and not judged(drives, Promises(dissipative=0.25))

@@ -77,7 +77,9 @@ def whole(short: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, 
     return folder, total
 
 
-def test_ends_with_the_same_bits_wherever_it_stopped(short: Path, whole: tuple[Path, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ends_with_the_same_bits_wherever_it_stopped(
+    short: Path, whole: tuple[Path, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ended, total = whole
     for steps in (1, total // 2, total):
         folder = tmp_path / f"after{steps}"
@@ -88,7 +90,9 @@ def test_ends_with_the_same_bits_wherever_it_stopped(short: Path, whole: tuple[P
         assert results(folder) == results(ended) and not (folder / resume.NAME).exists(), steps
 
 
-def test_goes_on_rather_than_anew_and_may_stop_again(short: Path, whole: tuple[Path, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_goes_on_rather_than_anew_and_may_stop_again(
+    short: Path, whole: tuple[Path, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ended, total = whole
     interrupted(tmp_path / "out", short, monkeypatch, total // 2)
     interrupted(tmp_path / "out", short, monkeypatch, total // 4, "--resume")
@@ -109,7 +113,9 @@ def test_networks_of_any_shape_too(short: Path, tmp_path: Path, monkeypatch: pyt
 
 def test_a_killed_process_leaves_a_checkpoint(short: Path, whole: tuple[Path, int], tmp_path: Path) -> None:
     code = "from penode_sil.cli import cli; cli()"
-    process = subprocess.Popen([sys.executable, "-c", code, "train", str(MODEL), "--data", str(short), "-o", str(tmp_path / "out")], stdout=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, "train", str(MODEL), "--data", str(short), "-o", str(tmp_path / "out")], stdout=subprocess.DEVNULL
+    )
     for _ in range(6000):
         if (tmp_path / "out" / resume.NAME).exists() or process.poll() is not None:
             break

@@ -78,13 +78,25 @@ def test_report_stands_alone(trained: Path) -> None:
 def test_one_weighed_mass_settles_the_scale(recordings: tuple[Path, Path], tmp_path: Path) -> None:
     model = (HERE / "quarter.toml").read_text().replace("value = 90,", "value = 81,").replace("value = 300000", "value = 330000")
     (tmp_path / "quarter.toml").write_text(model)
-    arguments = ["train", str(tmp_path / "quarter.toml"), "--data", str(recordings[0]), "-o", str(tmp_path / "out"), "--known", "m_b=350 kg", "--json"]
+    arguments = [
+        "train",
+        str(tmp_path / "quarter.toml"),
+        "--data",
+        str(recordings[0]),
+        "-o",
+        str(tmp_path / "out"),
+        "--known",
+        "m_b=350 kg",
+        "--json",
+    ]
     result = CliRunner().invoke(cli, arguments)
     assert result.exit_code == 0, result.output
     found = json.loads(result.output)
     assert not [u for u in found["not_identifiable"] if u["kind"] == "scale"]
     for name, p in found["parameters"].items():
-        assert abs(p["value"] / generator.PLAIN[name] - 1.0) < (0.02 if name == "d_t" else 0.01), name  # d_t by its own band of 0.8 % at 42 s, x 1.9
+        assert abs(p["value"] / generator.PLAIN[name] - 1.0) < (0.02 if name == "d_t" else 0.01), (
+            name
+        )  # d_t by its own band of 0.8 % at 42 s, x 1.9
 
 
 @pytest.mark.parametrize(
@@ -93,14 +105,20 @@ def test_one_weighed_mass_settles_the_scale(recordings: tuple[Path, Path], tmp_p
         (lambda t: t, ["--known", "mass"], "no such parameter"),
         (lambda t: t, ["--known", "m_b=3 m"], "measured in kg"),
         (lambda t: t.replace("layers = [16, 16, 16]", "layers = [16, 16], activation = 'step'", 1), [], "cannot be trained"),
-        (lambda t: t.replace('spring_net = { inputs = ["m"], output', 'spring_net = { inputs = [], output'), [], "unit of each input"),
-        (lambda t: t.replace('spring_net = { inputs = ["m"], output', 'spring_net = { inputs = [""], output'), [], "takes a number without unit, an element has a deflection in m"),
+        (lambda t: t.replace('spring_net = { inputs = ["m"], output', "spring_net = { inputs = [], output"), [], "unit of each input"),
+        (
+            lambda t: t.replace('spring_net = { inputs = ["m"], output', 'spring_net = { inputs = [""], output'),
+            [],
+            "takes a number without unit, an element has a deflection in m",
+        ),
         (lambda t: t.replace("value = 300000", "value = -300000"), [], "left all bounds"),
     ],
 )
 def test_bad_input_is_one_line(change, given: list[str], says: str, recordings: tuple[Path, Path], tmp_path: Path) -> None:
     (tmp_path / "quarter.toml").write_text(change((HERE / "quarter.toml").read_text()))
-    result = CliRunner().invoke(cli, ["train", str(tmp_path / "quarter.toml"), "--data", str(recordings[0]), "-o", str(tmp_path / "out"), *given])
+    result = CliRunner().invoke(
+        cli, ["train", str(tmp_path / "quarter.toml"), "--data", str(recordings[0]), "-o", str(tmp_path / "out"), *given]
+    )
     assert isinstance(result.exception, (UserError, penode_gen.ModelError)), result.output
     assert any(says in p for p in result.exception.problems), result.exception.problems
     assert not (tmp_path / "out").exists()
@@ -109,5 +127,7 @@ def test_bad_input_is_one_line(change, given: list[str], says: str, recordings: 
 def test_standing_still_is_refused(tmp_path: Path) -> None:
     rows = "\n".join(f"{k * 1e-3:.3f},0,{0.02 * np.sin(k * k):.5f},{0.1 * np.cos(k * k):.5f}" for k in range(3000))
     (tmp_path / "still.csv").write_text("time [s],z_road [m],a_body [m/s^2],a_wheel [m/s^2]\n" + rows + "\n")
-    result = CliRunner().invoke(cli, ["train", str(HERE / "quarter.toml"), "--data", str(tmp_path / "still.csv"), "-o", str(tmp_path / "out")])
+    result = CliRunner().invoke(
+        cli, ["train", str(HERE / "quarter.toml"), "--data", str(tmp_path / "still.csv"), "-o", str(tmp_path / "out")]
+    )
     assert isinstance(result.exception, UserError) and "no input moves" in result.exception.problems[0]

@@ -35,4 +35,6 @@ def test_page_runs(recordings: tuple[Path, Path], tmp_path: Path, monkeypatch: p
     trained = load(tmp_path / "trained" / "model_trained.toml")
     for name, port in trained.networks.items():
         assert not port.promises or broken(port.promises, trained.sets["default"].networks[name], False) == []
-    assert {"car.set", "report.html", "training.json", "spring_net.onnx", "damper_net.onnx"} <= {p.name for p in (tmp_path / "trained").iterdir()}
+    assert {"car.set", "report.html", "training.json", "spring_net.onnx", "damper_net.onnx"} <= {
+        p.name for p in (tmp_path / "trained").iterdir()
+    }

@@ -31,9 +31,7 @@ def refused(master: Master, call, *arguments) -> str:
 
 
 def master_of(protocol: str, port: int) -> Master:
-    application = create_application_from_config(
-        {"Transport": {"Eth": {"host": "127.0.0.1", "port": port, "protocol": protocol.upper()}}}
-    )
+    application = create_application_from_config({"Transport": {"Eth": {"host": "127.0.0.1", "port": port, "protocol": protocol.upper()}}})
     set_application(application)
     logging.getLogger("PYXCP").setLevel(logging.CRITICAL)
     master = Master("eth", config=application)
@@ -90,7 +88,9 @@ def session(master: Master, new: bytes) -> dict[str, object]:
     for address in (SHOWN, SEGMENT - 4, SEGMENT + len(new) - 3):
         master.setMta(address)
         seen["denied"].append(refused(master, master.download, b"1234"))
-    seen["outside"] = [refused(master, master.shortUpload, 4, a) for a in (0, SHOWN - 1, SHOWN + 13, SEGMENT - 1, SEGMENT + len(new) - 3, 0xFFFFFFFF)]
+    seen["outside"] = [
+        refused(master, master.shortUpload, 4, a) for a in (0, SHOWN - 1, SHOWN + 13, SEGMENT - 1, SEGMENT + len(new) - 3, 0xFFFFFFFF)
+    ]
     seen["back"] = switch(master, 1)
     seen["ecu page"] = master.getCalPage(ECU, 0)
     seen["again"] = refused(master, master.setCalPage, ECU, 0, 0)  # the working page still holds the NaN

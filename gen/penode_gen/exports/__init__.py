@@ -14,14 +14,7 @@ from .interface import Exporter, ExportError, Option, Options, run
 __all__ = ["FORMATS", "ExportError", "Exporter", "Option", "Options", "export", "exporter"]
 
 # Name on the command line -> module of this package, whose EXPORTER it is. A new format is a new line.
-FORMATS: dict[str, str] = {
-    "fmu3": "fmu3",
-    "fmu2": "fmu2",
-    "modelica": "modelica",
-    "ssp": "ssp",
-    "a2l": "a2l",
-    "efmu": "efmu",
-}
+FORMATS: dict[str, str] = {"fmu3": "fmu3", "fmu2": "fmu2", "modelica": "modelica", "ssp": "ssp", "a2l": "a2l", "efmu": "efmu"}
 
 
 @cache

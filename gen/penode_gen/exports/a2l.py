@@ -51,7 +51,9 @@ def epk(program: Program, symbol: str | None) -> tuple[str, int] | None:
     except UnicodeDecodeError as exc:
         raise ExportError(f"--epk: {name} is no ASCII text; name an array of characters") from exc
     if not text or quote(text) != f'"{text}"':  # a tool compares it with the memory, character by character
-        raise ExportError(f'--epk: {name} holds "{text}", which an A2L cannot repeat as it is; use a text without quotes, backslashes and double spaces')
+        raise ExportError(
+            f'--epk: {name} holds "{text}", which an A2L cannot repeat as it is; use a text without quotes, backslashes and double spaces'
+        )
     return text, place.address
 
 
@@ -62,13 +64,17 @@ def _measured(model: Model, program: Program, instance: str, named: str | None) 
     try:
         found.of_model(model, instance)
     except KeyError as exc:
-        raise ExportError(f"{program.path}: {exc.args[0]} is not there; generate the C of {model.path.name} again with penode {VERSION}") from exc
+        raise ExportError(
+            f"{program.path}: {exc.args[0]} is not there; generate the C of {model.path.name} again with penode {VERSION}"
+        ) from exc
     sensors = program.names(f"{model.name}_z_t")
     for name in others or sensors[:1]:
         try:
             found.of_variable(model, name)
         except KeyError as exc:
-            problems.append(f"--measure: {program.path} has no variable {exc.args[0]}; name variables outside of functions, with commas between")
+            problems.append(
+                f"--measure: {program.path} has no variable {exc.args[0]}; name variables outside of functions, with commas between"
+            )
     if problems:
         raise ExportError(*problems)
     return found
@@ -95,9 +101,16 @@ def _build(model: Model, options: Options) -> bytes:
 
 
 def describe(
-    model: Model, program: Program, values: Place, measured: Measurements, wire: dict[str, Any], identity: tuple[str, int] | None, max_cto: Any = None,
-    pages: bool = True, addresses: bool = True,
-) -> str:  # fmt: skip
+    model: Model,
+    program: Program,
+    values: Place,
+    measured: Measurements,
+    wire: dict[str, Any],
+    identity: tuple[str, int] | None,
+    max_cto: Any = None,
+    pages: bool = True,
+    addresses: bool = True,
+) -> str:
     """
     The text of an A2L. `values`: the array of a set; `pages`: a slave of penode switches between two of them there; `addresses`: False for
     zeros, where SYMBOL_LINKs are to be resolved. Raises ExportError.
@@ -112,11 +125,25 @@ def describe(
         if not _IDENTIFIER.fullmatch(name):
             raise ExportError(f"{model.path.name}: {name}: A2L has no such names; use letters without accents, digits and underscores")
     return render(
-        "a2l.j2", version=VERSION, model=model, values=values, characteristics=entries, measurements=measured.found.values(),
-        groups=_groups(entries, measured), units=_units(shown), scale={entry.unit: 1.0 / entry.factor for entry in shown}, wire=wire, epk=identity,
-        lists=static_lists(program), max_cto=int(max_cto or _PACKET[wire["kind"]]), little=program.little_endian, cycle=_cycle(model.sample_time),
-        quote=quote, pages=pages, addresses=addresses,
-    )  # fmt: skip
+        "a2l.j2",
+        version=VERSION,
+        model=model,
+        values=values,
+        characteristics=entries,
+        measurements=measured.found.values(),
+        groups=_groups(entries, measured),
+        units=_units(shown),
+        scale={entry.unit: 1.0 / entry.factor for entry in shown},
+        wire=wire,
+        epk=identity,
+        lists=static_lists(program),
+        max_cto=int(max_cto or _PACKET[wire["kind"]]),
+        little=program.little_endian,
+        cycle=_cycle(model.sample_time),
+        quote=quote,
+        pages=pages,
+        addresses=addresses,
+    )
 
 
 def quote(text: str) -> str:

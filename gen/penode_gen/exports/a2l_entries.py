@@ -76,13 +76,17 @@ def page(model: Model, program: Program) -> Place:
     try:
         head, values = (program.find(name) for name in names)
     except KeyError as exc:
-        raise ExportError(f"{program.path}: it has no variable {exc.args[0]}; name a program with the C of {model.name} in it, compiled with -g") from exc
+        raise ExportError(
+            f"{program.path}: it has no variable {exc.args[0]}; name a program with the C of {model.name} in it, compiled with -g"
+        ) from exc
     size = program.find(f"{names[1]}[0]").size
     found = program.bytes_at(head.address, 8)
     order = "little" if program.little_endian else "big"
     expected = (sets.layout(model, _FLOATS[size]), layout.length(model))
     if tuple(int.from_bytes(found[i : i + 4], order) for i in (0, 4)) != expected or values.size != expected[1] * size:
-        raise ExportError(f"{program.path}: its sets are not those of {model.path.name}; generate the C of this model file again, and link it")
+        raise ExportError(
+            f"{program.path}: its sets are not those of {model.path.name}; generate the C of this model file again, and link it"
+        )
     return values
 
 
@@ -101,7 +105,11 @@ def characteristics(model: Model, values: Place, number: Place) -> list[Characte
             size = (b.rows, columns) if array.shape else ()
             offset = b.at * number.size
             unit, factor = scaled(written.get(array.name) or (units.si(array.unit) if array.unit else ""))
-            found.append(Characteristic(name, text, values.address + offset, size, a2l_type(number), unit, factor, low / factor, high / factor, offset))
+            found.append(
+                Characteristic(
+                    name, text, values.address + offset, size, a2l_type(number), unit, factor, low / factor, high / factor, offset
+                )
+            )
     return found
 
 
@@ -119,15 +127,15 @@ class Measurements:
         self.groups: dict[str, list[str]] = {}
         self.found: dict[str, Measurement] = {}
 
-    def add(self, group: str, name: str, path: str, unit: str = "", text: str = "", low: float | None = None, high: float | None = None) -> None:
+    def add(
+        self, group: str, name: str, path: str, unit: str = "", text: str = "", low: float | None = None, high: float | None = None
+    ) -> None:
         """One number. Raises KeyError if the program has it not."""
         place = self.program.find(path)
         shown, factor = scaled(unit)
         lowest, highest = (limit if told is None else told for limit, told in zip(limits(place), (low, high)))  # in SI
         name = name if name not in self.found else f"{group}.{name}"
-        self.found[name] = Measurement(
-            name, text, place.address, a2l_type(place), shown, factor, lowest / factor, highest / factor, path
-        )
+        self.found[name] = Measurement(name, text, place.address, a2l_type(place), shown, factor, lowest / factor, highest / factor, path)
         self.groups.setdefault(group, []).append(name)
 
     def of_model(self, model: Model, instance: str) -> None:
@@ -155,7 +163,11 @@ class Measurements:
     def _of_sensors(self, model: Model, place: Place) -> bool:
         """Is it a member of what NAME_sensors writes? Then it is measured as that sensor."""
         struct, _, name = place.path.rpartition(".")
-        found = [sensor for sensor in model.sensors if sensor.name == name] if struct and type_name(self.program.find(struct).type) == f"{model.name}_z_t" else []
+        found = (
+            [sensor for sensor in model.sensors if sensor.name == name]
+            if struct and type_name(self.program.find(struct).type) == f"{model.name}_z_t"
+            else []
+        )
         for sensor in found:
             self.add("sensor", sensor.name, place.path, sensor.unit, sensor.description)
         return bool(found)
@@ -179,7 +191,11 @@ def instance_of(model: Model, program: Program, named: str | None) -> str:
     if named is None and len(known) == 1:
         return known[0]
     if named is None:
-        several = f"it has several variables of the type {kind} ({', '.join(known)})" if known else f"it has no variable of the type {kind} outside of functions"
+        several = (
+            f"it has several variables of the type {kind} ({', '.join(known)})"
+            if known
+            else f"it has no variable of the type {kind} outside of functions"
+        )
         raise ExportError(f"{program.path}: {several}; name one by --instance")
     try:
         place = program.find(named)

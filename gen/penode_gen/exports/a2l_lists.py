@@ -32,14 +32,18 @@ def static_lists(program: Program) -> list[StaticList]:
     except KeyError:
         return []
     if type_name(whole.type) != _TYPE:
-        raise ExportError(f"{program.path}: {SYMBOL} is of the type {type_name(whole.type) or 'without a name'}; make it a constant of the type {_TYPE}")
+        raise ExportError(
+            f"{program.path}: {SYMBOL} is of the type {type_name(whole.type) or 'without a name'}; make it a constant of the type {_TYPE}"
+        )
     try:
         found: list[StaticList] = []
         for n in range(program.number(program.find(f"{SYMBOL}.lists"))):
             place = _there(program.pointed(program.find(f"{SYMBOL}.list"), n))
             found.append(_list(program, place, n, sum(before.odts for before in found)))
     except KeyError as exc:
-        raise ExportError(f"{program.path}: what {SYMBOL} points to is not in the file; make it, its lists and their entries constants") from exc
+        raise ExportError(
+            f"{program.path}: what {SYMBOL} points to is not in the file; make it, its lists and their entries constants"
+        ) from exc
     return found
 
 

@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from ..model import Model
-from . import efmu_code, efmu_manifest, efmu_schemas
-from . import efmu_variables as ev
+from . import efmu_code, efmu_manifest, efmu_schemas, efmu_variables as ev
 from .archive import zipped
 from .efmu_behaviour import behaviour
 from .efmu_manifest import Representation
@@ -22,9 +21,16 @@ def algorithm_code(model: Model, dialect: str) -> tuple[efmu_code.Block, Represe
     block = efmu_code.block(model)
     files, id = {CODE: block.text}, efmu_manifest.identifier(model, ALGORITHM, dialect)
     manifest = render(
-        "efmu_algorithm.xml.j2", **efmu_manifest.shared(model, dialect), id=id, code=CODE, files=efmu_manifest.listed(files, {"alg": "Code"}),
-        clock=next(v for v in block.variables if v.label == ev.STEP_SIZE), signals=block.signals, units=ev.unit_list(block.variables), variables=block.variables,
-    )  # fmt: skip
+        "efmu_algorithm.xml.j2",
+        **efmu_manifest.shared(model, dialect),
+        id=id,
+        code=CODE,
+        files=efmu_manifest.listed(files, {"alg": "Code"}),
+        clock=next(v for v in block.variables if v.label == ev.STEP_SIZE),
+        signals=block.signals,
+        units=ev.unit_list(block.variables),
+        variables=block.variables,
+    )
     return block, Representation(ALGORITHM, "AlgorithmCode", id, manifest, files)
 
 
@@ -33,7 +39,11 @@ def build(model: Model, options: Options) -> bytes:
     dialect = options["dialect"]
     block, algorithm = algorithm_code(model, dialect)
     found = efmu_schemas.schemas(dialect, options["schemas"])
-    parts = [algorithm, *production_code(model, block, algorithm, dialect), behaviour(model, block, algorithm, dialect, options["recalibration"])]
+    parts = [
+        algorithm,
+        *production_code(model, block, algorithm, dialect),
+        behaviour(model, block, algorithm, dialect, options["recalibration"]),
+    ]
     files: dict[str, bytes | str] = {f"eFMU/schemas/{path}": data for path, data in found.items()}
     for part in parts:
         files |= {f"eFMU/{part.folder}/{name}": text for name, text in part.files.items()}
@@ -43,10 +53,20 @@ def build(model: Model, options: Options) -> bytes:
 
 
 EXPORTER = Exporter(
-    "eFMU: the container of eFMI, with Algorithm Code, Production Code and Behavioral Model", (".fmu", ".efmu"), build,
+    "eFMU: the container of eFMI, with Algorithm Code, Production Code and Behavioral Model",
+    (".fmu", ".efmu"),
+    build,
     options=(
-        Option("dialect", "beta1: manifests of eFMI 1.0.0 Beta 1 (default); dymola: those of Dymola 2026x", choices=tuple(efmu_schemas.DIALECTS), default="beta1"),
-        Option("recalibration", 'exchange of sets in a scenario of the Behavioral Model, such as "2:altered_friction", or none (default: at 2 s to the second set)'),
+        Option(
+            "dialect",
+            "beta1: manifests of eFMI 1.0.0 Beta 1 (default); dymola: those of Dymola 2026x",
+            choices=tuple(efmu_schemas.DIALECTS),
+            default="beta1",
+        ),
+        Option(
+            "recalibration",
+            'exchange of sets in a scenario of the Behavioral Model, such as "2:altered_friction", or none (default: at 2 s to the second set)',
+        ),
         Option("schemas", "folder with the schemas of the dialect (default for beta1: those in the package rumoca)"),
     ),
-)  # fmt: skip
+)

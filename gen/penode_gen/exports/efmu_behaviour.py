@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from ..model import Model
-from . import efmu_manifest
-from . import efmu_variables as ev
+from . import efmu_manifest, efmu_variables as ev
 from .efmu_code import Block
 from .efmu_manifest import Representation
 from .efmu_production import PRECISIONS
@@ -24,9 +23,21 @@ def behaviour(model: Model, block: Block, algorithm: Representation, dialect: st
     tuned = [v for s in found for v, _, _ in s.tuned]
     id = efmu_manifest.identifier(model, FOLDER, dialect, str(recalibration))
     manifest = render(
-        "efmu_behaviour.xml.j2", **efmu_manifest.shared(model, dialect), id=id, algorithm=algorithm, files=efmu_manifest.listed(files, {"csv": "ReferenceData"}),
-        scenarios=found, signals=signals, outputs=block.of("output"), variables=[*signals, *tuned], columns=columns, pairs=zip, precisions=list(PRECISIONS),
-        units=ev.unit_list([*signals, *tuned]), second=ev.unit_id("s"), sample_time=repr(float(model.sample_time)),
+        "efmu_behaviour.xml.j2",
+        **efmu_manifest.shared(model, dialect),
+        id=id,
+        algorithm=algorithm,
+        files=efmu_manifest.listed(files, {"csv": "ReferenceData"}),
+        scenarios=found,
+        signals=signals,
+        outputs=block.of("output"),
+        variables=[*signals, *tuned],
+        columns=columns,
+        pairs=zip,
+        precisions=list(PRECISIONS),
+        units=ev.unit_list([*signals, *tuned]),
+        second=ev.unit_id("s"),
+        sample_time=repr(float(model.sample_time)),
         time_column=time_column([v.label for v in signals]),
-    )  # fmt: skip
+    )
     return Representation(FOLDER, "BehavioralModel", id, manifest, files)

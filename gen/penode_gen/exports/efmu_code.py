@@ -13,8 +13,7 @@ from .. import expressions as ex
 from ..causalise import Causal, Step, causalise
 from ..emit_c import VERSION
 from ..model import Model
-from . import efmu_variables as ev
-from . import galec_text as text
+from . import efmu_variables as ev, galec_text as text
 from .efmu_networks import Function, functions
 from .interface import ExportError
 from .templating import render
@@ -52,7 +51,10 @@ def _check(model: Model, causal: Causal) -> None:
         problems.append(f'input = "{model.interpolation}": it has no form in Algorithm Code here; use held or linear')
     if model.guard.out_of_range != "report":
         problems.append(f'out_of_range = "{model.guard.out_of_range}": it has no form in Algorithm Code here; use report')
-    problems += [f"'{s.name}': an actuator that works on samples has no form in Algorithm Code here; leave it out or use a lag" for s in model.sampled]
+    problems += [
+        f"'{s.name}': an actuator that works on samples has no form in Algorithm Code here; leave it out or use a lag"
+        for s in model.sampled
+    ]
     if model.interpolation == "held" and causal.uses([*causal.rates, *causal.outputs], causal.input_rates):
         problems.append('input = "held": the model reads the rate of an input, which then has no form in Algorithm Code here; use linear')
     if problems:
@@ -90,13 +92,29 @@ class _Writer:
         model, tunable = self.model, any(v.causality == "tunableParameter" for v in self.variables)
         integrate, outputs = self._body(self.rates, "k") if model.states else [], self._body(self.outputs, "y")
         signals: dict[str, tuple[str, ...]] = {"Startup": (), "Recalibrate": ("NAN",) if tunable else (), "DoStep": ("NAN",)}
-        context = self._method() | self._inputs() | {
-            "model": model, "version": VERSION, "name": text.name(model.name), "functions": self.functions, "signals": signals, "at": self.locals,
-            "declared": list(self.declared), "integrate": integrate, "outputs": outputs, "n_x": len(model.states), "n_y": len(model.outputs),
-            "array": text.array, "real": text.real, "of": lambda causality: [v for v in self.variables if v.causality == causality],
-            "started": f"self.{text.name(ev.STARTED)}", "own": lambda label: self.shown[label].own,
-            "shown": [(text.name(s.name), n) for n, s in enumerate(self.causal.states, 1) if self._is_read(s)],
-        }  # fmt: skip
+        context = (
+            self._method()
+            | self._inputs()
+            | {
+                "model": model,
+                "version": VERSION,
+                "name": text.name(model.name),
+                "functions": self.functions,
+                "signals": signals,
+                "at": self.locals,
+                "declared": list(self.declared),
+                "integrate": integrate,
+                "outputs": outputs,
+                "n_x": len(model.states),
+                "n_y": len(model.outputs),
+                "array": text.array,
+                "real": text.real,
+                "of": lambda causality: [v for v in self.variables if v.causality == causality],
+                "started": f"self.{text.name(ev.STARTED)}",
+                "own": lambda label: self.shown[label].own,
+                "shown": [(text.name(s.name), n) for n, s in enumerate(self.causal.states, 1) if self._is_read(s)],
+            }
+        )
         return Block(render("galec.alg.j2", **context), self.variables, signals)
 
     def _method(self) -> dict[str, Any]:
@@ -104,9 +122,14 @@ class _Writer:
         step = f"self.{text.name(ev.STEP_SIZE)}"
         substeps = text.real(float(self.model.substeps))
         return {
-            "nodes": ", ".join(map(text.real, nodes)), "weights": ", ".join(map(text.real, weights)), "stages": len(nodes), "divisor": text.real(divisor),
-            "step": step, "substeps": substeps, "h": step if self.model.substeps == 1 else f"({step} / {substeps})",
-        }  # fmt: skip
+            "nodes": ", ".join(map(text.real, nodes)),
+            "weights": ", ".join(map(text.real, weights)),
+            "stages": len(nodes),
+            "divisor": text.real(divisor),
+            "step": step,
+            "substeps": substeps,
+            "h": step if self.model.substeps == 1 else f"({step} / {substeps})",
+        }
 
     def _inputs(self) -> dict[str, Any]:
         """Inputs at a share of the sample, as the stages see them; their rates; and inputs at the sample, as outputs see them."""

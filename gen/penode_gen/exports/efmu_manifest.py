@@ -69,4 +69,6 @@ def listed(files: Mapping[str, str], roles: Mapping[str, str]) -> list[dict[str,
 
 def content(model: Model, dialect: str, parts: list[Representation]) -> str:
     """__content.xml."""
-    return render("efmu_content.xml.j2", **shared(model, dialect), parts=parts, id=identifier(model, "container", dialect), manifest=MANIFEST)
+    return render(
+        "efmu_content.xml.j2", **shared(model, dialect), parts=parts, id=identifier(model, "container", dialect), manifest=MANIFEST
+    )

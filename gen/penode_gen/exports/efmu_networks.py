@@ -12,9 +12,12 @@ from . import galec_text as text
 
 # Of the sum p[i] of a neuron. ReLU is as in the C: max(p, 0.0) may turn NaN into 0. Adding 0 p keeps NaN and turns Inf into it.
 _ACTIVATIONS = {
-    "relu": "0.5 * ({0} + absolute({0}))", "tanh": "tanh({0})", "sigmoid": text.SIGMOID, "softplus": text.SOFTPLUS,
+    "relu": "0.5 * ({0} + absolute({0}))",
+    "tanh": "tanh({0})",
+    "sigmoid": text.SIGMOID,
+    "softplus": text.SOFTPLUS,
     "step": "(if {0} < 0.0 then 0.0 else 1.0) + (0.0 * {0})",
-}  # fmt: skip
+}
 
 
 @dataclass

@@ -25,7 +25,9 @@ def production_code(model: Model, block: Block, algorithm: Representation, diale
     return [_of_precision(model, block, algorithm, dialect, texts, precision) for precision in PRECISIONS]
 
 
-def _of_precision(model: Model, block: Block, algorithm: Representation, dialect: str, texts: dict[str, str], precision: str) -> Representation:
+def _of_precision(
+    model: Model, block: Block, algorithm: Representation, dialect: str, texts: dict[str, str], precision: str
+) -> Representation:
     real = PRECISIONS[precision]
     wrapper = _wrapper(model, block)
     files = {name: flat(text, real) for name, text in (texts | wrapper).items()}
@@ -33,20 +35,41 @@ def _of_precision(model: Model, block: Block, algorithm: Representation, dialect
     id = efmu_manifest.identifier(model, folder, dialect)
     entries = efmu_manifest.listed(files, {"c": "Code", "h": "Code"})
     manifest = render(
-        "efmu_production.xml.j2", **efmu_manifest.shared(model, dialect), id=id, algorithm=algorithm, files=entries, precision=precision, real=real,
-        name=f"{model.name}_efmu", variables=block.variables, signals=block.signals, methods=_METHODS, includes=_includes(files), lengths=model.owner,
-    )  # fmt: skip
+        "efmu_production.xml.j2",
+        **efmu_manifest.shared(model, dialect),
+        id=id,
+        algorithm=algorithm,
+        files=entries,
+        precision=precision,
+        real=real,
+        name=f"{model.name}_efmu",
+        variables=block.variables,
+        signals=block.signals,
+        methods=_METHODS,
+        includes=_includes(files),
+        lengths=model.owner,
+    )
     return Representation(folder, "ProductionCode", id, manifest, files)
 
 
 def _wrapper(model: Model, block: Block) -> dict[str, str]:
     """The C that has the block's methods as functions."""
     context: dict[str, Any] = {
-        "model": model, "version": VERSION, "name": model.name, "block": f"{model.name}_efmu", "prefix": model.name.upper(), "owner": model.owner,
-        "variables": block.variables, "tunables": [v for v in block.variables if v.element], "inputs": model.inputs, "outputs": model.outputs,
-        "states": model.states, "constants": [v for v in block.variables if v.causality == "constant"],
-        "member": {v.label: v.member for v in block.variables}, "starts": {v.label: float(v.start) for v in block.variables if v.causality in ("input", "constant")},
-    }  # fmt: skip
+        "model": model,
+        "version": VERSION,
+        "name": model.name,
+        "block": f"{model.name}_efmu",
+        "prefix": model.name.upper(),
+        "owner": model.owner,
+        "variables": block.variables,
+        "tunables": [v for v in block.variables if v.element],
+        "inputs": model.inputs,
+        "outputs": model.outputs,
+        "states": model.states,
+        "constants": [v for v in block.variables if v.causality == "constant"],
+        "member": {v.label: v.member for v in block.variables},
+        "starts": {v.label: float(v.start) for v in block.variables if v.causality in ("input", "constant")},
+    }
     return {f"{model.name}_efmu.{suffix}": render(f"efmu_block.{suffix}.j2", **context) for suffix in ("h", "c")}
 
 

@@ -43,7 +43,10 @@ class Scenario:
         """The CSV: time, inputs, outputs, and a column for each element of what is tuned."""
         signals = [*(i.name for i in model.inputs), *(o.name for o in model.outputs)]
         rows = [",".join([time_column(signals), *signals, *(c for v, _, _ in self.tuned for c in columns(v))])]
-        tails = ["".join(f",{x!r}" for values in chosen for x in np.ravel(values).tolist()) for chosen in zip(*((a, b) for _, a, b in self.tuned))] or ["", ""]
+        tails = [
+            "".join(f",{x!r}" for values in chosen for x in np.ravel(values).tolist())
+            for chosen in zip(*((a, b) for _, a, b in self.tuned))
+        ] or ["", ""]
         for k, numbers in enumerate(np.concatenate([self.u, self.y], axis=1).tolist()):
             rows.append(f"{k * model.sample_time:.9g}{''.join(f',{x!r}' for x in numbers)}{tails[k >= self.at]}")
         return "\n".join(rows) + "\n"
@@ -75,7 +78,9 @@ def scenarios(model: Model, variables: list[Variable], asked: str | None) -> lis
     length, rows = sum(v.count for v, _, _ in changes), _rows(model, exchange[0] + _AFTER if exchange else _LASTS)
     if rows * length > _MOST:
         if asked:
-            raise ExportError(f"--recalibration: a table of {rows} samples with {length} numbers each is too large; choose an earlier time, or none")
+            raise ExportError(
+                f"--recalibration: a table of {rows} samples with {length} numbers each is too large; choose an earlier time, or none"
+            )
         exchange, rows = None, _rows(model, _LASTS)
     t = np.arange(rows) * model.sample_time
     u = np.array([_sweep(i.minimum, i.maximum, 1.0 + 0.1 * k, t) for k, i in enumerate(model.inputs)]).reshape(len(model.inputs), rows).T
@@ -96,7 +101,9 @@ def _exchange(model: Model, asked: str | None) -> tuple[float, str] | None:
     if asked == "none" or (asked is None and len(model.sets) < 2):
         return None
     try:
-        found = schedule(model, asked if asked is not None else f"{round(_LASTS / model.sample_time) * model.sample_time:.9g}:{list(model.sets)[1]}")
+        found = schedule(
+            model, asked if asked is not None else f"{round(_LASTS / model.sample_time) * model.sample_time:.9g}:{list(model.sets)[1]}"
+        )
     except ExportError as error:
         raise ExportError(*(p.replace("--schedule", "--recalibration") for p in error.problems)) from error
     if len(found) != 1:
@@ -132,7 +139,9 @@ def _reference(model: Model, u: Array, names: list[str], at: int) -> Array:
         before = now
     with np.errstate(invalid="ignore"):
         if not np.isfinite(y).all():
-            raise ExportError(f"{model.path.name}: the reference of the Behavioral Model is not finite; check the model with penode simulate")
+            raise ExportError(
+                f"{model.path.name}: the reference of the Behavioral Model is not finite; check the model with penode simulate"
+            )
     return np.array(y)
 
 
@@ -147,4 +156,3 @@ def _step(model: Model, numeric: Numeric, x: Array, before: Array, now: Array, r
             total = total + weight * k
         x = x + h / divisor * total
     return x
-

@@ -17,8 +17,16 @@ from .interface import ExportError
 
 # The versions that manifests of a dialect name: file of the schema -> version.
 DIALECTS = {
-    "beta1": {"efmiContainerManifest.xsd": "0.11.0", "AlgorithmCode/efmiAlgorithmCodeManifest.xsd": "0.14.0", "ProductionCode/efmiProductionCodeManifest.xsd": "0.17.0"},
-    "dymola": {"efmiContainerManifest.xsd": "0.10.0", "AlgorithmCode/efmiAlgorithmCodeManifest.xsd": "0.13.0", "ProductionCode/efmiProductionCodeManifest.xsd": "0.17.0"},
+    "beta1": {
+        "efmiContainerManifest.xsd": "0.11.0",
+        "AlgorithmCode/efmiAlgorithmCodeManifest.xsd": "0.14.0",
+        "ProductionCode/efmiProductionCodeManifest.xsd": "0.17.0",
+    },
+    "dymola": {
+        "efmiContainerManifest.xsd": "0.10.0",
+        "AlgorithmCode/efmiAlgorithmCodeManifest.xsd": "0.13.0",
+        "ProductionCode/efmiProductionCodeManifest.xsd": "0.17.0",
+    },
 }
 _BEHAVIOUR = "BehavioralModel/efmiBehavioralModelManifest.xsd"
 _MARK = re.compile(rb"schemas/((?:\w+/)?(?:\w+\.(?:xsd|txt|md)|LICENSE))")
@@ -35,7 +43,9 @@ def schemas(dialect: str, folder: str | None) -> dict[str, bytes]:
             raise ExportError(f"{where}: it has no {path}; name the folder that holds the schemas of an eFMU with --schemas")
     for path, version in DIALECTS[dialect].items():
         if f'fixed="{version}"'.encode() not in found[path]:
-            raise ExportError(f"{where}: {path} is not version {version}, which the dialect {dialect} has; choose the other --dialect or other schemas")
+            raise ExportError(
+                f"{where}: {path} is not version {version}, which the dialect {dialect} has; choose the other --dialect or other schemas"
+            )
     _check(found, where)
     return found
 
@@ -43,17 +53,25 @@ def schemas(dialect: str, folder: str | None) -> dict[str, bytes]:
 def _of_folder(folder: Path) -> dict[str, bytes]:
     if not folder.is_dir():
         raise ExportError(f"--schemas {folder}: there is no such folder; name the folder schemas/ of an eFMU")
-    paths = [p for p in sorted(folder.rglob("*")) if p.is_file() and (p.suffix == ".xsd" or p.name.startswith("LICENSE")) and p.stat().st_size <= _LARGEST]
+    paths = [
+        p
+        for p in sorted(folder.rglob("*"))
+        if p.is_file() and (p.suffix == ".xsd" or p.name.startswith("LICENSE")) and p.stat().st_size <= _LARGEST
+    ]
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in paths}
 
 
 def _of_package(dialect: str) -> dict[str, bytes]:
     """The schemas inside of rumoca, which keeps each behind its path."""
     if dialect != "beta1":
-        raise ExportError(f"--dialect {dialect}: its schemas are in no package; name the folder schemas/ of an eFMU of that tool with --schemas")
+        raise ExportError(
+            f"--dialect {dialect}: its schemas are in no package; name the folder schemas/ of an eFMU of that tool with --schemas"
+        )
     spec = importlib.util.find_spec("rumoca")
     if spec is None or not spec.submodule_search_locations:
-        raise ExportError("--format efmu: an eFMU carries the schemas of the standard; pip install penode[efmu], or name their folder with --schemas")
+        raise ExportError(
+            "--format efmu: an eFMU carries the schemas of the standard; pip install penode[efmu], or name their folder with --schemas"
+        )
     found: dict[str, bytes] = {}
     for place in spec.submodule_search_locations:
         for path in sorted(Path(place).glob("_native*")):

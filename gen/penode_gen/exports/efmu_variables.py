@@ -104,7 +104,9 @@ def collect(model: Model, causal: Causal, used: Iterable[str]) -> list[Variable]
             found.append(scalar(constant(p.name, taken), "constant", p.value, p.unit, p.description))
     found += [scalar(f"state.{n}", "state", x, state_unit(model, n), f"state {n}") for n, x in zip(model.states, model.start)]
     if model.states:
-        found += [scalar(f"previous({i.name})", "state", v.start, i.unit, f"{i.name} of the sample before") for i, v in zip(model.inputs, found)]
+        found += [
+            scalar(f"previous({i.name})", "state", v.start, i.unit, f"{i.name} of the sample before") for i, v in zip(model.inputs, found)
+        ]
         found.append(Variable(STARTED, "state", np.array(0.0), description="true from the first good sample on", boolean=True))
     _check(model, found)
     return found

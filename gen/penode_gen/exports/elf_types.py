@@ -115,7 +115,10 @@ class Program:
                     named = die.get_DIE_from_attribute("DW_AT_specification") if "DW_AT_specification" in die.attributes else die
                     if address is not None and {"DW_AT_name", "DW_AT_type"} <= named.attributes.keys():
                         name = named.attributes["DW_AT_name"].value.decode()
-                        yield name, Place(name, address, (die if "DW_AT_type" in die.attributes else named).get_DIE_from_attribute("DW_AT_type"))
+                        yield (
+                            name,
+                            Place(name, address, (die if "DW_AT_type" in die.attributes else named).get_DIE_from_attribute("DW_AT_type")),
+                        )
 
     def _address(self, unit: Any, die: Any) -> int | None:
         """Of a static variable; None if it has none, or the linker has dropped it."""

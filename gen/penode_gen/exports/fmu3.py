@@ -24,7 +24,9 @@ def build(model: Model, options: Options) -> bytes:
     files |= {f"binaries/{target}/{model.name}{fmu_files.suffix(target)}": data for target, data in made.items()}
     files |= described
     files |= fmu_files.documentation(context, sorted(made))
-    files["sources/buildDescription.xml"] = render("fmi3_build.xml.j2", **context, compiled=sorted(name for name in texts if name.endswith(".c")))
+    files["sources/buildDescription.xml"] = render(
+        "fmi3_build.xml.j2", **context, compiled=sorted(name for name in texts if name.endswith(".c"))
+    )
     files["modelDescription.xml"] = render("fmi3.xml.j2", **context)
     files["terminalsAndIcons/terminalsAndIcons.xml"] = render("fmi3_terminals.xml.j2", **context)
     return zipped(files)

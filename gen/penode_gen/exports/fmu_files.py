@@ -30,10 +30,20 @@ OPTIONS = (
 )
 # Parts of the runtime that no FMU needs.
 _LEFT_OUT = ("pen_xcp", "pen_selftest")
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-ffunction-sections", "-fdata-sections", "-shared", "-Wl,--gc-sections")
+_FLAGS = (
+    "-std=c99",
+    "-O2",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fvisibility=hidden",
+    "-ffunction-sections",
+    "-fdata-sections",
+    "-shared",
+    "-Wl,--gc-sections",
+)
 # What a compiler is called, the suffix of a shared library and more options, by platform of FMI 3.
 _COMPILERS: dict[str, tuple[str, str, tuple[str, ...]]] = {
-    "x86_64-windows": ("x86_64-w64-mingw32-gcc", ".dll", ("-s", "-static-libgcc", "-Wl,--no-insert-timestamp")),
+    "x86_64-windows": ("x86_64-w64-mingw32-gcc", ".dll", ("-s", "-static-libgcc", "-Wl,--no-insert-timestamp"))
 }
 if platform.system() == "Linux" and platform.machine() in ("x86_64", "aarch64"):
     _COMPILERS[f"{platform.machine()}-linux"] = ("gcc", ".so", ("-fPIC", "-Wl,--build-id=none"))
@@ -62,15 +72,36 @@ def context(model: Model, options: Options, fmi: int) -> dict[str, Any]:
         arrays.append({"name": array.name, "rows": shape[0], "columns": shape[1], "blocks": array.blocks, "block": block})
         block += len(array.blocks)
     return {
-        "model": model, "name": fv.identifier(model), "prefix": model.name.upper(), "version": VERSION, "fmi": fmi, "token": token(model, options),
-        "variables": found, "groups": groups, "tunables": arrays, "end": found[-1].first + found[-1].count,
+        "model": model,
+        "name": fv.identifier(model),
+        "prefix": model.name.upper(),
+        "version": VERSION,
+        "fmi": fmi,
+        "token": token(model, options),
+        "variables": found,
+        "groups": groups,
+        "tunables": arrays,
+        "end": found[-1].first + found[-1].count,
         "tunable_end": next(g["first"] for g in groups if g["key"] == "tunable") + sum(v.count for v in found if v.key == "tunable"),
-        "n_u": len(model.inputs), "n_y": len(model.outputs), "n_z": len(model.sensors), "n_x": len(model.states),
-        "inputs": model.inputs, "outputs": model.outputs, "sensors": model.sensors, "states": model.states, "start": model.start,
-        "constants": [v.start[0] for v in found if v.key == "constant" and v.start], "sets": list(model.sets), "sampled": bool(model.sampled),
-        "sample_time": repr(model.sample_time), "units": fv.unit_definitions(found), "functions": functions(fmi), "real": options["real"],
-        "provided": _provided(fmi), "xcp": options["xcp"],
-    }  # fmt: skip
+        "n_u": len(model.inputs),
+        "n_y": len(model.outputs),
+        "n_z": len(model.sensors),
+        "n_x": len(model.states),
+        "inputs": model.inputs,
+        "outputs": model.outputs,
+        "sensors": model.sensors,
+        "states": model.states,
+        "start": model.start,
+        "constants": [v.start[0] for v in found if v.key == "constant" and v.start],
+        "sets": list(model.sets),
+        "sampled": bool(model.sampled),
+        "sample_time": repr(model.sample_time),
+        "units": fv.unit_definitions(found),
+        "functions": functions(fmi),
+        "real": options["real"],
+        "provided": _provided(fmi),
+        "xcp": options["xcp"],
+    }
 
 
 def _provided(fmi: int) -> set[str]:
@@ -107,7 +138,10 @@ def flat(text: str, real: str) -> str:
     """All in one folder; the number type is fixed in the sources, since importers compile them with options of their own."""
     text = re.sub(r'#include "penode/', '#include "', text)
     if real == "double":
-        text = text.replace("#ifdef PEN_REAL_DOUBLE\ntypedef double pen_real_t;", "#define PEN_REAL_DOUBLE /* as exported */\n#ifdef PEN_REAL_DOUBLE\ntypedef double pen_real_t;")
+        text = text.replace(
+            "#ifdef PEN_REAL_DOUBLE\ntypedef double pen_real_t;",
+            "#define PEN_REAL_DOUBLE /* as exported */\n#ifdef PEN_REAL_DOUBLE\ntypedef double pen_real_t;",
+        )
     return text
 
 
@@ -122,7 +156,16 @@ def binaries(texts: dict[str, str], name: str, fmi: int, debug: bool = False) ->
                 continue
             output = f"{name}{suffix}"
             files = sorted(file for file in texts if file.endswith(".c"))
-            command = [compiler, *_FLAGS, *more, *(["-g"] if debug and suffix == ".so" else []), f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", *files, "-o", output]
+            command = [
+                compiler,
+                *_FLAGS,
+                *more,
+                *(["-g"] if debug and suffix == ".so" else []),
+                f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX",
+                *files,
+                "-o",
+                output,
+            ]
             done = subprocess.run(command, cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL)
             if done.returncode:
                 lines = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines() or ["?"]
@@ -135,14 +178,19 @@ def notes(options: Options) -> list[str]:
     """The binaries that are missing for want of a compiler, a line each; none where they are not wanted."""
     if options.get("source_only"):
         return []
-    return [f"no binary for {target} inside: {compiler} is not installed" for target, (compiler, _, _) in _COMPILERS.items() if shutil.which(compiler) is None]
+    return [
+        f"no binary for {target} inside: {compiler} is not installed"
+        for target, (compiler, _, _) in _COMPILERS.items()
+        if shutil.which(compiler) is None
+    ]
 
 
 def documentation(context: dict[str, Any], platforms: list[str]) -> dict[str, str]:
     """Page and licence, by path in the FMU."""
     return {
         "documentation/index.html": template("fmu_page.html.j2", **context, platforms=platforms),
-        "documentation/licenses/license.txt": "The C runtime in this FMU, and the code that penode generates:\n\n" + (ROOT / "LICENSE").read_text(encoding="utf-8"),
+        "documentation/licenses/license.txt": "The C runtime in this FMU, and the code that penode generates:\n\n"
+        + (ROOT / "LICENSE").read_text(encoding="utf-8"),
     }
 
 

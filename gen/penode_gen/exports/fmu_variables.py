@@ -68,11 +68,14 @@ class Variable:
 
     def scalars(self, head: str, body: str) -> str:
         """The lines of all elements in FMI 2, with what they share: attributes, and the element inside. 200 000 of them are too many for a template's loop."""
-        before, between = '    <ScalarVariable name="', f' {head}><{body}'
+        before, between = '    <ScalarVariable name="', f" {head}><{body}"
         if self.start is None:
             return "".join(f'{before}{name}" valueReference="{place}"{between}/></ScalarVariable>\n' for name, place, _ in self.elements())
         kind = "choice" if self.kind == "choice" else "real"
-        return "".join(f'{before}{name}" valueReference="{place}"{between} start="{number(start, kind)}"/></ScalarVariable>\n' for (name, place, _), start in zip(self.elements(), self.start))
+        return "".join(
+            f'{before}{name}" valueReference="{place}"{between} start="{number(start, kind)}"/></ScalarVariable>\n'
+            for (name, place, _), start in zip(self.elements(), self.start)
+        )
 
 
 def number(value: float, kind: str = "real") -> str:
@@ -94,27 +97,65 @@ def variables(model: Model, dtype: type = np.float32) -> list[Variable]:
     """All variables by place. Raises ExportError where two have one name."""
     table = _Table()
     table.add("time", "time", "independent", "continuous", "simulation time", unit="s")
-    table.add("parameter_set", "parameter_set", "parameter", "tunable", "named parameter set, selected without copying", kind="choice",
-              choices=tuple(model.sets), start=(1.0,))  # fmt: skip
-    table.add("between", "input_between_samples", "parameter", "fixed", "held: inputs keep their value over a step; linear: they reach their early.* at its end",
-              kind="choice", choices=BETWEEN, start=(2.0 if model.sampled else 1.0,))  # fmt: skip
+    table.add(
+        "parameter_set",
+        "parameter_set",
+        "parameter",
+        "tunable",
+        "named parameter set, selected without copying",
+        kind="choice",
+        choices=tuple(model.sets),
+        start=(1.0,),
+    )
+    table.add(
+        "between",
+        "input_between_samples",
+        "parameter",
+        "fixed",
+        "held: inputs keep their value over a step; linear: they reach their early.* at its end",
+        kind="choice",
+        choices=BETWEEN,
+        start=(2.0 if model.sampled else 1.0,),
+    )
     table.add("set_id", "set_id", "output", "discrete", "id of the set in force; 1000 and more: written by the master", kind="whole")
     table.add("status", "status", "output", "discrete", "flags of penode/pen_status.h of the last communication step", kind="whole")
     table.add("checksum", "set_checksum", "output", "discrete", "CRC-32 of the set in force", kind="whole")
     _signals(table, model)
     n_x, n_u = len(model.states), len(model.inputs)
     if n_x:
-        table.add("state_state", "jacobian.state_state", "local", "continuous", "state at the end of the last communication step by the state at its start", shape=(n_x, n_x))
+        table.add(
+            "state_state",
+            "jacobian.state_state",
+            "local",
+            "continuous",
+            "state at the end of the last communication step by the state at its start",
+            shape=(n_x, n_x),
+        )
     if n_x and n_u:
-        table.add("state_input", "jacobian.state_input", "local", "continuous", "state at the end of the last communication step by the inputs", shape=(n_x, n_u))
+        table.add(
+            "state_input",
+            "jacobian.state_input",
+            "local",
+            "continuous",
+            "state at the end of the last communication step by the inputs",
+            shape=(n_x, n_u),
+        )
     values = sets.set_values(model, "default", dtype)
     described = {p.name: p.description for p in model.tunable} | {n: p.description for n, p in model.networks.items()}
     for array in layout.arrays(model):
         start = tuple(map(float, np.ravel(layout.gather(array, values))))
         owner, _, part = array.name.partition(".")
         words = f"{part.replace('_', ' ')}: {described.get(owner, '')}" if part else described.get(owner, "")
-        table.add("tunable", array.name, "parameter", "tunable", words.strip(": "), unit=units.si(array.unit) if array.unit else "",
-                  shape=array.shape, start=start)  # fmt: skip
+        table.add(
+            "tunable",
+            array.name,
+            "parameter",
+            "tunable",
+            words.strip(": "),
+            unit=units.si(array.unit) if array.unit else "",
+            shape=array.shape,
+            start=start,
+        )
     _check_names(table.variables)
     return table.variables
 
@@ -151,7 +192,9 @@ def _check_names(found: list[Variable]) -> None:
     problems = []
     for v in found:
         if v.name in seen:
-            problems.append(f"'{v.name}' would be two variables of the FMU, {v.causality} and {seen[v.name].causality}; rename one of them in the model file")
+            problems.append(
+                f"'{v.name}' would be two variables of the FMU, {v.causality} and {seen[v.name].causality}; rename one of them in the model file"
+            )
         seen[v.name] = v
     if problems:
         raise ExportError(*problems)
@@ -159,8 +202,23 @@ def _check_names(found: list[Variable]) -> None:
 
 def groups(found: list[Variable]) -> list[dict[str, object]]:
     """First place of each group, in the order in which fmu_sets.c.j2 tells places apart."""
-    keys = ("time", "parameter_set", "between", "set_id", "status", "checksum", "input", "early", "output", "sensor", "state", "constant",
-            "state_state", "state_input", "tunable")  # fmt: skip
+    keys = (
+        "time",
+        "parameter_set",
+        "between",
+        "set_id",
+        "status",
+        "checksum",
+        "input",
+        "early",
+        "output",
+        "sensor",
+        "state",
+        "constant",
+        "state_state",
+        "state_input",
+        "tunable",
+    )
     first: dict[str, int] = {}
     at = found[-1].first + found[-1].count
     for key in reversed(keys):

@@ -30,12 +30,16 @@ _ONLY = "fmu_only.core"  # the instance, of the templates fmi2.c and fmi3.c
 _WIRE = "tcp:127.0.0.1:5555"  # an example: the importer's slave has its own
 
 
-def described(model: Model, texts: dict[str, str], made: dict[str, bytes], fmi: int, folders: dict[str, str]) -> tuple[dict[str, bytes], dict[str, bytes | str]]:
+def described(
+    model: Model, texts: dict[str, str], made: dict[str, bytes], fmi: int, folders: dict[str, str]
+) -> tuple[dict[str, bytes], dict[str, bytes | str]]:
     """
     The binaries without their debug information, and the files of the layered standard by path in the FMU. `made`: platform of FMI 3 ->
     binary, compiled with debug information where it is an ELF file; `folders`: its folder in binaries/. Raises ExportError.
     """
-    missing = [name for name in ("elftools",) if importlib.util.find_spec(name) is None] + [name for name in ("gcc", "objcopy") if shutil.which(name) is None]
+    missing = [name for name in ("elftools",) if importlib.util.find_spec(name) is None] + [
+        name for name in ("gcc", "objcopy") if shutil.which(name) is None
+    ]
     if missing:
         raise ExportError(f"--xcp: the A2L needs {missing[0]}, which is not installed; pip install penode[xcp], and install gcc")
     stripped, files = dict(made), {}

@@ -10,8 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import sympy as sp
 
-from .. import expressions as ex
-from .. import functions
+from .. import expressions as ex, functions
 from .interface import ExportError
 
 _RESERVED = frozenset(
@@ -76,7 +75,9 @@ class Printer:
     def inner(self, e: sp.Expr) -> str:
         """Text that can stand as an operand."""
         text = self(e)
-        return text if e.is_Symbol or text.startswith("(if ") or re.fullmatch(r"[\d.]+(e[+-]\d+)?", text) or self._is_call(e) else f"({text})"
+        return (
+            text if e.is_Symbol or text.startswith("(if ") or re.fullmatch(r"[\d.]+(e[+-]\d+)?", text) or self._is_call(e) else f"({text})"
+        )
 
     @staticmethod
     def _is_call(e: sp.Expr) -> bool:
@@ -112,7 +113,7 @@ class Printer:
         if not exponent.is_Integer:
             raise ExportError(f"the power '{e}' has no form in GALEC; write it with exp or sqrt")
         if exponent < 0:
-            return f"1.0 / {self.inner(base ** -exponent)}"
+            return f"1.0 / {self.inner(base**-exponent)}"
         return " * ".join([self.inner(base)] * int(exponent))
 
     def _call(self, e: sp.Expr) -> str:
@@ -143,8 +144,16 @@ class Printer:
 
 
 _CALLS: dict[object, str] = {
-    sp.exp: "exp", sp.tanh: "tanh", sp.sin: "sin", sp.cos: "cos", sp.atan: "atan", functions.Root: "sqrt", functions.Logarithm: "ln",
-    ex.Absolute: "absolute", sp.Abs: "absolute", ex.Sign: "sign",
-}  # fmt: skip
+    sp.exp: "exp",
+    sp.tanh: "tanh",
+    sp.sin: "sin",
+    sp.cos: "cos",
+    sp.atan: "atan",
+    functions.Root: "sqrt",
+    functions.Logarithm: "ln",
+    ex.Absolute: "absolute",
+    sp.Abs: "absolute",
+    ex.Sign: "sign",
+}
 SIGMOID = "1.0 / (1.0 + exp(0.0 - {0}))"
 SOFTPLUS = "max({0}, 0.0) + ln(1.0 + exp(0.0 - absolute({0})))"

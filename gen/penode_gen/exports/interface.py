@@ -65,7 +65,9 @@ def run(exporter: Exporter, name: str, model: Model, path: Path, options: Option
         packages = " ".join(missing)
         raise ExportError(f"--format {name}: it needs the Python package {packages}, which is not installed; pip install {packages}")
     if path.suffix.lower() not in exporter.suffixes:
-        raise ExportError(f'{path}: a file of the format {name} does not end in "{path.suffix}"; end its name in {_either(exporter.suffixes)}')
+        raise ExportError(
+            f'{path}: a file of the format {name} does not end in "{path.suffix}"; end its name in {_either(exporter.suffixes)}'
+        )
     return exporter.build(model, {option.name: option.default for option in exporter.options} | options)
 
 

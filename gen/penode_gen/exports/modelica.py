@@ -24,10 +24,16 @@ def build(model: Model, options: Options) -> bytes:
 
 
 EXPORTER = Exporter(
-    "Modelica: the whole model, or its networks as blocks", (".mo", ".zip"), build,
+    "Modelica: the whole model, or its networks as blocks",
+    (".mo", ".zip"),
+    build,
     options=(
-        Option("form", "model: all of it, self-contained (default); library: record and block for NeuralNetwork 2.1; external: C with its block, a .zip",
-               choices=FORMS, default="model"),
+        Option(
+            "form",
+            "model: all of it, self-contained (default); library: record and block for NeuralNetwork 2.1; external: C with its block, a .zip",
+            choices=FORMS,
+            default="model",
+        ),
         Option("set", "parameter set (default: default)", default="default"),
     ),
-)  # fmt: skip
+)

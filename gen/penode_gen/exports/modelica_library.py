@@ -24,11 +24,20 @@ def _described(model: Model, chosen: str) -> list[dict[str, object]]:
     found = []
     for name, network in model.sets[chosen].networks.items():
         port = model.networks[name]
-        found.append({
-            "name": identifier(name), "nin": network.n_inputs, "nout": network.n_outputs, "layers": _layers(network),
-            "arrays": [{"name": part, "shape": ", ".join(map(str, v.shape)), "text": array(v, "      ")} for part, v in arrays(network)],
-            "description": quoted(port.description or name), "units": [unit(u) for u in port.input_units], "unit": unit(port.output_unit),
-        })  # fmt: skip
+        found.append(
+            {
+                "name": identifier(name),
+                "nin": network.n_inputs,
+                "nout": network.n_outputs,
+                "layers": _layers(network),
+                "arrays": [
+                    {"name": part, "shape": ", ".join(map(str, v.shape)), "text": array(v, "      ")} for part, v in arrays(network)
+                ],
+                "description": quoted(port.description or name),
+                "units": [unit(u) for u in port.input_units],
+                "unit": unit(port.output_unit),
+            }
+        )
     return found
 
 
@@ -46,9 +55,15 @@ def _layers(network: Network) -> list[dict[str, object]]:
 
 def _dense(layer: Dense, number: int) -> dict[str, object]:
     return {
-        "kind": "dense", "number": number, "n": layer.n_out, "n_in": layer.n_in, "activation": layer.activation, "library": _LIBRARY[layer.activation],
-        "weights": _c(layer.weights.ravel()), "bias": _c(layer.bias),
-    }  # fmt: skip
+        "kind": "dense",
+        "number": number,
+        "n": layer.n_out,
+        "n_in": layer.n_in,
+        "activation": layer.activation,
+        "library": _LIBRARY[layer.activation],
+        "weights": _c(layer.weights.ravel()),
+        "bias": _c(layer.bias),
+    }
 
 
 def _c(values: np.ndarray) -> str:

@@ -50,12 +50,18 @@ class _Writer:
             found.append(Relation(("equations", q.name), left, right, q.name))
         rename, meant = aliases(model), meanings(model)
         found = [Relation(q.where, q.left.xreplace(meant), q.right.xreplace(meant), q.comment) for q in found if q.left not in rename]
-        signals = [(s.name, s.unit, s.description, parse(("outputs", s.name), s.expression).xreplace(meant)) for s in (*model.outputs, *model.sensors)]
+        signals = [
+            (s.name, s.unit, s.description, parse(("outputs", s.name), s.expression).xreplace(meant))
+            for s in (*model.outputs, *model.sensors)
+        ]
         return _used(found, signals), signals, unit_of
 
     def text(self) -> str:
         model = self.model
-        problems = [f"'{s.name}': an actuator that works on samples has no form in continuous Modelica; leave it out or use a lag" for s in model.sampled]
+        problems = [
+            f"'{s.name}': an actuator that works on samples has no form in continuous Modelica; leave it out or use a lag"
+            for s in model.sampled
+        ]
         problems += ['outside = "fade": it has no form here; use "extrapolate" or "clamp"'] if model.outside == "fade" else []
         if problems:
             raise ExportError(*(f"{model.path.name}: {p}" for p in problems))
@@ -71,8 +77,15 @@ class _Writer:
             self.equations.append(f"{name} = {self._print(meaning)}{about};")
         for call, name in list(self.calls.items()):
             self._network(call, name)
-        return render("modelica_model.mo.j2", model=model, name=identifier(model.name), version=VERSION, declared=self.declared, equations=self.equations,
-                      description=quoted(model.description or model.name))  # fmt: skip
+        return render(
+            "modelica_model.mo.j2",
+            model=model,
+            name=identifier(model.name),
+            version=VERSION,
+            declared=self.declared,
+            equations=self.equations,
+            description=quoted(model.description or model.name),
+        )
 
     def _print(self, e: sp.Expr) -> str:
         for call in sorted(e.atoms(AppliedUndef), key=str):
@@ -95,7 +108,9 @@ class _Writer:
                 self.declared.append(f"parameter Real {self._free(f'{name}_{part}')}[{shape}] = {array(values, '    ')};")
 
     def _line(self, kind: str, name: str, si: str, value: str = "", description: str = "", more: str = "") -> None:
-        self.declared.append(f'{kind} {name}(unit="{unit(si)}"{more}){f" = {value}" if value else ""}{f" {quoted(description)}" if description else ""};')
+        self.declared.append(
+            f'{kind} {name}(unit="{unit(si)}"{more}){f" = {value}" if value else ""}{f" {quoted(description)}" if description else ""};'
+        )
 
     def _signals(self) -> None:
         """Inputs, outputs and states; an output that shows a state of its own name is that state."""
@@ -160,16 +175,24 @@ def _used(found: list[Relation], signals: list[tuple[str, str, str, sp.Expr]]) -
     """Without deflections and rates that nothing reads: the rate of an input would have to be differentiated."""
     while True:
         read = set().union(*(q.right.free_symbols for q in found), *(e.free_symbols for *_, e in signals))
-        kept = [q for q in found if q.left in read or not q.left.is_Symbol or not q.left.name.startswith(("s_", "v_")) or q.where[0] != "elements"]
+        kept = [
+            q
+            for q in found
+            if q.left in read or not q.left.is_Symbol or not q.left.name.startswith(("s_", "v_")) or q.where[0] != "elements"
+        ]
         if len(kept) == len(found):
             return found
         found = kept
 
 
 ACTIVATIONS = {
-    "relu": "max({0}, 0.0)", "identity": "{0}", "tanh": "tanh({0})", "sigmoid": "1.0/(1.0 + exp(-{0}))",
-    "softplus": "max({0}, 0.0) + log(1.0 + exp(-noEvent(abs({0}))))", "step": "noEvent(if {0} >= 0.0 then 1.0 else 0.0)",
-}  # fmt: skip
+    "relu": "max({0}, 0.0)",
+    "identity": "{0}",
+    "tanh": "tanh({0})",
+    "sigmoid": "1.0/(1.0 + exp(-{0}))",
+    "softplus": "max({0}, 0.0) + log(1.0 + exp(-noEvent(abs({0}))))",
+    "step": "noEvent(if {0} >= 0.0 then 1.0 else 0.0)",
+}
 
 
 def arrays(network: Network) -> list[tuple[str, np.ndarray]]:

@@ -12,8 +12,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.printing.str import StrPrinter
 
-from .. import expressions as ex
-from .. import functions, units
+from .. import expressions as ex, functions, units
 from .interface import ExportError
 
 _RESERVED = frozenset(

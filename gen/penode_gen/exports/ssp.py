@@ -13,8 +13,7 @@ from .. import layout, sets
 from ..emit_c import VERSION
 from ..model import Model
 from ..networks import Affine
-from . import fmu2, fmu3, fmu_files
-from . import fmu_variables as fv
+from . import fmu2, fmu3, fmu_files, fmu_variables as fv
 from .archive import zipped
 from .interface import Exporter, ExportError, Option, Options
 from .templating import render
@@ -29,12 +28,16 @@ def schedule(model: Model, text: str) -> list[dict[str, Any]]:
     for part in text.split(",") if text.strip() else []:
         match = _EXCHANGE.fullmatch(part)
         if not match:
-            raise ExportError(f"--schedule: '{part.strip()}' is no exchange; write a time in seconds, a colon and a set, such as 2.5:{next(iter(model.sets), 'default')}")
+            raise ExportError(
+                f"--schedule: '{part.strip()}' is no exchange; write a time in seconds, a colon and a set, such as 2.5:{next(iter(model.sets), 'default')}"
+            )
         time, name = float(match[1]), match[2]
         if name not in model.sets:
             raise ExportError(f"--schedule: the model file has no set '{name}'; use one of: {', '.join(model.sets)}")
         if abs(time / model.sample_time - round(time / model.sample_time)) > 1e-6:
-            raise ExportError(f"--schedule: {time:g} s is no multiple of the sample time, {model.sample_time:g} s; a set comes into force between two samples")
+            raise ExportError(
+                f"--schedule: {time:g} s is no multiple of the sample time, {model.sample_time:g} s; a set comes into force between two samples"
+            )
         if found and time <= found[-1]["time"]:
             raise ExportError(f"--schedule: {time:g} s does not come after {found[-1]['time']:g} s; give the times in order")
         found.append({"time": time, "set": name})
@@ -81,10 +84,18 @@ def build(model: Model, options: Options) -> bytes:
     fmu = (fmu2 if old else fmu3).build(model, {option.name: options[option.name] for option in fmu_files.OPTIONS})
     dtype = fmu_files.dtype(options)
     context = {
-        "model": model, "name": fv.identifier(model), "generator": f"penode {VERSION}", "version": version, "old": old, "exchanges": exchanges,
-        "chosen": options["set"], "stop": (exchanges[-1]["time"] if exchanges else 0.0) + 10000 * model.sample_time, "units": fv.unit_definitions(fv.variables(model, dtype)),
-        "signals": [v for v in fv.variables(model, dtype) if v.key in ("input", "output", "sensor")], "pairs": record_names(model),
-    }  # fmt: skip
+        "model": model,
+        "name": fv.identifier(model),
+        "generator": f"penode {VERSION}",
+        "version": version,
+        "old": old,
+        "exchanges": exchanges,
+        "chosen": options["set"],
+        "stop": (exchanges[-1]["time"] if exchanges else 0.0) + 10000 * model.sample_time,
+        "units": fv.unit_definitions(fv.variables(model, dtype)),
+        "signals": [v for v in fv.variables(model, dtype) if v.key in ("input", "output", "sensor")],
+        "pairs": record_names(model),
+    }
     files: dict[str, bytes | str] = {
         f"resources/{model.name}.fmu": fmu,
         "SystemStructure.ssd": render("ssp_system.xml.j2", **context),
@@ -98,7 +109,9 @@ def build(model: Model, options: Options) -> bytes:
 
 
 EXPORTER = Exporter(
-    "SSP with the FMU, a file of values for each parameter set, and a schedule of sets", (".ssp",), build,
+    "SSP with the FMU, a file of values for each parameter set, and a schedule of sets",
+    (".ssp",),
+    build,
     options=(
         *fmu_files.OPTIONS,
         Option("ssp_version", "2.0 with FMI 3 (default), or 1.0 with FMI 2", choices=VERSIONS, default="2.0"),
@@ -106,4 +119,4 @@ EXPORTER = Exporter(
         Option("set", "parameter set (default: default)", default="default"),
     ),
     notes=fmu_files.notes,
-)  # fmt: skip
+)

@@ -31,10 +31,23 @@ except BaseException as error:
     print(" ".join(str(error).split())[:2000], file=sys.stderr)
     sys.exit(9)
 """
-_TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?)|((?:[A-Za-z_]\w*|'[^'\n]+')(?:\.(?:[A-Za-z_]\w*|'[^'\n]+'))*)|([-+*/^(),=<>{}\[\]]))")
+_TOKEN = re.compile(
+    r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?)|((?:[A-Za-z_]\w*|'[^'\n]+')(?:\.(?:[A-Za-z_]\w*|'[^'\n]+'))*)|([-+*/^(),=<>{}\[\]]))"
+)
 _DECLARED = re.compile(r'((?:\w+ )*?)(Real|Integer|Boolean|String|\w+)(\[[^\]]*\])? ([\w.\']+)(?:\((.*?)\))?(?: = (.*?))?(?: "(.*)")?;$')
-_FUNCTIONS = {"sin": sympy.sin, "cos": sympy.cos, "atan": sympy.atan, "exp": sympy.exp, "log": sympy.log, "sqrt": sympy.sqrt, "tanh": sympy.tanh,
-              "abs": sympy.Abs, "sign": sympy.sign, "max": sympy.Max, "min": sympy.Min}  # fmt: skip
+_FUNCTIONS = {
+    "sin": sympy.sin,
+    "cos": sympy.cos,
+    "atan": sympy.atan,
+    "exp": sympy.exp,
+    "log": sympy.log,
+    "sqrt": sympy.sqrt,
+    "tanh": sympy.tanh,
+    "abs": sympy.Abs,
+    "sign": sympy.sign,
+    "max": sympy.Max,
+    "min": sympy.Min,
+}
 
 
 @dataclass
@@ -65,7 +78,9 @@ def derivative(name: str) -> sympy.Symbol:
 def flat(path: Path, text: str, model: str) -> Flat:
     """The flattened model. Raises ImportProblem with one line."""
     if importlib.util.find_spec("rumoca") is None:
-        raise ImportProblem(f"{path}: to read a model it needs the Modelica compiler rumoca, which is not installed; pip install penode[modelica]")
+        raise ImportProblem(
+            f"{path}: to read a model it needs the Modelica compiler rumoca, which is not installed; pip install penode[modelica]"
+        )
     if len(text) > _LARGEST:
         raise ImportProblem(f"{path}: more than {_LARGEST} characters; name the file of the model alone, libraries in MODELICA_LIBS")
     roots = [root for root in os.environ.get("MODELICA_LIBS", "").split(os.pathsep) if root]
@@ -73,13 +88,22 @@ def flat(path: Path, text: str, model: str) -> Flat:
         with tempfile.TemporaryDirectory() as alone:  # rumoca reads the files beside it as well
             copy = Path(alone, "model.mo")
             copy.write_text(text, encoding="utf-8")
-            done = subprocess.run([sys.executable, "-c", _COMPILE, str(copy), model, *roots], capture_output=True, text=True, timeout=LIMIT, stdin=subprocess.DEVNULL, errors="replace")
+            done = subprocess.run(
+                [sys.executable, "-c", _COMPILE, str(copy), model, *roots],
+                capture_output=True,
+                text=True,
+                timeout=LIMIT,
+                stdin=subprocess.DEVNULL,
+                errors="replace",
+            )
     except subprocess.TimeoutExpired:
         raise ImportProblem(f"{path}: rumoca has not compiled {model} within {LIMIT} s; import a smaller model") from None
     if done.returncode != 0:
         said = (done.stderr.replace(alone, "").strip().splitlines() or [f"it ended with code {done.returncode}"])[-1]
         if "unsupported-feature:events" in said:
-            raise ImportProblem(f"{path}: {model} has events (when, reinit, or if without noEvent), which are not read; use the elements of a model file for stops and friction")
+            raise ImportProblem(
+                f"{path}: {model} has events (when, reinit, or if without noEvent), which are not read; use the elements of a model file for stops and friction"
+            )
         raise ImportProblem(f"{path}: rumoca cannot compile {model}: {said[:300]}; mend the model, or name its libraries in MODELICA_LIBS")
     return _parsed(done.stdout, f"{path}: {model}")
 
@@ -111,7 +135,9 @@ def _declare(found: Flat, line: str, where: str) -> None:
     words, kind, shape, name, attributes, value, description = match.groups()
     role = next((word for word in ("parameter", "constant", "input", "output") if word in words.split()), "")
     if shape or kind not in ("Real", "Integer", "Boolean") or (kind != "Real" and role not in ("parameter", "constant")):
-        raise ImportProblem(f"{where}: {name} is {kind}{shape or ''}{' that changes' if kind != 'Real' and not shape else ''}, which is not read; only Real scalars are")
+        raise ImportProblem(
+            f"{where}: {name} is {kind}{shape or ''}{' that changes' if kind != 'Real' and not shape else ''}, which is not read; only Real scalars are"
+        )
     if kind == "Boolean":  # a choice that the compiler has made already
         return
     given = dict(re.findall(r'(\w+) = ("[^"]*"|[^,]+)', attributes or ""))
@@ -174,7 +200,9 @@ class _Parser:
 
     def error(self) -> ImportProblem:
         word = self.words[self.at][1]
-        return ImportProblem(f"{self.where}: '{word or 'the end'}' is not read in an expression; only + - * / ^, der and {', '.join(_FUNCTIONS)} are")
+        return ImportProblem(
+            f"{self.where}: '{word or 'the end'}' is not read in an expression; only + - * / ^, der and {', '.join(_FUNCTIONS)} are"
+        )
 
     def take(self, *signs: str) -> str:
         """The sign here, if it is one of these."""
@@ -241,7 +269,9 @@ class _Parser:
             return differentiated(values[0])
         if name not in _FUNCTIONS or len(values) != (2 if name in ("max", "min") else 1):
             self.at -= 1
-            raise ImportProblem(f"{self.where}: the function '{name}' with {len(values)} arguments is not read; read are der, {', '.join(_FUNCTIONS)}")
+            raise ImportProblem(
+                f"{self.where}: the function '{name}' with {len(values)} arguments is not read; read are der, {', '.join(_FUNCTIONS)}"
+            )
         return _FUNCTIONS[name](*values)
 
 

@@ -17,12 +17,24 @@ import numpy as np
 from ..networks import Affine, Dense, Layer, Network, NetworkError
 from .interface import ImportProblem, Options
 
-_TOKEN = re.compile(r'\s*(?://[^\n]*|/\*.*?\*/|("(?:[^"\\]|\\.)*")|(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)|(.))', re.S)
+_TOKEN = re.compile(
+    r'\s*(?://[^\n]*|/\*.*?\*/|("(?:[^"\\]|\\.)*")|(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)|(.))',
+    re.S,
+)
 _LARGEST = 2_000_000  # values of a file
 _DEEPEST = 3  # braces: a matrix has two
 _LAYER = re.compile(r"layer_(\d+)_(weights|bias)")
 _SCALE = re.compile(r"scale_(\d+)_(shift|factor)")
-_ACTIVATIONS = {"relu": "relu", "id": "identity", "identity": "identity", "linear": "identity", "tanh": "tanh", "sigmoid": "sigmoid", "softplus": "softplus", "step": "step"}
+_ACTIVATIONS = {
+    "relu": "relu",
+    "id": "identity",
+    "identity": "identity",
+    "linear": "identity",
+    "tanh": "tanh",
+    "sigmoid": "sigmoid",
+    "softplus": "softplus",
+    "step": "step",
+}
 
 Value = float | list["Value"]
 
@@ -195,11 +207,15 @@ def _network(arrays: dict[str, np.ndarray], activations: dict[str, str] | None, 
     for k in numbers:
         weights, bias = (_part(arrays, f"layer_{k}_{part}", where) for part in ("weights", "bias"))
         if weights.ndim != 2 or bias.shape != weights.shape[:1]:
-            raise ImportProblem(f"{where}: layer_{k}: weights {list(weights.shape)} and bias {list(bias.shape)} do not fit; they must be [n, m] and [n]")
+            raise ImportProblem(
+                f"{where}: layer_{k}: weights {list(weights.shape)} and bias {list(bias.shape)} do not fit; they must be [n, m] and [n]"
+            )
         named = (activations or {}).get(f"layer_{k}")
         kind = _ACTIVATIONS.get(named.lower()) if named else "identity" if k == numbers[-1] else options.activation
         if kind is None:
-            raise ImportProblem(f"{where}: layer_{k}: the activation '{named}' is not known; known are {', '.join(sorted(set(_ACTIVATIONS.values())))}")
+            raise ImportProblem(
+                f"{where}: layer_{k}: the activation '{named}' is not known; known are {', '.join(sorted(set(_ACTIVATIONS.values())))}"
+            )
         layers.append(Dense(weights, bias, kind))
     scales = sorted({int(m[1]) for part in arrays if (m := _SCALE.fullmatch(part))})
     for k in scales:

@@ -38,7 +38,9 @@ def model_file(text: str, path: Path, model: str | None = None) -> str:
     if model is None and len(known) > 1:
         top = re.findall(r"^(?:model|class)\s+(\w+)", text, re.M)
         if len(top) != 1:
-            raise ImportProblem(f"{path}: it has {len(known)} models: {', '.join(known[:20])}; choose one with --model, behind its packages: A.B.{known[-1]}")
+            raise ImportProblem(
+                f"{path}: it has {len(known)} models: {', '.join(known[:20])}; choose one with --model, behind its packages: A.B.{known[-1]}"
+            )
         known = top
     chosen = model or known[0]
     if not re.fullmatch(r"\w+(\.\w+)*", chosen):
@@ -119,12 +121,19 @@ class _Reduction:
     def dummy(self) -> bool:
         """Remove a name with a derivative that others determine: the length of a spring, the position of a second mass."""
         moving = self.moving()
-        kept = {n for n in moving for e in self.equations if derivative(n) in e.free_symbols and {str(s) for s in e.free_symbols} & (moving - {n})}
+        kept = {
+            n
+            for n in moving
+            for e in self.equations
+            if derivative(n) in e.free_symbols and {str(s) for s in e.free_symbols} & (moving - {n})
+        }
         for i, e in enumerate(self.equations):
             if not any(str(s).startswith("der(") for s in e.free_symbols):
                 names = self.candidates(e, moving)
                 if names:
-                    return self.substitute(i, min(names, key=lambda n: (n in kept, self.found.variables[n].start != 0, -self.free.index(n))))
+                    return self.substitute(
+                        i, min(names, key=lambda n: (n in kept, self.found.variables[n].start != 0, -self.free.index(n)))
+                    )
         return False
 
     def substitute(self, i: int, name: str) -> bool:
@@ -135,7 +144,9 @@ class _Reduction:
         by = {self.symbol(name): value}
         if any(derivative(name) in other.free_symbols for other in [*self.equations, *self.solved.values()]):
             if any(str(s).startswith("der(") for s in value.free_symbols):
-                raise ImportProblem(f"{self.where}: the second derivative of what {name} equals is needed, which is not read; declare it as a state")
+                raise ImportProblem(
+                    f"{self.where}: the second derivative of what {name} equals is needed, which is not read; declare it as a state"
+                )
             by[derivative(name)] = differentiated(value, self.constant)
         self.equations = [sympy.expand(other.subs(by)) for other in self.equations]
         self.solved = {n: s.subs(by) for n, s in self.solved.items()} | {name: value}
@@ -151,7 +162,9 @@ def _units(found: Flat, where: str) -> dict[str, str]:
             try:
                 known[name] = _unit(variable.unit)
             except UnitError:
-                raise ImportProblem(f"{where}: {name} has the unit '{variable.unit[:40]}', which is not known; write it in SI units") from None
+                raise ImportProblem(
+                    f"{where}: {name} has the unit '{variable.unit[:40]}', which is not known; write it in SI units"
+                ) from None
     terms = [sympy.Add.make_args(sympy.expand(e)) for e in found.equations]
     before = -1
     while before != len(known):
@@ -244,13 +257,24 @@ class _Page:
         parameters = [n for n, v in variables.items() if v.role == "parameter" and n in used]
         inputs = [n for n in variables if n in self.reduced.inputs and n in used]
         rest = [n for n in self.reduced.free if n not in moving and n in used]
-        lines = ["# from Modelica, by penode import; choose a sample time", "[model]", f'name = "{re.sub(r"^[^A-Za-z]+|[^A-Za-z0-9_]", "", model).lower() or "model"}"', 'sample_time = "1 ms"']
-        lines += self.section("parameters", parameters, lambda n: f"value = {number(self.found.values[n], self.found, f'{self.where}: {n}')!r}, ")
+        lines = [
+            "# from Modelica, by penode import; choose a sample time",
+            "[model]",
+            f'name = "{re.sub(r"^[^A-Za-z]+|[^A-Za-z0-9_]", "", model).lower() or "model"}"',
+            'sample_time = "1 ms"',
+        ]
+        lines += self.section(
+            "parameters", parameters, lambda n: f"value = {number(self.found.values[n], self.found, f'{self.where}: {n}')!r}, "
+        )
         lines += self.section("inputs", inputs, lambda n: "")
         lines += self.section("states", moving, lambda n: f"start = {variables[n].start!r}, " if variables[n].start else "")
         lines += self.section("variables", rest, lambda n: "")
         lines += ["", "[equations]", *(f'e{k} = "{self.equation(e)}"' for k, e in enumerate(self.reduced.equations, 1))]
-        lines += ["", "[outputs]", *(f'{self.label(n)} = {{ value = "{self.print(e)}", unit = "{self.unit(n)}" }}' for n, e in outputs.items())]
+        lines += [
+            "",
+            "[outputs]",
+            *(f'{self.label(n)} = {{ value = "{self.print(e)}", unit = "{self.unit(n)}" }}' for n, e in outputs.items()),
+        ]
         return "\n".join(lines) + "\n"
 
     def outputs(self, moving: list[str]) -> dict[str, sympy.Expr]:
@@ -276,10 +300,12 @@ class _Page:
         return ["", f"[{title}]", *lines] if lines else []
 
     def described(self, variable: Variable) -> str:
-        text = re.sub(r'[^\w .,;:()/+*^-]', "", variable.description).strip()
+        text = re.sub(r"[^\w .,;:()/+*^-]", "", variable.description).strip()
         return f', description = "{text}"' if text else ""
 
     def unit(self, name: str) -> str:
         if name not in self.units:
-            raise ImportProblem(f"{self.where}: {name} has no unit, and none follows from a sum; declare it, as {name.rpartition('.')[2]}(unit=\"N/m\")")
+            raise ImportProblem(
+                f'{self.where}: {name} has no unit, and none follows from a sum; declare it, as {name.rpartition(".")[2]}(unit="N/m")'
+            )
         return self.units[name]

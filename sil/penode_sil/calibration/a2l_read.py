@@ -14,9 +14,17 @@ from ..errors import UserError
 
 _TOKEN = re.compile(r'/\*.*?\*/|//[^\n]*|"((?:[^"\\]|\\.|"")*)"|([^\s"]+)', re.S)
 _TYPES = {
-    "UBYTE": "u1", "SBYTE": "i1", "UWORD": "u2", "SWORD": "i2", "ULONG": "u4", "SLONG": "i4", "A_UINT64": "u8", "A_INT64": "i8",
-    "FLOAT32_IEEE": "f4", "FLOAT64_IEEE": "f8",
-}  # fmt: skip
+    "UBYTE": "u1",
+    "SBYTE": "i1",
+    "UWORD": "u2",
+    "SWORD": "i2",
+    "ULONG": "u4",
+    "SLONG": "i4",
+    "A_UINT64": "u8",
+    "A_INT64": "i8",
+    "FLOAT32_IEEE": "f4",
+    "FLOAT64_IEEE": "f8",
+}
 
 
 @dataclass
@@ -169,8 +177,11 @@ def parse(text: str, origin: str) -> A2l:
         parts = module.all("MOD_PAR")
         epk = (parts[0].after("EPK", 1), parts[0].after("ADDR_EPK", 1)) if parts else ([], [])
         return A2l(
-            module.words[0], {e.name: e for e in characteristics}, {e.name: e for e in measurements},
-            (segments[0][0], segments[0][1]) if len(segments) == 1 else None, (epk[0][0], int(epk[1][0], 0)) if all(epk) else None,
-        )  # fmt: skip
+            module.words[0],
+            {e.name: e for e in characteristics},
+            {e.name: e for e in measurements},
+            (segments[0][0], segments[0][1]) if len(segments) == 1 else None,
+            (epk[0][0], int(epk[1][0], 0)) if all(epk) else None,
+        )
     except (ValueError, IndexError, KeyError) as exc:
         raise UserError(f"{origin}: it cannot be read as A2L ({exc}); export it again with penode export --format a2l") from exc

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UserError, hint
 from ..building import FLAGS, ROOT, build_once, compiler_version, generated, model_options, sources_in
+from ..errors import UserError, hint
 from ..targets import MACHINES, PORT, _included
 from .codes import Slave
 from .virtual import Served, describe, free_port, identity, period
@@ -32,16 +32,30 @@ def build(model: Any, machine: str) -> Path:
         raise UserError(f'--on: there is no controller for "{machine}"; {hint(machine, WITH_UART)}')
     between = period(model)
     if 10**9 % between:  # ns
-        raise UserError(f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; use --on sil")
+        raise UserError(
+            f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; use --on sil"
+        )
     source, firmware = generated(model), ROOT / "sil" / "firmware"
     code = [source / f"{model.name}.c", source / f"{model.owner}_params.c", *sources_in(("src", "*.c"))]
     own = [firmware / "serve_uart.c", firmware / "controller.c", PORT / "uart.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
     command = [
-        str(PORT / "cc"), MACHINES[machine], *FLAGS, "-O2", "-g", f"-I{ROOT}/port/xcp", f"-I{PORT}", f"-I{source}", *model_options(model),
-        f'-DCONTROLLER_EPK="{identity(model)} {machine}"', f"-DCONTROLLER_PERIOD={between}ULL", *map(str, [*own, *code]),
-    ]  # fmt: skip
+        str(PORT / "cc"),
+        MACHINES[machine],
+        *FLAGS,
+        "-O2",
+        "-g",
+        f"-I{ROOT}/port/xcp",
+        f"-I{PORT}",
+        f"-I{source}",
+        *model_options(model),
+        f'-DCONTROLLER_EPK="{identity(model)} {machine}"',
+        f"-DCONTROLLER_PERIOD={between}ULL",
+        *map(str, [*own, *code]),
+    ]
     headers = [*sources_in(("port/xcp", "*.h"), ("sil/firmware", "*.h")), source / f"{model.name}.h"]
-    return build_once(f"{model.name}-uart-{machine}", ".elf", command, [compiler_version("arm-none-eabi-gcc"), *_included(), *headers, *own, *code])
+    return build_once(
+        f"{model.name}-uart-{machine}", ".elf", command, [compiler_version("arm-none-eabi-gcc"), *_included(), *headers, *own, *code]
+    )
 
 
 @contextmanager
@@ -55,7 +69,9 @@ def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[n
     inputs = u.astype(np.float32).tobytes()
     if len(inputs) > Slave.STIMULUS:
         most = Slave.STIMULUS // (len(inputs) // len(u)) * model.sample_time
-        raise UserError(f"--scenario: the emulated controller holds the inputs of {most:g} s, not of {len(u) * model.sample_time:g} s; shorten it, or use --on sil")
+        raise UserError(
+            f"--scenario: the emulated controller holds the inputs of {most:g} s, not of {len(u) * model.sample_time:g} s; shorten it, or use --on sil"
+        )
     program = build(model, machine)
     port = port if port is None else port or free_port(host, False)
     line = "pty" if port is None else f"tcp:{host}:{port},server=on,wait=off"
@@ -64,15 +80,30 @@ def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[n
         stimulus = Path(folder, "inputs")
         stimulus.write_bytes(inputs)
         words = [
-            _EMULATOR, "-machine", MACHINES[machine], "-display", "none", "-monitor", "none", "-serial", line,
-            "-semihosting-config", f"enable=on,target=native,arg=program,arg={stimulus}", "-kernel", str(program),
-        ]  # fmt: skip
-        with subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True) as process:
+            _EMULATOR,
+            "-machine",
+            MACHINES[machine],
+            "-display",
+            "none",
+            "-monitor",
+            "none",
+            "-serial",
+            line,
+            "-semihosting-config",
+            f"enable=on,target=native,arg=program,arg={stimulus}",
+            "-kernel",
+            str(program),
+        ]
+        with subprocess.Popen(
+            words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+        ) as process:
             assert process.stdout
             device = process.stdout.readline().partition("redirected to ")[2].split()[:1] if port is None else []
             time.sleep(0.5)
             if process.poll() is not None:
-                raise UserError(f"{line}: the emulator has ended ({process.stdout.read().strip() or process.returncode}); choose another port")
+                raise UserError(
+                    f"{line}: the emulator has ended ({process.stdout.read().strip() or process.returncode}); choose another port"
+                )
             try:
                 yield Served(f"serial:{device[0]}" if device else f"tcp:{host}:{port}", a2l)
             finally:

@@ -47,7 +47,10 @@ _REMEDIES = {
 
 def _without_noise(application: Any) -> None:
     """pyxcp reports each refusal on stderr, with a page of diagnostics."""
-    for logger in (application.log, *(logging.getLogger(name) for name in list(logging.root.manager.loggerDict) if "pyxcp" in name.lower())):
+    for logger in (
+        application.log,
+        *(logging.getLogger(name) for name in list(logging.root.manager.loggerDict) if "pyxcp" in name.lower()),
+    ):
         logger.handlers = [logging.NullHandler()]
         logger.propagate = False
         logger.setLevel(logging.CRITICAL + 1)
@@ -148,7 +151,9 @@ class Link:
         found = parse(text, str(path or self.address.text))
         epk = self.text(Text.EPK) if found.epk is not None else ""
         if found.epk is not None and epk and epk != found.epk[0]:
-            raise UserError(f'{path or self.address.text}: the A2L is that of "{found.epk[0]}", the controller is "{epk}"; export the A2L of its program')
+            raise UserError(
+                f'{path or self.address.text}: the A2L is that of "{found.epk[0]}", the controller is "{epk}"; export the A2L of its program'
+            )
         return found
 
 

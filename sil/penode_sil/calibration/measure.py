@@ -73,7 +73,11 @@ def _policy(entries: list[Entry], every: int) -> tuple[Any, Samples]:
 
     places = {entry.address: entry for entry in entries}.values()  # two names of one place are one column
     measured = [(entry.name, entry.address, 0, _TYPES[entry.type.str[1:]]) for entry in places]
-    lists = [DaqList(name="step", event_num=int(Slave.STEP), stim=False, enable_timestamps=True, measurements=measured, priority=0, prescaler=every)]
+    lists = [
+        DaqList(
+            name="step", event_num=int(Slave.STEP), stim=False, enable_timestamps=True, measurements=measured, priority=0, prescaler=every
+        )
+    ]
     policy = Collector(lists, logger=logging.getLogger("penode.measure"))  # else pyxcp reads the command line, which is ours
     policy.pid_off = False  # which it sets only then
     return policy, kept
@@ -118,7 +122,12 @@ def _log(period: float, entries: list[Entry], kept: Samples, broken: bool = Fals
 
 
 def record(
-    address: addresses.Address, a2l: A2l, names: list[str], duration: float | None, every: int = 1, during: Callable[[Link], object] = lambda link: None
+    address: addresses.Address,
+    a2l: A2l,
+    names: list[str],
+    duration: float | None,
+    every: int = 1,
+    during: Callable[[Link], object] = lambda link: None,
 ) -> Log:
     """
     Measure while `during(link)` runs, and then for `duration` seconds, until an interrupt, or until the controller falls silent: what has
@@ -180,7 +189,9 @@ def _seconds(option: str, text: str) -> float:
 @click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
 @click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
 @click.option("--duration", help='How long, like "10 s"; until Ctrl-C if not given.')
-@click.option("--stage", "staged", metavar="SET", help="Write this set meanwhile, as penode stage does: MODEL.toml:NAME, or a file in serial form.")
+@click.option(
+    "--stage", "staged", metavar="SET", help="Write this set meanwhile, as penode stage does: MODEL.toml:NAME, or a file in serial form."
+)
 @click.option("--after", default="1 s", show_default=True, help="When to begin with that.")
 @click.option("--every", type=click.IntRange(1, 255), default=1, show_default=True, help="Every so many steps a sample.")
 @click.option("-o", "--output", type=FILE, required=True, help="File to write (.mf4).")
@@ -213,7 +224,9 @@ def measure(
     lost = "lost ones not counted" if log.lost is None else f"{log.lost} lost"
     click.echo(f"{to}: {log.time.size} samples in {log.time[-1]:.3f} s, {lost} -> {output}")
     if log.lost is None:
-        note("XCP has no code for the controller's period (1 to 255 times 1 ns, 10 ns, ... 1 s): measure a counter, such as sample, to see gaps")
+        note(
+            "XCP has no code for the controller's period (1 to 255 times 1 ns, 10 ns, ... 1 s): measure a counter, such as sample, to see gaps"
+        )
     if log.broken:
         raise UserError(f"{to}: the controller has fallen silent, or the line is broken; what came until then is in {output}")
     if log.lost:
@@ -223,4 +236,7 @@ def measure(
 def columns(log: Log, a2l: A2l) -> list[Column]:
     """A log as a table."""
     entries = a2l.measurements
-    return [Column("time", "s", log.time), *(Column(name, entries[name].unit or "1", entries[name].shown(values)) for name, values in log.values.items())]
+    return [
+        Column("time", "s", log.time),
+        *(Column(name, entries[name].unit or "1", entries[name].shown(values)) for name, values in log.values.items()),
+    ]

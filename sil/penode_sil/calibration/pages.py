@@ -42,7 +42,9 @@ def segment(a2l: A2l) -> tuple[int, int, np.dtype[Any]]:
     """Address, bytes and type of the values of a set. Raises UserError."""
     kinds = {entry.type for entry in a2l.characteristics.values()}
     if a2l.segment is None or len(kinds) != 1:
-        raise UserError(f"the A2L of {a2l.name} has not one memory segment of one kind of numbers; export it with penode export --format a2l")
+        raise UserError(
+            f"the A2L of {a2l.name} has not one memory segment of one kind of numbers; export it with penode export --format a2l"
+        )
     return *a2l.segment, kinds.pop()
 
 
@@ -73,7 +75,9 @@ def choose(text: str, kind: np.dtype[Any]) -> ChosenSet:
     except ValueError as exc:
         raise UserError(f"{text}: {exc}; name a set as MODEL.toml:NAME, or a file in serial form") from exc
     if found.values.dtype != kind:
-        raise UserError(f"{text}: its values have {found.values.dtype.itemsize} bytes, those of the controller {kind.itemsize}; write the set in that form")
+        raise UserError(
+            f"{text}: its values have {found.values.dtype.itemsize} bytes, those of the controller {kind.itemsize}; write the set in that form"
+        )
     return ChosenSet(f"{Path(text).name} (set {found.id})", found.layout, found.values)
 
 

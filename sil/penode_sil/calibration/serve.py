@@ -24,15 +24,31 @@ from .virtual import Served, inputs, served
 @click.option("--udp", type=click.IntRange(0, 65535), help="The same over UDP.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0: every one of this machine.")
 @click.option("--scenario", type=FILE, help="Scenario file whose inputs drive it, again and again; zeros if not given.")
-@click.option("--on", "target", default="sil", show_default=True, metavar="sil|pil[:machine]", help="On this machine, or on an emulated Cortex-M.")
-@click.option("--quiet", type=click.IntRange(0, 60000), default=0, show_default=True, help="Milliseconds after the last edit until it is in force, while the working page runs; 0: by page switch only.")
+@click.option(
+    "--on", "target", default="sil", show_default=True, metavar="sil|pil[:machine]", help="On this machine, or on an emulated Cortex-M."
+)
+@click.option(
+    "--quiet",
+    type=click.IntRange(0, 60000),
+    default=0,
+    show_default=True,
+    help="Milliseconds after the last edit until it is in force, while the working page runs; 0: by page switch only.",
+)
 @click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), help="Seconds; until Ctrl-C if not given.")
 @click.option("--a2l", type=FILE, help="File to write its A2L to, for tools that do not ask the controller.")
 @click.option("--json", "as_json", is_flag=True, help="Print the address and the end as JSON.")
 def serve(
-    model: Path, tcp: int | None, udp: int | None, host: str, scenario: Path | None, target: str, quiet: int, duration: float | None, a2l: Path | None,
+    model: Path,
+    tcp: int | None,
+    udp: int | None,
+    host: str,
+    scenario: Path | None,
+    target: str,
+    quiet: int,
+    duration: float | None,
+    a2l: Path | None,
     as_json: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Run the compiled model file MODEL in real time, for calibration tools to connect to by XCP."""
     if (tcp is None) == (udp is None):
         raise UserError("serve needs one of --tcp PORT and --udp PORT; use --tcp 5555")
@@ -40,26 +56,42 @@ def serve(
     if place not in ("sil", "pil") or (machine and place == "sil"):
         raise UserError(f'--on: "{target}" is not known; use sil, pil or pil:MACHINE')
     if place == "pil" and (tcp is None or quiet):
-        raise UserError("--on pil: its serial line is a TCP port, and edits are in force by page switch only; use --tcp PORT, without --quiet")
+        raise UserError(
+            "--on pil: its serial line is a TCP port, and edits are in force by page switch only; use --tcp PORT, without --quiet"
+        )
     loaded = penode_gen.load(model)
     u = inputs(loaded, scenario)
     kind = "tcp" if tcp is not None else "udp"
     port = int(tcp if tcp is not None else udp or 0)
-    with emulated(loaded, machine or WITH_UART[0], host, port, u) if place == "pil" else served(loaded, kind, host, port, u, quiet) as found:
+    with (
+        emulated(loaded, machine or WITH_UART[0], host, port, u) if place == "pil" else served(loaded, kind, host, port, u, quiet) as found
+    ):
         if a2l is not None:
             a2l.write_text(found.a2l, encoding="utf-8")
         if place == "pil":
-            note(f"it offers no A2L: give penode measure, stage and compare --a2l {a2l}" if a2l else "it offers no A2L: write one by --a2l, for tools and for penode measure, stage and compare")
+            note(
+                f"it offers no A2L: give penode measure, stage and compare --a2l {a2l}"
+                if a2l
+                else "it offers no A2L: write one by --a2l, for tools and for penode measure, stage and compare"
+            )
         elif not found.a2l:
             note("it offers no A2L: that needs the Python package pyelftools; pip install penode[xcp]")
-        click.echo(json.dumps({"address": found.address}) if as_json else f"{loaded.name} at {found.address}, a step each {loaded.sample_time * 1e3:g} ms; end with Ctrl-C")
+        click.echo(
+            json.dumps({"address": found.address})
+            if as_json
+            else f"{loaded.name} at {found.address}, a step each {loaded.sample_time * 1e3:g} ms; end with Ctrl-C"
+        )
         _wait(duration)
     if place == "sil":
         _tell_end(found, as_json)
 
 
 def _tell_end(found: Served, as_json: bool) -> None:
-    click.echo(json.dumps({"steps": found.steps, "late": found.late}) if as_json else f"{found.steps} steps, {found.late} of them more than a period late")
+    click.echo(
+        json.dumps({"steps": found.steps, "late": found.late})
+        if as_json
+        else f"{found.steps} steps, {found.late} of them more than a period late"
+    )
 
 
 def _wait(duration: float | None) -> None:

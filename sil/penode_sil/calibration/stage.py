@@ -23,7 +23,6 @@ from .link import Link, connected
 from .pages import ChosenSet, Pages
 
 
-
 @dataclass(frozen=True)
 class Staged:
     """What came of it: bytes written, seconds for that, the checksum that both sides agree on, the id that the controller gave."""
@@ -65,13 +64,17 @@ def write(link: Link, a2l: A2l, chosen: ChosenSet) -> tuple[int, float]:
     expected = a2l.measurements.get("set.layout")
     layout = int(link.number(expected)) if expected else chosen.layout
     if chosen.values.nbytes != size or layout != chosen.layout:
-        raise UserError(f"{chosen.name}: it is a set of another model (layout 0x{chosen.layout:08x}, the controller has 0x{layout:08x}); choose one of {a2l.name}")
+        raise UserError(
+            f"{chosen.name}: it is a set of another model (layout 0x{chosen.layout:08x}, the controller has 0x{layout:08x}); choose one of {a2l.name}"
+        )
     begin = time.perf_counter()
     link.write(address, chosen.values.astype(chosen.values.dtype.newbyteorder(link.order)).tobytes())
     seconds = time.perf_counter() - begin
     found = link.checksum(address, size)
     if found != chosen.checksum:
-        raise UserError(f"{chosen.name}: what has arrived is something else (CRC-32 0x{found:08x}, not 0x{chosen.checksum:08x}); the running set stays, stage it again")
+        raise UserError(
+            f"{chosen.name}: what has arrived is something else (CRC-32 0x{found:08x}, not 0x{chosen.checksum:08x}); the running set stays, stage it again"
+        )
     return found, seconds
 
 
@@ -139,7 +142,9 @@ def compare(model: Path, to: str, a2l: Path | None, listed: int, as_json: bool) 
     differing = found.differing(described, address)
     if as_json:
         keys = ("name", "unit", "running", "reference")
-        click.echo(json.dumps({"running": running, "reference": reference, "differing": [dict(zip(keys, row)) for row in differing]}, indent=1))
+        click.echo(
+            json.dumps({"running": running, "reference": reference, "differing": [dict(zip(keys, row)) for row in differing]}, indent=1)
+        )
         return
     click.echo(f"running: {running}, reference: {reference}")
     for name, unit, now, then in differing[:listed]:

@@ -21,9 +21,9 @@ import penode_gen
 from penode_gen import exports, placeholder
 
 from .. import scenario as scenarios
+from ..building import FLAGS, ROOT, build_once, compiler_version, generated, model_options, sources_in
 from ..console import note
 from ..errors import UserError
-from ..building import FLAGS, ROOT, build_once, compiler_version, generated, model_options, sources_in
 from .codes import Slave
 
 MEASURED = "shown"  # the variable of it with what may be measured besides the instance
@@ -96,21 +96,32 @@ class Served:
 
 
 @contextmanager
-def served(model: Any, kind: str, host: str, port: int, u: NDArray[np.float32], quiet: int = 0, max_cto: int = Slave.MAX_CTO) -> Iterator[Served]:
+def served(
+    model: Any, kind: str, host: str, port: int, u: NDArray[np.float32], quiet: int = 0, max_cto: int = Slave.MAX_CTO
+) -> Iterator[Served]:
     """Run a virtual controller; `kind` is tcp, udp or frames (CAN frames as datagrams). Raises UserError."""
     program = build(model)
     try:
         port = port or free_port(host, kind != "tcp")
     except OSError as exc:
         raise UserError(f"--host: {host} is no address of this machine; use 127.0.0.1, or 0.0.0.0 for all") from exc
-    a2l = describe(model, program, f"{kind}:{host}:{port}" if kind != "frames" else "can:0x100:0x101") if importlib.util.find_spec("elftools") else ""
+    a2l = (
+        describe(model, program, f"{kind}:{host}:{port}" if kind != "frames" else "can:0x100:0x101")
+        if importlib.util.find_spec("elftools")
+        else ""
+    )
     with tempfile.TemporaryDirectory() as folder:
         stimulus, offered = Path(folder, "inputs"), Path(folder, "a2l")
         stimulus.write_bytes(u.astype(np.float32).tobytes())
         offered.write_text(a2l, encoding="utf-8")
         words = [program, kind, host, port, int(max_cto), quiet, stimulus, offered if a2l else "-"]
         with subprocess.Popen(
-            [str(word) for word in words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+            [str(word) for word in words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
         ) as process:
             assert process.stdin and process.stdout and process.stderr
             if not process.stdout.readline():

@@ -22,9 +22,9 @@ from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 from penode_gen.networks import Affine, Dense, Network, layer_slope, layer_value
 
+from .explanation import Explanation
 from .hypotheses import Basis, size
 from .naming import Curve
-from .explanation import Explanation
 from .study import Study
 
 Array = NDArray[np.float64]
@@ -171,9 +171,8 @@ def as_json(network: Network) -> str:
     if isinstance(first, Affine):
         top["normalise"] = {"kind": "min-max", "min": first.shift.tolist(), "max": (first.shift + 1.0 / first.factor).tolist()}
     top["layers"] = [
-        {"activation": x.activation, "weights": x.weights.tolist(), "bias": x.bias.tolist()}
-        for x in network.layers if isinstance(x, Dense)
-    ]  # fmt: skip
+        {"activation": x.activation, "weights": x.weights.tolist(), "bias": x.bias.tolist()} for x in network.layers if isinstance(x, Dense)
+    ]
     if isinstance(last, Affine):
         top["denormalise"] = {"kind": "min-max", "min": last.shift.tolist(), "max": (last.shift + last.factor).tolist()}
     if network.input_min is not None and network.input_max is not None:
@@ -187,8 +186,12 @@ def write(study: Study, e: Explanation, learnt: list[Taught], beside: Path, outp
     lines = [
         f"# The nominal model with one more parameter set, in which {', '.join(t.element for t in learnt)} knows what the recordings show.",
         "# It has the layout of the nominal code: it can be staged in an ECU that runs that.",
-        "", "[model]", f'extends = "{beside.as_posix()}"', "", f"[sets.{SET}]",
-    ]  # fmt: skip
+        "",
+        "[model]",
+        f'extends = "{beside.as_posix()}"',
+        "",
+        f"[sets.{SET}]",
+    ]
     networks = dict(study.model.sets[study.set_name].networks) if study.set_name != "default" else {}
     for name, network in (networks | {t.port: t.network for t in learnt}).items():
         (output / f"{name}_{SET}.json").write_text(as_json(network))

@@ -20,8 +20,13 @@ def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
     wide, (term,) = with_forms(bench, [t.form], moved, 90 + number)  # forms that are only tried have the number of their round, far below
     names = dict(zip([f.target for f in t.term.free], term.free))
     own = {f.target: f for f in bench.fit.free}
-    fitted = [replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free if f.target in own or f.target in names]
-    free = (*fitted, *(f for f in own.values() if f.target not in {x.target for x in fitted}))  # the bench may have parameters that the trial did not fit
+    fitted = [
+        replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free if f.target in own or f.target in names
+    ]
+    free = (
+        *fitted,
+        *(f for f in own.values() if f.target not in {x.target for x in fitted}),
+    )  # the bench may have parameters that the trial did not fit
     fresh = replace(bench, model=wide, free=free, level=t.level)
     problem = fresh.problem()
     fresh = replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(wide.states)), FOLLOWED))

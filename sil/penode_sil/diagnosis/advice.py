@@ -77,12 +77,17 @@ def _with_alike(model: Model, c: Cause) -> Cause:
 
 def advice(d: Diagnosis) -> tuple[str, ...]:
     """What to do next, the most useful first."""
-    first = [f"tell {place(x.cause.kind, x.cause.where)} from {' and '.join(place(n.kind, n.where) for n, _ in x.others)}: {x.how}" for x in doubts(d)]
+    first = [
+        f"tell {place(x.cause.kind, x.cause.where)} from {' and '.join(place(n.kind, n.where) for n, _ in x.others)}: {x.how}"
+        for x in doubts(d)
+    ]
     return (*first, *_of_verdict(d), *_of_holdout(d))
 
 
 def _of_verdict(d: Diagnosis) -> list[str]:
-    if d.verdict == "no_discrepancy" and any(g.before_rmse > UNSEEN * g.noise_floor and g.after_rmse < g.before_rmse for g in d.gain.values()):
+    if d.verdict == "no_discrepancy" and any(
+        g.before_rmse > UNSEEN * g.noise_floor and g.after_rmse < g.before_rmse for g in d.gain.values()
+    ):
         return ["use model_extended.toml: it is the model as fitted to the recordings"]
     if d.verdict == "no_discrepancy":
         return ["keep the model; before you use it for faster or larger motion, record some"]
@@ -91,9 +96,15 @@ def _of_verdict(d: Diagnosis) -> list[str]:
     if d.verdict == "unexplained":
         return _where_to_look(d)
     worse = [name for name, g in d.gain.items() if g.worsened]
-    found = [f"do not use model_extended.toml yet: on the hold-out its error of {', '.join(worse)} is larger than that of the model as it is"] if worse else _take_over(d)
+    found = (
+        [f"do not use model_extended.toml yet: on the hold-out its error of {', '.join(worse)} is larger than that of the model as it is"]
+        if worse
+        else _take_over(d)
+    )
     if d.verdict == "partly_explained":
-        found.append(f"look for the rest: {1.0 - d.explained:.0%} of the avoidable residual is unexplained; the report shows where and when it occurs")
+        found.append(
+            f"look for the rest: {1.0 - d.explained:.0%} of the avoidable residual is unexplained; the report shows where and when it occurs"
+        )
     return found
 
 
@@ -116,12 +127,18 @@ def _where_to_look(d: Diagnosis) -> list[str]:
     if not places:
         return ["compare signals and times of the largest residual in the report with what the plant did then"]
     shares = ", ".join(f"{p['place']} {p['share']:.0%}" for p in places[:3])
-    return [f"look at {places[0]['place']} first: give it a law in the model file, or train a network there (penode train), and diagnose again; "
-            f"share of the residual that a missing force could make up for: {shares}"]  # fmt: skip
+    return [
+        f"look at {places[0]['place']} first: give it a law in the model file, or train a network there (penode train), and diagnose again; "
+        f"share of the residual that a missing force could make up for: {shares}"
+    ]
 
 
 def _of_holdout(d: Diagnosis) -> list[str]:
     if not d.gain:
         return ["hold out a recording with --holdout: without one, nothing shows how far the model errs on new data"]
     beyond = max(g.outside for g in d.gain.values())
-    return [f"train on motion as large and fast as that of the hold-out: {beyond:.0%} of its samples go beyond the training"] if beyond > FARTHER else []
+    return (
+        [f"train on motion as large and fast as that of the hold-out: {beyond:.0%} of its samples go beyond the training"]
+        if beyond > FARTHER
+        else []
+    )

@@ -9,14 +9,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+
 import penode_gen
 from penode_gen.model import Model
 
 from ..measured import Measured
 from . import explanation, plausible, residual, weighed
 from .entries import extends
-from .result import OUTSIDE, Cause, Diagnosis, Recorded
 from .explanation import Explanation
+from .result import OUTSIDE, Cause, Diagnosis, Recorded
 
 
 def write_extended(text: str, model: Model, output: Path) -> Model:
@@ -49,8 +50,8 @@ def alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
 
 
 def by_innovations(
-    w: weighed.Weighed, best: Explanation | None, output: Path | None, remarks: Sequence[str], tell: Callable[[float, str], None],
-) -> Diagnosis:  # fmt: skip
+    w: weighed.Weighed, best: Explanation | None, output: Path | None, remarks: Sequence[str], tell: Callable[[float, str], None]
+) -> Diagnosis:
     """The diagnosis of recordings that sensor noise alone cannot judge, from what was weighed, and of which `best` is what sensor noise would
     say; without recordings and time, which the caller has."""
     study = w.study
@@ -62,6 +63,15 @@ def by_innovations(
     doubt = plausible.doubt(study, best, w.verdict) if w.verdict == "unexplained" else ""
     causes = w.causes or ((Cause(OUTSIDE, "", {}, 0.5),) if w.verdict == "unexplained" else ())
     return Diagnosis(
-        w.verdict, causes, w.gain, w.numerics, w.explained, evidence, 0.0,
-        (*[doubt] * bool(doubt), *remarks, *w.notes), residual=shown.numbers(), explanations=w.explanations, shown=shown,
-    )  # fmt: skip
+        w.verdict,
+        causes,
+        w.gain,
+        w.numerics,
+        w.explained,
+        evidence,
+        0.0,
+        (*[doubt] * bool(doubt), *remarks, *w.notes),
+        residual=shown.numbers(),
+        explanations=w.explanations,
+        shown=shown,
+    )

@@ -43,15 +43,18 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
         return re.sub(r"\b((?:[Fsv]_)?)(x\d+_\d+_\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
 
     values = fit.values
-    parameters = [_changed(model, name, values[name]) for name in model.parameters if name in values and values[name] != model.parameters[name].value]
+    parameters = [
+        _changed(model, name, values[name]) for name in model.parameters if name in values and values[name] != model.parameters[name].value
+    ]
     elements = []
     for t in forces:
         for name in t.elements:
             own = next(e for e in bench.model.elements if e.name == name)
             parameters += [
                 f"{named(p.name)} = {table({'value': values.get(p.name, p.value), 'unit': p.unit})}"
-                for p in bench.model.parameters.values() if p.name.startswith(f"{name}_")
-            ]  # fmt: skip
+                for p in bench.model.parameters.values()
+                if p.name.startswith(f"{name}_")
+            ]
             elements.append(f"{named(name)} = {table(_element(own, named))}")
     driven = _driven(model, fit, terms, {*taken, *rename.values()})
     redirected = _redirected(model, driven)
@@ -69,14 +72,23 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
     lines = [
         f"# What the recordings taught about {model.path.name}: {learnt or 'nothing but values'}.",
-        "", "[model]", extends(model.path.resolve()), f"name = {toml(model.name + '_extended')}",
-        f"sample_time = {toml(f'{model.sample_time:.12g} s')}", *[f"substeps = {substeps}"] * (substeps > model.substeps), "",
-    ]  # fmt: skip
+        "",
+        "[model]",
+        extends(model.path.resolve()),
+        f"name = {toml(model.name + '_extended')}",
+        f"sample_time = {toml(f'{model.sample_time:.12g} s')}",
+        *[f"substeps = {substeps}"] * (substeps > model.substeps),
+        "",
+    ]
     for title, entries in (
-        ("parameters", [*parameters, *driven.parameters]), ("actuators", driven.actuators), ("elements", [*redirected["elements"], *elements]),
-        ("states", driven.states), ("equations", [*redirected["equations"], *driven.equations]), ("outputs", outputs),
+        ("parameters", [*parameters, *driven.parameters]),
+        ("actuators", driven.actuators),
+        ("elements", [*redirected["elements"], *elements]),
+        ("states", driven.states),
+        ("equations", [*redirected["equations"], *driven.equations]),
+        ("outputs", outputs),
         ("sensors", [f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}" for s, x in zip(model.sensors, sensors) if x]),
-    ):  # fmt: skip
+    ):
         if entries:
             lines += [f"[{title}]", *entries, ""]
     return Applied("\n".join(lines), tuple(driven.left))
@@ -104,9 +116,15 @@ def _element(e: Element, named: Callable[[str], str]) -> dict[str, object]:
 
 
 def _sensor(
-    model: Model, j: int, expression: str, values: dict[str, float], offsets: Collection[str], limits: Mapping[int, float],
-    delays: Mapping[int, float], driven: Driven,
-) -> dict[str, object]:  # fmt: skip
+    model: Model,
+    j: int,
+    expression: str,
+    values: dict[str, float],
+    offsets: Collection[str],
+    limits: Mapping[int, float],
+    delays: Mapping[int, float],
+    driven: Driven,
+) -> dict[str, object]:
     """What a sensor that measures otherwise has as its value and unit; nothing for one that does not."""
     s, unit = model.sensors[j], units.si(model.sensors[j].unit)
 

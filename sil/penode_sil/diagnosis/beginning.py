@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.model import Model
 
 from .evidence.fit import Problem
 from .evidence.observer import Filter, Predictor, Record, augmented, sample_noise
-from .fit import Free
-from .fit import Problem as OutputError
+from .fit import Free, Problem as OutputError
 from .noise import Experiment
 from .study import Study
 

@@ -17,7 +17,10 @@ CLOSE = 1e-3  # [s] sample time up to which parabolas between samples are close 
 def far(step: float, signals: Sequence[Array]) -> bool:
     """Are samples `step` [s] apart too far for straight lines between them? More than CLOSE, or with fewer than 32 in a period of a signal [n, n_u],
     whose rms a line misses by (2 pi/32)^2/12 = 0.3 %."""
-    rms, change = (np.sqrt(np.mean(np.concatenate(x) ** 2, axis=0)) for x in ([s - np.mean(s, axis=0) for s in signals], [np.diff(s, axis=0) for s in signals]))
+    rms, change = (
+        np.sqrt(np.mean(np.concatenate(x) ** 2, axis=0))
+        for x in ([s - np.mean(s, axis=0) for s in signals], [np.diff(s, axis=0) for s in signals])
+    )
     return step > CLOSE or bool(np.any(32.0 * change > 2.0 * np.pi * rms))
 
 
@@ -53,7 +56,9 @@ def _means(u: Array) -> Array:
     """Of the smooth signals [..., n - 1, n_u] over each interval. At their ends they go on turned by half about them, for there the noise of
     samples would count six times."""
     more, axis = min(16, u.shape[-2] - 1), u.ndim - 2
-    before, after = (2.0 * u[..., [end], :] - u[..., rows, :][..., ::-1, :] for end, rows in ((0, slice(1, more + 1)), (-1, slice(-more - 1, -1))))
+    before, after = (
+        2.0 * u[..., [end], :] - u[..., rows, :][..., ::-1, :] for end, rows in ((0, slice(1, more + 1)), (-1, slice(-more - 1, -1)))
+    )
     at = np.arange(float(u.shape[-2] + 2 * more))
     spline = make_interp_spline(at, np.concatenate([before, u, after], axis=-2), k=7, axis=axis)
     return np.diff(spline.antiderivative()(at[more : len(at) - more]), axis=axis)

@@ -9,13 +9,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen import units
 from penode_gen.model import Model
 
 from ..measured import Measured
 from . import dropouts
-from .result import Cause, Value
 from .explanation import Explanation
+from .result import Cause, Value
 from .study import Study
 
 FEW = 5  # bad samples of a sensor that make a fault of it

@@ -17,7 +17,24 @@ import penode_gen
 from penode_gen.model import Model
 
 from ..measured import Measured
-from . import absorb, echo, explaining, extension, measuring, nameless, noise, numerics, plant, plausible, refining, residual, small, steady, straight, tones
+from . import (
+    absorb,
+    echo,
+    explaining,
+    extension,
+    measuring,
+    nameless,
+    noise,
+    numerics,
+    plant,
+    plausible,
+    refining,
+    residual,
+    small,
+    steady,
+    straight,
+    tones,
+)
 from .answers import alternatives, write_extended
 from .broken import broken_sensors, still_wild
 from .explanation import Explanation
@@ -99,16 +116,27 @@ def by_noise(case: Case, study: Study, best: Explanation | None, judged: Judged)
     whole = judged.named is not None and (judged.named is judged.unnamed or best is not None and bool(judged.causes))
     shown = residual.show(study, judged.named.fit if whole else None, extended if whole else None, held, judged.verdict == "unexplained")
     return Diagnosis(
-        judged.verdict, judged.causes, gain, judged.numbers, judged.explained, judged.evidence, judged.alike,
-        tuple([judged.doubt] * bool(judged.doubt)) + judged.notes, residual=shown.numbers(), absorbed=absorbed,
-        explanations=alternatives(judged.causes), shown=shown,
-    )  # fmt: skip
+        judged.verdict,
+        judged.causes,
+        gain,
+        judged.numbers,
+        judged.explained,
+        judged.evidence,
+        judged.alike,
+        tuple([judged.doubt] * bool(judged.doubt)) + judged.notes,
+        residual=shown.numbers(),
+        absorbed=absorbed,
+        explanations=alternatives(judged.causes),
+        shown=shown,
+    )
 
 
 def _still_broken(case: Case, study: Study, best: Explanation, faults: list[Cause], bursts: Sequence[np.ndarray]) -> list[Cause]:
     kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
     rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
-    again = broken_sensors(study.model, case.train, study, best.fit.simulated, kept)  # a cause may clip as well: then a rail looks like a drop-out
+    again = broken_sensors(
+        study.model, case.train, study, best.fit.simulated, kept
+    )  # a cause may clip as well: then a rail looks like a drop-out
     return [f for f in again if f.kind != "sensor_dropout" or f.where not in rails]
 
 
@@ -170,7 +198,9 @@ def _with_a_size(study: Study, best: Explanation | None, causes: tuple[Cause, ..
     """Causes, and those left out because their size may be nothing; all of them, if nothing else were named. What was counted, not fitted, and
     values of the file's own parameters have no such size."""
     fitted = set(best.groups) if best else set()
-    nothing = [c for c in causes if (c.kind, c.where) in fitted and c.may_be_nothing and not c.parameters.keys() & study.model.parameters.keys()]
+    nothing = [
+        c for c in causes if (c.kind, c.where) in fitted and c.may_be_nothing and not c.parameters.keys() & study.model.parameters.keys()
+    ]
     kept = tuple(c for c in causes if c not in nothing)
     return (kept, nothing) if kept else (causes, [])
 
@@ -187,7 +217,9 @@ def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, Mo
     fitted = [c for c in judged.causes if c not in judged.faults]
     if fitted and any(gain[s].after_rmse > UNSEEN * gain[s].noise_floor and gain[s].outside < FARTHER for s in worse):
         names = " and ".join(f"{c.kind} at {c.where}" for c in fitted)
-        judged = judged.nothing(f"{names} would explain the training, but makes {', '.join(worse)} of the hold-out worse: train with more excitations")
+        judged = judged.nothing(
+            f"{names} would explain the training, but makes {', '.join(worse)} of the hold-out worse: train with more excitations"
+        )
     elif worse and not judged.causes:
         note = f"parameters that fit the training within their tolerances make {', '.join(worse)} of the hold-out worse: left as they were"
         judged = replace(judged, named=None, unnamed=None, notes=(*judged.notes, note))
@@ -205,9 +237,14 @@ def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, Mo
 
 
 def hints(
-    study: Study, explanations: Sequence[Explanation], verdict: str, behind: bool, change: steady.Change | None, tone: tones.Tone,
+    study: Study,
+    explanations: Sequence[Explanation],
+    verdict: str,
+    behind: bool,
+    change: steady.Change | None,
+    tone: tones.Tone,
     drift: float,
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     """Notes on what is left: motion that comes late (`behind`), what changes with time, masses, a tone, a drift of clocks."""
     notes = []
     if behind:

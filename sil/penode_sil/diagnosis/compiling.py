@@ -8,6 +8,7 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
+
 import penode_gen
 from penode_gen import fold
 from penode_gen.causalise import Causal, causalise

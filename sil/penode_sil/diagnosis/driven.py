@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+
 from penode_gen.model import Model
 
 from ..measured import Measured

@@ -102,7 +102,13 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
             less = y @ model < MAX_SILENT * (model @ model)  # a model that is a little wrong is followed, though by less
             fades = _discharges(y)  # from where it was, which may be of the other sign
             deep = np.min(np.abs(y)) < 0.25 * np.max(np.abs(model))
-            if a > int(0.1 / e.step) and b - a < longest and (fades or less and np.mean(sinks) > 0.95) and deep and np.count_nonzero(inside) > 4:
+            if (
+                a > int(0.1 / e.step)
+                and b - a < longest
+                and (fades or less and np.mean(sinks) > 0.95)
+                and deep
+                and np.count_nonzero(inside) > 4
+            ):
                 found[a:b, j] = True
                 empty.append(fades)
         if np.mean(found[:, j]) > (0.06 if np.mean(empty or [False]) > 0.5 else 0.02):  # that often, only what discharges

@@ -58,5 +58,7 @@ def echo(study: Study, fit: Fit) -> Echo:
             shared[:, 0] = 0.0
             along = 0.5 * n * fft.irfft(shared, n, axis=1)  # at all lags
             gain = np.einsum("it,ij,jt->t", along, np.linalg.pinv(product, rcond=1e-10, hermitian=True), along)
-            found.append(Echo(*(float(np.max(gain[part], initial=0.0)) for part in (slice(near, far), slice(n - far, n - near), slice(near)))))
+            found.append(
+                Echo(*(float(np.max(gain[part], initial=0.0)) for part in (slice(near, far), slice(n - far, n - near), slice(near))))
+            )
     return max(found, key=lambda x: x.late - x.early)

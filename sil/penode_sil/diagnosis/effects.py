@@ -10,8 +10,9 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from penode_gen.model import GROUND, Model
 from scipy import fft
+
+from penode_gen.model import GROUND, Model
 
 from .elementary import force_laws
 from .hypotheses import CLOCK, Basis, Fault, Motion, clock, sensor_faults
@@ -111,9 +112,15 @@ def _transformed(rows: Array, band: int) -> Complex:
 
 
 def collect(
-    model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], seen: Sequence[Seen], found: Sequence[Place],
-    sensor_names: Sequence[str], parameters: int = 0, kinds: Collection[str] = (),
-) -> tuple[list[Candidate], Single]:  # fmt: skip
+    model: Model,
+    experiments: Sequence[Experiment],
+    metrics: Sequence[Metric],
+    seen: Sequence[Seen],
+    found: Sequence[Place],
+    sensor_names: Sequence[str],
+    parameters: int = 0,
+    kinds: Collection[str] = (),
+) -> tuple[list[Candidate], Single]:
     """All candidates, or those of some kinds, and their whitened effects [candidates, rows], with room for `parameters` more."""
     own = _Effects(experiments, metrics, seen)
     groups = [*_at_places(model, own, seen, found, kinds), *_of_sensors(own, seen, sensor_names, kinds)]

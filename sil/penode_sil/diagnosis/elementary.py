@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.model import GROUND
 
 from .hypotheses import BENDS, HALVES, KNEE, STRIBECK, Basis, Motion, bent, lag, losses, size, slips, warm
@@ -98,13 +99,23 @@ def _network(at: _At) -> Iterator[Basis | None]:
             over = f"max({what} - gap, 0)" if side > 0 else f"min({what} + gap, 0)"
             for sign in (1, -1):
                 yield law(
-                    "network_extrapolation", f"k*{over}", ("k", unit), {} if stated else known, sign,
-                    lambda s, v, t: side * np.maximum(side * (s if what == "s" else v) - gap, 0.0), fixed=known if stated else {},
-                )  # fmt: skip
+                    "network_extrapolation",
+                    f"k*{over}",
+                    ("k", unit),
+                    {} if stated else known,
+                    sign,
+                    lambda s, v, t: side * np.maximum(side * (s if what == "s" else v) - gap, 0.0),
+                    fixed=known if stated else {},
+                )
                 yield law(
-                    "network_extrapolation", f"k*{over}^2", ("k", "N/m^2" if what == "s" else "N*s^2/m^2"), {} if stated else known, sign,
-                    lambda s, v, t: np.maximum(side * (s if what == "s" else v) - gap, 0.0) ** 2, fixed=known if stated else {},
-                )  # fmt: skip
+                    "network_extrapolation",
+                    f"k*{over}^2",
+                    ("k", "N/m^2" if what == "s" else "N*s^2/m^2"),
+                    {} if stated else known,
+                    sign,
+                    lambda s, v, t: np.maximum(side * (s if what == "s" else v) - gap, 0.0) ** 2,
+                    fixed=known if stated else {},
+                )
 
 
 def _friction(at: _At) -> Iterator[Basis | None]:
@@ -140,15 +151,23 @@ def _stribeck(at: _At) -> Iterator[Basis | None]:
     for w in (0.01, 0.02, 0.04, 0.08, 0.16, 0.3):
         a = w * speed
         yield law(
-            "stribeck_friction", "2.3316439815971242*k*exp(-(v/width)^2)*v/width", ("k", "N"), {"width": (a, "m/s")}, 1,
+            "stribeck_friction",
+            "2.3316439815971242*k*exp(-(v/width)^2)*v/width",
+            ("k", "N"),
+            {"width": (a, "m/s")},
+            1,
             lambda s, v, t: 2.3316439815971242 * np.exp(-((v / a) ** 2)) * v / a,
-        )  # fmt: skip
+        )
     for w, fall, rise in product((0.005, 0.015), (0.03, 0.06, 0.12, 0.2), (0.4, 1.2)):
         a, b = w * speed, fall * speed
         yield law(
-            "stribeck_friction", STRIBECK, FORCE, {"knee": (a, "m/s"), "width": (b, "m/s"), "rise": (rise, "1")}, 1,
+            "stribeck_friction",
+            STRIBECK,
+            FORCE,
+            {"knee": (a, "m/s"), "width": (b, "m/s"), "rise": (rise, "1")},
+            1,
             lambda s, v, t: np.tanh(v / a) * (1.0 + rise * np.exp(-((v / b) ** 2))),
-        )  # fmt: skip
+        )
     for w in (0.003, 0.01, 0.03):
         for fall in (0.02, 0.06, 0.2):
             a, b = w * reach, fall * speed
@@ -168,7 +187,13 @@ def _relaxation(at: _At) -> Iterator[Basis | None]:
         yield law("maxwell_bushing", "maxwell_bushing", STIFFNESS, {"relaxation": (tau, "s")}, 1, lambda s, v, t: s - lag(s, tau, step))
     for tau in (0.01, 0.06, 0.4):
         yield law(
-            "maxwell_bushing", "hardening_bushing", ("cubic", "N/m^3"), {"relaxation": (tau, "s")}, 0, lambda s, v, t: (s - lag(s, tau, step)) ** 3, True
+            "maxwell_bushing",
+            "hardening_bushing",
+            ("cubic", "N/m^3"),
+            {"relaxation": (tau, "s")},
+            0,
+            lambda s, v, t: (s - lag(s, tau, step)) ** 3,
+            True,
         )
 
 
@@ -184,7 +209,17 @@ def _in_series(at: _At) -> Iterator[Basis | None]:
     for row, (gap, tau) in enumerate(ways):
         kind, known = ("backlash", {}) if gap else ("maxwell_bushing", {"gap": (gap, "m")})
         shapes = {"relaxation": (tau, "s")} | ({} if known else {"gap": (gap, "m")})
-        yield Basis(kind, place, "loose_damper", DAMPING, shapes, 1, tuple(each_lost[row] for each_lost in lost), fixed=known, least={"relaxation": 0.2 * step})
+        yield Basis(
+            kind,
+            place,
+            "loose_damper",
+            DAMPING,
+            shapes,
+            1,
+            tuple(each_lost[row] for each_lost in lost),
+            fixed=known,
+            least={"relaxation": 0.2 * step},
+        )
 
 
 def _damping(at: _At) -> Iterator[Basis | None]:
@@ -198,19 +233,31 @@ def _damping(at: _At) -> Iterator[Basis | None]:
     for w in GRID:
         a = w * speed
         yield law(
-            "degressive_damper", "-k*(max(v - knee, 0) + min(v + knee, 0))", ("k", "N*s/m"), {"knee": (a, "m/s")}, 1,
+            "degressive_damper",
+            "-k*(max(v - knee, 0) + min(v + knee, 0))",
+            ("k", "N*s/m"),
+            {"knee": (a, "m/s")},
+            1,
             lambda s, v, t: np.clip(v, -a, a) - v,
-        )  # fmt: skip
+        )
         if w > 0.1:
             b = 0.1 * a
             yield law(
-                "degressive_damper", KNEE, ("k", "N*s/m"), {"knee": (a, "m/s"), "round": (b, "m/s")}, 1,
+                "degressive_damper",
+                KNEE,
+                ("k", "N*s/m"),
+                {"knee": (a, "m/s"), "round": (b, "m/s")},
+                1,
                 lambda s, v, t: -b * (np.logaddexp(0.0, (v - a) / b) - np.logaddexp(0.0, (-v - a) / b)),
-            )  # fmt: skip
+            )
             yield law(
-                "quadratic_damper", "k*(max(v - knee, 0) + min(v + knee, 0))", ("k", "N*s/m"), {"knee": (a, "m/s")}, 1,
+                "quadratic_damper",
+                "k*(max(v - knee, 0) + min(v + knee, 0))",
+                ("k", "N*s/m"),
+                {"knee": (a, "m/s")},
+                1,
                 lambda s, v, t: v - np.clip(v, -a, a),
-            )  # fmt: skip
+            )
     yield law("degressive_damper", "linear_damper", DAMPING, {}, 0, lambda s, v, t: v, True)
     yield law("quadratic_damper", "quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, 1, lambda s, v, t: v * np.abs(v))
     yield law("quadratic_damper", "k*v^3", ("k", "N*s^3/m^3"), {}, 1, lambda s, v, t: v**3)
@@ -230,9 +277,13 @@ def _uneven_damping(at: _At) -> Iterator[Basis | None]:
         for w in (0.1, 0.3):
             a = w * speed
             yield law(
-                "asymmetric_damper", "k*(max(v - knee, 0) - min(v + knee, 0))", ("k", "N*s/m"), {"knee": (a, "m/s")}, sign,
+                "asymmetric_damper",
+                "k*(max(v - knee, 0) - min(v + knee, 0))",
+                ("k", "N*s/m"),
+                {"knee": (a, "m/s")},
+                sign,
                 lambda s, v, t: np.maximum(np.abs(v) - a, 0.0),
-            )  # fmt: skip
+            )
     yield law("asymmetric_damper", "linear_damper", DAMPING, {}, 0, lambda s, v, t: v, True)
 
 
@@ -243,9 +294,7 @@ def _fading(at: _At) -> Iterator[Basis | None]:
     for sign in (1, -1):
         for w in (0.1, 0.3, 1.0, 10.0):
             a = w * last
-            yield law(
-                "damper_fading", "fading_damper", DAMPING, {"time": (a, "s")}, sign, lambda s, v, t: v * (1.0 - np.exp(-t / a))
-            )
+            yield law("damper_fading", "fading_damper", DAMPING, {"time": (a, "s")}, sign, lambda s, v, t: v * (1.0 - np.exp(-t / a)))
         work = max(float(np.trapezoid(m.v**2, m.t)) for m in motions)
         for w, cool in ((0.3, 10.0), (1.0, 10.0), (10.0, 10.0), (10.0, 1.0)):
             a, b = w * work, cool * last

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.model import Model
 
 from ..errors import UserError
@@ -35,10 +36,14 @@ AGAIN = 3  # times that bursts are looked for in what is left without them
 
 
 def diagnose(
-    model: Model, train: Sequence[Measured], holdout: Sequence[Measured] = (), output: Path | None = None,
-    set_name: str = "default", log: Callable[[str], None] = lambda text: None,
+    model: Model,
+    train: Sequence[Measured],
+    holdout: Sequence[Measured] = (),
+    output: Path | None = None,
+    set_name: str = "default",
+    log: Callable[[str], None] = lambda text: None,
     tell: Callable[[float, str], None] = lambda share, doing: None,
-) -> Diagnosis:  # fmt: skip
+) -> Diagnosis:
     """Name what the model gets wrong in `train`, and measure on `holdout` what knowing it gains; with `output`, write
     model_extended.toml there. `log` gets what is tried, `tell` which share of the work is done and what comes next."""
     started = time.perf_counter()
@@ -129,9 +134,7 @@ def _by_innovations(case: Case, best: Explanation | None, w: weighed.Weighed) ->
     return by_innovations(w, best, case.output, case.remarks, case.tell)
 
 
-def unburst(
-    model: Model, experiments: Sequence[Experiment], set_name: str
-) -> tuple[Study, Study, list[NDArray[np.bool_]]]:
+def unburst(model: Model, experiments: Sequence[Experiment], set_name: str) -> tuple[Study, Study, list[NDArray[np.bool_]]]:
     """The two studies of `begin` without bursts of samples that are far out, and these bursts: a fit that they have misled does not show
     all of them."""
     study, other = begin(model, experiments, set_name)

@@ -21,9 +21,7 @@ HEAVY = 2e6  # steps for all derivatives: where it takes more, only the best exp
 ROUGH = 5e5  # the same: where it takes more, fits begin with longer steps
 
 
-def explain(
-    study: Study, terms: Sequence[Term], iterations: int = 12, start: Fit | None = None, formulas: float = 0.0
-) -> Explanation:
+def explain(study: Study, terms: Sequence[Term], iterations: int = 12, start: Fit | None = None, formulas: float = 0.0) -> Explanation:
     """Fit some terms by simulation, with everything else from where a fit has left it. What ends without force is left out."""
     recordings = len(study.experiments)
     built = extended(study.model, study.places, terms, recordings if study.moving else 0, recordings)

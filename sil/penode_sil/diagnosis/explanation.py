@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from penode_gen.model import Model
 from scipy import constants
+
+from penode_gen.model import Model
 
 from .build import Extended, Term
 from .fit import Fit, Problem
@@ -27,12 +28,21 @@ NEW = 50.0  # chi2 that a further kind must gain beyond that
 FORM = 7e-4  # of what has been gained: a number more must gain that, or it only mends the form
 LEAST = 1e-3  # of what has been gained: less, beside a curve, is a matter of its memory that no family has
 CURVES = {  # kinds of one family at one place are one curve with one name
-    "coulomb_friction": "friction", "stribeck_friction": "friction", "bouc_wen": "friction",
-    "degressive_damper": "damper", "quadratic_damper": "damper", "asymmetric_damper": "damper", "damper_fading": "damper",
-    "cubic_spring": "spring", "asymmetric_spring": "spring", "bump_stop": "spring", "backlash": "spring",
+    "coulomb_friction": "friction",
+    "stribeck_friction": "friction",
+    "bouc_wen": "friction",
+    "degressive_damper": "damper",
+    "quadratic_damper": "damper",
+    "asymmetric_damper": "damper",
+    "damper_fading": "damper",
+    "cubic_spring": "spring",
+    "asymmetric_spring": "spring",
+    "bump_stop": "spring",
+    "backlash": "spring",
     "network_extrapolation": "spring",
-    "tyre_nonlinear": "tyre", "tyre_liftoff": "tyre",
-}  # fmt: skip
+    "tyre_nonlinear": "tyre",
+    "tyre_liftoff": "tyre",
+}
 EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK)  # a formula after all
 FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay")  # and of one number
 LOADS = {"constant_force", "sensor_bias"}  # one looks like the other
@@ -191,9 +201,8 @@ def missing(e: Explanation, group: Group) -> Fit:
             effect += e.fit.jacobian[:, i] * (f.value - f.origin) / f.unit
     rest = [i for i in range(len(e.fit.free)) if i not in own]
     return replace(
-        e.fit, free=tuple(e.fit.free[i] for i in rest), residual=e.fit.residual + effect, jacobian=e.fit.jacobian[:, rest],
-        whole=False,
-    )  # fmt: skip
+        e.fit, free=tuple(e.fit.free[i] for i in rest), residual=e.fit.residual + effect, jacobian=e.fit.jacobian[:, rest], whole=False
+    )
 
 
 def group_parameter(e: Explanation, group: Group) -> str:

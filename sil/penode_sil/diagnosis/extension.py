@@ -52,9 +52,13 @@ def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[
         learnt = "something that is on no list; the element nameless takes what it can of it"
     lines = [
         f"# What the recordings taught about {model.path.name}: {learnt or 'nothing'}.",
-        "", "[model]", extends(model.path.resolve()), f"name = {toml(model.name + '_extended')}",
-        f"sample_time = {toml(f'{model.sample_time:.12g} s')}", "",
-    ]  # fmt: skip
+        "",
+        "[model]",
+        extends(model.path.resolve()),
+        f"name = {toml(model.name + '_extended')}",
+        f"sample_time = {toml(f'{model.sample_time:.12g} s')}",
+        "",
+    ]
     if any(c.kind == "integration_error" for c in causes):
         lines[-1:] = ['method = "rk4"', 'input = "linear"', ""]
     if e is not None:
@@ -161,7 +165,9 @@ class _Written:
         """The time since the start, where a sensor asks for it."""
         if any(re.search(rf"\b{self.age}\b", expression) for expression in self.changed.values()):
             last = max(float(x.time[-1] - x.time[0]) for x in self.study.experiments)
-            self.parameters.append(f"{self.recorded} = {table({'value': last, 'unit': 's', 'description': 'the longest recording of the training'})}")
+            self.parameters.append(
+                f"{self.recorded} = {table({'value': last, 'unit': 's', 'description': 'the longest recording of the training'})}"
+            )
             self.states.append(f"{self.age} = {table({'unit': 's', 'description': 'since the start'})}")
             self.equations.append(f"{self.age} = {toml(f'der({self.age}) = 1')}")
 
@@ -169,12 +175,17 @@ class _Written:
         """Titles and entries, in the order of the file."""
         outputs = [
             f"{s.name} = {table({'value': self.changed.get(s.name, self.named(s.expression)), 'unit': s.unit})}"  # one name means one quantity
-            for s, old in zip(self.e.built.model.outputs, self.study.model.outputs) if s.expression != old.expression or s.name in self.changed
-        ]  # fmt: skip
+            for s, old in zip(self.e.built.model.outputs, self.study.model.outputs)
+            if s.expression != old.expression or s.name in self.changed
+        ]
         return (
-            ("parameters", self.parameters), ("elements", self._elements()), ("states", self.states), ("equations", self.equations),
-            ("outputs", outputs), ("sensors", self.sensors),
-        )  # fmt: skip
+            ("parameters", self.parameters),
+            ("elements", self._elements()),
+            ("states", self.states),
+            ("equations", self.equations),
+            ("outputs", outputs),
+            ("sensors", self.sensors),
+        )
 
 
 def _fine(study: Study, term: Term, name: str, e: Explanation) -> int:
@@ -240,8 +251,14 @@ def _railed(signal: str, rail: float, sharpness: float, name: str, unit: str, pa
 def _drift(e: Explanation, values: dict[object, float], sensor: int, name: str, unit: str, share: str, parameters: list[str]) -> str:
     """What a bias changes by while a recording goes on; after the longest one of the training it stays."""
     own = _series(e, values, sensor)
-    slow = sum((k * Legendre.basis(int(f.shape), domain=(0.0, 1.0)) for f, k in own if f.what == "drift"), Legendre([0.0], domain=(0.0, 1.0)))
-    parts = [(c, f"*{share}{f'^{power}' if power > 1 else ''}" if power else "") for power, c in enumerate(slow.convert(kind=Polynomial).coef) if c]
+    slow = sum(
+        (k * Legendre.basis(int(f.shape), domain=(0.0, 1.0)) for f, k in own if f.what == "drift"), Legendre([0.0], domain=(0.0, 1.0))
+    )
+    parts = [
+        (c, f"*{share}{f'^{power}' if power > 1 else ''}" if power else "")
+        for power, c in enumerate(slow.convert(kind=Polynomial).coef)
+        if c
+    ]
     parts += [(k, f"*(1 - exp(-{f.shape:.7g}*{share}))") for f, k in own if f.what == "warming"]
     named = [f"drift_{name}_{n}" for n in range(1, len(parts) + 1)]
     parameters += [f"{own} = {table({'value': size, 'unit': unit})}" for own, (size, _) in zip(named, parts)]

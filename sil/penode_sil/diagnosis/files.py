@@ -43,9 +43,7 @@ def load_model(job: Job) -> penode_gen.Model:
 
 
 def run(
-    job: Job,
-    log: Callable[[str], None] = lambda text: None,
-    tell: Callable[[float, str], None] = lambda share, doing: None,
+    job: Job, log: Callable[[str], None] = lambda text: None, tell: Callable[[float, str], None] = lambda share, doing: None
 ) -> tuple[penode_gen.Model, Diagnosis]:
     """Diagnose and write diagnosis.json, model_extended.toml and report.html; all or none. UserError for bad input."""
     compiled = compilers()

@@ -108,18 +108,23 @@ class Fit:
         size = float(weight @ way)
         jacobian = self.jacobian + np.outer(missed, weight / size) if size > 0.0 else self.jacobian  # what nothing shows stays
         return replace(
-            self, free=free, chi2=chi2, cost=chi2 + float(sum(f.offset**2 for f in free)), residual=residual, jacobian=jacobian,
-            whole=False,
-        )  # fmt: skip
+            self, free=free, chi2=chi2, cost=chi2 + float(sum(f.offset**2 for f in free)), residual=residual, jacobian=jacobian, whole=False
+        )
 
 
 class Problem:
     """A model against recordings in their metrics."""
 
     def __init__(
-        self, model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], set_name: str = "default",
-        fastest: float = 0.0, faults: Sequence[Fault] = (), rough: bool = False,
-    ):  # fmt: skip
+        self,
+        model: Model,
+        experiments: Sequence[Experiment],
+        metrics: Sequence[Metric],
+        set_name: str = "default",
+        fastest: float = 0.0,
+        faults: Sequence[Fault] = (),
+        rough: bool = False,
+    ):
         self.model, self.experiments, self.metrics, self.set_name = model, experiments, metrics, set_name
         self.faults, self.fastest = faults, fastest
         self.moving = moving(model)
@@ -131,7 +136,10 @@ class Problem:
         way = ("cubic" if self.moving else "parabola") if close else "linear"
         exact = replace(folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
         self.batch = compiled(anonymous(exact), ordered(model)[0])
-        self.inputs = [e.drive if close else _drive(e, self.fine) if model.inputs else np.zeros((self.fine * (len(e.time) - 1) + 1, 0)) for e in experiments]
+        self.inputs = [
+            e.drive if close else _drive(e, self.fine) if model.inputs else np.zeros((self.fine * (len(e.time) - 1) + 1, 0))
+            for e in experiments
+        ]
 
     @cached_property
     def halved(self) -> Problem | None:
@@ -318,9 +326,10 @@ class Problem:
         blocks, rows, simulated = [], [], []
         for e in range(len(self.experiments)):
             own = [
-                i for i, f in enumerate(free)
+                i
+                for i, f in enumerate(free)
                 if i not in known and not (isinstance(f.target, tuple) and f.target[0] == "start" and f.target[1] != e)
-            ]  # fmt: skip
+            ]
             step = 1e-3
             lanes = self.batch.lanes
             shifts = np.zeros((-(-(len(own) + 1) // lanes) * lanes, len(free)))  # whole vectors lie closely in memory
@@ -349,9 +358,16 @@ def _halved(e: Experiment) -> Experiment:
     line = e.y[:1] + np.linspace(0.0, 1.0, len(e.time))[:, None] * (e.y[-1:] - e.y[:1])
     low = fft.irfft(fft.rfft(e.y - line, axis=0)[: n // 2 + 1], n, axis=0) / 2.0 + line[::2]
     return replace(
-        e, time=e.time[::2], u=e.u[::2], y=low, good=e.good[::2], drive=e.drive[::2], rate=e.rate[::2],
-        unsure=e.unsure[: n // 2 + 1], quiet=e.quiet[: n // 2 + 1],
-    )  # fmt: skip
+        e,
+        time=e.time[::2],
+        u=e.u[::2],
+        y=low,
+        good=e.good[::2],
+        drive=e.drive[::2],
+        rate=e.rate[::2],
+        unsure=e.unsure[: n // 2 + 1],
+        quiet=e.quiet[: n // 2 + 1],
+    )
 
 
 def _put(free: Sequence[Free], values: Array) -> tuple[Free, ...]:

@@ -39,11 +39,7 @@ DIED = "the process that diagnosed it died; is there enough memory? diagnose it 
 
 
 def diagnose(
-    job: Job,
-    processes: int = 1,
-    scheduler: str = "",
-    resume: bool = False,
-    tell: Callable[[int, int], None] = lambda done, of: None,
+    job: Job, processes: int = 1, scheduler: str = "", resume: bool = False, tell: Callable[[int, int], None] = lambda done, of: None
 ) -> tuple[Row, ...]:
     """Diagnose each recording of a job by itself, with the same hold-out, into a folder of its own below job.output;
     the table over all is written beside. `scheduler` is the address of a Dask cluster whose workers see the same files.

@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.model import Model
 
 from .catalogue.form import Form, Series

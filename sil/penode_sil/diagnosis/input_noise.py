@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+
 from penode_gen import units
 from penode_gen.model import Model
 
@@ -30,8 +31,10 @@ def with_noise_of_inputs(model: Model, train: Sequence[Measured], set_name: str)
     if measured >= drove:
         return model, []
     found = ", ".join(f"{i.name} {shown[i.name]:.3g} {units.si(i.unit)}" for i in model.inputs if i.name in shown)
-    return noisy, [f"white noise in recorded inputs, of which the model file states none: {found}; it did not drive the plant, by "
-                   f"{drove - measured:.3g} of -2 ln(likelihood) of the sensors. State it: noise = ..."]  # fmt: skip
+    return noisy, [
+        f"white noise in recorded inputs, of which the model file states none: {found}; it did not drive the plant, by "
+        f"{drove - measured:.3g} of -2 ln(likelihood) of the sensors. State it: noise = ..."
+    ]
 
 
 def _shown(train: Sequence[Measured], name: str, k: int) -> float:

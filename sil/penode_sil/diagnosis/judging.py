@@ -24,7 +24,13 @@ DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.2  # a hidden mass with more damping is no part on rubber, whose loss factor is 0.4 at most: it stands for some other dynamics
 MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks only stand in for it
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
-SIZES = {"tyre_damping": "damping", "coulomb_friction": "force", "bouc_wen": "force", "maxwell_bushing": "stiffness", "hidden_resonance": "frequency"}
+SIZES = {
+    "tyre_damping": "damping",
+    "coulomb_friction": "force",
+    "bouc_wen": "force",
+    "maxwell_bushing": "stiffness",
+    "hidden_resonance": "frequency",
+}
 
 
 def judge(
@@ -88,7 +94,9 @@ def damped(causes: Sequence[Cause]) -> list[str]:
         v = {k: p.value for k, p in c.parameters.items()}
         if v["damping_ratio"] > DAMPED:
             like = f"a mass of {v['mass']:.3g} kg at {v['frequency']:.3g} Hz with a damping ratio of {v['damping_ratio']:.2f}"
-            lines.append(f"what {c.where} lacks is like {like}, too much for a part on rubber: pitch, roll, an occupant, a load that moves?")
+            lines.append(
+                f"what {c.where} lacks is like {like}, too much for a part on rubber: pitch, roll, an occupant, a load that moves?"
+            )
     return lines
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen import units
 from penode_gen.model import Model
 
@@ -16,8 +17,8 @@ from ..targets import Sil
 from . import stepped
 from .beginning import start_of
 from .build import SPREAD
-from .dropouts import bursts
 from .compiling import moving
+from .dropouts import bursts
 from .evidence.blocks import DRAWS
 from .fit import Free, Problem
 from .hypotheses import size
@@ -41,6 +42,7 @@ def started(model: Model, e: Experiment, study: Study) -> tuple[Array, Array]:
 
 def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
     """Sensors [n, n_z] of the generated C (float) driven by the recorded inputs from a start state."""
+
     def simulate(one: Model) -> Array:
         instance = Sil(one).instance(set_name)
         if len(start):
@@ -84,7 +86,9 @@ def measure(
         if not own:
             continue
         floor = float(noise[j])
-        errors = [np.concatenate([r.values[c.good] for c, r in zip(own, each)]) for each in ([c.before for c in own], [c.after for c in own])]
+        errors = [
+            np.concatenate([r.values[c.good] for c, r in zip(own, each)]) for each in ([c.before for c in own], [c.after for c in own])
+        ]
         share, ci95 = achieved(*errors, floor)
         beyond = float(np.mean(np.concatenate(outside)))
         gains[s.name] = Gain(rms(errors[0]), rms(errors[1]), floor, share, units.si(s.unit), beyond, ci95)

@@ -29,6 +29,7 @@ from .study import Study
 
 Array = NDArray[np.float64]
 
+
 @dataclass(frozen=True)
 class Effort:
     """How a walk is looked for. `strengths`: variance of a force's rate after a second, in squares of `_unit` times `pace` [1/s^2];
@@ -62,9 +63,12 @@ class Missing:
         """As in diagnosis.json."""
         size = float(np.sqrt(np.mean(np.concatenate(self.forces) ** 2)))
         return {
-            "place": self.place.name, "ends": list(self.place.ends), "unit": self.place.unit("N"), "missing_rms": float(f"{size:.5g}"),
+            "place": self.place.name,
+            "ends": list(self.place.ends),
+            "unit": self.place.unit("N"),
+            "missing_rms": float(f"{size:.5g}"),
             "share": float(f"{self.share:.5g}"),
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,10 +224,18 @@ class _Recording:
         declared = np.array([s.noise for s in study.model.sensors])
         quiet = np.sqrt(np.min(study.levels[k], axis=0))  # a force that is missing is no noise
         sigma = np.where(declared > 0.0, declared, quiet)[list(own)]
-        driven = e if force is None else replace(
-            e, u=_beside(e.u, force), drive=_beside(e.drive, force), rate=_beside(e.rate, np.gradient(force, e.step)),
-            unsure=_beside(e.unsure, np.zeros(len(e.unsure))), held=None if e.held is None else np.append(e.held, False),
-        )  # fmt: skip
+        driven = (
+            e
+            if force is None
+            else replace(
+                e,
+                u=_beside(e.u, force),
+                drive=_beside(e.drive, force),
+                rate=_beside(e.rate, np.gradient(force, e.step)),
+                unsure=_beside(e.unsure, np.zeros(len(e.unsure))),
+                held=None if e.held is None else np.append(e.held, False),
+            )
+        )
         problem = Problem(acting or study.model, [driven], (), study.set_name, study.linear.fastest, study.null.faults)
         moves = np.vstack([np.zeros(len(free)), EFFORT.shift * np.eye(len(free))])
         z = problem.simulate(0, [replace(_of(f, k), low=-np.inf, high=np.inf) for f in free], moves)[0][:, :, list(own)] / sigma
@@ -316,7 +328,9 @@ def _least(whole: Array, r: Array, down: Array, up: Array) -> Array:
     scaled = whole / size
     root = np.linalg.cholesky(scaled.T @ scaled + 1e-12 * np.eye(len(size))).T
     reach = 1e-12  # limits must differ
-    found = lsq_linear(root, linalg.solve_triangular(root.T, scaled.T @ r, lower=True), (down * size - reach, up * size + reach), method="bvls")
+    found = lsq_linear(
+        root, linalg.solve_triangular(root.T, scaled.T @ r, lower=True), (down * size - reach, up * size + reach), method="bvls"
+    )
     return np.clip(found.x / size, down, up)
 
 

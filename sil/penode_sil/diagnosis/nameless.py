@@ -13,10 +13,10 @@ from penode_gen.networks import Dense, Network
 
 from .absorb import learn
 from .build import Extended
+from .explanation import COST, Explanation
 from .fit import Fit, Free, Problem
 from .hypotheses import Basis
 from .plant import extend
-from .explanation import COST, Explanation
 from .study import Study, loss
 
 HIDDEN = 8  # neurons, of deflection and rate: 32 weights
@@ -46,9 +46,11 @@ def fitted(study: Study, best: Explanation | None) -> Explanation | None:
     free = []
     for i, (row, offset, k) in enumerate(zip(first.weights, first.bias, last.weights[0]), 1):
         for key, start, scale, unit in (
-            ("a", row[0] / reach, 1.0 / reach, "1/m"), ("b", row[1] / speed, 1.0 / speed, "s/m"), ("c", offset, 1.0, "1"),
+            ("a", row[0] / reach, 1.0 / reach, "1/m"),
+            ("b", row[1] / speed, 1.0 / speed, "s/m"),
+            ("c", offset, 1.0, "1"),
             ("k", k, float(np.std(force)), "N"),
-        ):  # fmt: skip
+        ):
             parameters[f"nameless_{key}{i}"] = (float(start), unit)
             free.append(Free(f"nameless_{key}{i}", float(start), scale, sigma=10.0 * scale, origin=float(start)))
     text = " + ".join(f"nameless_k{i}*tanh(nameless_a{i}*s + nameless_b{i}*v + nameless_c{i})" for i in range(1, HIDDEN + 1))

@@ -14,9 +14,9 @@ from penode_gen.model import Model
 
 from .build import Term
 from .explanation import Group
+from .fit import Fit
 from .hypotheses import Basis
 from .plant import Place
-from .fit import Fit
 from .score import where
 from .study import Study
 
@@ -129,9 +129,7 @@ def _tyre(terms: Sequence[Term], names: Sequence[str], values: Values, reach: fl
     return "tyre_liftoff" if max(lost, default=0.0) > EDGE * reach else "tyre_nonlinear"
 
 
-def straight(
-    model: Model, places: Sequence[Place], terms: Sequence[Term], names: Sequence[str], group: Group, values: Values
-) -> str:
+def straight(model: Model, places: Sequence[Place], terms: Sequence[Term], names: Sequence[str], group: Group, values: Values) -> str:
     """The parameter of the linear element that a curve beside it only changes; empty if it is a curve, or there is none."""
     own = [(t, n) for t, n in zip(terms, names) if t.group == group]
     if group[0] not in (*DAMPERS, "cubic_spring", "asymmetric_spring", "tyre_nonlinear"):
@@ -218,7 +216,14 @@ def shape(law: str, s: Array, v: Array, a: Mapping[str, float]) -> Array:
             return np.sign(v) / (1.0 + (v / a["stribeck"]) ** 2)
         case "fading_damper" | "heating_damper":
             return v
-    functions = {"abs": np.abs, "exp": np.exp, "tanh": np.tanh, "max": np.maximum, "min": np.minimum, "softplus": lambda x: np.logaddexp(0.0, x)}
+    functions = {
+        "abs": np.abs,
+        "exp": np.exp,
+        "tanh": np.tanh,
+        "max": np.maximum,
+        "min": np.minimum,
+        "softplus": lambda x: np.logaddexp(0.0, x),
+    }
     words = functions | {"s": s, "v": v, "k": 1.0, "force": 1.0} | dict(a)
     return eval(law.replace("^", "**"), {"__builtins__": {}}, words)  # one of our own texts
 

@@ -92,9 +92,16 @@ class Experiment:
 
 
 def prepare(
-    name: str, time: Array, u: Array, y: Array, good: NDArray[np.bool_], noise: Array, laws: Sequence[Noise | None],
-    slow: Sequence[float] = (), held: Array | None = None,
-) -> Experiment:  # fmt: skip
+    name: str,
+    time: Array,
+    u: Array,
+    y: Array,
+    good: NDArray[np.bool_],
+    noise: Array,
+    laws: Sequence[Noise | None],
+    slow: Sequence[float] = (),
+    held: Array | None = None,
+) -> Experiment:
     """An experiment from raw signals, the noise of the inputs [n_u], and what is known of that of the sensors; `slow` are the intervals
     [s] of those whose samples are farther apart than these, `held` [n_u] those of inputs that keep their value in between, or 0.
 
@@ -247,7 +254,6 @@ class Thinning:
             some = slice(k, k + TOGETHER)
             np.divide(fft.rfft(rows[some], axis=1)[:, : len(self.gain)], self.gain, out=spectra[some])
         return spectra.reshape(*signals.shape[1:], -1)
-
 
     def rates(self, signals: Array, spectra: NDArray[np.complex128], step: float) -> NDArray[np.complex128]:
         """Spectra [sensors, f] of the rates (central differences, at the ends to one side) of signals [n, sensors] that have `spectra`."""

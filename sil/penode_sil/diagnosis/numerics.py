@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+
 from penode_gen import units
 
 from ..batch import Batch

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
 from penode_gen import units
 from penode_gen.model import Model, Parameter
 
@@ -51,10 +52,14 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
         if p.name in shared and not straight.off(p.value, value, shared[p.name], _limit(p)):
             notes.append(f"{p.name} is {value:.4g} {unit} beside what was found at its place, which shares its straight part")
         elif size < WORTH:
-            notes.append(f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of what acts there: as much as anything that the model leaves out might")
+            notes.append(
+                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of what acts there: as much as anything that the model leaves out might"
+            )
         elif not straight.off(p.value, beside, shared_by_all.get(p.name, (0.0, 0.0)), _limit(p)):
             absorbed.append(p.name)
-            notes.append(f"{p.name} is {value:.4g} {unit} without the small deviations that were found, and {beside:.4g} with them: within its tolerance")
+            notes.append(
+                f"{p.name} is {value:.4g} {unit} without the small deviations that were found, and {beside:.4g} with them: within its tolerance"
+            )
         else:
             causes.append(_cause(p, value, sd, shared, confidence))
     return Judged(tuple(causes), tuple(notes), tuple(absorbed))

@@ -115,9 +115,7 @@ def _external(model: Model, e: Element) -> bool:
     return e.law == "expression" and not re.search(rf"\b({moves})\b", e.expression)
 
 
-def extend(
-    model: Model, elements: Sequence[Element], parameters: Mapping[str, tuple[float, str]], where: Sequence[Place] = ()
-) -> Model:
+def extend(model: Model, elements: Sequence[Element], parameters: Mapping[str, tuple[float, str]], where: Sequence[Place] = ()) -> Model:
     """The model with more elements; units of `parameters` are those of elements that move along a line. What measures the force at
     a place then measures theirs as well."""
     elements = [_told_apart(model, e) for e in elements]
@@ -135,9 +133,13 @@ def extend(
         for name, (value, unit) in parameters.items()
     }
     return replace(
-        model, elements=(*model.elements, *elements), parameters={**model.parameters, **values}, sensors=sensors,
-        outputs=outputs, extra_states=(*model.extra_states, *states),
-    )  # fmt: skip
+        model,
+        elements=(*model.elements, *elements),
+        parameters={**model.parameters, **values},
+        sensors=sensors,
+        outputs=outputs,
+        extra_states=(*model.extra_states, *states),
+    )
 
 
 def _told_apart(model: Model, e: Element) -> Element:
@@ -225,9 +227,11 @@ def linearise(model: Model, found: Sequence[Place], x: Array, u: Array) -> Linea
     probed = extend(model, forces, {}, found)
     seen = [Signal(f"{q}_probe{k}", f"{q}_probe{k}", p.unit(unit)) for k, p in enumerate(found) for q, unit in (("s", "m"), ("v", "m/s"))]
     probed = replace(
-        probed, interpolation="linear", inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(found))),
+        probed,
+        interpolation="linear",
+        inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(found))),
         sensors=(*probed.sensors, *seen),
-    )  # fmt: skip
+    )
     system = functions(probed)
     n_x, n_w = len(probed.states), len(probed.inputs)
     step = np.concatenate(
@@ -246,6 +250,12 @@ def linearise(model: Model, found: Sequence[Place], x: Array, u: Array) -> Linea
     mean = np.mean(slopes, axis=0)
     top, low = mean[:n_x], mean[n_x:]
     return Linear(
-        top[:, :n_x], top[:, n_x : n_x + n_w], top[:, n_x + n_w :], low[:, :n_x], low[:, n_x : n_x + n_w], low[:, n_x + n_w :],
-        len(model.inputs), len(model.sensors),
-    )  # fmt: skip
+        top[:, :n_x],
+        top[:, n_x : n_x + n_w],
+        top[:, n_x + n_w :],
+        low[:, :n_x],
+        low[:, n_x : n_x + n_w],
+        low[:, n_x + n_w :],
+        len(model.inputs),
+        len(model.sensors),
+    )

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from penode_gen import units
 from penode_gen.model import Model
 
+from .explanation import COST, NEW, Explanation, cost
 from .fit import Free, Problem
 from .noise import Experiment
-from .explanation import COST, NEW, Explanation, cost
 from .study import Study, guessed
 
 Array = NDArray[np.float64]

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.model import Model
 
 from . import catalogue, clipping, holding
@@ -154,7 +155,9 @@ def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[
     level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
     most = float(np.max(bench.fit.taken(best, problem.floor)))  # what acts at one place is seen by few sensors
     whole = bench.fit.taken_whole(best, problem.floor)
-    return Trial(term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved), most, whole)
+    return Trial(
+        term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved), most, whole
+    )
 
 
 def _sized(term: Term, sizes: Array) -> list[Free]:

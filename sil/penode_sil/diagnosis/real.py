@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import constants
+
 from penode_gen import units
 from penode_gen.model import GROUND, Model
-from scipy import constants
 
 from . import catalogue, innovate, parameters
 from .catalogue import drives, friction, loads
@@ -24,8 +25,8 @@ from .evidence.screening import Probe
 from .fit import Free
 from .innovate import Found
 from .noise import Experiment
-from .propose import FREE_RUN, SMALL, motions
 from .plant import Place
+from .propose import FREE_RUN, SMALL, motions
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
 from .rounds import MIN_TAKEN, name_of, terms_of
 from .terms import Term, Trial
@@ -33,7 +34,9 @@ from .worth import SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, s
 
 Array = NDArray[np.float64]
 RIGHT = 0.93  # share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
-RIVAL = (1.0 - RIGHT) / RIGHT  # posterior, RIGHT of which is as much as what is not in the catalogue has: from there on an explanation is listed
+RIVAL = (
+    1.0 - RIGHT
+) / RIGHT  # posterior, RIGHT of which is as much as what is not in the catalogue has: from there on an explanation is listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +82,11 @@ def answer(
         elif first:
             notes.append(_small(term, f"{size:.1%} of what acts there") if size < enough else f"{place(*name_of(term))} {MAY_BE_NOTHING}")
     for a in found.small:
-        what = f"{a.trial.taken:.0%} of the power of prediction errors" if a.trial.taken < MIN_TAKEN else f"{a.trial.share:.1%} of what acts there"
+        what = (
+            f"{a.trial.taken:.0%} of the power of prediction errors"
+            if a.trial.taken < MIN_TAKEN
+            else f"{a.trial.share:.1%} of what acts there"
+        )
         notes.append(_small(a.terms[0], what))
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
     biased, remarks = _offsets(model, after, Probe.of(after), any(c.kind in (*loads.KINDS, *stopped) for c in causes))
@@ -107,7 +114,9 @@ def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[F
     if not first[2].absorbed or not large:
         return first
     wider = judged(first[0].naming(large))
-    log(f"{', '.join(first[2].absorbed)} may have made up for {', '.join(' at '.join(name_of(a.trial)) for a in large)}; still does {wider[2].absorbed}")
+    log(
+        f"{', '.join(first[2].absorbed)} may have made up for {', '.join(' at '.join(name_of(a.trial)) for a in large)}; still does {wider[2].absorbed}"
+    )
     return wider if set(wider[2].absorbed) < set(first[2].absorbed) else first
 
 
@@ -215,7 +224,11 @@ def _wider(bench: Bench, term: Term, size: float) -> float:
     """Factor of the deviations of a term of this share of what acts: noise alone makes less of them than what the model leaves out."""
     cut = term.form.how == "clip"  # the size of which is its limit itself
     ratios = undetermined(bench.model, bench.fit)
-    known = min(bench.fit.deviation(f.target, ratios) / max(abs(f.value - (0.0 if cut else f.origin)), 1e-300) for f in _values_of(bench, term) if cut or not f.log)
+    known = min(
+        bench.fit.deviation(f.target, ratios) / max(abs(f.value - (0.0 if cut else f.origin)), 1e-300)
+        for f in _values_of(bench, term)
+        if cut or not f.log
+    )
     return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
 
 
@@ -242,7 +255,9 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
         sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # collinearity with other free values amplifies the effect of model error
         large = WORTH * shown < abs(value) - Z_95 * sd and abs(value) < shown and abs(abs(value) / constants.g - 1.0) > WORTH
         if bench.places and not loaded and large:  # without places it may stand for any law
-            causes.append(_load(model, bench, probe, s.name, value, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit)))
+            causes.append(
+                _load(model, bench, probe, s.name, value, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit))
+            )
         else:
             notes.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
     return causes, notes
@@ -259,7 +274,9 @@ def _load(model: Model, bench: Bench, probe: Probe, sensor: str, offset: float, 
     f = bench.fit.free[i]
     used, white = bench.fit.used, 1.0 / np.sqrt(bench.fit.variance)
     seen = (bench.fit.slopes[:, :, i] * white)[used] / f.unit
-    starts = (bench.fit.slopes * white[None, :, None])[used][:, [not isinstance(x.target, str) and x.target[0] == "start" for x in bench.fit.free]]
+    starts = (bench.fit.slopes * white[None, :, None])[used][
+        :, [not isinstance(x.target, str) and x.target[0] == "start" for x in bench.fit.free]
+    ]
     for k, p in enumerate(bench.places):
         if GROUND not in p.ends or p.role == "tyre":
             continue

@@ -39,5 +39,7 @@ def line(known: dict[str, Any] | None, confidence: float) -> str:
         return f"no cause was named with this confidence in simulated cases ({known['source']})"
     low, high = (f"{100 * x:.0f}" for x in found["ci95"])
     band = f"{100 * found['from']:.0f} to {100 * found['to']:.0f} %"
-    share = f"{found['right']} of {found['named']} were right ({100 * found['right'] / found['named']:.0f} %, 95 % interval {low} to {high} %)"
+    share = (
+        f"{found['right']} of {found['named']} were right ({100 * found['right'] / found['named']:.0f} %, 95 % interval {low} to {high} %)"
+    )
     return f"of causes named with {band} confidence in simulated cases, {share}; source: {known['source']}"

@@ -27,8 +27,7 @@ from penode_gen.emit_c import compiled_templates
 from penode_gen.model import Model
 
 from ..output import whole
-from . import catalogue
-from . import report_figure as fig
+from . import catalogue, report_figure as fig
 from .advice import doubts
 from .reliability import line
 from .report_figure import Axis, Figure, pretty, readable
@@ -54,9 +53,13 @@ def render(model: Model, d: Diagnosis, extended: Path) -> str:
     """The same as text."""
     folder = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
     environment = jinja2.Environment(
-        loader=folder, bytecode_cache=compiled_templates(), autoescape=True, trim_blocks=True, lstrip_blocks=True,
+        loader=folder,
+        bytecode_cache=compiled_templates(),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
-    )  # fmt: skip
+    )
     environment.filters |= {"plain": plain, "pretty": pretty, "percent": percent, "value": value, "sure": sure, "sentence": sentence}
     shown: Shown = d.shown
     train, held = (ordered(channels) for channels in (shown.train, shown.holdout))

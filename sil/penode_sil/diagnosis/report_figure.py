@@ -53,10 +53,7 @@ class Axis:
             rough = (self.high - self.low) / 5.0
             power = 10.0 ** np.floor(np.log10(rough))
             step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= rough * 0.999)
-            values = [
-                k * step
-                for k in range(int(np.ceil(self.low / step - 1e-9)), int(np.floor(self.high / step + 1e-9)) + 1)
-            ]
+            values = [k * step for k in range(int(np.ceil(self.low / step - 1e-9)), int(np.floor(self.high / step + 1e-9)) + 1)]
         inside = [v for v in values if -1e-9 <= float(self.share(v)) <= 1.0 + 1e-9]
         return [(float(self.share(v)), number(v)) for v in inside]
 
@@ -131,9 +128,7 @@ def _runs(x: Array, y: Array, ax: Axis, ay: Axis) -> Iterator[str]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], sound.astype(np.int8), [0]])))
     for a, b in zip(edges[::2], edges[1::2]):
         px, py = _grid(x[a:b], y[a:b], ax, ay)
-        steps = "".join(
-            f"{dx}{dy if dy < 0 else f' {dy}'} " for dx, dy in zip(np.diff(px).tolist(), np.diff(py).tolist())
-        )
+        steps = "".join(f"{dx}{dy if dy < 0 else f' {dy}'} " for dx, dy in zip(np.diff(px).tolist(), np.diff(py).tolist()))
         yield f"M{px[0]} {py[0]}" + (f"l{steps.rstrip()}" if b - a > 1 else "h0")
 
 
@@ -167,20 +162,9 @@ def tiles(values: Array, x: Array, y: Array, ax: Axis, ay: Axis, full: float, sa
         v = float(values[i, j])
         path = f"M{px[i]} {py[j + 1]}H{px[i + 1]}V{py[j]}H{px[i]}z"
         more = says.format(
-            x=number(float(f"{(x[i] + x[i + 1]) / 2:.3g}")),
-            y=number(float(f"{(y[j] + y[j + 1]) / 2:.3g}")),
-            v=number(float(f"{v:.3g}")),
+            x=number(float(f"{(x[i] + x[i + 1]) / 2:.3g}")), y=number(float(f"{(y[j] + y[j + 1]) / 2:.3g}")), v=number(float(f"{v:.3g}"))
         )
-        found.append(
-            Mark(
-                "tile",
-                "plus" if v > 0.0 else "minus",
-                path,
-                "",
-                more,
-                round(min(abs(v) / full, 1.0), 3) if full > 0.0 else 0.0,
-            )
-        )
+        found.append(Mark("tile", "plus" if v > 0.0 else "minus", path, "", more, round(min(abs(v) / full, 1.0), 3) if full > 0.0 else 0.0))
     return found
 
 

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from . import catalogue
-from . import report_figure as fig
+from . import catalogue, report_figure as fig
 from .advice import doubts
 from .reliability import line
 from .report_figure import pretty, readable
@@ -97,7 +96,9 @@ def lead(d: Diagnosis, train: Sequence[Channel]) -> list[str]:
 
 def because(c: Cause) -> str:
     """A cause with what it means and its sizes."""
-    sizes = ", ".join(f"{plain(k)} {value(v.value, v.unit)} ({value(v.ci95[0], v.unit)} … {value(v.ci95[1], v.unit)})" for k, v in c.parameters.items())
+    sizes = ", ".join(
+        f"{plain(k)} {value(v.value, v.unit)} ({value(v.ci95[0], v.unit)} … {value(v.ci95[1], v.unit)})" for k, v in c.parameters.items()
+    )
     name = place(c.kind, c.where)
     return f"{name[0].upper()}{name[1:]}{': ' * bool(sizes)}{sizes}. {catalogue.MEANING.get(c.kind, '')}".strip()
 
@@ -134,7 +135,11 @@ def cost(d: Diagnosis) -> tuple[str, str, str]:
     if not d.gain:
         return what, "not measured", "no recording was held out"
     shares = {name: g.share_of_achievable for name, g in d.gain.items() if g.share_of_achievable is not None}
-    name = max(shares, key=lambda n: shares[n]) if shares else max(d.gain, key=lambda n: d.gain[n].before_rmse / max(d.gain[n].noise_floor, 1e-300))
+    name = (
+        max(shares, key=lambda n: shares[n])
+        if shares
+        else max(d.gain, key=lambda n: d.gain[n].before_rmse / max(d.gain[n].noise_floor, 1e-300))
+    )
     g = d.gain[name]
     before, after, noise = (value(x, g.unit) for x in (g.before_rmse, g.after_rmse, g.noise_floor))
     gained = f", {percent(min(shares[name], 1.0))} of what can be gained" if name in shares and before != after else ""

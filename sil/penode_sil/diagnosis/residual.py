@@ -139,9 +139,7 @@ def whiteness(ratio: Array) -> tuple[Whiteness, Array]:
     line = np.arange(m) / max(m - 1, 1)
     distance = float(max(np.max(line[1:] - inner), np.max(inner - line[:-1]))) if m > 1 else 0.0
     limit = float(special.kolmogi(CHANCE)) / np.sqrt(max(m - 1, 1))
-    return Whiteness(
-        distance, limit, float(special.kolmogorov(distance * np.sqrt(max(m - 1, 1)))), float(np.mean(ratio))
-    ), running
+    return Whiteness(distance, limit, float(special.kolmogorov(distance * np.sqrt(max(m - 1, 1)))), float(np.mean(ratio))), running
 
 
 def stretches(time: Array, good: NDArray[np.bool_], *signals: Array) -> list[tuple[float, float, list[float]]]:
@@ -150,8 +148,9 @@ def stretches(time: Array, good: NDArray[np.bool_], *signals: Array) -> list[tup
     step = time[1] - time[0]
     return [
         (float(time[a]), float(time[b - 1] + step), [rms(x[a:b][good[a:b]]) for x in signals])
-        for a, b in zip(edges, edges[1:]) if good[a:b].any()
-    ]  # fmt: skip
+        for a, b in zip(edges, edges[1:])
+        if good[a:b].any()
+    ]
 
 
 def third_octaves(low: float, high: float) -> Array:
@@ -170,9 +169,8 @@ def band_rms(f: Array, power: Array, edges: Array) -> Array:
 
 
 def channels(
-    e: Experiment, model: Model, before: Array, after: Array | None, floor: tuple[Array, Array],
-    beyond: NDArray[np.bool_] | None = None,
-) -> list[Channel]:  # fmt: skip
+    e: Experiment, model: Model, before: Array, after: Array | None, floor: tuple[Array, Array], beyond: NDArray[np.bool_] | None = None
+) -> list[Channel]:
     """All sensors of a recording that were measured, from what was simulated [n, n_z]; `floor`: frequencies and noise
     variance per sample [f, n_z]."""
     n, step, found = len(e.time), e.step, []
@@ -195,12 +193,26 @@ def channels(
             return Residual(r, density(r, step, length, good)[1][kept], linear, white, running)
 
         _, limit, chance = coherence(e.y[:, j], e.u, step, short_length)
-        found.append(Channel(
-            e.name, sensor.name, units.si(sensor.unit), e.time - e.time[0], e.y[:, j], good,
-            float(np.sqrt(np.mean(floor[1][:, j]))), f[kept], power[kept],
-            2.0 * step * np.interp(f[kept], floor[0], floor[1][:, j]), limit, chance, e.frequencies[1 : e.band],
-            residual(before), None if after is None else residual(after), beyond,
-        ))  # fmt: skip
+        found.append(
+            Channel(
+                e.name,
+                sensor.name,
+                units.si(sensor.unit),
+                e.time - e.time[0],
+                e.y[:, j],
+                good,
+                float(np.sqrt(np.mean(floor[1][:, j]))),
+                f[kept],
+                power[kept],
+                2.0 * step * np.interp(f[kept], floor[0], floor[1][:, j]),
+                limit,
+                chance,
+                e.frequencies[1 : e.band],
+                residual(before),
+                None if after is None else residual(after),
+                beyond,
+            )
+        )
     return found
 
 
@@ -296,7 +308,5 @@ def show(study: Study, fit: Fit | None, extended: Model | None, holdout: Sequenc
     any; `nameless`: what has no name is shown as the force that is missing at each place."""
     train: list[Channel] = []
     for k, e in enumerate(study.experiments):
-        train += channels(
-            e, study.model, study.null.simulated[k], fit.simulated[k] if fit else None, noise_floor(study, k)
-        )
+        train += channels(e, study.model, study.null.simulated[k], fit.simulated[k] if fit else None, noise_floor(study, k))
     return Shown(tuple(train), tuple(holdout), tuple(surfaces(study, extended, fit)), missing_forces(study) if nameless else ())

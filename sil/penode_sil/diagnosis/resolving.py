@@ -9,8 +9,9 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import penode_gen
 from numpy.typing import NDArray
+
+import penode_gen
 from penode_gen.model import INTERPOLATIONS, Model
 
 from .measuring import deployed, started

@@ -64,9 +64,7 @@ def at_rest(rest: Study, free: Study, in_motion: Sequence[Explanation], log) -> 
     return quiet, [e for e in found if loaded(e) < weight(rest.model)]
 
 
-def resting(
-    other: Study, study: Study, explanations: list[Explanation], log: Callable[[str], None]
-) -> tuple[Study, list[Explanation]]:
+def resting(other: Study, study: Study, explanations: list[Explanation], log: Callable[[str], None]) -> tuple[Study, list[Explanation]]:
     """Study and explanations at rest, where recordings that seem to start in motion are likelier to start at rest with other causes."""
     if not study.moving:
         return study, explanations

@@ -72,9 +72,17 @@ def rig(model: Model, places: Sequence[Place]) -> Model:
     memory = tuple(s for s in model.extra_states if any(s.name.startswith(f"{x.name}_") for x in elements))
     inputs = (*(Input(f"s_place{k}", p.unit("m")) for k, p in enumerate(places)), *model.inputs)
     return replace(
-        model, bodies=(), points=(), inputs=inputs, elements=tuple(elements), extra_states=memory, variables=(), equations=(),
-        outputs=(signals[0],), sensors=tuple(signals),
-    )  # fmt: skip
+        model,
+        bodies=(),
+        points=(),
+        inputs=inputs,
+        elements=tuple(elements),
+        extra_states=memory,
+        variables=(),
+        equations=(),
+        outputs=(signals[0],),
+        sensors=tuple(signals),
+    )
 
 
 def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surface]:
@@ -90,9 +98,7 @@ def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surf
     n_z, n_u = len(study.model.sensors), len(study.model.inputs)
     motions, beside, rigs = [], [], []
     for k, (e, simulated) in enumerate(zip(study.experiments, watch(study, fit or study.null))):
-        nominal, rest = (
-            rfft(np.where(e.good, e.y - z[:, :n_z], 0.0), axis=0)[: e.band] for z in (study.null.simulated[k], simulated)
-        )
+        nominal, rest = (rfft(np.where(e.good, e.y - z[:, :n_z], 0.0), axis=0)[: e.band] for z in (study.null.simulated[k], simulated))
         h = study.linear.transfer(e.frequencies[: e.band])[:, :, [n_u + p for p in acting] + list(range(n_u))]
         gain = likely(e, study.levels[k], h[:, :n_z], len(acting), nominal / np.sqrt(len(e.time)))
         w = np.einsum("fqz,fz->fq", gain, rest)
@@ -108,23 +114,15 @@ def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surf
         rigs.append(replace(e.driven_at(s, v), y=none, good=none > 0.0))
     known = tuple(f for f in study.null.free if isinstance(f.target, str))  # nominal is what the tolerance allows
     try:
-        laws = [
-            (Problem(rig(m, places), rigs, (), study.set_name), free)
-            for m, free in ((study.model, known), (extended, ()))
-            if m
-        ]
+        laws = [(Problem(rig(m, places), rigs, (), study.set_name), free) for m, free in ((study.model, known), (extended, ())) if m]
     except (ModelError, CausaliseError, UserError):
         return []
-    both = [
-        [np.array(p.simulate(k, free, np.zeros((1, len(free))))[0][0]) for k in range(len(rigs))] for p, free in laws
-    ]
+    both = [[np.array(p.simulate(k, free, np.zeros((1, len(free))))[0][0]) for k in range(len(rigs))] for p, free in laws]
     found = []
     for i, place in enumerate(places):
         s, v = (np.concatenate([m[q][:, i] for m in motions]) for q in (0, 1))
         forces = [np.concatenate([z[:, i] for z in each]) for each in both]
-        edges = tuple(
-            np.linspace(-x, x, BINS + 1) for x in (max(float(np.quantile(np.abs(q), 0.999)), 1e-12) for q in (s, v))
-        )
+        edges = tuple(np.linspace(-x, x, BINS + 1) for x in (max(float(np.quantile(np.abs(q), 0.999)), 1e-12) for q in (s, v)))
         measured = forces[-1] + np.concatenate([w[:, i] for w in beside])
         names = tuple(name for name, _ in place.elements)
         found.append(Surface(place.name, names, s, v, measured, forces[0], forces[1] if extended else None, edges, place.turns))

@@ -9,7 +9,6 @@ from typing import Any
 
 from ..measured import Measured
 
-
 OUTSIDE = "outside_taxonomy"  # kind of what has no name
 NOTHING = {"scale": 1.0, "gain": 1.0}  # sizes without any effect; 0 for others
 MAY_BE_NOTHING = "may be nothing, by the 95 % interval of its size; not named, but in model_extended.toml"

@@ -25,7 +25,9 @@ from .worth import WORTH, Z_95, alone, least, mostly, share, undetermined
 Array = NDArray[np.float64]
 SCORED = 4  # of the promising trials, how many are scored on held-out blocks
 MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
-MIN_FORM = 0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
+MIN_FORM = (
+    0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
+)
 MIN_TAKEN = 0.25  # of the power of a sensor's innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
 MIN_BLOCKS = 3  # of the blocks in which it does
 LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
@@ -107,7 +109,9 @@ class Rounds:
         trials = holding.told_apart(bench, wide, [_scored(bench, bench.problem(wide), self.blocks, t) for t in trials[:SCORED]])
         better = [t.blocks - scores for t in trials]
         for t, b in zip(trials, better):
-            self.log(f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}")
+            self.log(
+                f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}"
+            )
         good = [t for t, b in zip(trials, better) if _accepted(bench, t, b)]
         good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
         matter = [t for t in good if _matters(t)]

@@ -17,8 +17,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from penode_gen.model import Model
 from scipy import fft, optimize
+
+from penode_gen.model import Model
 
 from .fit import Fit
 from .hypotheses import Basis, Fault, Motion

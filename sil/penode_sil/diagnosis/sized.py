@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen import units
 from penode_gen.model import Model
 
@@ -294,10 +295,7 @@ def _maxwell_bushing(c: _Cause) -> Parameters:
         parallel += [(p[d] / p[tau], p[tau]) for d, tau in series]
         return sum(k for k, _ in parallel), sum(k * tau for k, tau in parallel)
 
-    return {
-        "stiffness": ("N/m", lambda p: bushing(p)[0]),
-        "relaxation_time": ("s", lambda p: bushing(p)[1] / max(bushing(p)[0], 1e-300)),
-    }
+    return {"stiffness": ("N/m", lambda p: bushing(p)[0]), "relaxation_time": ("s", lambda p: bushing(p)[1] / max(bushing(p)[0], 1e-300))}
 
 
 def _tyre_liftoff(c: _Cause) -> Parameters:

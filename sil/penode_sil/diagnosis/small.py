@@ -35,6 +35,8 @@ def share(study: Study, e: Explanation, group: tuple[str, str]) -> float:
     force = Curve(*zip(*pairs))(s, v, values)
     lines = np.stack([s, v], axis=1) / np.maximum([np.linalg.norm(s), np.linalg.norm(v)], 1e-300)
     left = force - lines @ np.linalg.lstsq(lines, force, rcond=None)[0]
-    stiffness, damping = (nominal(study.model, study.places[k], law, of, values) for law, of in (("linear_spring", "stiffness"), ("linear_damper", "damping")))
+    stiffness, damping = (
+        nominal(study.model, study.places[k], law, of, values) for law, of in (("linear_spring", "stiffness"), ("linear_damper", "damping"))
+    )
     acts = float(np.std(stiffness * s + damping * v))
     return float(np.sqrt(np.mean(left**2))) / BENT / acts if acts > 0.0 else 0.0

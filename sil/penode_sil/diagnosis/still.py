@@ -11,6 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen import units
 from penode_gen.model import Input, Model, Signal
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen import laws, units
 from penode_gen.model import Model
 

@@ -10,15 +10,16 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.model import Model, Parameter, Signal
 
 from . import plant
+from .effects import collect
 from .evidence.prior import SHARE
 from .fit import KEPT, Fit, Free, Problem
 from .hypotheses import size
 from .noise import Experiment, Metric, metric, sensor_levels
 from .plant import Linear, Place
-from .effects import collect
 from .score import Regression, Seen, smooth
 
 Array = NDArray[np.float64]

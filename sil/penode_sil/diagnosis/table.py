@@ -17,7 +17,18 @@ import jinja2
 from ..output import whole
 
 JSON = "diagnoses.json"
-KEPT = ("verdict", "causes", "gain", "numerics", "explained", "evidence", "explanations", "advice", "notes", "seconds")  # of each diagnosis.json
+KEPT = (
+    "verdict",
+    "causes",
+    "gain",
+    "numerics",
+    "explained",
+    "evidence",
+    "explanations",
+    "advice",
+    "notes",
+    "seconds",
+)  # of each diagnosis.json
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,11 @@ def _fitted(items: list[str], room: int) -> list[str]:
     """Items on so many lines of WIDTH columns, each of them whole; how many have no room there is the last line."""
     lines: list[str] = []
     for k, item in enumerate(items):
-        more = textwrap.wrap(item, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False) if len(item) > WIDTH else [item]
+        more = (
+            textwrap.wrap(item, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+            if len(item) > WIDTH
+            else [item]
+        )
         last = k + 1 == len(items)
         if len(lines) + len(more) > room - (not last):
             return [*lines, f"  {len(items) - k} more in the report"]

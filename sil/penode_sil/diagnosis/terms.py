@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 
@@ -103,7 +104,11 @@ def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], fir
             free.append(Free(f"{name}_{part.gain[0]}", 0.0, 0.05 * size, sigma=size, low=low, high=high))
             for key, (value, _) in part.shapes.items():
                 if key not in part.fixed:
-                    free.append(Free(f"{name}_{key}", value, value, log=True, sigma=1.0, origin=value, low=value / part.span, high=part.span * value))
+                    free.append(
+                        Free(
+                            f"{name}_{key}", value, value, log=True, sigma=1.0, origin=value, low=value / part.span, high=part.span * value
+                        )
+                    )
         terms.append(Term(form, tuple(names), tuple(free)))
     return extend(model, elements, parameters, where), terms
 

@@ -24,12 +24,21 @@ BENT = 0.1  # more of a signal at its largest, to begin with
 CLOSE = 0.02  # of the gain: an exchanged cause that is nearly as good gets more laws
 WEAK = 2.0  # times the cost of a law: if to first order it is worth less, it may not be worth it
 TEXTBOOK = {
-    "bump_stop": ("bump_stop", "rebound_stop"), "cubic_spring": ("cubic_spring",), "backlash": ("backlash",),
-    "asymmetric_spring": (BENDS["s"], "linear_spring"), "asymmetric_damper": (BENDS["v"], "linear_damper"),
-    "coulomb_friction": ("coulomb_friction",), "bouc_wen": ("bouc_wen_loop",), "maxwell_bushing": ("maxwell_bushing",),
-    "stribeck_friction": (STRIBECK,), "quadratic_damper": ("quadratic_damper",), "tyre_nonlinear": ("quadratic_spring",),
-    "degressive_damper": (KNEE,), "damper_fading": ("heating_damper",), "tyre_damping": ("linear_damper",),
-}  # fmt: skip
+    "bump_stop": ("bump_stop", "rebound_stop"),
+    "cubic_spring": ("cubic_spring",),
+    "backlash": ("backlash",),
+    "asymmetric_spring": (BENDS["s"], "linear_spring"),
+    "asymmetric_damper": (BENDS["v"], "linear_damper"),
+    "coulomb_friction": ("coulomb_friction",),
+    "bouc_wen": ("bouc_wen_loop",),
+    "maxwell_bushing": ("maxwell_bushing",),
+    "stribeck_friction": (STRIBECK,),
+    "quadratic_damper": ("quadratic_damper",),
+    "tyre_nonlinear": ("quadratic_spring",),
+    "degressive_damper": (KNEE,),
+    "damper_fading": ("heating_damper",),
+    "tyre_damping": ("linear_damper",),
+}
 TAKING = {  # laws that take an element away: its law and argument
     "backlash": ("linear_spring", "stiffness"),
     "liftoff": ("linear_spring", "stiffness"),

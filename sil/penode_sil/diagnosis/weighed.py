@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen import units
 from penode_gen.model import Model
 
@@ -29,7 +30,9 @@ from .study import Study, fitted, guessed, look
 from .worth import WORTH
 
 Array = NDArray[np.float64]
-MIN_UNMODELLED = 0.0055  # of what moves, and worth MIN_GAIN: less wanders beside causes that are the truth, 0.003 of the levels tried at most
+MIN_UNMODELLED = (
+    0.0055  # of what moves, and worth MIN_GAIN: less wanders beside causes that are the truth, 0.003 of the levels tried at most
+)
 UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be that, or a curve that stands for another one
 
 
@@ -110,7 +113,9 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
     still = bench.problem().solve(bench.fit.free, bench.gains(bench.fit).at(Level(0.0, 1.0)), 12)
     gained = bench.fit.likelihood - still.likelihood
     better = bench.fit.likelihood - nominal.fit.likelihood
-    log(f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats; it follows better than the nominal model by {better:.0f}")
+    log(
+        f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats; it follows better than the nominal model by {better:.0f}"
+    )
     if better < -MIN_GAIN * len(nominal.free):
         return Misfit(np.inf, bench.fit.likelihood, bench.update)
     return Misfit(bench.level.size if gained > MIN_GAIN and bench.level.size > MIN_UNMODELLED else 0.0, bench.fit.likelihood, bench.update)
@@ -143,9 +148,13 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     after = tuple(measuring.started(extended, e, study)[1] for e in study.experiments)
     fit = replace(study.null, simulated=after)
     left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after))
-    powers = [sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)]
+    powers = [
+        sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)
+    ]
     causes, notes = _plausible(model, found.causes)
-    known = replace(found.run, free=tuple(f for f in found.run.free if f.target in guessed(model)))  # the others may compensate for laws that were added
+    known = replace(
+        found.run, free=tuple(f for f in found.run.free if f.target in guessed(model))
+    )  # the others may compensate for laws that were added
     numbers, coarse = numerics.numerics(replace(measured, model=fitted(model, known)))
     share = max(1.0 - powers[1] / powers[0], found.taken, 0.0)  # the first without what sensors and inputs are off by
     stated = np.array([s.noise for s in model.sensors])
@@ -158,8 +167,23 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     laws = sum(max(len(x.form.parts), 1) for a in found.found.named for x in a.terms)
     likelihood = found.found.plain.fit.likelihood
     return Weighed(
-        measured, causes, verdict, notes, explanations, text, extended, gain, held, fit, share, bench.level.size, laws, numbers, likelihood, bench.update,
-    )  # fmt: skip
+        measured,
+        causes,
+        verdict,
+        notes,
+        explanations,
+        text,
+        extended,
+        gain,
+        held,
+        fit,
+        share,
+        bench.level.size,
+        laws,
+        numbers,
+        likelihood,
+        bench.update,
+    )
 
 
 def _measured(study: Study, noise: Array) -> Study:
@@ -204,7 +228,9 @@ def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ..
     stated = [c.where for c in off if model.parameters[c.where].tolerance > 0.0]
     if len(stated) < 2:
         return causes, []
-    return (), [f"{', '.join(stated)} would all have to be outside of their tolerances: another plant, or dynamics that the model does not have"]
+    return (), [
+        f"{', '.join(stated)} would all have to be outside of their tolerances: another plant, or dynamics that the model does not have"
+    ]
 
 
 def _gain(model: Model, off: Sequence[Cause]) -> Cause | None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.model import GROUND, Model
 
 from . import clipping
@@ -22,7 +23,9 @@ WORTH = 0.07  # of what acts: less is a small deviation. Any model is 2 to 5 % w
 BENT = 0.6  # of a friction or a cube along a Gaussian motion is beside a straight line, in rms: sqrt(1 - 2/pi), sqrt(1 - 9/15)
 Z_95 = 1.96  # standard deviations that hold 95 %
 RATIO = 3.0  # times what wanders beside all that was found: where that is little, a name is worth it from less on
-SYSTEMATIC = 0.007  # of what acts: what mis-modelling of 3.5 % does to the size of a form, for it is like it to 0.2 in rms, one direction of 25
+SYSTEMATIC = (
+    0.007  # of what acts: what mis-modelling of 3.5 % does to the size of a form, for it is like it to 0.2 in rms, one direction of 25
+)
 LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of their parameter makes as large as they have to be
 ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
@@ -97,9 +100,15 @@ def confounded(model: Model, fit: Fit, targets: Collection[object]) -> dict[obje
     left = columns / size
     left = left - others @ np.linalg.lstsq(others, left, rcond=1e-9)[0]
     _, seen, ways = np.linalg.svd(left, full_matrices=False)
-    resolution = ways[seen > SYSTEMATIC].T @ ways[seen > SYSTEMATIC]  # of the fit: identity for what is seen by itself, 0 for what is not seen
+    resolution = (
+        ways[seen > SYSTEMATIC].T @ ways[seen > SYSTEMATIC]
+    )  # of the fit: identity for what is seen by itself, 0 for what is not seen
     values = resolution @ (size * np.array([(f.value - f.origin) / f.unit for f in free])) / size
-    return {f.target: float(f.origin + f.unit * x) for f, x, sole in zip(free, values, np.diag(resolution)) if SYSTEMATIC < sole < 1.0 - SYSTEMATIC}
+    return {
+        f.target: float(f.origin + f.unit * x)
+        for f, x, sole in zip(free, values, np.diag(resolution))
+        if SYSTEMATIC < sole < 1.0 - SYSTEMATIC
+    }
 
 
 def _columns(model: Model, fit: Fit, targets: Collection[object]) -> tuple[Array, Array]:
@@ -108,7 +117,11 @@ def _columns(model: Model, fit: Fit, targets: Collection[object]) -> tuple[Array
     masses = {b.mass for b in model.bodies} - set(targets)
     rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
     own = [column * (not f.log) for f, column in zip(fit.free, rows.T) if f.target in targets]
-    rest = [column / np.linalg.norm(column) for f, column in zip(fit.free, rows.T) if f.target not in targets and f.target not in masses and column.any()]
+    rest = [
+        column / np.linalg.norm(column)
+        for f, column in zip(fit.free, rows.T)
+        if f.target not in targets and f.target not in masses and column.any()
+    ]
     return np.array(own).T.reshape(len(rows), -1), np.array(rest).T.reshape(len(rows), -1)
 
 

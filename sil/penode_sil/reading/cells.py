@@ -14,8 +14,39 @@ from numpy.typing import NDArray
 from ..errors import UserError
 
 Array = NDArray[np.float64]
-MISSING = frozenset(["", "-", "--", "---", "?", "*", ".", "na", "n/a", "#n/a", "#na", "#nv", "nil", "null", "none", "nan", "<na>", "(null)",
-                     "-nan", "+nan", "1.#qnan", "-1.#ind", "1.#inf", "-1.#inf", "#div/0!", "#num!", "#value!", "nan(ind)", "-nan(ind)"])  # fmt: skip
+MISSING = frozenset(
+    [
+        "",
+        "-",
+        "--",
+        "---",
+        "?",
+        "*",
+        ".",
+        "na",
+        "n/a",
+        "#n/a",
+        "#na",
+        "#nv",
+        "nil",
+        "null",
+        "none",
+        "nan",
+        "<na>",
+        "(null)",
+        "-nan",
+        "+nan",
+        "1.#qnan",
+        "-1.#ind",
+        "1.#inf",
+        "-1.#inf",
+        "#div/0!",
+        "#num!",
+        "#value!",
+        "nan(ind)",
+        "-nan(ind)",
+    ]
+)
 FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))[dD]([+-]?\d+)")
 GROUPS = re.compile(r"[+-]?\d{1,3}(?:['\u2019\u00a0\u202f ]\d{3})+(?:[.,]\d+)?")
 NUMBER = re.compile(r"\s*[+-]?(?:\d+([.,]?)\d*|([.,])\d+)(?:[eEdD][+-]?\d+)?\s*")

@@ -66,7 +66,13 @@ def _named(found: layout.Layout) -> list[header.Cell]:
 
 
 def _table(
-    path: Path, found: layout.Layout, named: Sequence[header.Cell], lines: Lines, columns: object, form: str, stamped: frozenset[str] = frozenset()
+    path: Path,
+    found: layout.Layout,
+    named: Sequence[header.Cell],
+    lines: Lines,
+    columns: object,
+    form: str,
+    stamped: frozenset[str] = frozenset(),
 ) -> Recording:
     units = {cell.key: "s" if cell.key in stamped else cell.unit for cell in named}
     texts = {cell.key: (cell.name, cell.text) for cell in named}

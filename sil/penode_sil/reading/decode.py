@@ -10,16 +10,24 @@ from pathlib import Path
 from ..errors import UserError
 
 MARKS = (
-    (codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF32_LE, "utf-32-le"), (codecs.BOM_UTF32_BE, "utf-32-be"),
-    (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"),
-)  # fmt: skip
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
 # what other kinds of file begin with, and what they are
 OTHERS = (
-    (b"\x1f\x8b", "compressed (gzip)", "unpack it"), (b"PK\x03\x04", "an Excel workbook or a zip archive", "export CSV from it"),
-    (b"\xd0\xcf\x11\xe0", "an Excel workbook", "export CSV from it"), (b"\x89HDF", "HDF5 (or MATLAB 7.3)", "export CSV or MDF4"),
-    (b"MATLAB 5", "a MATLAB file", "export CSV or MDF4"), (b"PAR1", "a Parquet file", "export CSV or MDF4"),
-    (b"TDSm", "a TDMS file", "export CSV or MDF4"), (b"\xfd7zXZ", "compressed (xz)", "unpack it"), (b"BZh", "compressed (bzip2)", "unpack it"),
-)  # fmt: skip
+    (b"\x1f\x8b", "compressed (gzip)", "unpack it"),
+    (b"PK\x03\x04", "an Excel workbook or a zip archive", "export CSV from it"),
+    (b"\xd0\xcf\x11\xe0", "an Excel workbook", "export CSV from it"),
+    (b"\x89HDF", "HDF5 (or MATLAB 7.3)", "export CSV or MDF4"),
+    (b"MATLAB 5", "a MATLAB file", "export CSV or MDF4"),
+    (b"PAR1", "a Parquet file", "export CSV or MDF4"),
+    (b"TDSm", "a TDMS file", "export CSV or MDF4"),
+    (b"\xfd7zXZ", "compressed (xz)", "unpack it"),
+    (b"BZh", "compressed (bzip2)", "unpack it"),
+)
 
 
 def read_text(path: Path) -> tuple[str, str]:

@@ -124,6 +124,8 @@ def _read_mdf(path: Path, names: list[str] | None, pairs: Mapping[str, str]) -> 
     """Groups of an MDF file as tables, and the names of all its channels."""
     wanted = None
     if names is not None:
-        wanted = frozenset(one.name for name in names for one in ([named.Called(name)] if name not in pairs else named.readings(pairs[name])))
+        wanted = frozenset(
+            one.name for name in names for one in ([named.Called(name)] if name not in pairs else named.readings(pairs[name]))
+        )
     groups, known = mdf.read(path, wanted)
     return [Recording(path, None, units, columns, {}, texts=texts) for units, columns, texts in groups], known

@@ -19,8 +19,10 @@ NAMED = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "b
 STATED = re.compile(r'^\s*"?sep=([^\w"\'.+\-]|\\t)"?\s*$', re.IGNORECASE)
 COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s*")
 HEAD, TAIL = 400, 60  # lines looked at from both ends
-TIMES = frozenset("time t zeit timestamp timestamps time_stamp time_stamps zeitstempel elapsed_time time_axis x_value uhrzeit datetime "
-                  "date_time temps tiempo tempo seconds".split())  # fmt: skip
+TIMES = frozenset(
+    "time t zeit timestamp timestamps time_stamp time_stamps zeitstempel elapsed_time time_axis x_value uhrzeit datetime "
+    "date_time temps tiempo tempo seconds".split()
+)
 
 
 @dataclass(frozen=True)

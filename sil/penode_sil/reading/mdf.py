@@ -115,8 +115,9 @@ def _main(path: str, asked: str) -> None:
         groups = _groups(file, None if names is None else set(names))
         masters = {file.groups[g].channels[c].name for g, c in file.masters_db.items()}
         said = {"groups": [(units, called) for units, _, called in groups], "known": sorted(set(file.channels_db) - masters)}
-        arrays = {f"{g},{c}": values for g, (units, columns, _) in enumerate(groups)
-                  for c, values in enumerate(columns[name] for name in units)}  # fmt: skip
+        arrays = {
+            f"{g},{c}": values for g, (units, columns, _) in enumerate(groups) for c, values in enumerate(columns[name] for name in units)
+        }
     except _Problem as problem:
         said = {"problem": str(problem)}
     except Exception as exc:  # a broken file makes the reader raise a dozen kinds

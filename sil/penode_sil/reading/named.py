@@ -38,7 +38,7 @@ def aliases(texts: Iterable[str], known: Iterable[str]) -> dict[str, str]:
     for text in texts:
         match = PAIR.match(text)
         if match is None:
-            raise UserError(f'channel "{text}" is not understood; write the model\'s name = the file\'s name [unit]')
+            raise UserError(f"channel \"{text}\" is not understood; write the model's name = the file's name [unit]")
         if match[1] not in (*known, "time"):
             what = f'channel {match[1]}: the model has no input or sensor "{match[1]}"'
             raise UserError(f"{what}; {hint(match[1], known)}")
@@ -116,6 +116,6 @@ def check(pairs: Mapping[str, str], tables: Sequence[Any], path: Path, names: It
     for name, text in pairs.items():
         if (names is None or name in names) and not any(columns(text, t.units, t.texts) for t in tables):
             wanted = next((one.name for one in readings(text)[1:2]), text)
-            problems.append(f"{path}: there is no column \"{wanted}\" for {option(name, text)}; {hint(wanted, every)}")
+            problems.append(f'{path}: there is no column "{wanted}" for {option(name, text)}; {hint(wanted, every)}')
     if problems:
         raise UserError(*problems)

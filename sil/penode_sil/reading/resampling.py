@@ -107,10 +107,7 @@ def resample(
         how = f"by a low-pass without phase ({PASS_BAND * 0.5 / sample_time:.4g} Hz)"
     else:
         moved = np.column_stack([np.interp(raster, time, column) for column in values.T])
-    note = (
-        f"resampled {how} from {time.size} rows {usual * 1e3:.6g} ms apart "
-        f"to {count} samples {sample_time * 1e3:.6g} ms apart"
-    )
+    note = f"resampled {how} from {time.size} rows {usual * 1e3:.6g} ms apart to {count} samples {sample_time * 1e3:.6g} ms apart"
     return raster, moved, note
 
 

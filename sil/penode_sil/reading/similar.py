@@ -14,15 +14,28 @@ from . import named, unit_text
 
 # words for one quantity; the first letters of a word count as well
 KINDS = (
-    "a acc accel acceleration beschl beschleunigung", "v vel velocity speed rate geschw", "f force kraft load", "m tau torque moment drehmoment trq",
-    "z x y s pos position height displacement disp weg hoehe level travel", "phi q angle winkel theta alpha rot", "w n omega speed rate drehzahl gyro",
-    "road street ground strasse", "wheel rad hub unsprung", "body chassis aufbau sprung", "deflection defl travel federweg susp suspension stroke",
-    "t time zeit", "p pressure druck", "u voltage spannung", "i current strom",
-)  # fmt: skip
+    "a acc accel acceleration beschl beschleunigung",
+    "v vel velocity speed rate geschw",
+    "f force kraft load",
+    "m tau torque moment drehmoment trq",
+    "z x y s pos position height displacement disp weg hoehe level travel",
+    "phi q angle winkel theta alpha rot",
+    "w n omega speed rate drehzahl gyro",
+    "road street ground strasse",
+    "wheel rad hub unsprung",
+    "body chassis aufbau sprung",
+    "deflection defl travel federweg susp suspension stroke",
+    "t time zeit",
+    "p pressure druck",
+    "u voltage spannung",
+    "i current strom",
+)
 SAME = [frozenset(kind.split()) for kind in KINDS]
 
 
-def proposals(missing: Mapping[str, str], free: Mapping[str, str | None], names: Mapping[str, str], least: float = 0.4) -> dict[str, tuple[str, str]]:
+def proposals(
+    missing: Mapping[str, str], free: Mapping[str, str | None], names: Mapping[str, str], least: float = 0.4
+) -> dict[str, tuple[str, str]]:
     """For names of a model (name -> unit), of columns (key -> unit; key -> name): the column to propose and why, where there is
     one. Each column once; those that measure something else never. A column is proposed by its name if it repeats the share `least`."""
     from scipy.optimize import linear_sum_assignment  # slow to load

@@ -20,8 +20,25 @@ from . import named, unit_text
 Array = NDArray[np.float64]
 GAP = 1.5  # an interval longer than this many usual (median) intervals is a gap
 TIME = ("time", "t", "Time")
-OTHER_TIMES = ("time", "t", "zeit", "timestamp", "timestamps", "time_stamp", "time_stamps", "zeitstempel", "elapsed_time", "time_axis",
-               "x_value", "uhrzeit", "datetime", "date_time", "temps", "tiempo", "tempo")  # fmt: skip
+OTHER_TIMES = (
+    "time",
+    "t",
+    "zeit",
+    "timestamp",
+    "timestamps",
+    "time_stamp",
+    "time_stamps",
+    "zeitstempel",
+    "elapsed_time",
+    "time_axis",
+    "x_value",
+    "uhrzeit",
+    "datetime",
+    "date_time",
+    "temps",
+    "tiempo",
+    "tempo",
+)
 # what a column's name may end in; signs between them part or multiply: m_s2 is m/s^2, N_s_m is N*s/m
 PART = r"(?:[mun]?s|[mu]?sec|mps|min|h|[cmuk]?m|[mkM]?N|Nm|Ns|k?g|mg|rad|deg|rpm|dps|kmh|kph|m?V|m?A|[kM]?Pa|bar|K|k?Hz|kW|W|J|pct)\d?"
 SUFFIX = re.compile(rf"(?:[ _]{PART})+$")
@@ -143,8 +160,7 @@ class Recording:
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size and finite:
             raise UserError(
-                f"{self.place(bad[0])}: channel {name} has no finite value there"
-                f"{more(bad.size)}; cut the recording or fill the value in"
+                f"{self.place(bad[0])}: channel {name} has no finite value there{more(bad.size)}; cut the recording or fill the value in"
             )
         with np.errstate(over="ignore"):
             return values if scale == 1.0 else values * scale

@@ -123,5 +123,7 @@ def _along(g: sp.Expr, argument: sp.Expr, symbols: Sequence[sp.Symbol]) -> Calla
     places = np.random.default_rng(0).normal(size=(3 + 2 * len(way), len(way)))
     given = found(places @ way + rest)
     close = 1e-9  # functions that differ do so by more than rounding at random states
-    same = np.allclose(np.broadcast_to(evaluate(*places.T), len(places)), given, rtol=close, atol=close * max(float(np.max(np.abs(given))), 1e-300))
+    same = np.allclose(
+        np.broadcast_to(evaluate(*places.T), len(places)), given, rtol=close, atol=close * max(float(np.max(np.abs(given))), 1e-300)
+    )
     return found if same else None

@@ -46,23 +46,31 @@ def read(paths: Sequence[Path], model: Model) -> Start:
             found = {n: p.value for n, p in other.parameters.items() if n in model.parameters}
             own = {n: v for n, v in other.sets["default"].networks.items() if n in model.networks} if other.sets else {}
             if not found and not own:
-                raise UserError(f"--from {given}: {path.name} has no parameter and no network of {model.path}; give a file that was made from it")
+                raise UserError(
+                    f"--from {given}: {path.name} has no parameter and no network of {model.path}; give a file that was made from it"
+                )
             parameters |= found
             networks |= own
         elif path.suffix.lower() in (".onnx", ".json"):
             name = path.stem if path.stem in model.networks else next(iter(model.networks)) if len(model.networks) == 1 else ""
             if not name:
-                raise UserError(f"--from {given}: {model.path} has no network {path.stem}; name the file after one of {', '.join(model.networks)}")
+                raise UserError(
+                    f"--from {given}: {model.path} has no network {path.stem}; name the file after one of {', '.join(model.networks)}"
+                )
             try:
                 networks[name] = read_network(path)
             except NetworkError as exc:
                 raise UserError(f"--from {exc}") from exc
         else:
-            raise UserError(f"--from {given}: neither a model file (.toml), nor a network (.onnx, .json), nor a diagnosis.json; give one of these")
+            raise UserError(
+                f"--from {given}: neither a model file (.toml), nor a network (.onnx, .json), nor a diagnosis.json; give one of these"
+            )
     for name, network in networks.items():
         inputs = len(model.networks[name].input_units)
         if (network.n_inputs, network.n_outputs) != (inputs, 1):
-            raise UserError(f"--from: network {name} has inputs and outputs {network.n_inputs} and {network.n_outputs}, the model's {inputs} and 1; give one of that shape")
+            raise UserError(
+                f"--from: network {name} has inputs and outputs {network.n_inputs} and {network.n_outputs}, the model's {inputs} and 1; give one of that shape"
+            )
         if all(isinstance(layer, Affine) for layer in network.layers):
             raise UserError(f"--from: network {name} scales its input and has no layer with weights; give one that has, or leave it out")
     return Start(parameters, {n: v for n, v in networks.items() if not _silent(v)})
@@ -81,7 +89,11 @@ def ratios(start: Start, free: Sequence[str], model: Model, before: Array) -> Ar
 
 def curve(port: Port, network: Network, reach: float) -> Curve:
     """A network of one input as a curve on a regular grid, over the range of its training, else to `reach` both ways."""
-    low, high = (float(v[0]) for v in (network.input_min, network.input_max)) if network.input_min is not None and network.input_max is not None else (-reach, reach)
+    low, high = (
+        (float(v[0]) for v in (network.input_min, network.input_max))
+        if network.input_min is not None and network.input_max is not None
+        else (-reach, reach)
+    )
     reach = max(high, -low)
     knots = grid(port, min(low, -1e-3 * reach), max(high, 1e-3 * reach), port.knots)
     values = network.evaluate(knots[:, None])[:, 0]

@@ -18,14 +18,24 @@ from ..console import FILE, Several, staged
 @click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on; not learnt from.")
 @click.option("-o", "--output", type=FILE, required=True, help="Directory for what is found; created if need be.")
 @click.option("--known", multiple=True, help="A parameter that was measured: m_b, or m_b='351 kg'.")
-@click.option("--from", "start", type=FILE, multiple=True, help="Start there: a trained or extended model file, NETWORK.onnx, or diagnosis.json.")
+@click.option(
+    "--from", "start", type=FILE, multiple=True, help="Start there: a trained or extended model file, NETWORK.onnx, or diagnosis.json."
+)
 @click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
 @click.option("--seed", default=0, show_default=True, help="Of the weights that a network starts from; curves need none.")
 @click.option("--resume", is_flag=True, help="Go on with the training into DIR that was interrupted, to the same bits.")
 @click.option("--json", "as_json", is_flag=True, help="Print training.json.")
 def train(
-    model: Path, data: tuple[Path, ...], holdout: tuple[Path, ...], output: Path, known: tuple[str, ...], start: tuple[Path, ...],
-    channel: tuple[str, ...], seed: int, resume: bool, as_json: bool,
+    model: Path,
+    data: tuple[Path, ...],
+    holdout: tuple[Path, ...],
+    output: Path,
+    known: tuple[str, ...],
+    start: tuple[Path, ...],
+    channel: tuple[str, ...],
+    seed: int,
+    resume: bool,
+    as_json: bool,
 ) -> None:
     """Fit the networks of the model file MODEL, and its parameters within their tolerances, to recordings.
 

@@ -127,7 +127,9 @@ def fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArr
     return _fewer(knots, values, spread, count, regular, fixed) if fixed.sum() + 2 <= count else kept
 
 
-def _fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArray[np.bool_], fixed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _fewer(
+    knots: Array, values: Array, spread: Array, count: int, regular: NDArray[np.bool_], fixed: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
     """The same with knots that stay."""
     keep = np.ones(len(knots), dtype=bool)
     favour = 2.0 * np.log(len(knots))

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,8 +13,8 @@ from . import data, unknown
 from .curve import Curve, bent, fewer, spaced, three
 from .port import Port, inputs_of
 from .problem import Point, Problem
-from .solve import NONE, Fit, Limits, solve
 from .settings import SETTINGS
+from .solve import NONE, Fit, Limits, solve
 
 Array = NDArray[np.float64]
 Tell = Callable[[float, str], None]
@@ -55,7 +56,9 @@ def limits_of(problem: Problem, bounds: Sequence[Callable[[Curve], Limits]]) -> 
 
 def rescaled(problem: Problem, point: Point, seen: Sequence[Array], ports: Sequence[Port]) -> Problem:
     """The problem with the size of each network's force as it is now, and at least a hundredth of the largest."""
-    spans = np.array([float(np.ptp(s(inputs_of(p, seen) if p.knots == 0 else inputs_of(p, seen)[:, 0]))) for s, p in zip(point.shapes, ports)])
+    spans = np.array(
+        [float(np.ptp(s(inputs_of(p, seen) if p.knots == 0 else inputs_of(p, seen)[:, 0]))) for s, p in zip(point.shapes, ports)]
+    )
     apart = tuple(a.visited(inputs_of(ports[a.shape], seen)[:, 0]) for a in problem.apart)
     values = dict(zip(problem.model.parameters, problem.parameters(point)))
     for a in apart:  # a network that takes only what a parameter cannot has no slopes of its own at first: it is measured by the parameter
@@ -80,9 +83,12 @@ def seen_by(problem: Problem, point: Point) -> list[Array]:
 
 
 def train(
-    problem: Problem, ports: Sequence[Port], bounds: Sequence[Callable[[Curve], Limits]], tell: Tell,
+    problem: Problem,
+    ports: Sequence[Port],
+    bounds: Sequence[Callable[[Curve], Limits]],
+    tell: Tell,
     start: Callable[[Problem, Point], Point] = lambda problem, point: point,
-) -> tuple[Problem, Fit]:  # fmt: skip
+) -> tuple[Problem, Fit]:
     """Curves for all networks of a problem; `start` puts what is known already in place of straight lines."""
     limits = limits_of(problem, bounds)
     tell(0.05, "straight lines")
@@ -95,7 +101,9 @@ def train(
         problem = rescaled(problem, point, seen, ports)
         for i, port in enumerate(ports):
             knots = min(max(count, len(point.shapes[i].knots)), port.knots)
-            point = Point(point.ratios, point.starts, (*point.shapes[:i], curve_on(port, point.shapes[i], seen, knots), *point.shapes[i + 1 :]))
+            point = Point(
+                point.ratios, point.starts, (*point.shapes[:i], curve_on(port, point.shapes[i], seen, knots), *point.shapes[i + 1 :])
+            )
         fit = solve(problem, point, iterations, 20.0, limits, patience=1)
         point = fit.point
         problem = renoised(problem, point)
@@ -138,7 +146,11 @@ def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callab
         if shape.zero >= 0:
             own = np.insert(np.insert(own, shape.zero, 0.0, axis=0), shape.zero, 0.0, axis=1)
         regular = np.isin(shape.knots, grid_.knots)
-        want = fewer(shape.knots, shape.values, own, port.knots, regular, shape.zero) if bent(shape.knots, shape.values, own, regular) else regular
+        want = (
+            fewer(shape.knots, shape.values, own, port.knots, regular, shape.zero)
+            if bent(shape.knots, shape.values, own, regular)
+            else regular
+        )
         shapes.append(shape.on(shape.knots[want]))
     return problem, Point(fit.point.ratios, fit.point.starts, tuple(shapes))
 

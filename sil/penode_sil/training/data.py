@@ -37,7 +37,9 @@ class Record:
         """Its beginning."""
         if samples >= len(self.y):
             return self
-        d = replace(self.drive, u=np.ascontiguousarray(self.drive.u[:samples]), between=np.ascontiguousarray(self.drive.between[: samples - 1]))
+        d = replace(
+            self.drive, u=np.ascontiguousarray(self.drive.u[:samples]), between=np.ascontiguousarray(self.drive.between[: samples - 1])
+        )
         return replace(self, drive=d, y=self.y[:samples], good=self.good[:samples])
 
 

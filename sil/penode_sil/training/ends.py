@@ -14,12 +14,12 @@ from penode_gen.networks import Network
 from . import begin, curves
 from .curve import Curve, three
 from .curves import Tell
-from .port import Port, inputs_of
 from .dense import Dense, like
 from .engine import Shape
+from .port import Port, inputs_of
 from .problem import Point, Problem
-from .solve import Fit, Limits, solve
 from .settings import SETTINGS
+from .solve import Fit, Limits, solve
 
 Array = NDArray[np.float64]
 
@@ -41,9 +41,14 @@ def loud(problem: Problem, point: Point) -> float:
 
 
 def train(
-    problem: Problem, ports: Sequence[Port], shapes: Sequence[Network], bounds: Sequence[Callable[[Curve], Limits]], seed: int, tell: Tell,
+    problem: Problem,
+    ports: Sequence[Port],
+    shapes: Sequence[Network],
+    bounds: Sequence[Callable[[Curve], Limits]],
+    seed: int,
+    tell: Tell,
     start: begin.Start = begin.Start(),
-) -> tuple[Problem, Fit]:  # fmt: skip
+) -> tuple[Problem, Fit]:
     """All networks of a problem; several random starts if one does not come down to the noise. What a `start` knows is tried first."""
     limits = curves.limits_of(problem, bounds)
     tell(0.02, "straight lines")
@@ -70,7 +75,9 @@ def _of(found: tuple[Problem, Fit]) -> tuple[Problem, Point]:
     return found[0], found[1].point
 
 
-def _begin(problem: Problem, lines: Point, seen: Sequence[Array], ports: Sequence[Port], shapes: Sequence[Network], seed: int, start: begin.Start) -> Point:
+def _begin(
+    problem: Problem, lines: Point, seen: Sequence[Array], ports: Sequence[Port], shapes: Sequence[Network], seed: int, start: begin.Start
+) -> Point:
     """Random weights in place of the lines, or those of a start."""
     found: list[Shape] = []
     for k, (port, network, line) in enumerate(zip(ports, shapes, lines.shapes)):

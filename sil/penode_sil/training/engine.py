@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
-from ..output import whole
 from ..building import build_directory, build_once, compiler_version
+from ..output import whole
 from .curve import Curve
 from .dense import Dense
 from .drive import NODES, SHARES, Drive
@@ -26,7 +26,16 @@ from .settings import SETTINGS
 
 Array = NDArray[np.float64]
 Shape = Curve | Dense
-OPTIONS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-fassociative-math", "-fno-signed-zeros")
+OPTIONS = (
+    "-std=c99",
+    "-O3",
+    "-march=native",
+    "-ffp-contract=fast",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fassociative-math",
+    "-fno-signed-zeros",
+)
 
 
 class _Net(ctypes.Structure):

@@ -39,9 +39,14 @@ def _call(name: str) -> object:
 
 
 for _function, _name in {
-    "Root": "sqrt", "Logarithm": "log", "Softplus": "t_softplus", "Sigmoid": "t_sigmoid", "Sign": "t_sign", "Absolute": "fabs",
+    "Root": "sqrt",
+    "Logarithm": "log",
+    "Softplus": "t_softplus",
+    "Sigmoid": "t_sigmoid",
+    "Sign": "t_sign",
+    "Absolute": "fabs",
     "Heaviside": "t_step",
-}.items():  # fmt: skip
+}.items():
     setattr(_Printer, f"_print_{_function}", _call(_name))
 
 
@@ -68,7 +73,9 @@ def equations(model: Model, free: Sequence[str]) -> Equations:
     for name, results in flat.items():
         parts.append(_function(name, [r.xreplace(swap).xreplace(names) for r in results], x, p, n))
     cases = "".join(f"    case {i}: arguments_{i}(x, u, ud, p, N, y, fx, fp, fn); break;\n" for i in range(len(calls)))
-    parts.append(f"static inline void arguments(int call, {_GIVEN}, {_FOUND})\n{{\n    switch (call) {{\n{cases}    default: break;\n    }}\n}}")
+    parts.append(
+        f"static inline void arguments(int call, {_GIVEN}, {_FOUND})\n{{\n    switch (call) {{\n{cases}    default: break;\n    }}\n}}"
+    )
     return Equations("\n\n".join(parts) + "\n", tuple((name, len(a)) for name, a in calls))
 
 
@@ -102,4 +109,3 @@ def _lines(target: str, results: list[sp.Expr]) -> list[str]:
 def _tidy(expr: sp.Expr) -> sp.Expr:
     """Derivatives of kinks are kinks: no Dirac pulses."""
     return expr.replace(sp.DiracDelta, lambda *a: sp.Integer(0))
-

@@ -59,10 +59,18 @@ def run(job: Job, tell: Callable[[float, str], None] = lambda share, doing: None
 
 def _identity(job: Job, model: Model, start: begin.Start) -> dict[str, str]:
     """All that the bits of a training follow from, in the words of its call."""
-    return resume.identity({
-        "model file": model.digest, "--data": job.data, "--holdout": job.holdout, "--channel": job.channels, "--known": job.known, "--seed": job.seed,
-        "--from": start, "versions of programs": (versions(), compiler(), SETTINGS),
-    })  # fmt: skip
+    return resume.identity(
+        {
+            "model file": model.digest,
+            "--data": job.data,
+            "--holdout": job.holdout,
+            "--channel": job.channels,
+            "--known": job.known,
+            "--seed": job.seed,
+            "--from": start,
+            "versions of programs": (versions(), compiler(), SETTINGS),
+        }
+    )
 
 
 def _known(text: str, model: Model) -> tuple[str, float | None]:
@@ -85,14 +93,19 @@ def _known(text: str, model: Model) -> tuple[str, float | None]:
 def _write(job: Job, model: Model, after: Model, found: Trained) -> None:
     """All files but for what a later step may refuse: the set is read back from them."""
     facts = {
-        "penode.seed": str(found.seed), "penode.chi2": f"{found.chi2:.6g}", "penode.converged": str(found.converged).lower(),
-        "penode.versions": json.dumps(found.versions), "penode.recordings": json.dumps(found.digests),
+        "penode.seed": str(found.seed),
+        "penode.chi2": f"{found.chi2:.6g}",
+        "penode.converged": str(found.converged).lower(),
+        "penode.versions": json.dumps(found.versions),
+        "penode.recordings": json.dumps(found.digests),
         "penode.holdout": json.dumps({e.signal: {"before": e.before, "after": e.after, "noise": e.noise} for e in found.holdout}),
         "penode.not_identifiable": json.dumps([u.text for u in found.unknown]),
-    }  # fmt: skip
+    }
     for force in found.forces:
         own = facts | {
-            "penode.band": json.dumps([{"x": x[::4].tolist(), "sigma1": s[::4].tolist(), "sigma2": (2.0 * s[::4]).tolist()} for x, s in zip(force.x, force.sigma)]),
+            "penode.band": json.dumps(
+                [{"x": x[::4].tolist(), "sigma1": s[::4].tolist(), "sigma2": (2.0 * s[::4]).tolist()} for x, s in zip(force.x, force.sigma)]
+            ),
             "penode.visited": json.dumps([{"edges": e.tolist(), "counts": c.tolist()} for e, c in zip(force.edges, force.counts)]),
         }
         text = f"{force.name} of {found.model}; inputs in {', '.join(force.units)}, output in {force.output}; trained by penode {found.versions['penode']}"
@@ -111,7 +124,13 @@ def _write(job: Job, model: Model, after: Model, found: Trained) -> None:
 def _model_file(job: Job, model: Model, found: Trained) -> str:
     """A model file that extends the one that was trained: its set `default` is the trained one, `before` what it was."""
     way = Path(os.path.relpath(model.path.resolve(), job.output.resolve())).as_posix()
-    lines = [f"# {model.name} with networks trained by penode {found.versions['penode']}; report.html says on what and how well.", "", "[model]", f'extends = "{way}"', ""]
+    lines = [
+        f"# {model.name} with networks trained by penode {found.versions['penode']}; report.html says on what and how well.",
+        "",
+        "[model]",
+        f'extends = "{way}"',
+        "",
+    ]
     if found.parameters:
         lines.append("[parameters]")
         for name, (value, sigma, _, unit) in found.parameters.items():
@@ -141,6 +160,10 @@ def _before(job: Job, model: Model) -> list[str]:
             entry = {"file": entry} if isinstance(entry, str) else dict(entry)
             if "file" in entry:
                 entry["file"] = Path(os.path.relpath((model.path.parent / entry["file"]).resolve(), job.output.resolve())).as_posix()
-        text = json.dumps(entry) if not isinstance(entry, dict) else "{ " + ", ".join(f"{k} = {json.dumps(v)}" for k, v in entry.items()) + " }"
+        text = (
+            json.dumps(entry)
+            if not isinstance(entry, dict)
+            else "{ " + ", ".join(f"{k} = {json.dumps(v)}" for k, v in entry.items()) + " }"
+        )
         lines.append(f"{name} = {text}")
     return lines

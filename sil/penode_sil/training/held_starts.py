@@ -22,7 +22,9 @@ Array = NDArray[np.float64]
 ITERATIONS, CLOSE = 8, 0.1
 
 
-def fitted(problem: Problem, records: tuple[Record, ...], point: Point, ports: Sequence[Port], seen: Sequence[Array]) -> tuple[Problem, Point] | None:
+def fitted(
+    problem: Problem, records: tuple[Record, ...], point: Point, ports: Sequence[Port], seen: Sequence[Array]
+) -> tuple[Problem, Point] | None:
     """Start states of other recordings, all else as trained. Straight lines in place of the networks, as they were `seen` in training, find
     states to begin with where these are better than those of the model file. None where the model leaves all bounds from both: then it does so
     within the recording."""

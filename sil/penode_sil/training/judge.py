@@ -15,8 +15,8 @@ from penode_gen.model import Model
 
 from ..batch import Batch
 from ..measured import Measured
-from .port import Port, inputs_of
 from .data import Noise
+from .port import Port, inputs_of
 from .problem import Point, Problem
 from .result import Error
 from .settings import SETTINGS
@@ -25,9 +25,15 @@ Array = NDArray[np.float64]
 
 
 def errors(
-    problem: Problem, point: Point, measured: Sequence[Measured], before: Model, after: Model, ports: Sequence[Port], ranges: Sequence[tuple[Array, Array]],
+    problem: Problem,
+    point: Point,
+    measured: Sequence[Measured],
+    before: Model,
+    after: Model,
+    ports: Sequence[Port],
+    ranges: Sequence[tuple[Array, Array]],
     noise: Noise,
-) -> tuple[tuple[Error, ...], float, float]:  # fmt: skip
+) -> tuple[tuple[Error, ...], float, float]:
     """RMS errors of all recorded signals, the share of samples outside of the trained range, and the share left out for them."""
     found = problem.residuals(point)
     if found is None:
@@ -84,9 +90,11 @@ def visited(ports: Sequence[Port], seen: Sequence[Array]) -> list[Array]:
 
 def with_networks(model: Model, networks: dict[str, object], parameters: dict[str, float]) -> Model:
     """The model with trained networks in its set 'default', and with other parameters."""
-    default = replace(model.sets["default"], networks=model.sets["default"].networks | networks, parameters=model.sets["default"].parameters | {
-        k: v for k, v in parameters.items() if k in model.sets["default"].parameters
-    })  # fmt: skip
+    default = replace(
+        model.sets["default"],
+        networks=model.sets["default"].networks | networks,
+        parameters=model.sets["default"].parameters | {k: v for k, v in parameters.items() if k in model.sets["default"].parameters},
+    )
     changed = {n: replace(p, value=parameters[n]) for n, p in model.parameters.items() if n in parameters}
     digest = sets.digest(replace(model, sets={"default": default}))
     return replace(model, sets=model.sets | {"default": default}, parameters=model.parameters | changed, digest=digest)

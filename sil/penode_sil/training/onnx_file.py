@@ -37,14 +37,18 @@ def model(network: Network, name: str, text: str, properties: Mapping[str, str])
 
     for layer in network.layers:
         if isinstance(layer, Affine):
-            for kind, values in (("Sub", layer.shift), ("Mul", layer.factor)) if layer.form == "centre" else (("Mul", layer.factor), ("Add", layer.shift)):
+            for kind, values in (
+                (("Sub", layer.shift), ("Mul", layer.factor)) if layer.form == "centre" else (("Mul", layer.factor), ("Add", layer.shift))
+            ):
                 node(kind, constant(values))
         else:
             node("Gemm", constant(layer.weights), constant(layer.bias), transB=1)
             if layer.activation != "identity":
                 node(_NODES[layer.activation])
     nodes[-1].output[0] = "y"
-    ends = [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["batch", w]) for n, w in (("x", network.n_inputs), ("y", network.n_outputs))]
+    ends = [
+        helper.make_tensor_value_info(n, TensorProto.FLOAT, ["batch", w]) for n, w in (("x", network.n_inputs), ("y", network.n_outputs))
+    ]
     graph = helper.make_graph(nodes, name, ends[:1], ends[1:], constants)
     found = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8, producer_name="penode")
     found.doc_string = text

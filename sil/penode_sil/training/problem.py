@@ -82,7 +82,9 @@ class Problem:
 
     def with_(self, **changes: object) -> Problem:
         """The same problem but for some of it."""
-        given = {k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied", "plain", "apart", "journal")}
+        given = {
+            k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied", "plain", "apart", "journal")
+        }
         return Problem(**(given | changes))  # type: ignore[arg-type]
 
     @property
@@ -98,7 +100,9 @@ class Problem:
 
     def begin(self, shapes: Sequence[Shape]) -> Point:
         """Nominal parameters, the model's start, and shapes."""
-        return Point(np.ones(len(self.engine.free)), np.tile(np.array(self.model.start, dtype=float), (len(self.records), 1)), tuple(shapes))
+        return Point(
+            np.ones(len(self.engine.free)), np.tile(np.array(self.model.start, dtype=float), (len(self.records), 1)), tuple(shapes)
+        )
 
     def residuals(self, point: Point) -> tuple[list[Array], list[Array]] | None:
         """Measured less simulated signals and inputs of the networks, a recording each; None where the simulation diverges."""
@@ -160,7 +164,7 @@ class Problem:
                     one = one * (weight[rows, j] / self.noise.sigma[j])[:, None]
                     along += white[rows, j] @ one
                     if columns > SETTINGS.problem_wide:
-                        few = one[::SETTINGS.problem_sparse]
+                        few = one[:: SETTINGS.problem_sparse]
                         part += few.T @ few * (len(one) / len(few))
                     else:
                         part += one.T @ one
@@ -174,7 +178,15 @@ class Problem:
         for name in self.engine.free:
             tolerance = self.model.parameters[name].tolerance
             known = tolerance <= 1.0
-            deviations.append(1e-9 if name in self.held or self.frozen else SETTINGS.problem_limit * tolerance if known else SETTINGS.problem_vague if not np.isfinite(tolerance) else tolerance)
+            deviations.append(
+                1e-9
+                if name in self.held or self.frozen
+                else SETTINGS.problem_limit * tolerance
+                if known
+                else SETTINGS.problem_vague
+                if not np.isfinite(tolerance)
+                else tolerance
+            )
             origin.append(1.0)
         units = [u for b in self.model.bodies for u in (b.unit,)] + [f"{b.unit}/s" for b in self.model.bodies]
         spread = [STARTS[u] for u in units] + [1.0 + 10.0 * abs(s.start) for s in self.model.extra_states]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from penode_gen.model import Promises
 
 from .curve import Curve
-from .solve import NONE, Limits
 from .settings import SETTINGS
+from .solve import NONE, Limits
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,9 @@ def bound(promises: Promises, margin: float = SETTINGS.promised_first, size: flo
         slopes = _free(curve, (np.eye(len(curve.knots))[1:] - np.eye(len(curve.knots))[:-1]) / wide[:, None])
         values = _free(curve, np.eye(len(curve.knots)))
         force = margin * min(max(float(np.max(np.abs(curve.values))), size), _or_far(promises.max_force))
-        by = margin * min(max(float(np.max(np.abs(np.diff(curve.values) / wide))), size / float(np.ptp(curve.knots))), _or_far(promises.max_slope))
+        by = margin * min(
+            max(float(np.max(np.abs(np.diff(curve.values) / wide))), size / float(np.ptp(curve.knots))), _or_far(promises.max_slope)
+        )
         rows: list[Array] = []
         least: list[Array] = []
 

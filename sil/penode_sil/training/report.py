@@ -29,21 +29,33 @@ img{{max-width:100%}}.warn{{border-left:4px solid #D55E00;padding-left:.8rem}}co
 def write(path: Path, t: Trained) -> None:
     """The page, whole or not at all."""
     verdict = "The fit converged." if t.converged else "The fit did not converge, or the model cannot be what was recorded."
-    parts = [f"<p{'' if t.converged else ' class=warn'}>{verdict} {t.seconds:.1f} s of processor time; chi2 {t.chi2:.3f} a sample (1 is noise).</p>"]
+    parts = [
+        f"<p{'' if t.converged else ' class=warn'}>{verdict} {t.seconds:.1f} s of processor time; chi2 {t.chi2:.3f} a sample (1 is noise).</p>"
+    ]
     parts += [f"<p class=warn>{html.escape(n)}</p>" for n in t.notes]
     for force in t.forces:
         parts.append(f"<h2>{html.escape(force.name)}</h2>\n<p>{html.escape(_about(force))}</p>\n{_image(force)}")
     if t.unknown:
-        parts.append("<h2>What the recordings cannot tell</h2>\n<ul>" + "".join(f"<li>{html.escape(u.text)}</li>" for u in t.unknown) + "</ul>")
+        parts.append(
+            "<h2>What the recordings cannot tell</h2>\n<ul>" + "".join(f"<li>{html.escape(u.text)}</li>" for u in t.unknown) + "</ul>"
+        )
     if t.parameters:
-        rows = "".join(f"<tr><td>{n}</td><td>{v:.6g} {u}</td><td>{s:.2g}</td><td>{b:.6g}</td></tr>" for n, (v, s, b, u) in t.parameters.items())
+        rows = "".join(
+            f"<tr><td>{n}</td><td>{v:.6g} {u}</td><td>{s:.2g}</td><td>{b:.6g}</td></tr>" for n, (v, s, b, u) in t.parameters.items()
+        )
         parts.append(f"<h2>Parameters</h2>\n<table><tr><th>name</th><th>value</th><th>1 sigma</th><th>before</th></tr>{rows}</table>")
     for title, errors in (("training recordings", t.training), ("held-out recordings", t.holdout)):
         parts += [f"<h2>RMS error on {title}</h2>\n{_table(errors)}"] if errors else []
     if t.holdout:
-        parts.append(f"<p>{100 * t.outside:.2f} % of the held-out samples lie outside of the trained range; for the last column {100 * t.masked:.1f} % are left out.</p>")
+        parts.append(
+            f"<p>{100 * t.outside:.2f} % of the held-out samples lie outside of the trained range; for the last column {100 * t.masked:.1f} % are left out.</p>"
+        )
     facts = {"seed": t.seed, **t.versions, **t.digests}
-    parts.append("<h2>Made from</h2>\n<table>" + "".join(f"<tr><td>{html.escape(str(k))}</td><td><code>{html.escape(str(v))}</code></td></tr>" for k, v in facts.items()) + "</table>")
+    parts.append(
+        "<h2>Made from</h2>\n<table>"
+        + "".join(f"<tr><td>{html.escape(str(k))}</td><td><code>{html.escape(str(v))}</code></td></tr>" for k, v in facts.items())
+        + "</table>"
+    )
     with whole(path) as part:
         part.write_text(_PAGE.format(title=html.escape(f"{t.model}: trained networks"), body="\n".join(parts)), encoding="utf-8")
 
@@ -56,20 +68,28 @@ def _about(f: Force) -> str:
 
 
 def _table(errors: tuple[Error, ...]) -> str:
-    head = "".join(f"<th>{h}</th>" for h in ("signal", "before", "after", "in the generated C", "noise", "inside the trained range", "gained"))
+    head = "".join(
+        f"<th>{h}</th>" for h in ("signal", "before", "after", "in the generated C", "noise", "inside the trained range", "gained")
+    )
     rows = []
     for e in errors:
         room = e.before**2 - e.noise**2
         gained = f"{100 * (e.before**2 - e.after**2) / room:.1f} %" if room > 0.0 else ""
         cells = (e.before, e.after, e.deployed, e.noise, e.inside)
-        rows.append(f"<tr><td>{html.escape(e.signal)} [{html.escape(e.unit)}]</td>" + "".join(f"<td>{v:.4g}</td>" for v in cells) + f"<td>{gained}</td></tr>")
+        rows.append(
+            f"<tr><td>{html.escape(e.signal)} [{html.escape(e.unit)}]</td>"
+            + "".join(f"<td>{v:.4g}</td>" for v in cells)
+            + f"<td>{gained}</td></tr>"
+        )
     return f"<table><tr>{head}</tr>{''.join(rows)}</table>"
 
 
 def _image(f: Force) -> str:
     """Force with its bands, and below it where the recordings were."""
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, len(f.x), squeeze=False, sharex="col", height_ratios=(4, 1), figsize=(4.5 + 3.5 * len(f.x), 4.4), layout="constrained")
+        figure, axes = plt.subplots(
+            2, len(f.x), squeeze=False, sharex="col", height_ratios=(4, 1), figsize=(4.5 + 3.5 * len(f.x), 4.4), layout="constrained"
+        )
         for k, (x, y, s) in enumerate(zip(f.x, f.y, f.sigma)):
             top, low = axes[:, k]
             top.fill_between(x, y - 2 * s, y + 2 * s, color=COLOURS[5], alpha=0.3, linewidth=0, label="2 sigma")

@@ -73,7 +73,10 @@ class Trained:
 
     def as_json(self) -> dict[str, object]:
         """For programs; arrays as lists, networks left out."""
-        found = {k: getattr(self, k) for k in ("model", "known", "outside", "masked", "converged", "notes", "chi2", "seconds", "seed", "digests", "versions")}
+        found = {
+            k: getattr(self, k)
+            for k in ("model", "known", "outside", "masked", "converged", "notes", "chi2", "seconds", "seed", "digests", "versions")
+        }
         found["parameters"] = {n: {"value": v, "sigma": s, "before": b, "unit": u} for n, (v, s, b, u) in self.parameters.items()}
         found["not_identifiable"] = [asdict(u) for u in self.unknown]
         found["training"], found["holdout"] = ([asdict(e) for e in errors] for errors in (self.training, self.holdout))
@@ -83,10 +86,15 @@ class Trained:
 
 def _force(f: Force) -> dict[str, object]:
     return {
-        "way": f.way, "file": f"{f.name}.onnx", "low": f.low, "high": f.high, "promises_broken": f.broken, "pieces": f.pieces,
+        "way": f.way,
+        "file": f"{f.name}.onnx",
+        "low": f.low,
+        "high": f.high,
+        "promises_broken": f.broken,
+        "pieces": f.pieces,
         "band": [{"x": x.tolist(), "y": y.tolist(), "sigma": s.tolist()} for x, y, s in zip(f.x, f.y, f.sigma)],
         "visited": [{"edges": e.tolist(), "counts": c.tolist()} for e, c in zip(f.edges, f.counts)],
-    }  # fmt: skip
+    }
 
 
 def sentences(t: Trained, folder: object) -> str:
@@ -103,8 +111,13 @@ def sentences(t: Trained, folder: object) -> str:
     for title, errors in (("training", t.training), ("held-out data", t.holdout)):
         if errors:
             lines.append(f"  {'RMS error on ' + title:<26}{'before':>10}{'after':>10}{'in the C':>10}{'noise':>10}{'inside':>10}")
-            lines += [f"    {e.signal:<24}{e.before:>10.4g}{e.after:>10.4g}{e.deployed:>10.4g}{e.noise:>10.4g}{e.inside:>10.4g}  {e.unit}" for e in errors]
+            lines += [
+                f"    {e.signal:<24}{e.before:>10.4g}{e.after:>10.4g}{e.deployed:>10.4g}{e.noise:>10.4g}{e.inside:>10.4g}  {e.unit}"
+                for e in errors
+            ]
     if t.holdout:
-        lines.append(f"  {100 * t.outside:.2f} % of the hold-out lies outside of the trained range, {100 * t.masked:.1f} % is left out for 'inside'")
+        lines.append(
+            f"  {100 * t.outside:.2f} % of the hold-out lies outside of the trained range, {100 * t.masked:.1f} % is left out for 'inside'"
+        )
     lines += [f"  note: {n}" for n in t.notes]
     return "\n".join([*lines, f"  -> {folder}/report.html"])

@@ -81,11 +81,18 @@ class Journal:
         states = [self._states[k] for k in numbers]
         with whole(self.path) as part:
             np.savez(
-                part, identity=json.dumps(self.identity), starts=np.array(self._starts), numbers=np.array(numbers),
-                spent=self.before + time.process_time() - self._started, lengths=np.array([len(s.vector) for s in states]),
-                vectors=np.concatenate([s.vector for s in states]), costs=np.array([s.cost for s in states]), dampings=np.array([s.damping for s in states]),
-                poor=np.array([s.poor for s in states]), steps=np.array([s.steps for s in states]),
-            )  # fmt: skip
+                part,
+                identity=json.dumps(self.identity),
+                starts=np.array(self._starts),
+                numbers=np.array(numbers),
+                spent=self.before + time.process_time() - self._started,
+                lengths=np.array([len(s.vector) for s in states]),
+                vectors=np.concatenate([s.vector for s in states]),
+                costs=np.array([s.cost for s in states]),
+                dampings=np.array([s.damping for s in states]),
+                poor=np.array([s.poor for s in states]),
+                steps=np.array([s.steps for s in states]),
+            )
 
     def read(self) -> None:
         """What the file has. UserError for one that is damaged, or of another training."""

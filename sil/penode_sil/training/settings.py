@@ -40,7 +40,9 @@ class Settings:
     story_tries: int = 8
     story_still: float = 1e-9  # a network's input that moves less against 1 has not been excited
     story_loud: float = 1.25  # times the noise that a sensor states, from which on a fit did not converge, or the model lacks something
-    unknown_invisible: float = 0.5  # of its prior deviation: what data leave uncertain by more rests on the model file, not on the recordings
+    unknown_invisible: float = (
+        0.5  # of its prior deviation: what data leave uncertain by more rests on the model file, not on the recordings
+    )
     unknown_nothing: float = 1e-2  # of what the model file says of a direction: what data say less of is not seen at all
     unknown_part: float = 0.25  # of the largest: components of a direction that are named
     unknown_split: float = 0.01  # of a force's span: a constant that is known no better is reported

@@ -74,11 +74,19 @@ def least(curvature: Array, slope: Array, limits: Limits, at: Array) -> Array:
 
 
 def solve(
-    problem: Problem, point: Point, iterations: int, close: float = SETTINGS.solve_close, limits: Callable[[Point], Limits] = lambda point: NONE,
-    damping: float = 1e-3, tell: Callable[[int], None] = lambda k: None, patience: int = 2,
-) -> Fit:  # fmt: skip
+    problem: Problem,
+    point: Point,
+    iterations: int,
+    close: float = SETTINGS.solve_close,
+    limits: Callable[[Point], Limits] = lambda point: NONE,
+    damping: float = 1e-3,
+    tell: Callable[[int], None] = lambda k: None,
+    patience: int = 2,
+) -> Fit:
     """From a point to the least cost. Two dampings are tried at once, then larger ones until one gains."""
-    number, state = problem.journal.enter([point.vector, *(s.knots for s in point.shapes if isinstance(s, Curve)), np.array([iterations, close, damping, patience])])
+    number, state = problem.journal.enter(
+        [point.vector, *(s.knots for s in point.shapes if isinstance(s, Curve)), np.array([iterations, close, damping, patience])]
+    )
     if state is None:
         state = State(point.vector, problem.cost(point), damping, 0, 0)
     if not np.isfinite(state.cost):

@@ -24,14 +24,14 @@ from ..measured import Measured
 from . import apart, bands, begin, curves, data, dense, ends, held_starts, heldout, judge, kinks, promised, unfold, unknown
 from .curve import Curve
 from .curves import Tell
-from .port import Port, inputs_of
 from .dense import Dense
 from .engine import Engine
+from .port import Port, inputs_of
 from .problem import Point, Problem
 from .result import Error, Force, Trained
 from .resume import Journal
-from .solve import Fit, solve
 from .settings import SETTINGS
+from .solve import Fit, solve
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,14 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
     ports = ports_of(model, engine)
     templates = [model.sets["default"].networks[p.name] for p in ports]
     records = tuple(data.record(model, m, engine.signals) for m in train_)
-    problem = Problem(engine, records, data.at_first(model, records, engine.signals), np.ones(len(ports)), apart=apart.find(model, engine.free, engine.networks), journal=options.journal)
+    problem = Problem(
+        engine,
+        records,
+        data.at_first(model, records, engine.signals),
+        np.ones(len(ports)),
+        apart=apart.find(model, engine.free, engine.networks),
+        journal=options.journal,
+    )
     bounds = [promised.bound(model.networks[p.name].promises, size=1.0) for p in ports]
     try:
         if all(p.knots for p in ports):
@@ -80,7 +87,8 @@ def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin
     """Curves and parameters of a start in place of straight lines."""
     seen = curves.seen_by(problem, point)
     shapes = tuple(
-        begin.curve(p, start.networks[p.name], float(np.max(np.abs(inputs_of(p, seen))))) if p.name in start.networks else s for p, s in zip(ports, point.shapes)
+        begin.curve(p, start.networks[p.name], float(np.max(np.abs(inputs_of(p, seen))))) if p.name in start.networks else s
+        for p, s in zip(ports, point.shapes)
     )
     return Point(begin.ratios(start, problem.engine.free, problem.model, point.ratios), point.starts, shapes)
 
@@ -110,7 +118,9 @@ def check(model: Model) -> None:
         why = dense.trainable(network)
         problems += [f"{model.path}: network {name} {why}"] if why else []
     if model.outside == "fade":
-        problems.append(f'{model.path}: outside = "fade" changes what networks give within their range; train with "extrapolate" or "clamp"')
+        problems.append(
+            f'{model.path}: outside = "fade" changes what networks give within their range; train with "extrapolate" or "clamp"'
+        )
     if problems:
         raise UserError(*problems)
 
@@ -129,9 +139,13 @@ def ports_of(model: Model, engine: Engine) -> list[Port]:
         zero = port.promises.zero_at_zero or bool(elements and len(elements) == len(seen))
         knots = unfold.capacity(template) if zero else 0
         if port.promises.max_force is not None and model.outside != "clamp":
-            raise UserError(f'{model.path}: network {name} promises max_force, which training keeps with outside = "clamp" only; choose that, or promise max_slope')
+            raise UserError(
+                f'{model.path}: network {name} promises max_force, which training keeps with outside = "clamp" only; choose that, or promise max_slope'
+            )
         if port.promises and not knots:
-            raise UserError(f"{model.path}: network {name} makes promises, which hold for a ReLU network of one input with room for kinks; give it layers = [16, 16]")
+            raise UserError(
+                f"{model.path}: network {name} makes promises, which hold for a ReLU network of one input with room for kinks; give it layers = [16, 16]"
+            )
         found.append(Port(name, tuple(seen), _is_rate(port), zero, max(knots, 0) if knots >= 3 else 0))
     return found
 
@@ -154,15 +168,17 @@ def _with_known(model: Model, options: Options) -> tuple[Model, tuple[str, ...]]
 def _check_excited(model: Model, ports: Sequence[Port], visited: Sequence[Array]) -> None:
     problems = [
         f"{model.path}: the recordings do not move the input of {p.name} ({model.networks[p.name].input_units[k]}): nothing can be learnt of it; record the plant while it moves"
-        for p, x in zip(ports, visited) for k in range(x.shape[1]) if np.ptp(x[:, k]) < SETTINGS.story_still
-    ]  # fmt: skip
+        for p, x in zip(ports, visited)
+        for k in range(x.shape[1])
+        if np.ptp(x[:, k]) < SETTINGS.story_still
+    ]
     if problems:
         raise UserError(*problems)
 
 
 def written(
-    model: Model, problem: Problem, fit: Fit, ports: Sequence[Port], templates: Sequence[Network], visited: Sequence[Array],
-) -> tuple[list[Network], Fit]:  # fmt: skip
+    model: Model, problem: Problem, fit: Fit, ports: Sequence[Port], templates: Sequence[Network], visited: Sequence[Array]
+) -> tuple[list[Network], Fit]:
     """Networks that are the fitted shapes, promises kept by the margin of the certificate."""
     found: list[Network] = []
     for k, (port, template, x) in enumerate(zip(ports, templates, visited)):
@@ -181,7 +197,9 @@ def written(
             bounds = [promised.bound(model.networks[p.name].promises, margin if p is port else SETTINGS.promised_first, 1.0) for p in ports]
             fit = solve(problem, fit.point, 2, 1.0, curves.limits_of(problem, bounds), damping=1e-6)
         else:
-            raise UserError(f"{model.path}: network {port.name} cannot keep its promises by their margin: {promises.broken(given, network, model.outside == 'clamp')[0]}; relax them")
+            raise UserError(
+                f"{model.path}: network {port.name} cannot keep its promises by their margin: {promises.broken(given, network, model.outside == 'clamp')[0]}; relax them"
+            )
         found.append(network)
     return found, fit
 
@@ -193,9 +211,17 @@ def _envelope(low: float, high: float, folded: bool) -> tuple[float, float]:
 
 
 def _judged(
-    model: Model, problem: Problem, fit: Fit, ports: Sequence[Port], networks: Sequence[Network], visited: Sequence[Array],
-    train_: Sequence[Measured], held: Sequence[Measured], given: tuple[Options, tuple[str, ...], float], tell: Tell,
-) -> tuple[Model, Trained]:  # fmt: skip
+    model: Model,
+    problem: Problem,
+    fit: Fit,
+    ports: Sequence[Port],
+    networks: Sequence[Network],
+    visited: Sequence[Array],
+    train_: Sequence[Measured],
+    held: Sequence[Measured],
+    given: tuple[Options, tuple[str, ...], float],
+    tell: Tell,
+) -> tuple[Model, Trained]:
     """What is known of a fit."""
     tell(0.97, "what is known of it")
     options, known, spent = given
@@ -214,23 +240,52 @@ def _judged(
         _force(model, port, shape, network, x, band.deviation(k))
         for k, (port, shape, network, x) in enumerate(zip(ports, fit.point.shapes, networks, visited))
     ]
-    loud = [e.signal for e in training if any(s.name == e.signal and s.noise > 0.0 and e.after > SETTINGS.story_loud * s.noise for s in (*model.sensors, *model.outputs))]
-    notes = [f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"] if loud else []
+    loud = [
+        e.signal
+        for e in training
+        if any(s.name == e.signal and s.noise > 0.0 and e.after > SETTINGS.story_loud * s.noise for s in (*model.sensors, *model.outputs))
+    ]
+    notes = (
+        [
+            f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"
+        ]
+        if loud
+        else []
+    )
     notes += dict.fromkeys(f"{p}" for m in train_ for p in m.quality.problems)  # parts of a file have them in common
-    notes += [f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, the network takes the rest" for a in problem.apart if ports[a.shape].knots]
+    notes += [
+        f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, the network takes the rest"
+        for a in problem.apart
+        if ports[a.shape].knots
+    ]
     notes += kinks.notes(problem, fit, ports)
     if held and not holdout:
         titles = ", ".join(m.title for m in held)
-        notes.append(f"{titles}: the trained model leaves all bounds there, so there is no error on held-out data; a recording that goes further must be among --data")
+        notes.append(
+            f"{titles}: the trained model leaves all bounds there, so there is no error on held-out data; a recording that goes further must be among --data"
+        )
     if model.method not in ("euler", "heun", "rk4"):
         notes.append(f"the deployed method is {model.method}; networks were trained through rk4 with the same steps")
     sigma = {n: float(band.deviations[i]) * abs(model.parameters[n].value) for i, n in enumerate(problem.engine.free)}
     parameters = {n: (float(values[n]), sigma[n], model.parameters[n].value, model.parameters[n].unit) for n in sigma}
     found = Trained(
-        model.name, tuple(forces), parameters, known, tuple(unknown.find(problem, fit, ports, visited)), training, holdout, outside, masked,
-        (fit.ended or _all_stated(model, training)) and not loud, tuple(notes), problem.chi2(fit.point) / max(problem.samples, 1), spent, options.seed,
-        {m.path.name: hashlib.sha256(m.path.read_bytes()).hexdigest() for m in (*train_, *held)} | {model.path.name: model.digest}, versions(),
-    )  # fmt: skip
+        model.name,
+        tuple(forces),
+        parameters,
+        known,
+        tuple(unknown.find(problem, fit, ports, visited)),
+        training,
+        holdout,
+        outside,
+        masked,
+        (fit.ended or _all_stated(model, training)) and not loud,
+        tuple(notes),
+        problem.chi2(fit.point) / max(problem.samples, 1),
+        spent,
+        options.seed,
+        {m.path.name: hashlib.sha256(m.path.read_bytes()).hexdigest() for m in (*train_, *held)} | {model.path.name: model.digest},
+        versions(),
+    )
     return after, found
 
 
@@ -264,6 +319,18 @@ def _force(model: Model, port: Port, shape: Curve | Dense, network: Network, x: 
     pieces = fold.pieces(network, model.outside == "clamp") if fold.foldable(network) else 0
     way = "curve" if isinstance(shape, Curve) else "network"
     return Force(
-        port.name, way, declared.input_units, declared.output_unit, low, high, tuple(xs), tuple(ys), tuple(sigmas), tuple(edges), tuple(counts),
-        tuple(broken), pieces, network,
-    )  # fmt: skip
+        port.name,
+        way,
+        declared.input_units,
+        declared.output_unit,
+        low,
+        high,
+        tuple(xs),
+        tuple(ys),
+        tuple(sigmas),
+        tuple(edges),
+        tuple(counts),
+        tuple(broken),
+        pieces,
+        network,
+    )

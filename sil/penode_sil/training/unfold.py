@@ -69,7 +69,9 @@ def unfold(curve: Curve, template: Network, low: float, high: float) -> Network:
         raise ValueError("a curve that is not 0 at 0 has no exact network: its value there is free")
     found, widths = _kinks(curve), hidden(template)
     if not capacity(template) or len(found.at) > sum(rooms(widths)):
-        raise ValueError(f"{len(curve.knots)} knots do not fit: the network holds {capacity(template)}, one at 0 and at least one on either side of it")
+        raise ValueError(
+            f"{len(curve.knots)} knots do not fit: the network holds {capacity(template)}, one at 0 and at least one on either side of it"
+        )
     scale, size = _scales(template, max(abs(low), abs(high)), curve)
     at = found.at / scale
     shares = np.split(np.arange(len(at)), np.cumsum(rooms(widths))[:-1])

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from .curve import Curve
 from .port import Port
 from .problem import Problem
-from .solve import Fit
 from .settings import SETTINGS
+from .solve import Fit
 
 Array = NDArray[np.float64]
 
@@ -40,8 +40,9 @@ def _parameters(problem: Problem, fit: Fit) -> list[Unknown]:
     names, values, vectors, deviation = _seen(problem, fit)
     return [
         _direction(problem, names, vector * deviation / np.sqrt(max(value, 0.0) + 1.0))
-        for value, vector in zip(values, vectors.T) if value < SETTINGS.unknown_invisible**-2.0
-    ]  # fmt: skip
+        for value, vector in zip(values, vectors.T)
+        if value < SETTINGS.unknown_invisible**-2.0
+    ]
 
 
 def invisible(problem: Problem, fit: Fit) -> Array:

@@ -115,7 +115,10 @@ def main() -> int:
     asked = parser.parse_args()
     seen = read(asked.notes)
     if not seen:
-        print(f"{', '.join(map(str, asked.notes))}: nothing noted; run a campaign with PROBES={asked.notes[0]} and probes.py as its command", file=sys.stderr)
+        print(
+            f"{', '.join(map(str, asked.notes))}: nothing noted; run a campaign with PROBES={asked.notes[0]} and probes.py as its command",
+            file=sys.stderr,
+        )
         return 2
     if asked.what == "table":
         print(table(seen))

@@ -15,8 +15,16 @@ from .plants import SIGNALS, Plant
 from .solver import KNOT_RATE, RATE, STEPS, Motion, World, knots, simulate
 
 LEAD = 3.0  # s of driving before a recording that starts in motion
-SENSORS = ("a_body a_wheel deflection", "a_body a_wheel deflection", "a_body a_wheel", "a_body deflection", "a_wheel deflection",
-           "a_body a_wheel deflection z_body z_wheel", "a_body a_wheel z_body", "deflection z_body")  # of a vehicle
+SENSORS = (
+    "a_body a_wheel deflection",
+    "a_body a_wheel deflection",
+    "a_body a_wheel",
+    "a_body deflection",
+    "a_wheel deflection",
+    "a_body a_wheel deflection z_body z_wheel",
+    "a_body a_wheel z_body",
+    "deflection z_body",
+)  # of a vehicle
 NOTHING = Change({})
 
 
@@ -72,13 +80,17 @@ class Bench:
         world = self.plant.world(true)
         for i, c in enumerate(changes):
             laws = {(k if k in plants.ELEMENTS[self.plant.kind] else f"{i} {k}"): law for k, law in c.laws.items()}
-            world = replace(world, masses=(*world.masses, *c.masses), laws={**world.laws, **laws}, felt=c.felt or world.felt,
-                            inverse=world.inverse if c.inverse is None else c.inverse, auxiliary=c.auxiliary or world.auxiliary)
+            world = replace(
+                world,
+                masses=(*world.masses, *c.masses),
+                laws={**world.laws, **laws},
+                felt=c.felt or world.felt,
+                inverse=world.inverse if c.inverse is None else c.inverse,
+                auxiliary=c.auxiliary or world.auxiliary,
+            )
         return world
 
-    def move(
-        self, drive: Drive, changes: Sequence[Change] = (), steps: int = STEPS, factors: Mapping[str, float] | None = None
-    ) -> Motion:
+    def move(self, drive: Drive, changes: Sequence[Change] = (), steps: int = STEPS, factors: Mapping[str, float] | None = None) -> Motion:
         """Noise-free motion in one recording, without its lead."""
         p, world, settled = self.plant.true, self.world(changes, factors), sum(c.settled for c in changes)
         start = np.zeros((2, len(world.masses)))
@@ -90,9 +102,7 @@ class Bench:
         m, k = simulate(world, drive.values, start, steps), int(drive.lead * RATE)
         return replace(m, z=m.z[k:], v=m.v[k:], a=m.a[k:], reaction=m.reaction[k:])
 
-    def observe(
-        self, motion: Motion, changes: Sequence[Change], recording: int, noise: Signals | None = None
-    ) -> dict[str, np.ndarray]:
+    def observe(self, motion: Motion, changes: Sequence[Change], recording: int, noise: Signals | None = None) -> dict[str, np.ndarray]:
         """What the sensors give, at the sample rate; without noise and rounding unless the noise is given."""
         seen = {}
         for name, x in self.plant.signals(motion).items():
@@ -115,9 +125,7 @@ class Bench:
         """The signals of all training recordings in units of the noise."""
         return np.concatenate([whiten(p, self.noise, self.transfer(len(next(iter(p.values())))), self.input_noise) for p in parts])
 
-    def response(
-        self, changes: Sequence[Change] = (), steps: int = STEPS, factors: Mapping[str, float] | None = None
-    ) -> np.ndarray:
+    def response(self, changes: Sequence[Change] = (), steps: int = STEPS, factors: Mapping[str, float] | None = None) -> np.ndarray:
         """The noise-free signals of the training recordings in units of the noise; `steps` below STEPS where roughly will do."""
         as_before = steps < STEPS and not factors and not any(c.moves for c in changes)
         motions = self.linear_motions if as_before else [self.move(d, changes, steps, factors) for d in self.training]
@@ -143,13 +151,12 @@ class Bench:
     @cached_property
     def of_sensors(self) -> dict[tuple[str, str], np.ndarray]:
         """Whitened directions of a bias and of a scale of every sensor."""
+
         def only(name: str, change: type(np.copy)) -> np.ndarray:
             return self.white([{s: change(x) if s == name else 0 * x for s, x in part.items()} for part in self.linear_signals])
 
         return {
-            (kind, s): only(s, change)
-            for s in self.noise
-            for kind, change in (("sensor_bias", np.ones_like), ("sensor_scale", np.copy))
+            (kind, s): only(s, change) for s in self.noise for kind, change in (("sensor_bias", np.ones_like), ("sensor_scale", np.copy))
         }
 
     @cached_property
@@ -160,9 +167,7 @@ class Bench:
             rest = np.zeros(int(round(drive.duration * KNOT_RATE)) + 6)
             for k in range(2 * n):
                 free = self.observe(simulate(self.plant.world(), rest, np.eye(2 * n)[k].reshape(2, n), 1), (), i)
-                found.append(
-                    self.white([free if j == i else {s: 0 * x for s, x in p.items()} for j, p in enumerate(self.linear_signals)])
-                )
+                found.append(self.white([free if j == i else {s: 0 * x for s, x in p.items()} for j, p in enumerate(self.linear_signals)]))
         return found
 
     def left(self, x: np.ndarray, free: Sequence[np.ndarray] = ()) -> float:
@@ -232,9 +237,7 @@ def draw_drives(rng: np.random.Generator, plant: Plant, moving: bool, harsh: boo
         if last:
             factor = min(factor, *(0.9 * float((peaks[e] / x).min()) for e, x in own.items()))
         peaks = {e: np.maximum(peaks.get(e, 0.0), factor * x) for e, x in own.items()}
-        drives.append(
-            Drive("holdout_1.csv" if last else f"train_{i + 1}.csv", f"{label}, times {factor:.2f}", factor * drive.values, lead)
-        )
+        drives.append(Drive("holdout_1.csv" if last else f"train_{i + 1}.csv", f"{label}, times {factor:.2f}", factor * drive.values, lead))
     return tuple(drives)
 
 
@@ -244,8 +247,6 @@ def draw_bench(rng: np.random.Generator, seed: tuple[int, ...], kind: str, hard:
     sensors = rng.choice(SENSORS).split() if kind == "quarter" else list(SIGNALS[kind])
     noise = {s: draw_noise(rng, SIGNALS[kind][s][2], hard) for s in sensors}
     drives = draw_drives(rng, plant, hard, harsh)
-    worst = {"quarter": rng.uniform(5e-6, 5e-5), "mass": 3e-3 * float(np.std(drives[0].values)), "law": rng.uniform(2e-7, 2e-6)}[
-        kind
-    ]
+    worst = {"quarter": rng.uniform(5e-6, 5e-5), "mass": 3e-3 * float(np.std(drives[0].values)), "law": rng.uniform(2e-7, 2e-6)}[kind]
     rate = float(rng.choice([500, 1000, 2000], p=[0.35, 0.45, 0.2]))
     return Bench(plant, rate, noise, worst if hard else 0.0, drives, hard, seed)

@@ -17,28 +17,64 @@ from .plants import SIGNALS
 from .solver import RATE, Motion
 
 PATTERN = (  # the stratum of case i is PATTERN[i % 24]: 1/6 null, 1/2 with forms that no textbook has
-    "single_foreign", "null", "single_common", "pair", "single_foreign", "hard", "single_common", "single_foreign", "outside",
-    "null", "single_foreign", "single_common", "hard", "pair", "single_foreign", "null_hard", "single_common", "single_foreign",
-    "triple", "hard", "null", "single_foreign", "single_common", "pair")
+    "single_foreign",
+    "null",
+    "single_common",
+    "pair",
+    "single_foreign",
+    "hard",
+    "single_common",
+    "single_foreign",
+    "outside",
+    "null",
+    "single_foreign",
+    "single_common",
+    "hard",
+    "pair",
+    "single_foreign",
+    "null_hard",
+    "single_common",
+    "single_foreign",
+    "triple",
+    "hard",
+    "null",
+    "single_foreign",
+    "single_common",
+    "pair",
+)
 STRATA = tuple(dict.fromkeys(PATTERN))
 KINDS = tuple(dict.fromkeys(f.kind for f in FORMS if f.kind != OUTSIDE))
 BOUND = 50.0  # chi-square: below, an effect cannot be told from the noise with certainty, and "not identifiable" is right
 APART = 30.0  # chi-square: a rival that leaves less of the effect unexplained is as good an answer
 FAINT = 1000.0  # chi-square: below, every kind is tried as a rival
 NEAR = {  # kinds that come near, beside wrong parameters, biases and scales, which are always tried
-    "coulomb_friction": ("stribeck_friction", "bouc_wen"), "stribeck_friction": ("coulomb_friction", "bouc_wen"),
+    "coulomb_friction": ("stribeck_friction", "bouc_wen"),
+    "stribeck_friction": ("coulomb_friction", "bouc_wen"),
     "bouc_wen": ("coulomb_friction", "stribeck_friction", "maxwell_bushing"),
-    "maxwell_bushing": ("bouc_wen", "hidden_resonance"), "hidden_resonance": ("maxwell_bushing",),
-    "cubic_spring": ("bump_stop", "backlash"), "bump_stop": ("cubic_spring", "asymmetric_spring"),
-    "asymmetric_spring": ("bump_stop", "cubic_spring"), "backlash": ("cubic_spring", "bouc_wen", "coulomb_friction"),
-    "asymmetric_damper": ("quadratic_damper",), "degressive_damper": ("quadratic_damper", "coulomb_friction", "damper_fading"),
-    "quadratic_damper": ("degressive_damper", "damper_fading"), "damper_fading": ("degressive_damper", "quadratic_damper"),
-    "tyre_liftoff": ("tyre_nonlinear",), "tyre_nonlinear": ("tyre_liftoff",), "sensor_bias": ("constant_force",)}
+    "maxwell_bushing": ("bouc_wen", "hidden_resonance"),
+    "hidden_resonance": ("maxwell_bushing",),
+    "cubic_spring": ("bump_stop", "backlash"),
+    "bump_stop": ("cubic_spring", "asymmetric_spring"),
+    "asymmetric_spring": ("bump_stop", "cubic_spring"),
+    "backlash": ("cubic_spring", "bouc_wen", "coulomb_friction"),
+    "asymmetric_damper": ("quadratic_damper",),
+    "degressive_damper": ("quadratic_damper", "coulomb_friction", "damper_fading"),
+    "quadratic_damper": ("degressive_damper", "damper_fading"),
+    "damper_fading": ("degressive_damper", "quadratic_damper"),
+    "tyre_liftoff": ("tyre_nonlinear",),
+    "tyre_nonlinear": ("tyre_liftoff",),
+    "sensor_bias": ("constant_force",),
+}
 FAMILIES = (  # causes at the same time are of different families
-    ("coulomb_friction", "stribeck_friction", "bouc_wen", "maxwell_bushing"), ("tyre_liftoff", "tyre_nonlinear", "tyre_damping"),
-    ("degressive_damper", "quadratic_damper", "damper_fading", "asymmetric_damper"), ("constant_force", "sensor_bias"),
-    ("cubic_spring", "bump_stop", "asymmetric_spring", "backlash"), ("sensor_scale", "wrong_parameter"), ("hidden_resonance",),
-    ("sensor_delay", "sensor_clipping", "sensor_dropout"))
+    ("coulomb_friction", "stribeck_friction", "bouc_wen", "maxwell_bushing"),
+    ("tyre_liftoff", "tyre_nonlinear", "tyre_damping"),
+    ("degressive_damper", "quadratic_damper", "damper_fading", "asymmetric_damper"),
+    ("constant_force", "sensor_bias"),
+    ("cubic_spring", "bump_stop", "asymmetric_spring", "backlash"),
+    ("sensor_scale", "wrong_parameter"),
+    ("hidden_resonance",),
+    ("sensor_delay", "sensor_clipping", "sensor_dropout"),
+)
 TOUCHES = {"c": "spring damper", "d": "spring damper", "c_t": "tyre", "m_b": "body", "m_w": "wheel", "m": "mass"}
 
 
@@ -113,7 +149,9 @@ class Case:
                     continue
                 tried.append((kind, where, y))
         if effect.form.kind == "constant_force" and bench.plant.kind == "quarter":  # a load of another course on the wheel
-            tried += [("constant_force", "wheel", bench.response([on(0.1)], 2) - bench.linear) for on in faults.courses(rng, bench.place("wheel"))]
+            tried += [
+                ("constant_force", "wheel", bench.response([on(0.1)], 2) - bench.linear) for on in faults.courses(rng, bench.place("wheel"))
+            ]
         if effect.form.kind == "sensor_bias":  # or a load that goes its way
             for where in {"quarter": ("body",), "mass": ("mass",)}.get(bench.plant.kind, ()):
                 on = faults.going(rng, bench.place(where), lambda t: effect.change.sensor[effect.where](0.0 * t, None, 1 / (t[1] - t[0])))
@@ -188,10 +226,7 @@ class Case:
             rng, given = self.bench.rng(i, 99), drive.at_signals[0][:: int(RATE / self.bench.rate)]
             noise = {s: w.draw(rng, len(given)) for s, w in self.bench.noise.items()}
             found.append(
-                (
-                    given + self.bench.input_noise * rng.standard_normal(len(given)),
-                    self.bench.observe(motion, self.changes, i, noise),
-                )
+                (given + self.bench.input_noise * rng.standard_normal(len(given)), self.bench.observe(motion, self.changes, i, noise))
             )
         return found
 
@@ -204,17 +239,18 @@ class Case:
         floor = {bench.plant.names[s]: float(np.sqrt(np.mean((seen[s] - clean[s] - shaken[s]) ** 2))) for s in seen}
         trained, held = reach(bench.plant, self.motions[:-1], bench.training), reach(bench.plant, self.motions[-1:], [drive])
         inside = all(np.abs(h).max() <= np.abs(t).max() for e in trained for h, t in zip(held[e], trained[e]))
-        return {"holdout_inside": bool(inside), "noise_floor": floor,
-                "holdout_signals": {bench.plant.names[s]: [float(f"{v:.8g}") for v in x] for s, x in clean.items()}}
+        return {
+            "holdout_inside": bool(inside),
+            "noise_floor": floor,
+            "holdout_signals": {bench.plant.names[s]: [float(f"{v:.8g}") for v in x] for s, x in clean.items()},
+        }
 
     def write(self, folder: Path) -> list[Path]:
         """model.toml and the recordings, as the explainer gets them. Returns the recordings; the hold-out is the last."""
         folder.mkdir(parents=True, exist_ok=True)
         bench, rng = self.bench, self.bench.rng(98)
         stated = {s: n.rms * rng.uniform(0.85, 1.2) for s, n in bench.noise.items()}
-        (folder / "model.toml").write_text(
-            plants.model_file(bench.plant, bench.rate, stated, bench.input_noise * rng.uniform(0.85, 1.2))
-        )
+        (folder / "model.toml").write_text(plants.model_file(bench.plant, bench.rate, stated, bench.input_noise * rng.uniform(0.85, 1.2)))
         names, (role, unit) = bench.plant.names, plants.INPUT[bench.plant.kind]
         for drive, (given, seen) in zip(bench.drives, self.measured):
             header = ["time [s]", f"{names[role]} [{unit}]", *(f"{names[s]} [{SIGNALS[bench.plant.kind][s][1]}]" for s in seen)]

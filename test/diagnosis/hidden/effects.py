@@ -137,8 +137,6 @@ def times(x: np.ndarray, rate: float) -> np.ndarray:
 
 def places(form: Form, plant: Plant, sensors: list[str]) -> list[str]:
     """Where on this plant a form can act."""
-    here = {"quarter": "spring damper tyre body wheel", "mass": "spring damper mass", "law": "spring damper motion"}[
-        plant.kind
-    ].split()
+    here = {"quarter": "spring damper tyre body wheel", "mass": "spring damper mass", "law": "spring damper motion"}[plant.kind].split()
     meant = {"sensor": sensors, "parameter": list(plant.true), "clock": ["clock"], "strut": ["damper"] * (plant.kind == "quarter")}
     return [place for role in form.places for place in meant.get(role, [role] if role in here else [])]

@@ -62,19 +62,46 @@ def going(r: Rng, at: Place, course: Curve) -> Build:
 
 
 forms("wrong_parameter", "parameter", (0.01, 0.5), "another_value", another_value=another_value)
-forms("hidden_resonance", "body wheel mass", (0.005, 0.3), "absorber",
-      absorber=lambda r, at: absorber(r, at, lambda m, w, zeta: [(Kind.LINEAR, (m * w**2, 2 * zeta * m * w))]),
-      hardening_absorber=lambda r, at: absorber(r, at, lambda m, w, zeta, bend=r.uniform(0.1, 0.4): [
-          (Kind.LINEAR, (0.0, 2 * zeta * m * w)),
-          (Kind.DEFLECTION_CURVE, (), lambda s: m * w**2 * s * (1 + bend * np.minimum((s / at.s) ** 2, 10)))]),
-      rubbing_absorber=lambda r, at: absorber(r, at, lambda m, w, zeta, part=r.uniform(0.1, 0.3), q=at.s * r.uniform(0.1, 0.5): [
-          (Kind.LINEAR, (m * w**2 * (1 - part), 2 * zeta * m * w)), (Kind.SLIDER, (m * w**2 * part, q))]),
-      absorber_of_rubber=lambda r, at: absorber(r, at, lambda m, w, zeta, part=r.uniform(0.3, 0.8): [
-          (Kind.LINEAR, (m * w**2, zeta * m * w)), (Kind.SERIES, (m * w * part,), lambda s: m * w**2 * part * s)]))
-forms("constant_force", "body mass motion", (0.004, 0.6), "settled_load",
-      settled_load=lambda r, at: load(r, at, np.ones_like, settled=True),
-      put_on_at_once=lambda r, at: load(r, at, lambda t: (t > 0).astype(float)),
-      put_on_at_the_start=lambda r, at: load(r, at, lambda t, seconds=r.uniform(0.1, 0.8): rise(t, 0.2, seconds)))
+forms(
+    "hidden_resonance",
+    "body wheel mass",
+    (0.005, 0.3),
+    "absorber",
+    absorber=lambda r, at: absorber(r, at, lambda m, w, zeta: [(Kind.LINEAR, (m * w**2, 2 * zeta * m * w))]),
+    hardening_absorber=lambda r, at: absorber(
+        r,
+        at,
+        lambda m, w, zeta, bend=r.uniform(0.1, 0.4): [
+            (Kind.LINEAR, (0.0, 2 * zeta * m * w)),
+            (Kind.DEFLECTION_CURVE, (), lambda s: m * w**2 * s * (1 + bend * np.minimum((s / at.s) ** 2, 10))),
+        ],
+    ),
+    rubbing_absorber=lambda r, at: absorber(
+        r,
+        at,
+        lambda m, w, zeta, part=r.uniform(0.1, 0.3), q=at.s * r.uniform(0.1, 0.5): [
+            (Kind.LINEAR, (m * w**2 * (1 - part), 2 * zeta * m * w)),
+            (Kind.SLIDER, (m * w**2 * part, q)),
+        ],
+    ),
+    absorber_of_rubber=lambda r, at: absorber(
+        r,
+        at,
+        lambda m, w, zeta, part=r.uniform(0.3, 0.8): [
+            (Kind.LINEAR, (m * w**2, zeta * m * w)),
+            (Kind.SERIES, (m * w * part,), lambda s: m * w**2 * part * s),
+        ],
+    ),
+)
+forms(
+    "constant_force",
+    "body mass motion",
+    (0.004, 0.6),
+    "settled_load",
+    settled_load=lambda r, at: load(r, at, np.ones_like, settled=True),
+    put_on_at_once=lambda r, at: load(r, at, lambda t: (t > 0).astype(float)),
+    put_on_at_the_start=lambda r, at: load(r, at, lambda t, seconds=r.uniform(0.1, 0.8): rise(t, 0.2, seconds)),
+)
 
 
 # -- sensors -----------------------------------------------------------------------------------------------------------------------
@@ -158,31 +185,55 @@ def dropouts(r: Rng, at: Place, fill: Callable[[np.ndarray, int, int, Rng], np.n
     return build
 
 
-forms("sensor_bias", "sensor", (0.003, 0.5), "offset",
-      offset=lambda r, at: bias(r, at, np.ones_like),
-      warming_up=lambda r, at: bias(r, at,
-          lambda t, part=r.uniform(0.1, 0.4), tau=r.uniform(0.2, 1.0): 1 - part * np.exp(-t / tau)),
-      wandering_zero=lambda r, at: bias(r, at,
-          lambda t, f=r.uniform(0.3, 0.9), phi=r.uniform(0, 6.3): 1 + 0.2 * np.sin(2 * np.pi * f * t + phi)))
-forms("sensor_scale", "sensor", (0.01, 0.4), "gain",
-      gain=lambda r, at: scale(r, at, lambda x, t: np.ones_like(x)),
-      gain_that_bends=lambda r, at: scale(r, at, lambda x, t, bend=r.uniform(-0.3, 0.3): 1 + bend * np.minimum(np.abs(x), 2)),
-      gain_that_drifts=lambda r, at: scale(r, at, lambda x, t, drift=r.uniform(-0.3, 0.3): 1 + drift * (t - 0.5)),
-      gain_of_each_side=lambda r, at: scale(r, at, lambda x, t, other=r.uniform(0.5, 0.8): np.where(x > 0, 1.0, other)))
-forms("sensor_delay", "sensor", (0.01, 1.0), "pure_delay",
-      pure_delay=lambda r, at: delay(at, lambda x, _, seconds: shifted(x, RATE, seconds)),
-      first_order_lag=lambda r, at: delay(at, lag),
-      bessel_filter=lambda r, at: delay(at, bessel),
-      bus_with_jitter=lambda r, at: delay(at, partial(jitter, share=r.uniform(0.05, 0.2))))
-forms("sensor_clipping", "sensor", (0.05, 0.8), "both_rails",
-      both_rails=lambda r, at: clipped(at, lambda x, top: np.clip(x, -top, top)),
-      soft_rails=lambda r, at: clipped(at, lambda x, top, p=r.uniform(4, 12): x / (1 + np.abs(x / top) ** p) ** (1 / p)),
-      one_rail=lambda r, at: clipped(at, lambda x, top, up=way(r): np.minimum(up * x, top) * up),
-      unequal_rails=lambda r, at: clipped(at, lambda x, top, other=r.uniform(0.6, 0.9): np.clip(x, -top * other, top)))
-forms("sensor_dropout", "sensor", (0.002, 0.1), "frozen zeros",
-      frozen=lambda r, at: dropouts(r, at, lambda x, i, j, rng: x[i - 1]),
-      zeros=lambda r, at: dropouts(r, at, lambda x, i, j, rng: 0.0),
-      noise_bursts=lambda r, at: dropouts(r, at, lambda x, i, j, rng: rng.uniform(-1, 1, j - i) * at.peak),
-      rail=lambda r, at: dropouts(r, at, lambda x, i, j, rng, level=way(r) * r.uniform(1.2, 2.5): level * at.peak),
-      fading_to_zero=lambda r, at: dropouts(r, at,
-          lambda x, i, j, rng, k=r.uniform(5, 30): x[i - 1] * np.exp(-np.arange(j - i) / k)))
+forms(
+    "sensor_bias",
+    "sensor",
+    (0.003, 0.5),
+    "offset",
+    offset=lambda r, at: bias(r, at, np.ones_like),
+    warming_up=lambda r, at: bias(r, at, lambda t, part=r.uniform(0.1, 0.4), tau=r.uniform(0.2, 1.0): 1 - part * np.exp(-t / tau)),
+    wandering_zero=lambda r, at: bias(
+        r, at, lambda t, f=r.uniform(0.3, 0.9), phi=r.uniform(0, 6.3): 1 + 0.2 * np.sin(2 * np.pi * f * t + phi)
+    ),
+)
+forms(
+    "sensor_scale",
+    "sensor",
+    (0.01, 0.4),
+    "gain",
+    gain=lambda r, at: scale(r, at, lambda x, t: np.ones_like(x)),
+    gain_that_bends=lambda r, at: scale(r, at, lambda x, t, bend=r.uniform(-0.3, 0.3): 1 + bend * np.minimum(np.abs(x), 2)),
+    gain_that_drifts=lambda r, at: scale(r, at, lambda x, t, drift=r.uniform(-0.3, 0.3): 1 + drift * (t - 0.5)),
+    gain_of_each_side=lambda r, at: scale(r, at, lambda x, t, other=r.uniform(0.5, 0.8): np.where(x > 0, 1.0, other)),
+)
+forms(
+    "sensor_delay",
+    "sensor",
+    (0.01, 1.0),
+    "pure_delay",
+    pure_delay=lambda r, at: delay(at, lambda x, _, seconds: shifted(x, RATE, seconds)),
+    first_order_lag=lambda r, at: delay(at, lag),
+    bessel_filter=lambda r, at: delay(at, bessel),
+    bus_with_jitter=lambda r, at: delay(at, partial(jitter, share=r.uniform(0.05, 0.2))),
+)
+forms(
+    "sensor_clipping",
+    "sensor",
+    (0.05, 0.8),
+    "both_rails",
+    both_rails=lambda r, at: clipped(at, lambda x, top: np.clip(x, -top, top)),
+    soft_rails=lambda r, at: clipped(at, lambda x, top, p=r.uniform(4, 12): x / (1 + np.abs(x / top) ** p) ** (1 / p)),
+    one_rail=lambda r, at: clipped(at, lambda x, top, up=way(r): np.minimum(up * x, top) * up),
+    unequal_rails=lambda r, at: clipped(at, lambda x, top, other=r.uniform(0.6, 0.9): np.clip(x, -top * other, top)),
+)
+forms(
+    "sensor_dropout",
+    "sensor",
+    (0.002, 0.1),
+    "frozen zeros",
+    frozen=lambda r, at: dropouts(r, at, lambda x, i, j, rng: x[i - 1]),
+    zeros=lambda r, at: dropouts(r, at, lambda x, i, j, rng: 0.0),
+    noise_bursts=lambda r, at: dropouts(r, at, lambda x, i, j, rng: rng.uniform(-1, 1, j - i) * at.peak),
+    rail=lambda r, at: dropouts(r, at, lambda x, i, j, rng, level=way(r) * r.uniform(1.2, 2.5): level * at.peak),
+    fading_to_zero=lambda r, at: dropouts(r, at, lambda x, i, j, rng, k=r.uniform(5, 30): x[i - 1] * np.exp(-np.arange(j - i) / k)),
+)

@@ -8,6 +8,7 @@ from scipy import signal as dsp
 from .effects import OUTSIDE, Build, Change, Place, Rng, forms, pulling, rise, times, way
 from .solver import AUXILIARY, GROUND, Curve, Kind, Law
 
+
 def driven(at: Place, of_time: Curve) -> Build:
     """An unmeasured force on a body."""
     return lambda size: Change({"amplitude": size * at.force}, pulling(at, size * at.force), auxiliary=lambda t, u: of_time(t))
@@ -34,9 +35,7 @@ def gusts(r: Rng, at: Place) -> Build:
 def uneven_tyre(r: Rng, at: Place) -> Build:
     f, phase = r.uniform(3, 14), r.uniform(0, 2 * np.pi, 3)
     turn = lambda t, u: sum(np.sin(2 * np.pi * f * k * t + phase[k - 1]) / k**2 for k in (1, 2, 3))
-    return lambda size: Change(
-        {"amplitude": size * at.force}, {"hidden": Law(Kind.TRACK, 1, GROUND, (size * at.force,))}, auxiliary=turn
-    )
+    return lambda size: Change({"amplitude": size * at.force}, {"hidden": Law(Kind.TRACK, 1, GROUND, (size * at.force,))}, auxiliary=turn)
 
 
 def rocking_tyre(r: Rng, at: Place) -> Build:
@@ -70,16 +69,17 @@ def switching_damper(r: Rng, at: Place) -> Build:
 
 def levelling_spring(r: Rng, at: Place) -> Build:
     start, seconds, up = r.uniform(0.3, 0.7) * at.duration, r.uniform(0.1, 1.0), way(r)
-    return lambda size: Change({"step": up * size * at.stiffness}, {"hidden": at.law(Kind.TRACK_SPRING, up * size * at.stiffness)},
-                               auxiliary=lambda t, u: rise(t, start, seconds))
+    return lambda size: Change(
+        {"step": up * size * at.stiffness},
+        {"hidden": at.law(Kind.TRACK_SPRING, up * size * at.stiffness)},
+        auxiliary=lambda t, u: rise(t, start, seconds),
+    )
 
 
 def mains_hum(r: Rng, at: Place) -> Build:
     f, phase = r.choice([50.0, 60.0]) + r.uniform(-0.2, 0.2), r.uniform(0, 2 * np.pi)
     hum = lambda x, rate: np.sin(2 * np.pi * f * times(x, rate) + phase)
-    return lambda size: Change(
-        {"amplitude": size * at.peak}, sensor={at.where: lambda x, _, rate: x + size * at.peak * hum(x, rate)}
-    )
+    return lambda size: Change({"amplitude": size * at.peak}, sensor={at.where: lambda x, _, rate: x + size * at.peak * hum(x, rate)})
 
 
 def clock_drift(r: Rng, at: Place) -> Build:

@@ -33,9 +33,13 @@ NAMES = {
     "force": ("force", "load_cell"),
 }
 SIGNALS = {  # kind of plant -> signal -> (expression in the model file's names, unit, noise of usual sensors)
-    "quarter": {"a_body": ("der(v_{body})", "m/s^2", (0.01, 0.05)), "a_wheel": ("der(v_{wheel})", "m/s^2", (0.05, 0.3)),
-                "deflection": ("z_{body} - z_{wheel}", "m", (3e-5, 3e-4)), "z_body": ("z_{body}", "m", (5e-5, 3e-4)),
-                "z_wheel": ("z_{wheel}", "m", (5e-5, 3e-4))},
+    "quarter": {
+        "a_body": ("der(v_{body})", "m/s^2", (0.01, 0.05)),
+        "a_wheel": ("der(v_{wheel})", "m/s^2", (0.05, 0.3)),
+        "deflection": ("z_{body} - z_{wheel}", "m", (3e-5, 3e-4)),
+        "z_body": ("z_{body}", "m", (5e-5, 3e-4)),
+        "z_wheel": ("z_{wheel}", "m", (5e-5, 3e-4)),
+    },
     "mass": {"a_mass": ("der(v_{mass})", "m/s^2", (0.01, 0.05)), "z_mass": ("z_{mass}", "m", (3e-5, 3e-4))},
     "law": {"force": ("F_{spring} + F_{damper}", "N", (0.5, 4.0))},
 }
@@ -132,8 +136,13 @@ def draw(rng: np.random.Generator, hard: bool, kind: str) -> Plant:
     if "m_b" in nominal and not hard:
         tolerance["m_b"] = float(rng.choice([0.01, 0.02, 0.03]))  # payload and fuel
     inside = {name: np.clip(0.4 * rng.standard_normal(), -1, 1) * tolerance[name] for name in nominal}
-    return Plant(kind, {name: x * (1 + inside[name]) for name, x in nominal.items()}, nominal, tolerance,
-                 {role: str(rng.choice(choices)) for role, choices in NAMES.items()})
+    return Plant(
+        kind,
+        {name: x * (1 + inside[name]) for name, x in nominal.items()},
+        nominal,
+        tolerance,
+        {role: str(rng.choice(choices)) for role, choices in NAMES.items()},
+    )
 
 
 def model_file(plant: Plant, sample_rate: float, sensors: Mapping[str, float], input_noise: float) -> str:
@@ -145,23 +154,21 @@ def model_file(plant: Plant, sample_rate: float, sensors: Mapping[str, float], i
     lines = ["[model]", f'name = "{plant.kind}"', f'sample_time = "{1e3 / sample_rate:g} ms"']
     lines += ['input = "parabola"'] if plant.kind == "law" else []  # its force needs the rate, and a line's is late
     lines += ["", "[parameters]"]
-    lines += [
-        f'{p} = {{ value = {x!r}, unit = "{UNITS[p]}", tolerance = {plant.tolerance[p]!r} }}' for p, x in plant.nominal.items()
-    ]
+    lines += [f'{p} = {{ value = {x!r}, unit = "{UNITS[p]}", tolerance = {plant.tolerance[p]!r} }}' for p, x in plant.nominal.items()]
     noise = f", noise = {input_noise:.3g}" if input_noise else ""
     lines += ["", "[inputs]", f'{name[driver]} = {{ unit = "{unit}"{noise} }}', ""]
     bodies = {"quarter": {"body": "m_b", "wheel": "m_w"}, "mass": {"mass": "m"}, "law": {}}[plant.kind]
     if bodies:
         lines += [
             "[bodies]",
-            *(
-                f'{name[role]} = {{ mass = "{m}", position = "z_{name[role]}", velocity = "v_{name[role]}" }}'
-                for role, m in bodies.items()
-            ),
+            *(f'{name[role]} = {{ mass = "{m}", position = "z_{name[role]}", velocity = "v_{name[role]}" }}' for role, m in bodies.items()),
             "",
         ]
-    lines += ["[elements]", f'{name["spring"]} = {{ between = ["{a}", "{b}"], law = "linear_spring", stiffness = "c" }}',
-              f'{name["damper"]} = {{ between = ["{a}", "{b}"], law = "linear_damper", damping = "d" }}']
+    lines += [
+        "[elements]",
+        f'{name["spring"]} = {{ between = ["{a}", "{b}"], law = "linear_spring", stiffness = "c" }}',
+        f'{name["damper"]} = {{ between = ["{a}", "{b}"], law = "linear_damper", damping = "d" }}',
+    ]
     if plant.kind == "quarter":
         lines += [f'{name["tyre"]} = {{ between = ["{b}", "{name["road"]}"], law = "linear_spring", stiffness = "c_t" }}']
     if plant.kind == "mass":

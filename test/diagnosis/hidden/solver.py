@@ -77,8 +77,16 @@ class Motion:
 
 
 class _Law(ctypes.Structure):
-    _fields_ = [("kind", ctypes.c_int), ("a", ctypes.c_int), ("b", ctypes.c_int), ("unused", ctypes.c_int),
-                ("p", ctypes.c_double * 4), ("table", ctypes.c_void_p), ("scale", ctypes.c_double), ("per_step", ctypes.c_double)]
+    _fields_ = [
+        ("kind", ctypes.c_int),
+        ("a", ctypes.c_int),
+        ("b", ctypes.c_int),
+        ("unused", ctypes.c_int),
+        ("p", ctypes.c_double * 4),
+        ("table", ctypes.c_void_p),
+        ("scale", ctypes.c_double),
+        ("per_step", ctypes.c_double),
+    ]
 
 
 class _Plant(ctypes.Structure):
@@ -105,14 +113,7 @@ def _library() -> ctypes.CDLL:
         subprocess.run(["gcc", "-O2", "-std=c99", "-shared", "-fPIC", "-o", part, source, "-lm"], check=True)
         part.replace(built)
     library = ctypes.CDLL(str(built))
-    library.simulate.argtypes = [
-        ctypes.POINTER(_Plant),
-        ctypes.c_void_p,
-        ctypes.c_double,
-        ctypes.c_size_t,
-        ctypes.c_int,
-        ctypes.c_void_p,
-    ]
+    library.simulate.argtypes = [ctypes.POINTER(_Plant), ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int, ctypes.c_void_p]
     return library
 
 

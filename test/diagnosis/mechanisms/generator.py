@@ -18,9 +18,13 @@ SAMPLE = 1e-3
 HALVES = 4  # of half a step: the inputs are known there
 KINDS = {"halfcar": ("friction", "stop", "inertia", "nothing"), "drive": ("backlash", "cubic", "friction", "nothing")}
 WHERE = {  # the ends between which the hidden force acts
-    ("halfcar", "friction"): ("rear", "wheel_r"), ("halfcar", "stop"): ("front", "wheel_f"), ("halfcar", "inertia"): ("pitch", "ground"),
-    ("drive", "backlash"): ("shaft_in", "load"), ("drive", "cubic"): ("shaft_in", "load"), ("drive", "friction"): ("load", "ground"),
-}  # fmt: skip
+    ("halfcar", "friction"): ("rear", "wheel_r"),
+    ("halfcar", "stop"): ("front", "wheel_f"),
+    ("halfcar", "inertia"): ("pitch", "ground"),
+    ("drive", "backlash"): ("shaft_in", "load"),
+    ("drive", "cubic"): ("shaft_in", "load"),
+    ("drive", "friction"): ("load", "ground"),
+}
 TOLERANCE = 0.003  # of the model files; true values lie within 0.4 of it, one deviation
 
 

@@ -18,9 +18,7 @@ SURE = 3.0  # standard errors of the mean by which blocks of a second have to be
 
 
 @njit(error_model="numpy", cache=True)
-def walk(
-    w: np.ndarray, both: np.ndarray, shifts: np.ndarray, g: np.ndarray, start: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def walk(w: np.ndarray, both: np.ndarray, shifts: np.ndarray, g: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States and forces (samples, rows, lanes) of networks with weights w (25, lanes), in SI, at the first place; see rig.stepped."""
     places, (n, lanes) = g.shape[1], start.shape
     x, f = np.zeros((len(shifts), n, lanes)), np.zeros((len(shifts), places, lanes))
@@ -113,8 +111,11 @@ def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:
         won += [block.mean() for block in np.array_split(less, max(len(less) // second, 2))]
     sure = np.mean(won) > SURE * np.std(won, ddof=1) / np.sqrt(len(won))
     causes = [{"kind": "outside_taxonomy", "where": rig.element(0, "linear_spring") or "", "parameters": {}, "alternatives": []}]
-    return {"verdict": "unexplained" if sure else "no_discrepancy", "causes": causes if sure else [],
-            "gain": rig.gain(holdout, force if sure else None, lin)}  # fmt: skip
+    return {
+        "verdict": "unexplained" if sure else "no_discrepancy",
+        "causes": causes if sure else [],
+        "gain": rig.gain(holdout, force if sure else None, lin),
+    }
 
 
 if __name__ == "__main__":

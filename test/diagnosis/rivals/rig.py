@@ -133,7 +133,11 @@ class Rig:
             names |= {f"der_{b['position']}": x[n + i], f"der_{b['velocity']}": acceleration[i]}
         moved = [(at[a][0] - at[b][0], at[a][1] - at[b][1]) for a, b in self.places]
         seen = [eval(re.sub(r"der\((\w+)\)", r"der_\1", s), {"__builtins__": {}}, names) for s in self.sensors.values()]
-        return np.array([*x[n:], *acceleration]).reshape(2 * n, len(u[0])), np.array([m[0] for m in moved] + [m[1] for m in moved]), np.array(seen)
+        return (
+            np.array([*x[n:], *acceleration]).reshape(2 * n, len(u[0])),
+            np.array([m[0] for m in moved] + [m[1] for m in moved]),
+            np.array(seen),
+        )
 
     def linear(self, values: Mapping[str, float]) -> Linear:
         """The matrices, column by column from unit vectors."""
@@ -246,7 +250,12 @@ class Rig:
         for i, (k, floor) in enumerate(self.noise.items()):
             if np.isfinite(holdout.seen[k]).any():
                 share = float((before[i] - after[i]) / (before[i] - floor)) if before[i] > 1.05 * floor else None
-                found[k] = {"before_rmse": float(before[i]), "after_rmse": float(after[i]), "noise_floor": floor, "share_of_achievable": share}
+                found[k] = {
+                    "before_rmse": float(before[i]),
+                    "after_rmse": float(after[i]),
+                    "noise_floor": floor,
+                    "share_of_achievable": share,
+                }
         return found
 
 

@@ -130,7 +130,9 @@ def name(rig: Rig, place: int, term: str, k: float) -> tuple[str, str, dict[str,
 
 def power(term: str) -> tuple[int, int]:
     """Powers of deflection and rate in a term: what its scale is."""
-    return {"s": (1, 0), "abs(s)": (1, 0), "s^2": (2, 0), "s^3": (3, 0), "v": (0, 1), "abs(v)": (0, 1), "v abs(v)": (0, 2)}.get(term, (0, 0))
+    return {"s": (1, 0), "abs(s)": (1, 0), "s^2": (2, 0), "s^3": (3, 0), "v": (0, 1), "abs(v)": (0, 1), "v abs(v)": (0, 2)}.get(
+        term, (0, 0)
+    )
 
 
 def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:

@@ -66,9 +66,29 @@ FORCES: dict[str, Callable[[At, float], Built]] = {
     "constant_force": lambda a, x: ("constant", [-a.sign * 0.3 * x * a.f], {"force": a.sign * 0.3 * x * a.f}),
 }
 # the size that makes a law stronger without bound; others stop where physics does
-LIMITS = {"damper_fading": 1.8, "degressive_damper": 40.0, "backlash": 4.0, "aerated_damper": 6.0, "tyre_liftoff": 3.0, "asymmetric_spring": 1.5}
-STRUT = ("coulomb_friction", "stribeck_friction", "cubic_spring", "asymmetric_spring", "bump_stop", "backlash", "asymmetric_damper",
-         "degressive_damper", "quadratic_damper", "damper_fading", "bouc_wen", "maxwell_bushing", "aerated_damper")  # fmt: skip
+LIMITS = {
+    "damper_fading": 1.8,
+    "degressive_damper": 40.0,
+    "backlash": 4.0,
+    "aerated_damper": 6.0,
+    "tyre_liftoff": 3.0,
+    "asymmetric_spring": 1.5,
+}
+STRUT = (
+    "coulomb_friction",
+    "stribeck_friction",
+    "cubic_spring",
+    "asymmetric_spring",
+    "bump_stop",
+    "backlash",
+    "asymmetric_damper",
+    "degressive_damper",
+    "quadratic_damper",
+    "damper_fading",
+    "bouc_wen",
+    "maxwell_bushing",
+    "aerated_damper",
+)
 TYRE = ("tyre_liftoff", "tyre_damping", "tyre_nonlinear")
 INPUT = ("input_gain", "input_offset", "input_delay", "input_lag", "input_hold")
 SENSOR = ("sensor_bias", "sensor_scale", "sensor_delay", "sensor_clipping")

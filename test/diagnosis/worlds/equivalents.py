@@ -14,10 +14,12 @@ from .signals import RATE, beside, rms
 from .world import SAMPLE, World
 
 LEFT = 1.0  # of the mis-modelling's RMS: what is left then is no larger than what is wrong anyway
-BARE = {"time shift": "one sensor: plant and effects do not depend on time, a later input is a later answer",
-        "linear": "one sensor and a linear plant: a factor of the input is a factor of the answer",
-        "same force": "a constant on the input is a constant force on the body that it drives",
-        "settled": "at rest a constant force is a constant deflection, and so is a bias of the sensor that alone sees it"}  # fmt: skip
+BARE = {
+    "time shift": "one sensor: plant and effects do not depend on time, a later input is a later answer",
+    "linear": "one sensor and a linear plant: a factor of the input is a factor of the answer",
+    "same force": "a constant on the input is a constant force on the body that it drives",
+    "settled": "at rest a constant force is a constant deflection, and so is a bias of the sensor that alone sees it",
+}
 
 
 def curves(s: Array, v: Array, rate: float) -> Iterator[tuple[str, Array]]:
@@ -62,8 +64,11 @@ def _near(world: World, i: int) -> list[dict]:
     for kind, curve in curves(r.s[e.site], r.v[e.site], 1 / SAMPLE):
         left = rms(beside(f, curve, *columns)) / wrong
         best[kind] = min(left, best.get(kind, np.inf))
-    return [{"kind": k, "where": world.places(e), "why": f"its best fit leaves {x:.2f} of the mis-modelling there"}
-            for k, x in best.items() if x < LEFT and k != e.kind]  # fmt: skip
+    return [
+        {"kind": k, "where": world.places(e), "why": f"its best fit leaves {x:.2f} of the mis-modelling there"}
+        for k, x in best.items()
+        if x < LEFT and k != e.kind
+    ]
 
 
 def equivalents(world: World, i: int) -> list[dict]:
@@ -125,7 +130,25 @@ def _late(world: World, true: str) -> list[dict]:
 
 def truth(world: World) -> dict:
     """Kind, place, parameters, sizes and equivalents of every effect."""
-    found = [{"kind": e.kind, "where": world.places(e), "parameters": e.parameters, "ratio": round(e.ratio, 3), "share": round(e.share, 4),
-              "equivalents": equivalents(world, i), "companions": world.companions(e)} for i, e in enumerate(world.effects)]  # fmt: skip
-    return {"seed": world.seed, "index": world.index, "stratum": world.stratum, "group": world.group or ("single" if found else "null"),
-            "plant": world.kind.name, "tolerance": world.tolerance, "mismodelling": round(world.e, 4), "effects": found}  # fmt: skip
+    found = [
+        {
+            "kind": e.kind,
+            "where": world.places(e),
+            "parameters": e.parameters,
+            "ratio": round(e.ratio, 3),
+            "share": round(e.share, 4),
+            "equivalents": equivalents(world, i),
+            "companions": world.companions(e),
+        }
+        for i, e in enumerate(world.effects)
+    ]
+    return {
+        "seed": world.seed,
+        "index": world.index,
+        "stratum": world.stratum,
+        "group": world.group or ("single" if found else "null"),
+        "plant": world.kind.name,
+        "tolerance": world.tolerance,
+        "mismodelling": round(world.e, 4),
+        "effects": found,
+    }

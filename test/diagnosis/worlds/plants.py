@@ -63,12 +63,23 @@ def quarter(rng: np.random.Generator) -> Kind:
     """A quarter vehicle of 220 to 700 kg on a road."""
     m = float(rng.uniform(220, 700))
     c = m * (2 * np.pi * rng.uniform(1.0, 1.6)) ** 2
-    v = {"m_b": (m, "kg"), "m_w": (m * rng.uniform(0.09, 0.15), "kg"), "c": (c, "N/m"),
-         "d": (2 * rng.uniform(0.2, 0.4) * np.sqrt(c * m), "N*s/m"), "c_t": (c * rng.uniform(7, 11), "N/m")}  # fmt: skip
-    sites = {"suspension": (Site(("spring", "damper"), "c", "d"), (1.0, -1.0, 0.0)), "tyre": (Site(("tyre",), "c_t", road=0), (0.0, 1.0, -1.0)),
-             "body": (Site(("body",), coordinate=0), (1.0, 0.0, 0.0))}  # fmt: skip
-    sensors = {"a_body": ("der(v_body)", "m/s^2", "ddq", (1.0, 0.0)), "a_wheel": ("der(v_wheel)", "m/s^2", "ddq", (0.0, 1.0)),
-               "deflection": ("z_body - z_wheel", "m", "q", (1.0, -1.0))}  # fmt: skip
+    v = {
+        "m_b": (m, "kg"),
+        "m_w": (m * rng.uniform(0.09, 0.15), "kg"),
+        "c": (c, "N/m"),
+        "d": (2 * rng.uniform(0.2, 0.4) * np.sqrt(c * m), "N*s/m"),
+        "c_t": (c * rng.uniform(7, 11), "N/m"),
+    }
+    sites = {
+        "suspension": (Site(("spring", "damper"), "c", "d"), (1.0, -1.0, 0.0)),
+        "tyre": (Site(("tyre",), "c_t", road=0), (0.0, 1.0, -1.0)),
+        "body": (Site(("body",), coordinate=0), (1.0, 0.0, 0.0)),
+    }
+    sensors = {
+        "a_body": ("der(v_body)", "m/s^2", "ddq", (1.0, 0.0)),
+        "a_wheel": ("der(v_wheel)", "m/s^2", "ddq", (0.0, 1.0)),
+        "deflection": ("z_body - z_wheel", "m", "q", (1.0, -1.0)),
+    }
     ends = {"suspension": ("body", "wheel"), "tyre": ("wheel", "z_road")}
     return Kind("quarter", v, (("body", "m_b"), ("wheel", "m_w")), (), {"z_road": "m"}, sites, ((0.0,), (0.0,)), {}, ends, sensors)
 
@@ -108,13 +119,24 @@ def drive(rng: np.random.Generator) -> Kind:
     """Motor, elastic shaft, load; angles of both."""
     jm, jl = 0.02 * rng.uniform(0.6, 1.6), 0.1 * rng.uniform(0.6, 1.6)
     k = (2 * np.pi * rng.uniform(6, 11)) ** 2 * jm * jl / (jm + jl)
-    v = {"J_m": (jm, "kg*m^2"), "J_l": (jl, "kg*m^2"), "k": (k, "N*m/rad"), "d": (0.03 * np.sqrt(k * jm) * rng.uniform(2, 5), "N*m*s/rad"),
-         "d_m": (jm * rng.uniform(1, 3), "N*m*s/rad"), "d_l": (jl * rng.uniform(2, 6), "N*m*s/rad")}  # fmt: skip
-    sites = {"shaft": (Site(("shaft", "shaft_damper"), "k", "d"), (1.0, -1.0, 0.0)), "motor": (Site(("rotor", "motor"), "", "d_m", 0), (1.0, 0.0, 0.0)),
-             "load": (Site(("bearing", "load"), "", "d_l", 1), (0.0, 1.0, 0.0))}  # fmt: skip
+    v = {
+        "J_m": (jm, "kg*m^2"),
+        "J_l": (jl, "kg*m^2"),
+        "k": (k, "N*m/rad"),
+        "d": (0.03 * np.sqrt(k * jm) * rng.uniform(2, 5), "N*m*s/rad"),
+        "d_m": (jm * rng.uniform(1, 3), "N*m*s/rad"),
+        "d_l": (jl * rng.uniform(2, 6), "N*m*s/rad"),
+    }
+    sites = {
+        "shaft": (Site(("shaft", "shaft_damper"), "k", "d"), (1.0, -1.0, 0.0)),
+        "motor": (Site(("rotor", "motor"), "", "d_m", 0), (1.0, 0.0, 0.0)),
+        "load": (Site(("bearing", "load"), "", "d_l", 1), (0.0, 1.0, 0.0)),
+    }
     sensors = {"angle_motor": ("phi_motor", "rad", "q", (1.0, 0.0)), "angle_load": ("phi_load", "rad", "q", (0.0, 1.0))}
     ends = {"shaft": ("motor", "load"), "motor": ("motor", "ground"), "load": ("load", "ground")}
-    return Kind("drive", v, (("motor", "J_m"), ("load", "J_l")), ("motor", "load"), {"tau": "N*m"}, sites, ((1.0,), (0.0,)), {}, ends, sensors)
+    return Kind(
+        "drive", v, (("motor", "J_m"), ("load", "J_l")), ("motor", "load"), {"tau": "N*m"}, sites, ((1.0,), (0.0,)), {}, ends, sensors
+    )
 
 
 def halfcar(rng: np.random.Generator) -> Kind:
@@ -125,18 +147,26 @@ def halfcar(rng: np.random.Generator) -> Kind:
     sites = {}
     for x, share in (("f", b / (a + b)), ("r", a / (a + b))):
         c = share * m * (2 * np.pi * rng.uniform(1.1, 1.5)) ** 2
-        v |= {f"m_{x}": (share * m * 0.13, "kg"), f"c_{x}": (c, "N/m"), f"d_{x}": (2 * rng.uniform(0.2, 0.35) * np.sqrt(c * share * m), "N*s/m"),
-              f"t_{x}": (9 * c, "N/m")}  # fmt: skip
+        v |= {
+            f"m_{x}": (share * m * 0.13, "kg"),
+            f"c_{x}": (c, "N/m"),
+            f"d_{x}": (2 * rng.uniform(0.2, 0.35) * np.sqrt(c * share * m), "N*s/m"),
+            f"t_{x}": (9 * c, "N/m"),
+        }
     sites["front"] = (Site(("spring_f", "damper_f"), "c_f", "d_f"), (1.0, -a, -1.0, 0.0, 0.0, 0.0))
     sites["rear"] = (Site(("spring_r", "damper_r"), "c_r", "d_r"), (1.0, b, 0.0, -1.0, 0.0, 0.0))
     sites["tyre_f"] = (Site(("tyre_f",), "t_f", road=0), (0.0, 0.0, 1.0, 0.0, -1.0, 0.0))
     sites["tyre_r"] = (Site(("tyre_r",), "t_r", road=1), (0.0, 0.0, 0.0, 1.0, 0.0, -1.0))
     sites["heave"] = (Site(("heave",), coordinate=0), (1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     sites["pitch"] = (Site(("pitch",), coordinate=1), (0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
-    sensors = {"a_front": ("der(v_heave) - a*der(omega_pitch)", "m/s^2", "ddq", (1.0, -a, 0.0, 0.0)),
-               "a_rear": ("der(v_heave) + b*der(omega_pitch)", "m/s^2", "ddq", (1.0, b, 0.0, 0.0)),
-               "a_wheel_f": ("der(v_wheel_f)", "m/s^2", "ddq", (0.0, 0.0, 1.0, 0.0)), "a_wheel_r": ("der(v_wheel_r)", "m/s^2", "ddq", (0.0, 0.0, 0.0, 1.0)),
-               "s_front": ("front - z_wheel_f", "m", "q", (1.0, -a, -1.0, 0.0)), "s_rear": ("rear - z_wheel_r", "m", "q", (1.0, b, 0.0, -1.0))}  # fmt: skip
+    sensors = {
+        "a_front": ("der(v_heave) - a*der(omega_pitch)", "m/s^2", "ddq", (1.0, -a, 0.0, 0.0)),
+        "a_rear": ("der(v_heave) + b*der(omega_pitch)", "m/s^2", "ddq", (1.0, b, 0.0, 0.0)),
+        "a_wheel_f": ("der(v_wheel_f)", "m/s^2", "ddq", (0.0, 0.0, 1.0, 0.0)),
+        "a_wheel_r": ("der(v_wheel_r)", "m/s^2", "ddq", (0.0, 0.0, 0.0, 1.0)),
+        "s_front": ("front - z_wheel_f", "m", "q", (1.0, -a, -1.0, 0.0)),
+        "s_rear": ("rear - z_wheel_r", "m", "q", (1.0, b, 0.0, -1.0)),
+    }
     ends = {"front": ("front", "wheel_f"), "rear": ("rear", "wheel_r"), "tyre_f": ("wheel_f", "road_f"), "tyre_r": ("wheel_r", "road_r")}
     points = {"front": "z_heave - a*phi_pitch", "rear": "z_heave + b*phi_pitch"}
     masses = (("heave", "m_b"), ("pitch", "J"), ("wheel_f", "m_f"), ("wheel_r", "m_r"))
@@ -149,7 +179,7 @@ MAKERS = {"quarter": quarter, "rig": one_mass, "swing": swing, "joint": joint, "
 
 def model_text(kind: Kind, tolerance: float | None, noise: Mapping[str, float], sample: float) -> str:
     """The model file; without `tolerance` no parameter states one."""
-    lines = [f"[model]\nname = \"{kind.name}\"\nsample_time = \"{sample * 1e3:g} ms\"\n\n[parameters]"]
+    lines = [f'[model]\nname = "{kind.name}"\nsample_time = "{sample * 1e3:g} ms"\n\n[parameters]']
     for name, (value, unit) in kind.values.items():
         sure = ", exact = true" if name in kind.exact else f", tolerance = {tolerance:g}" if tolerance else ""
         lines.append(f'{name} = {{ value = {value:.12g}, unit = "{unit}"{sure} }}')
@@ -166,10 +196,16 @@ def model_text(kind: Kind, tolerance: float | None, noise: Mapping[str, float], 
         rest = list(site.elements)
         if site.spring:
             between = f'between = ["{kind.ends[name][0]}", "{kind.ends[name][1]}"]'
-            body = f'law = "expression", force = "{site.spring}*sin(phi_{kind.ends[name][0]})"' if name == kind.sine else f'law = "linear_spring", stiffness = "{site.spring}"'
+            body = (
+                f'law = "expression", force = "{site.spring}*sin(phi_{kind.ends[name][0]})"'
+                if name == kind.sine
+                else f'law = "linear_spring", stiffness = "{site.spring}"'
+            )
             lines.append(f"{rest.pop(0)} = {{ {between}, {body} }}")
         if site.damper:
-            lines.append(f'{rest[0]} = {{ between = ["{kind.ends[name][0]}", "{kind.ends[name][1]}"], law = "linear_damper", damping = "{site.damper}" }}')
+            lines.append(
+                f'{rest[0]} = {{ between = ["{kind.ends[name][0]}", "{kind.ends[name][1]}"], law = "linear_damper", damping = "{site.damper}" }}'
+            )
     if (k := kind.drive()) >= 0:
         lines.append(f'actuator = {{ between = ["{kind.masses[0][0]}", "ground"], law = "expression", force = "-{list(kind.inputs)[k]}" }}')
     first, (expression, unit, _, _) = next(iter(kind.sensors.items()))

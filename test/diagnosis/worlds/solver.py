@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 SOURCE = Path(__file__).with_name("world.c")
-LAWS = ("linear wave rub atan stribeck power one_side stop play skew knee fade hysteresis maxwell lift pressed aerated sine mount constant").split()
+LAWS = (
+    "linear wave rub atan stribeck power one_side stop play skew knee fade hysteresis maxwell lift pressed aerated sine mount constant"
+).split()
 STEP = 1.0 / 4000.0  # s; the fastest mode, 90 Hz, turns by 0.14 a step: the rule errs by 0.14^5/120 = 5e-7 a step
 FINER = 4  # parts of a step where a pocket of gas acts: 1e4 /s at its wall, 0.6 a part, stable up to 2.5
 
@@ -108,7 +110,17 @@ def run(plant: Plant, u: Array, ext: Array, start: Array, every: int, h: float =
     held = [np.ascontiguousarray(x, float) for x in (plant.inertia, A, plant.gains)]
     held += ints + [np.ascontiguousarray(x, float) for x in (p, *(denser(x, fine) for x in (u, du, ext)), start)]
     ptr = [x.ctypes.data_as(ctypes.c_void_p) for x in held]
-    if library().world_run(n, nu, len(names), nl, *ptr, ctypes.c_long(steps * fine), ctypes.c_double(h / fine), every * fine, out.ctypes.data_as(ctypes.c_void_p)):
+    if library().world_run(
+        n,
+        nu,
+        len(names),
+        nl,
+        *ptr,
+        ctypes.c_long(steps * fine),
+        ctypes.c_double(h / fine),
+        every * fine,
+        out.ctypes.data_as(ctypes.c_void_p),
+    ):
         raise Runaway
     us, dus = u[::every][: len(out)], du[::every][: len(out)]
     q, dq = out[:, :n], out[:, n : 2 * n]

@@ -22,7 +22,10 @@ LONG = {"train_1": 16.0, "train_2": 16.0, "holdout_1": 8.0}
 WORTH = 0.12  # an effect is at least that share of the force at its place, so that a name is worth it
 MAIN = ("quarter", "rig", "swing", "joint")
 PATTERN = ("single", "null", "single", "pair", "single", "single", "null", "single", "pair", "single")  # the main draw, by index
-STRATA = {"halfcar": ("coulomb_friction", "bump_stop", "inertia", "sensor_delay", ""), "drive": ("backlash", "cubic_spring", "coulomb_friction", "")}
+STRATA = {
+    "halfcar": ("coulomb_friction", "bump_stop", "inertia", "sensor_delay", ""),
+    "drive": ("backlash", "cubic_spring", "coulomb_friction", ""),
+}
 
 
 @dataclass
@@ -64,7 +67,10 @@ class World:
         even = bool(np.random.default_rng([seed, index // 2, key, 3]).integers(2)) == bool(index % 2)
         self.tolerance = 0.03 if (even if tolerances is None else tolerances) else None
         self.e = float(draw.uniform(0.02, 0.05))
-        self.true = {k: v if k in self.kind.exact else v * (1 + 0.01 * float(np.clip(draw.standard_normal(), -2, 2))) for k, (v, _) in self.kind.values.items()}
+        self.true = {
+            k: v if k in self.kind.exact else v * (1 + 0.01 * float(np.clip(draw.standard_normal(), -2, 2)))
+            for k, (v, _) in self.kind.values.items()
+        }
         self.effects = [self._effect(kind) for kind in self._kinds()]
         if self.effects:
             self.e = max(self.e, WORTH / min(x.target for x in self.effects))
@@ -139,8 +145,16 @@ class World:
     def _at(self, name: str, effect: Effect) -> At:
         site, r = self.kind.sites[name][0], self.runs["train_1"]
         p = {k: v for k, (v, _) in self.kind.values.items()}
-        return At(rms(self.first.s[name]), rms(self.first.v[name]), self._force(name, self.first), p.get(site.spring, 0.0), p.get(site.damper, 0.0),
-                  LONG["train_1"] + LEAD + 0 * len(r.q), effect.sign, effect.z)  # fmt: skip
+        return At(
+            rms(self.first.s[name]),
+            rms(self.first.v[name]),
+            self._force(name, self.first),
+            p.get(site.spring, 0.0),
+            p.get(site.damper, 0.0),
+            LONG["train_1"] + LEAD + 0 * len(r.q),
+            effect.sign,
+            effect.z,
+        )
 
     def _force(self, name: str, r: Run) -> float:
         """RMS of the force at a site: of its elements, or of the inertia where it has none."""

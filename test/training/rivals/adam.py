@@ -42,7 +42,9 @@ def weights(key: jax.Array) -> Tree:
     for n, (i, o) in enumerate(zip(WIDTH, WIDTH[1:])):
         key, one, two = jax.random.split(key, 3)
         last = n == len(WIDTH) - 2
-        found.append((jax.random.normal(one, (o, i)) * (0.02 if last else np.sqrt(2.0 / i)), (0.0 if last else 0.3) * jax.random.normal(two, (o,))))
+        found.append(
+            (jax.random.normal(one, (o, i)) * (0.02 if last else np.sqrt(2.0 / i)), (0.0 if last else 0.3) * jax.random.normal(two, (o,)))
+        )
     return found
 
 
@@ -84,20 +86,31 @@ def by_diffrax(known: dict[str, float]) -> Callable[[Tree, jax.Array], jax.Array
         half = jnp.reshape(road, (-1, 2))
         way = diffrax.LinearInterpolation(jnp.arange(len(half)) * 0.5 * STEP, half)
         solved = diffrax.diffeqsolve(
-            diffrax.ODETerm(lambda t, x, p: rates(known, p, x, way.evaluate(t))), diffrax.Tsit5(), ts[0], ts[-1], STEP, p["start"], p,
-            saveat=diffrax.SaveAt(ts=ts), max_steps=len(road) + 8,
-        )  # fmt: skip
+            diffrax.ODETerm(lambda t, x, p: rates(known, p, x, way.evaluate(t))),
+            diffrax.Tsit5(),
+            ts[0],
+            ts[-1],
+            STEP,
+            p["start"],
+            p,
+            saveat=diffrax.SaveAt(ts=ts),
+            max_steps=len(road) + 8,
+        )
         return jax.vmap(lambda x, r: rates(known, p, x, r[0])[2:])(solved.ys, road)
 
     return found
 
 
-def loss_of(simulate: Callable[[Tree, jax.Array], jax.Array], road: jax.Array, y: jax.Array, noise: jax.Array) -> Callable[[Tree], jax.Array]:
+def loss_of(
+    simulate: Callable[[Tree, jax.Array], jax.Array], road: jax.Array, y: jax.Array, noise: jax.Array
+) -> Callable[[Tree], jax.Array]:
     """Mean square of what is left over the noise: 1 is the best there is."""
     return lambda p: jnp.mean(((simulate(p, road) - y) / noise) ** 2)
 
 
-def adam(gradient: Callable[[Tree], tuple[jax.Array, Tree]], p: Tree, state: tuple[Tree, Tree], epoch: int, rate: float) -> tuple[Tree, tuple[Tree, Tree], float]:
+def adam(
+    gradient: Callable[[Tree], tuple[jax.Array, Tree]], p: Tree, state: tuple[Tree, Tree], epoch: int, rate: float
+) -> tuple[Tree, tuple[Tree, Tree], float]:
     """One epoch (Kingma and Ba, 2015)."""
     value, g = gradient(p)
     m = jax.tree.map(lambda m, g: 0.9 * m + 0.1 * g, state[0], g)
@@ -136,7 +149,9 @@ def timed(gradient: Callable[[Tree], tuple[jax.Array, Tree]], p: Tree) -> dict[s
 def keep(out: Path, p: Tree, state: tuple[Tree, Tree], facts: dict[str, Any]) -> None:
     """All that a later call goes on from."""
     leaves = {f"leaf{n}": np.asarray(v) for n, v in enumerate(jax.tree.leaves((p, state)))}
-    nets = {f"{name}_{kind}{n}": np.asarray(v) for name in ("spring", "damper") for n, pair in enumerate(p[name]) for kind, v in zip("wb", pair)}
+    nets = {
+        f"{name}_{kind}{n}": np.asarray(v) for name in ("spring", "damper") for n, pair in enumerate(p[name]) for kind, v in zip("wb", pair)
+    }
     part = out.with_suffix(".part.npz")
     np.savez(part, **leaves, **nets, facts=json.dumps(facts))
     part.replace(out)

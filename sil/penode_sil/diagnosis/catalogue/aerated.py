@@ -10,12 +10,16 @@ from ..plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("aerated_damper",)
-MEANING = {
-    "aerated_damper": "A damper that has lost oil: after each reversal it has no force until the gas in it is pressed together.",
-}
+MEANING = {"aerated_damper": "A damper that has lost oil: after each reversal it has no force until the gas in it is pressed together."}
 RIVALS = {
-    ("aerated_damper", "backlash"): "small strokes at low and at high frequency: gas loses more of the force at high frequency, a play does not",
-    ("aerated_damper", "maxwell_bushing"): "several amplitudes at one frequency: gas loses a smaller share of the force at large amplitudes, rubber the same share",
+    (
+        "aerated_damper",
+        "backlash",
+    ): "small strokes at low and at high frequency: gas loses more of the force at high frequency, a play does not",
+    (
+        "aerated_damper",
+        "maxwell_bushing",
+    ): "several amplitudes at one frequency: gas loses a smaller share of the force at large amplitudes, rubber the same share",
 }
 STRAIGHT = KINDS
 POCKETS = (0.1, 0.3, 0.8)  # of the rms deflection

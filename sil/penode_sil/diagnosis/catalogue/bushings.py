@@ -11,12 +11,8 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("maxwell_bushing",)
-MEANING = {
-    "maxwell_bushing": "Relaxation: an elastic force that a damper in series lets decay.",
-}
-RIVALS = {
-    ("bouc_wen", "maxwell_bushing"): "several amplitudes at one frequency: hysteresis changes with amplitude, relaxation does not",
-}
+MEANING = {"maxwell_bushing": "Relaxation: an elastic force that a damper in series lets decay."}
+RIVALS = {("bouc_wen", "maxwell_bushing"): "several amplitudes at one frequency: hysteresis changes with amplitude, relaxation does not"}
 STRAIGHT = KINDS
 TIMES = (0.15, 0.6, 2.5)  # of s_rms/v_rms, which is the time of a radian
 

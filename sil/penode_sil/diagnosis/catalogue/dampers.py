@@ -5,6 +5,7 @@
 from collections.abc import Iterable
 
 import numpy as np
+
 from penode_gen.model import GROUND, Model
 
 from ..plant import Place
@@ -20,8 +21,14 @@ MEANING = {
 }
 RIVALS = {
     ("degressive_damper", "quadratic_damper"): "rates over more than a decade",
-    ("degressive_damper", "wrong_parameter"): "one excitation at two amplitudes: with other damping the force scales with the amplitude, with a bent curve it does not",
-    ("quadratic_damper", "wrong_parameter"): "one excitation at two amplitudes: with other damping the force scales with the amplitude, with a bent curve it does not",
+    (
+        "degressive_damper",
+        "wrong_parameter",
+    ): "one excitation at two amplitudes: with other damping the force scales with the amplitude, with a bent curve it does not",
+    (
+        "quadratic_damper",
+        "wrong_parameter",
+    ): "one excitation at two amplitudes: with other damping the force scales with the amplitude, with a bent curve it does not",
     ("damper_fading", "wrong_parameter"): "the same excitation at the start and at the end of one long recording",
     ("damper_fading", "degressive_damper"): "the same excitation at the start and at the end of one recording, at two amplitudes",
 }

@@ -24,7 +24,10 @@ RIVALS = {
     ("input_delay", "sensor_delay"): "a second sensor, of another make: a late input makes both late",
     ("input_gain", "sensor_scale"): "measure the force of the actuator, or show the sensor a known size",
     ("sensor_delay", "sensor_scale"): "excitation up to higher frequencies: a delay turns the phase, a scale does not",
-    ("input_gain", "wrong_parameter"): "weigh a body, or measure the force of the actuator: motion alone shows only ratios of force to mass",
+    (
+        "input_gain",
+        "wrong_parameter",
+    ): "weigh a body, or measure the force of the actuator: motion alone shows only ratios of force to mass",
 }
 
 

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen import laws
 from penode_gen.model import Model
 from penode_gen.numeric import along

@@ -20,10 +20,16 @@ MEANING = {
 }
 RIVALS = {
     ("coulomb_friction", "stribeck_friction"): "slow motion with many reversals, and fast motion too: the lowest rates tell",
-    ("coulomb_friction", "bouc_wen"): "small strokes as well as large ones: before it slides, a Bouc-Wen element acts as a spring, Coulomb friction does not",
+    (
+        "coulomb_friction",
+        "bouc_wen",
+    ): "small strokes as well as large ones: before it slides, a Bouc-Wen element acts as a spring, Coulomb friction does not",
 }
 ONE = True  # friction at a place is one curve, with a peak or with memory
-EDGES, SPAN = (0.04, 0.12), 2.0  # of the rms rate: transitions of a friction, within that factor; smooth enough for Gauss-Newton, steep enough for any motion
+EDGES, SPAN = (
+    (0.04, 0.12),
+    2.0,
+)  # of the rms rate: transitions of a friction, within that factor; smooth enough for Gauss-Newton, steep enough for any motion
 WIDEST = EDGES[-1] * SPAN  # what bends slower is a damper
 PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway
 WAYS = (0.06, 0.25, 0.8)  # of the rms deflection: how far a hysteresis is bent before it slides

@@ -10,9 +10,7 @@ from ..plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("constant_force",)
-MEANING = {
-    "constant_force": "A constant force that the model does not have.",
-}
+MEANING = {"constant_force": "A constant force that the model does not have."}
 RIVALS = {
     ("constant_force", "sensor_bias"): "put the load on or take it off during the recording: only that transient tells them apart",
     ("constant_force", "input_offset"): "switch the actuator off: a load remains, an offset of the input does not",

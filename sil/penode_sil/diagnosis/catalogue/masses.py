@@ -5,16 +5,15 @@
 from collections.abc import Iterable
 
 import numpy as np
-from penode_gen.model import GROUND, Model
 from scipy import signal
+
+from penode_gen.model import GROUND, Model
 
 from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("hidden_resonance",)
-MEANING = {
-    "hidden_resonance": "A mass on a spring of its own that the model does not have.",
-}
+MEANING = {"hidden_resonance": "A mass on a spring of its own that the model does not have."}
 RATIOS = (0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.2, 3.2, 5.0)  # of v_rms/s_rms, to which its frequency is tried
 LOSS = 0.1  # damping ratio at first
 

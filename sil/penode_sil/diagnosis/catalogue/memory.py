@@ -11,8 +11,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import penode_gen
 from numpy.typing import NDArray
+
+import penode_gen
 from penode_gen import laws
 
 from ...batch import Batch
@@ -46,9 +47,12 @@ def force(law: str, values: Mapping[str, float], s: Array, step: float) -> Array
 def _batch(law: str, step: float, substeps: int) -> Batch:
     arguments = laws.LAWS[law].arguments
     text = MODEL.format(
-        step=step, substeps=substeps, law=law, arguments=", ".join(f'{a} = "p_{a}"' for a in arguments),
+        step=step,
+        substeps=substeps,
+        law=law,
+        arguments=", ".join(f'{a} = "p_{a}"' for a in arguments),
         parameters="\n".join(f'p_{a} = {{ value = 1, unit = "{u}" }}' for a, u in arguments.items()),
-    )  # fmt: skip
+    )
     with TemporaryDirectory() as folder:
         path = Path(folder) / "memory.toml"
         path.write_text(text)

@@ -11,9 +11,7 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("backlash",)
-MEANING = {
-    "backlash": "Play: within a gap the element transmits no force.",
-}
+MEANING = {"backlash": "Play: within a gap the element transmits no force."}
 STRAIGHT = KINDS
 GAPS = (0.05, 0.2, 0.6)  # of the rms deflection
 

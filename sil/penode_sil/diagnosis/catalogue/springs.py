@@ -16,7 +16,7 @@ MEANING = {
     "bump_stop": "A stop: beyond a gap an extra spring comes into contact.",
 }
 RIVALS = {
-    ("cubic_spring", "bump_stop"): "broadband excitation, which has small and large amplitudes, instead of a chirp of constant amplitude",
+    ("cubic_spring", "bump_stop"): "broadband excitation, which has small and large amplitudes, instead of a chirp of constant amplitude"
 }
 STRAIGHT = ("asymmetric_spring",)
 GAPS = (0.5, 0.75)  # of what the deflection reaches
@@ -32,7 +32,13 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     yield Form(KINDS[1], place.name, "force", index, (Part("asymmetric_spring", ("stiffness", "N/m")),))
     for share in GAPS:
         gap = {"gap": (share * motion.s_reach, "m")}
-        yield Form(KINDS[2], place.name, "force", index, (Part("stiffness*(max(s - gap, 0) + min(s + gap, 0))", ("stiffness", "N/m"), gap, 1, span=SPAN),))
+        yield Form(
+            KINDS[2],
+            place.name,
+            "force",
+            index,
+            (Part("stiffness*(max(s - gap, 0) + min(s + gap, 0))", ("stiffness", "N/m"), gap, 1, span=SPAN),),
+        )
         yield Form(KINDS[2], place.name, "force", index, (Part("bump_stop", ("stiffness", "N/m"), gap, 1, span=SPAN),), "one side")
         yield Form(KINDS[2], place.name, "force", index, (Part("rebound_stop", ("stiffness", "N/m"), gap, 1, span=SPAN),), "the other side")
 

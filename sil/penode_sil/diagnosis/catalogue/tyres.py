@@ -5,6 +5,7 @@
 from collections.abc import Iterable
 
 import numpy as np
+
 from penode_gen.model import Model
 
 from ..plant import Place
@@ -31,7 +32,9 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     yield Form(KINDS[0], place.name, "force", index, (Part("linear_damper", ("damping", "N*s/m"), {}, 1),))
     top = max(float(np.quantile(p.s, 0.9995)) for p in motion.parts)
     for share in SHARES if top > 0.0 else ():
-        yield Form(KINDS[1], place.name, "force", index, (Part("liftoff", ("stiffness", "N/m"), {"static": (share * top, "m")}, 1, span=2.0),))
+        yield Form(
+            KINDS[1], place.name, "force", index, (Part("liftoff", ("stiffness", "N/m"), {"static": (share * top, "m")}, 1, span=2.0),)
+        )
     yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_spring", ("quadratic", "N/m^2")),))
 
 

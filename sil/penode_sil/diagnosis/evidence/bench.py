@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.model import Model, Parameter
 
 from ..fit import Free
@@ -65,7 +66,9 @@ class Bench:
         scales = {scale(s.name) for s in self.model.sensors}
         values = {name: x for name, x in (self.linear or ({} if fit is None else fit.values)).items() if name not in scales}
         noise = np.array([i.noise for i in self.base.inputs])
-        return Gains(self.base.states, model.states, linear(self.base, values), noise, self.forces, self.noise, self.update * self.step, self.update)
+        return Gains(
+            self.base.states, model.states, linear(self.base, values), noise, self.forces, self.noise, self.update * self.step, self.update
+        )
 
 
 def parameter(p: Parameter) -> Free | None:
@@ -89,15 +92,25 @@ def with_tolerances(model: Model) -> Model:
 
 
 def build(
-    model: Model, places: Sequence[Place], records: Sequence[Record], noise: Array, fastest: float, set_name: str = "default",
+    model: Model,
+    places: Sequence[Place],
+    records: Sequence[Record],
+    noise: Array,
+    fastest: float,
+    set_name: str = "default",
     like: Bench | None = None,
-) -> Bench:  # fmt: skip
+) -> Bench:
     """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]. `like`: the bench of
     the nominal model if `model` is another one; base, updates and forces are taken from it."""
     wide = augmented(model, places)
     free = [f for f in map(parameter, model.parameters.values()) if f]
     spans = np.array([max(np.nanstd(np.concatenate([r.y[:, j] for r in records])), noise[j]) for j in range(len(noise))])
-    means = np.array([max(abs(np.nanmean(r.y[:, j])) for r in records) if any(np.isfinite(r.y[:, j]).any() for r in records) else 0.0 for j in range(len(noise))])
+    means = np.array(
+        [
+            max(abs(np.nanmean(r.y[:, j])) for r in records) if any(np.isfinite(r.y[:, j]).any() for r in records) else 0.0
+            for j in range(len(noise))
+        ]
+    )
     for s, span, mean in zip(model.sensors, spans, means):
         free.append(Free(bias(s.name), 0.0, span, sigma=span + mean))
     plain = Fit((), Filter.none(0, 0), *(np.zeros(0),) * 2, np.zeros(0, bool), np.zeros(0), 0.0, 0.0)
@@ -114,7 +127,15 @@ def build(
     for e, states in enumerate(x):
         for i, start in enumerate(model.start):
             size = max(float(np.std(states[:, i])), 1e-9)
-            starts.append(Free(("start", e, i), float(states[0, i]), 0.1 * size, sigma=3.0 * size + 3.0 * abs(float(np.mean(states[:, i]))), origin=start))
+            starts.append(
+                Free(
+                    ("start", e, i),
+                    float(states[0, i]),
+                    0.1 * size,
+                    sigma=3.0 * size + 3.0 * abs(float(np.mean(states[:, i]))),
+                    origin=start,
+                )
+            )
     return fit_null(replace(bench, free=(*free, *starts), nominal=(*free, *starts)))
 
 

@@ -69,7 +69,9 @@ def predictive(part: Fit, left: NDArray[np.bool_], floor: Array) -> float:
         ours, theirs = part.nu[good & part.used[:, j], j], part.nu[good & left, j]
         if len(ours) and len(theirs):
             width = spread(ours, floor[j])
-            total -= float(np.sum(0.5 * (FREEDOM + 1.0) * np.log1p(theirs**2 / (FREEDOM * width)))) + 0.5 * len(theirs) * float(np.log(width))
+            total -= float(np.sum(0.5 * (FREEDOM + 1.0) * np.log1p(theirs**2 / (FREEDOM * width)))) + 0.5 * len(theirs) * float(
+                np.log(width)
+            )
     return total
 
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ..fit import Free
 from .observer import Filter, Predictor
-from .prior import cost, precisions
-from .prior import slopes as prior_slopes
+from .prior import cost, precisions, slopes as prior_slopes
 
 Array = NDArray[np.float64]
 DAMPING = np.array([0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
@@ -107,7 +106,9 @@ class Problem:
 
     def at(self, free: Sequence[Free], by: Filter) -> Fit:
         """The fit that ends at these free values."""
-        small = np.array([MOVE * MOVE if f.log else MOVE for f in free])  # else a common scale of all forces would seem to bend what is seen
+        small = np.array(
+            [MOVE * MOVE if f.log else MOVE for f in free]
+        )  # else a common scale of all forces would seem to bend what is seen
         shifts = np.vstack([np.zeros(len(free)), np.diag(small)])
         for i, f in enumerate(free):
             if f.at(small[i]) == f.value:

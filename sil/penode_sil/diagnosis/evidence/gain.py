@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from penode_gen.model import Model
 from scipy import linalg
+
+from penode_gen.model import Model
 
 from ..plant import Linear, linearise
 from .observer import WANDER, Filter

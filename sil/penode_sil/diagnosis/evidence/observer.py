@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
 from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter, Signal, State
 
 from ...batch import Observer
@@ -18,8 +19,8 @@ from ..compiling import compiled, ordered
 from ..fit import Free
 from ..hypotheses import lag
 from ..noise import Experiment
-from . import samples
 from ..plant import Place, anonymous, extend, rotational_unit
+from . import samples
 
 Array = NDArray[np.float64]
 WANDER = "wander"  # stem of the forces that wander, and of their states
@@ -84,8 +85,8 @@ def augmented(model: Model, places: Sequence[Place]) -> Model:
     states = [State(f"{name}_f", u) for name, u in zip(names, units)]
     laws = [Equation(name, f"der({name}_f)*{WANDER}_tau = -{name}_f") for name in names]
     wide = replace(
-        model, parameters={**model.parameters, **free}, extra_states=(*model.extra_states, *states), equations=(*model.equations, *laws),
-    )  # fmt: skip
+        model, parameters={**model.parameters, **free}, extra_states=(*model.extra_states, *states), equations=(*model.equations, *laws)
+    )
     wide = extend(wide, forces, {}, where)
     sensors = tuple(replace(s, expression=f"({s.expression})*{scale(s.name)} + {bias(s.name)}") for s in wide.sensors)
     return replace(wide, sensors=sensors)
@@ -159,9 +160,8 @@ class Predictor:
         self.n_z = len(records[0].y[0])  # sensors that were measured; the model may have more
 
     def predict(
-        self, free: Sequence[Free], shifts: Array, by: Filter, extra: Mapping[int, Array] = {}, watched: int = 0,
-        states: Sequence[str] = (),
-    ) -> tuple[Lanes, list[Array], list[Array]]:  # fmt: skip
+        self, free: Sequence[Free], shifts: Array, by: Filter, extra: Mapping[int, Array] = {}, watched: int = 0, states: Sequence[str] = ()
+    ) -> tuple[Lanes, list[Array], list[Array]]:
         """Runs with free values after shifts [runs, free], corrected `by` a filter. `extra`: further inputs of a probed model per
         recording, [runs, n, .]; `watched`: how many sensors more to give, per recording [runs, n, watched]. Returns innovations,
         watched sensors, and states per recording [runs, n, n_x]."""
@@ -178,9 +178,14 @@ class Predictor:
             wide = np.zeros((*gain.shape[:-1], len(self.model.sensors)))
             wide[..., : self.n_z] = gain
             run = self.batch.run(
-                u, x0=start, parameters=parameters, set_name=self.set_name, states=states, every=self.fine,
+                u,
+                x0=start,
+                parameters=parameters,
+                set_name=self.set_name,
+                states=states,
+                every=self.fine,
                 observer=Observer(self.update, np.concatenate([y, blank], axis=-1), wide),
-            )  # fmt: skip
+            )
             z = run.z
             nu, finite = self._beyond(e, y, z[:, :, : self.n_z])
             sane &= (run.first_bad < 0) & finite
