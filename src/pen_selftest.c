@@ -18,7 +18,7 @@
 #define ARGUMENTS 8U
 #define ORDER 3U /* of a linear system */
 
-/* Of answer(), by penode_gen/selftest.py. */
+/* Of answer(), by penode_gen/emission/selftest.py. */
 #ifdef PEN_REAL_DOUBLE
 #define SOME 0x1.0c68612285642p-33 /* libgcc for Arm: the difference to 1 is 1 ulp too small */
 #define REST 0x1.fffffffef397ap-1

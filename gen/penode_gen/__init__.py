@@ -1,11 +1,11 @@
 """penode_gen: from a model file and its networks to C."""
 
-from .emit_c import VERSION, generate, render
+from .emission.model_c import VERSION, generate, render
 from .model import Model, ModelError
-from .numeric import Numeric, numeric
-from .read_toml import load
-from .serial_form import SerialSet, read_serial, serial
-from .sets import set_head, set_values
+from .reading.model_file import load
+from .sets.packing import set_head, set_values
+from .sets.serial_form import SerialSet, read_serial, serial
+from .twins.numeric import Numeric, numeric
 
 __all__ = [
     "VERSION",

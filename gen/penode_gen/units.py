@@ -11,7 +11,7 @@ from typing import Callable
 import pint
 import sympy as sp
 
-from . import expressions as ex, functions
+from .algebra import expressions as ex, functions
 
 
 def _known() -> pint.UnitRegistry:

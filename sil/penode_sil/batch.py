@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import penode_gen
-from penode_gen.causalise import Causal
-from penode_gen.emit_batch import BatchCode, render_batch
-from penode_gen.placeholder import columns
-from penode_gen.sampled import beside
+from penode_gen.algebra.causalise import Causal
+from penode_gen.algebra.placeholder import columns
+from penode_gen.algebra.sampled import beside
+from penode_gen.emission.batch_c import BatchCode, render_batch
 
 from .building import FLAGS, ROOT, build_directory, build_once, compile_program, digest_of, sources_in
 from .errors import UserError

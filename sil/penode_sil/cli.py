@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from . import environment as environment  # isort: split
+from . import environment  # isort: split
 
 import gc
 import json

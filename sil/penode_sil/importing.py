@@ -10,8 +10,8 @@ import click
 
 import penode_gen
 from penode_gen import imports
+from penode_gen.emission.network_json import to_json
 from penode_gen.networks import ACTIVATIONS
-from penode_gen.write_json import to_json
 
 from .console import FILE
 from .errors import UserError, hint

@@ -14,9 +14,8 @@ import click
 
 import penode_gen
 
-from . import look
 from .console import FILE, Several
-from .reading import named
+from .recordings import look, named
 
 
 @click.command(cls=Several)

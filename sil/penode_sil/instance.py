@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen.placeholder import columns
+from penode_gen.algebra.placeholder import columns
 
 from .status import BIT, FLAGS
 

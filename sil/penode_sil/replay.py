@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import recording, scenario as scenarios
+from . import recordings, scenario as scenarios
 from .errors import UserError
 from .signals import Samples
 
@@ -44,15 +44,15 @@ def load(path: Path, model: Any, set_name: str | None, channels: Iterable[str], 
     """Read a recording for a model; `how` says what an input does between two rows of the file. Raises UserError."""
     wanted = {signal.name: signal.unit for signal in model.inputs}
     signals = {s.name: s.unit for s in (*model.sensors, *model.outputs) if s.name not in wanted}
-    pairs = recording.aliases(channels, [*wanted, *signals])
-    tables = recording.read(path, [*wanted, *signals, "time"], pairs)
+    pairs = recordings.aliases(channels, [*wanted, *signals])
+    tables = recordings.read(path, [*wanted, *signals, "time"], pairs)
     sensed, broken = _sensed(tables, signals, path)
     if broken and not wanted and not sensed:
         raise UserError(next(iter(broken.values())))
     for name, problem in broken.items():
         note(f"{problem}; {name} is not compared")
     if wanted:
-        raster, u, remarks = recording.on_raster(tables, wanted, model.sample_time)
+        raster, u, remarks = recordings.on_raster(tables, wanted, model.sample_time)
         if how != "linear":
             u, remarks = _between(tables, wanted, raster, model.sample_time, how)
     else:
@@ -74,7 +74,7 @@ def _sensed(tables: Sequence[Any], signals: dict[str, str], path: Path) -> tuple
         try:
             if not any(table.find(name, unit) for table in tables):
                 continue
-            table = recording.pick(tables, name, unit)
+            table = recordings.pick(tables, name, unit)
             time = table.channel("time", "s", finite=False)
             values = table.channel(name, unit, finite=False)
         except UserError as exc:
@@ -107,7 +107,7 @@ def _between(tables: Sequence[Any], wanted: dict[str, str], raster: Array, step:
     """Inputs [n, inputs] on a raster, held or band-limited between the rows of the file; notes."""
     columns, remarks = [], []
     for name, unit in wanted.items():
-        table = recording.pick(list(tables), name, unit)
+        table = recordings.pick(list(tables), name, unit)
         time, values = table.time(), table.channel(name, unit)
         usual = float(np.median(np.diff(time)))
         if how == "held":
@@ -122,7 +122,7 @@ def _between(tables: Sequence[Any], wanted: dict[str, str], raster: Array, step:
             if usual >= 0.999 * step:
                 columns.append(values[np.rint((raster - time[0]) / usual).astype(int)])
                 continue
-        kernel = recording.Kernel(raster, float(time[0]), float(grid[1] - grid[0]), time.size, step)
+        kernel = recordings.Kernel(raster, float(time[0]), float(grid[1] - grid[0]), time.size, step)
         columns.append(kernel.apply(values[:, None])[:, 0])
         remarks.append(f"{name} is replayed band-limited from rows {usual * 1e3:.6g} ms apart")
     return np.column_stack(columns), list(dict.fromkeys(remarks))

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import scenario as scenarios, status, units
+from . import scenario as scenarios, status
 from .output import Column
+from .recordings import units
 from .replay import Replay
 from .targets import Run
 

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import UserError, hint
-from .recording import pick, read
+from .recordings import pick, read
+from .recordings.units import UnitError, quantity
 from .signals import ROAD_CLASSES, Bump, Chirp, Constant, Ramp, Road, Samples, Signal, Sum, VelocityChirp
-from .units import UnitError, quantity
 
 HOW = ("write", "select", "rollback")
 CHUNK = 64

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 import penode_gen
 
-from . import mil, replay, results, scenario as scenarios, starts, status, units
+from . import mil, replay, results, scenario as scenarios, starts, status
 from .console import FILE, Several, note, progress
 from .errors import UserError, hint
 from .mdf_write import write_mf4
 from .output import write_csv
+from .recordings import units
 from .results import Result
 from .schedule import instance_calls
 from .ssp_command import play

@@ -17,10 +17,10 @@ import penode_gen
 
 from . import scenario as scenarios
 from .errors import UserError, hint
+from .recordings.units import UnitError, quantity
 from .replay import Replay
 from .schedule import Call
 from .targets import Sil
-from .units import UnitError, quantity
 
 Array = NDArray[np.float64]
 GIVEN = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*")

@@ -118,7 +118,7 @@ class SilInstance(Instance):
 
     def run(self, u: NDArray[Any], calls: Sequence[Call] = (), progress: Progress = lambda n: None) -> Run:
         """Step through u [n, n_u], making each call before its sample."""
-        u = np.ascontiguousarray(penode_gen.placeholder.columns(self.sil.model, u).reshape(-1, self.sil.n_u), dtype=self.dtype)
+        u = np.ascontiguousarray(penode_gen.algebra.placeholder.columns(self.sil.model, u).reshape(-1, self.sil.n_u), dtype=self.dtype)
         total = len(u)
         samples = np.zeros((total, self.sil.n_x + self.sil.n_y + self.sil.n_z), dtype=self.dtype)
         status, made, done = np.zeros(total, dtype=np.uint32), [], 0
@@ -207,7 +207,7 @@ class Pil:
     def run(self, u: NDArray[Any], calls: Sequence[Call] = (), set_name: str = "default", progress: Progress = lambda n: None) -> Run:
         """Initialise an instance with a set and step through u [n, n_u], making each call before its sample."""
         u = np.ascontiguousarray(
-            penode_gen.placeholder.columns(self.model, u).reshape(-1, max(len(self.model.inputs), 1)), dtype=self.dtype
+            penode_gen.algebra.placeholder.columns(self.model, u).reshape(-1, max(len(self.model.inputs), 1)), dtype=self.dtype
         )
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "tape").write_bytes(self._tape(u, calls, set_name))

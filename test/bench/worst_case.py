@@ -21,7 +21,7 @@ from all_laws import all_laws
 from numpy.typing import NDArray
 
 import penode_gen
-from penode_gen import fold
+from penode_gen.sets import fold
 from penode_sil.building import ROOT
 from penode_sil.status import BIT
 from penode_sil.targets import MACHINES

@@ -29,7 +29,7 @@ from penode_gen.model import GROUND, Model
 from penode_sil import diagnosis
 from penode_sil.diagnosis import noise, study
 from penode_sil.diagnosis.missing import missing_forces
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 LIMIT = 0.05  # of the RMS of the true hidden force
 

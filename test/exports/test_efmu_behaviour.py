@@ -15,7 +15,8 @@ from efmu_instance import PRECISIONS, Scenario, play, scenarios
 from galec import Block
 
 import penode_gen
-from penode_gen import exports, layout
+from penode_gen import exports
+from penode_gen.sets import layout
 
 
 class Algorithm(Block):

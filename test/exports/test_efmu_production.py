@@ -17,7 +17,7 @@ from efmu_container import SCHEMAS, contents, export, problems, unmapped
 from efmu_instance import FOLDERS, Production
 
 import penode_gen
-from penode_gen import layout
+from penode_gen.sets import layout
 from penode_sil.schedule import Call
 from penode_sil.targets import Sil
 

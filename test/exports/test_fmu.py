@@ -18,7 +18,8 @@ from fmpy.validation import validate_fmu
 from master import DISCARD, ERROR, WARNING, Master, Unpacked, export
 
 import penode_gen
-from penode_gen import exports, layout
+from penode_gen import exports
+from penode_gen.sets import layout
 from penode_sil.schedule import Call
 from penode_sil.targets import Sil
 

@@ -69,10 +69,10 @@ def test_libcosim_changes_weights_while_it_runs(nqvm: Any, held: Any, tmp_path: 
     values = penode_gen.set_values(nqvm, SET)
     for k in range(1000):
         if k == 500:
-            for array in penode_gen.layout.arrays(nqvm):
+            for array in penode_gen.sets.layout.arrays(nqvm):
                 elements = unpacked.elements(array.name)
                 manipulator.slave_real_values(
-                    slave, [unpacked.reference[n] for n in elements], np.ravel(penode_gen.layout.gather(array, values)).tolist()
+                    slave, [unpacked.reference[n] for n in elements], np.ravel(penode_gen.sets.layout.gather(array, values)).tolist()
                 )
         execution.step()
         found.append(observer.last_real_values(slave, [unpacked.reference["z_b"], unpacked.reference["z_w"]]))

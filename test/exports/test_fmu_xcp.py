@@ -19,7 +19,8 @@ from conftest import chirp
 from master import ERROR, WARNING, Master, Unpacked, export
 
 import penode_gen
-from penode_gen import exports, layout
+from penode_gen import exports
+from penode_gen.sets import layout
 from penode_sil.calibration import a2l_read
 from penode_sil.schedule import Call
 from penode_sil.targets import Sil

@@ -20,10 +20,10 @@ from conftest import chirp
 
 import penode_gen
 from penode_gen import exports
+from penode_gen.emission.network_json import to_json
 from penode_gen.imports import ImportProblem, Options, modelica
-from penode_gen.network_files import read_network
 from penode_gen.networks import Affine
-from penode_gen.write_json import to_json
+from penode_gen.reading.network_files import read_network
 from penode_sil.targets import Sil
 
 RUMOCA = pytest.mark.skipif(importlib.util.find_spec("rumoca") is None, reason="rumoca is not installed: pip install penode[modelica]")

@@ -18,8 +18,9 @@ from click.testing import CliRunner
 from conftest import chirp
 
 import penode_gen
-from penode_gen import exports, layout
+from penode_gen import exports
 from penode_gen.exports.archive import zipped
+from penode_gen.sets import layout
 from penode_sil import ssp_file, ssp_player
 from penode_sil.cli import cli
 from penode_sil.errors import UserError

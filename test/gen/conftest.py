@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from penode_gen import selftest
+from penode_gen.emission import selftest
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "prove")]  # models and graphs; the reference of prove-promise

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 from onnx.reference import ReferenceEvaluator
 
-from penode_gen.network_files import read_network
 from penode_gen.networks import Network, NetworkError
+from penode_gen.reading.network_files import read_network
 
 FLOAT, DOUBLE = TensorProto.FLOAT, TensorProto.DOUBLE
 RNG = np.random.default_rng(0)

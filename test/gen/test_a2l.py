@@ -17,8 +17,9 @@ import pytest
 from models import RICH, network_file
 
 import penode_gen
-from penode_gen import exports, layout
+from penode_gen import exports
 from penode_gen.exports import a2l, elf_types
+from penode_gen.sets import layout
 from penode_sil.calibration import a2l_read, virtual
 
 ROOT = Path(__file__).resolve().parents[2]

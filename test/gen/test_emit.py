@@ -21,8 +21,10 @@ import sympy as sp
 from hypothesis import given, settings, strategies as st
 
 import penode_gen
-from penode_gen import c_text, emit_c, expressions, sets, write
-from penode_gen.causalise import causalise
+from penode_gen.algebra import expressions
+from penode_gen.algebra.causalise import causalise
+from penode_gen.emission import c_text, files, model_c
+from penode_gen.sets import packing
 
 ROOT = Path(__file__).resolve().parents[2]
 NQVM = sorted((ROOT / "gen" / "nqvm").glob("*.toml"))
@@ -220,11 +222,11 @@ n = "n.json"
 
 def test_another_abi_is_refused_at_compile_time(tmp_path, monkeypatch):
     """A model printed for another runtime does not compile, and says why."""
-    monkeypatch.setattr(sets, "ABI", sets.ABI + 1)
+    monkeypatch.setattr(packing, "ABI", packing.ABI + 1)
     penode_gen.generate(penode_gen.load(models.rich(tmp_path)), tmp_path / "c")
     said = complaints(tmp_path / "c", "rich")
     assert len(said) == 2 * len(COMPILERS)
-    assert all(f"rich was generated for runtime ABI {sets.ABI}: generate it again" in text for text in said)
+    assert all(f"rich was generated for runtime ABI {packing.ABI}: generate it again" in text for text in said)
 
 
 # -- files ------------------------------------------------------------------------------------------------------------
@@ -248,7 +250,7 @@ def test_all_files_or_none(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device", "rich_params.c")
 
     with monkeypatch.context() as patch, pytest.raises(OSError, match="No space left"):
-        patch.setattr(write.os, "chmod", full)
+        patch.setattr(files.os, "chmod", full)
         penode_gen.generate(model, out)
     assert [p.name for p in out.iterdir()] == ["rich.h"] and (out / "rich.h").read_text() == "old"
 
@@ -419,7 +421,7 @@ def test_steps_come_in_the_order_in_which_they_are_needed(tmp_path):
 @pytest.mark.parametrize("earlier", [True, False])
 def test_a_file_that_cannot_be_replaced_leaves_all_as_they_were(tmp_path, monkeypatch, failing, earlier):
     model = penode_gen.load(NQVM[0])
-    names = list(emit_c.render(model))
+    names = list(model_c.render(model))
     if earlier:
         for name in names:
             (tmp_path / name).write_text(f"earlier {name}")
@@ -440,7 +442,7 @@ def test_a_file_that_cannot_be_replaced_leaves_all_as_they_were(tmp_path, monkey
 def test_one_version_and_one_abi_everywhere():
     header = (ROOT / "inc" / "penode" / "pen_real.h").read_text()
     assert re.search(r'#define PEN_VERSION "(.*)"', header)[1] == penode_gen.VERSION
-    assert int(re.search(r"#define PEN_ABI (\d+)", header)[1]) == sets.ABI
+    assert int(re.search(r"#define PEN_ABI (\d+)", header)[1]) == packing.ABI
     assert f'\nversion = "{penode_gen.VERSION}"\n' in (ROOT / "pyproject.toml").read_text()
 
 

@@ -15,9 +15,9 @@ import pytest
 from numpy.typing import NDArray
 
 import penode_gen
-from penode_gen import fold
-from penode_gen.network_files import read_network
 from penode_gen.networks import Affine, Dense, Network
+from penode_gen.reading.network_files import read_network
+from penode_gen.sets import fold
 from penode_sil.status import BIT
 from penode_sil.targets import Sil
 

@@ -14,10 +14,11 @@ import sympy as sp
 from test_selftest import check
 
 import penode_gen
-from penode_gen import expressions as ex, functions, units
-from penode_gen.emit_batch import render_batch
-from penode_gen.emit_c import render
-from penode_gen.kernels import Kernels
+from penode_gen import units
+from penode_gen.algebra import expressions as ex, functions
+from penode_gen.emission.batch_c import render_batch
+from penode_gen.emission.model_c import render
+from penode_gen.twins.kernels import Kernels
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = """

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_gen import layout, sets
+from penode_gen.sets import layout, packing
 from penode_sil.targets import Sil
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -129,14 +129,14 @@ def test_each_value_belongs_to_one_array(case):
 
 def test_blocks_by_hand():
     """Of a layer of n rows, as penode/pen_net.h states them."""
-    assert [sets.dense_rows(n) for n in (1, 5, 10, 20, 23)] == [
+    assert [packing.dense_rows(n) for n in (1, 5, 10, 20, 23)] == [
         [(0, 1)],
         [(0, 4), (4, 1)],
         [(0, 4), (4, 4), (8, 1), (9, 1)],
         [(0, 16), (16, 4)],
         [(0, 16), (16, 4), (20, 1), (21, 1), (22, 1)],
     ]
-    assert sets.dense_rows(256) == [(16 * i, 16) for i in range(16)]
+    assert packing.dense_rows(256) == [(16 * i, 16) for i in range(16)]
 
 
 def test_units_and_places_of_a_small_one(tmp_path):
@@ -144,7 +144,7 @@ def test_units_and_places_of_a_small_one(tmp_path):
     model, _ = load(tmp_path, [3, 5, 1], True)
     table = json.loads(layout.to_json(model))
     assert (table["model"], table["length"], table["sets"]) == ("tuned", 42, {n: s.id for n, s in model.sets.items()})
-    assert table["layout"] == {"float": sets.layout(model), "double": sets.layout(model, float)}
+    assert table["layout"] == {"float": packing.layout(model), "double": packing.layout(model, float)}
     rows = {a["name"]: (a["shape"], a["unit"], [(b["first_row"], b["rows"], b["at"]) for b in a["blocks"]]) for a in table["arrays"]}
     assert rows == {
         "lift": ([], "m", [(0, 1, 0)]),

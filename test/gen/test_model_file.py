@@ -15,7 +15,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 import penode_gen
-from penode_gen import expressions, units
+from penode_gen import units
+from penode_gen.algebra import expressions
 
 GOOD = """[model]
 name = "good"

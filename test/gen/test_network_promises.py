@@ -16,9 +16,9 @@ import promise_reference as reference
 import pytest
 
 import penode_gen
-from penode_gen import exact, promises
 from penode_gen.model import NetworkPort, Promises
 from penode_gen.networks import Affine, Dense, Network
+from penode_gen.sets import exact, promises
 
 PROVE = Path(promise_check.__file__).parent
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from penode_gen.network_files import read_network
 from penode_gen.networks import ACTIVATIONS, Affine, Dense, Network, NetworkError
+from penode_gen.reading.network_files import read_network
 
 SHARED = Path(os.environ.get("PENODE_SHARED", Path(__file__).resolve().parents[3] / "shared"))
 PUBLISHED = SHARED / "nqvm-published"

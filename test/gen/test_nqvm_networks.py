@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from onnx import numpy_helper
 from onnx.reference import ReferenceEvaluator
 
-from penode_gen.network_files import read_network
+from penode_gen.reading.network_files import read_network
 
 NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm"
 Law = Callable[[float], float]

@@ -15,8 +15,8 @@ from onnx import NodeProto, TensorProto, helper, numpy_helper
 from onnx.reference import ReferenceEvaluator
 from onnx_graphs import B1, B2, DOUBLE, FACTOR, FLOAT, MLP, MLP_CONSTANTS, RNG, SHIFT, W1, W2, Constants, model, node, refused, same, save
 
-from penode_gen.network_files import read_network
 from penode_gen.networks import Affine, Dense, NetworkError
+from penode_gen.reading.network_files import read_network
 
 # ---- dense layers ----
 

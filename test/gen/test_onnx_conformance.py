@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from onnx import ModelProto, numpy_helper
 from onnx.backend.test.case.node import collect_testcases
 
-from penode_gen.network_files import read_network
 from penode_gen.networks import Network, NetworkError
+from penode_gen.reading.network_files import read_network
 
 DATA = Path(onnx.__file__).parent / "backend" / "test" / "data"
 

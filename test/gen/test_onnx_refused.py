@@ -14,8 +14,8 @@ from hypothesis import given, settings, strategies as st
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 from onnx_graphs import B1, MLP, MLP_CONSTANTS, SHIFT, W1, Constants, model, node, refused, save
 
-from penode_gen.network_files import read_network
 from penode_gen.networks import NetworkError
+from penode_gen.reading.network_files import read_network
 
 W = {"w": W1}
 

@@ -13,8 +13,8 @@ from onnx import numpy_helper
 from onnx.reference import ReferenceEvaluator
 from onnx_graphs import B1, B2, DOUBLE, W1, W2, model, node
 
-from penode_gen.network_files import read_network
 from penode_gen.networks import Dense, Network, NetworkError
+from penode_gen.reading.network_files import read_network
 
 RANDOM = np.random.default_rng(5)
 BN = {"g": RANDOM.uniform(0.5, 2.0, 5), "c": RANDOM.normal(size=5), "m": RANDOM.normal(size=5), "v": RANDOM.uniform(0.5, 2.0, 5)}

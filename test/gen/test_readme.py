@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from penode_gen import expressions, model, read_tables, read_toml
+from penode_gen import model
+from penode_gen.algebra import expressions
 from penode_gen.laws import LAWS
+from penode_gen.reading import model_file, tables
 
 TEXT = (Path(__file__).resolve().parents[2] / "gen" / "README.md").read_text(encoding="utf-8")
 
@@ -19,12 +21,12 @@ def test_every_law_with_its_arguments(law):
         assert argument in row
 
 
-@pytest.mark.parametrize("word", [*model.METHODS, *model.INTERPOLATIONS, *model.OUTSIDE, *read_toml.MODEL])
+@pytest.mark.parametrize("word", [*model.METHODS, *model.INTERPOLATIONS, *model.OUTSIDE, *model_file.MODEL])
 def test_every_choice_and_key_of_the_model(word):
     assert f"`{word}`" in TEXT or f"`{word} = " in TEXT
 
 
-@pytest.mark.parametrize("section", read_tables.SECTIONS)
+@pytest.mark.parametrize("section", tables.SECTIONS)
 def test_every_section(section):
     assert f"`[{section}]`" in TEXT
 

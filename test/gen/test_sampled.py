@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_gen.emit_c import _Emitter
-from penode_gen.evaluate import Evaluator
+from penode_gen.emission.model_c import _Emitter
+from penode_gen.twins.evaluate import Evaluator
 from penode_sil import mil, scenario
 from penode_sil.batch import Batch
 from penode_sil.signals import Chirp, Samples

@@ -19,9 +19,10 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_gen import selftest, translate
-from penode_gen.emit_c import _Emitter
-from penode_gen.evaluate import Evaluator
+from penode_gen.emission import selftest
+from penode_gen.emission.model_c import _Emitter
+from penode_gen.twins import translate
+from penode_gen.twins.evaluate import Evaluator
 from penode_sil.targets import MACHINES, Sil
 
 ROOT = Path(__file__).resolve().parents[2]

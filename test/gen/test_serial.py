@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_gen import serial_form
+from penode_gen.sets import serial_form
 from penode_sil.instance import Head
 from penode_sil.status import names
 from penode_sil.targets import Sil

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from penode_sil.reading import mdf
+from penode_sil.recordings import mdf
 
 try:
     import asammdf

@@ -31,11 +31,11 @@ import recording_forms
 
 import penode_gen
 from penode_gen.networks import NetworkError
-from penode_gen.read_json import read_json
-from penode_gen.read_onnx import read_onnx
-from penode_sil import look, measured, scenario
+from penode_gen.reading.json_file import read_json
+from penode_gen.reading.onnx_file import read_onnx
+from penode_sil import scenario
 from penode_sil.errors import UserError
-from penode_sil.recording import on_raster, read
+from penode_sil.recordings import look, measured, on_raster, read
 
 REFUSED = (penode_gen.ModelError, NetworkError, UserError)
 LIMIT = 20  # [s] of the processor for one file

@@ -42,7 +42,7 @@ READ = {
     "inc": "*.h",
     "port": "*.[ch]",
     "gen/nqvm/c": "*.[ch]",
-    "gen/penode_gen/templates": "*.j2",
+    "gen/penode_gen/emission/templates": "*.j2",
     "sil/firmware": "*.[ch]",
     "test/misra": "*[!c]",
     "test": "test.mk",

@@ -15,7 +15,7 @@ from pathlib import Path
 import gate
 
 import penode_gen
-from penode_gen.sets import offsets
+from penode_gen.sets.packing import offsets
 from penode_sil.building import FLAGS, generated, model_options
 
 WORK = gate.BUILD / "status"

@@ -14,12 +14,12 @@ from samples import sample
 from test_diagnosis import MODEL, drive, record, road
 
 import penode_gen
-from penode_gen import fold, sets
 from penode_gen.networks import Affine, Dense, Network
-from penode_gen.read_json import read_json
+from penode_gen.reading.json_file import read_json
+from penode_gen.sets import fold, packing
 from penode_sil import diagnosis
 from penode_sil.diagnosis import absorb
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 PICK = np.random.default_rng(5)
 NETWORK = Network(
@@ -91,7 +91,7 @@ def test_a_law_is_absorbed_by_the_network_beside_it(tmp_path):
     assert [(c.kind, c.where) for c in found.causes] == [("cubic_spring", "spring")]
     assert found.absorbed["networks"].keys() == {"net"}
     again = penode_gen.load(tmp_path / "found" / absorb.FILE)
-    assert sets.layout(again) == sets.layout(model)  # so the running code takes the set
+    assert packing.layout(again) == packing.layout(model)  # so the running code takes the set
     for name, gain in found.absorbed["gain"].items():
         # the law is missed by less than a tenth, and parameters within tolerance are not part of the set
         assert gain.after_rmse - gain.noise_floor < 0.2 * (gain.before_rmse - gain.noise_floor), name

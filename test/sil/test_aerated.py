@@ -12,7 +12,7 @@ import pytest
 import penode_gen
 from penode_sil.diagnosis import driven, plant, real
 from penode_sil.diagnosis.catalogue.form import Moved, Part
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 RIG = """
 [model]

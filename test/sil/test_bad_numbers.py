@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_gen.sets import offsets
+from penode_gen.sets.packing import offsets
 from penode_sil.instance import Head, Set
 from penode_sil.status import BIT, names
 from penode_sil.targets import Sil

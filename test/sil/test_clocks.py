@@ -9,8 +9,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from penode_sil.clocks import own_samples
-from penode_sil.stamps import evened, sampled_evenly
+from penode_sil.recordings.clocks import own_samples
+from penode_sil.recordings.stamps import evened, sampled_evenly
 
 N, STEP = 2000, 2e-3
 TIME = np.arange(N) * STEP

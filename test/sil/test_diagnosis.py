@@ -45,7 +45,7 @@ from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.faulty import delayed, railed
 from penode_sil.diagnosis.fit import Problem
 from penode_sil.diagnosis.late import fastest, poles
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 from penode_sil.targets import Sil
 
 M_B, M_W, C, D, C_T = 400.0, 45.0, 22e3, 1500.0, 210e3

@@ -23,7 +23,7 @@ from penode_sil.diagnosis.evidence.observer import Record, sample_noise
 from penode_sil.diagnosis.evidence.screening import Score
 from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.terms import Trial
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 J_M, J_L, K, D, D_M, D_L = 0.02, 0.1, 40.0, 0.07, 0.04, 0.4
 STEP, FINE = 0.002, 2

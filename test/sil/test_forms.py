@@ -12,7 +12,7 @@ import pytest
 from recording_forms import COUNT, DOUBTFUL, FORMS, STEP, UNITS, Form, signals
 
 from penode_sil.errors import UserError
-from penode_sil.recording import aliases, on_raster, read
+from penode_sil.recordings import aliases, on_raster, read
 
 
 def values(folder: Path, form: Form, options: tuple[str, ...] = ()) -> np.ndarray:

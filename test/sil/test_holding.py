@@ -17,7 +17,7 @@ from penode_sil.batch import Batch
 from penode_sil.diagnosis import applied, driven, plant, real
 from penode_sil.diagnosis.holding import held
 from penode_sil.diagnosis.noise import Experiment
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 FINE, SAMPLES = 8, 4000  # steps of the plant in a sample, samples
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 6.0

@@ -24,7 +24,7 @@ from penode_sil.diagnosis.evidence.bench import with_tolerances
 from penode_sil.diagnosis.evidence.gain import Gains, Level, riccati
 from penode_sil.diagnosis.evidence.observer import Record, augmented, sample_noise
 from penode_sil.diagnosis.study import begin
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 SWING = """
 [model]

@@ -14,7 +14,7 @@ import penode_gen
 from penode_sil import diagnosis
 from penode_sil.cli import cli
 from penode_sil.late import Delayed, Held
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 from penode_sil.signals import Samples
 
 ROTOR = """

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 import penode_gen
 from penode_sil.errors import UserError
-from penode_sil.measured import load, with_shared_rails
+from penode_sil.recordings.measured import load, with_shared_rails
 
 N = 8000
 T = np.round(np.arange(N) * 1e-3, 6)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from penode_sil.noise import estimate
+from penode_sil.recordings.noise import estimate
 
 H = 1e-3
 N = 30_000

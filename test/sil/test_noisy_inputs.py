@@ -12,7 +12,7 @@ from scipy import signal
 import penode_gen
 from penode_sil.diagnosis import engine
 from penode_sil.diagnosis.input_noise import with_noise_of_inputs
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 RIG = """
 [model]

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from penode_sil import diagnosis
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 SECONDS = 20.0
 NOISE = {"a_body": 0.02, "deflection": 1e-4}

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import signal
 
-from penode_sil.quality import examine, quantisation
+from penode_sil.recordings.quality import examine, quantisation
 
 N = 30_000
 T = np.arange(N) * 1e-3

@@ -17,10 +17,10 @@ from click.testing import CliRunner
 
 from penode_sil import cli, guard
 from penode_sil.errors import UserError
-from penode_sil.reading.similar import proposals
-from penode_sil.reading.unit_text import scale
-from penode_sil.recording import aliases, pick, read
-from penode_sil.units import UnitError
+from penode_sil.recordings import aliases, pick, read
+from penode_sil.recordings.similar import proposals
+from penode_sil.recordings.unit_text import scale
+from penode_sil.recordings.units import UnitError
 
 TURN, DEGREE, G = math.tau, math.tau / 360.0, 9.80665
 # as written in a file; what the model asks for; SI units per unit

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from penode_sil.errors import UserError
-from penode_sil.recording import aliases, on_raster, pick, read, read_csv, resample
+from penode_sil.recordings import aliases, on_raster, pick, read, read_csv, resample
 
 
 def write(tmp_path, text):

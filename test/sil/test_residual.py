@@ -12,7 +12,7 @@ from test_diagnosis import MODEL, SAMPLES, STEP, C, D, drive, record, road
 import penode_gen
 from penode_sil.diagnosis import noise, residual, study
 from penode_sil.diagnosis.driven import experiment
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 N, H = 40_000, 2e-3  # samples, interval [s]
 LENGTH = 1000

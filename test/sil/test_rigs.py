@@ -15,7 +15,7 @@ from penode_gen.model import Parameter
 from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.plant import placeless
 from penode_sil.diagnosis.study import null_study, uncertain
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 HERE = Path(__file__).resolve().parent
 MEASURED = Path(os.environ.get("PENODE_SHARED", HERE.parents[1].parent / "shared")) / "measured"

@@ -11,7 +11,7 @@ import pytest
 
 import penode_gen
 from penode_sil.diagnosis import diagnose
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 STEP, FINE, ROWS = 2e-3, 8, 2000
 NOISE = {"a_body": 0.0171, "a_wheel": 0.0897, "travel": 0.000115}

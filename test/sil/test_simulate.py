@@ -13,7 +13,7 @@ from test_cli import MODEL, table
 
 import penode_gen
 from penode_sil import replay, starts
-from penode_sil.reading import mdf
+from penode_sil.recordings import mdf
 
 SWING = """
 [model]

@@ -17,7 +17,7 @@ import penode_gen
 from penode_sil.cli import main
 from penode_sil.diagnosis.still import with_noise_at_rest
 from penode_sil.errors import UserError
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 
 SAMPLES = 4000
 MASS, STIFFNESS, DAMPING, NOISE = 2.0, 800.0, 8.0, 1e-5

@@ -67,7 +67,7 @@ def test_counts_of_a_small_tree(tree: Path) -> None:
     ("name", "text", "kind"),
     [
         ("sil/firmware/more.h", "\n" * 401, "long files"),
-        ("gen/penode_gen/templates/more.c.j2", "\n" * 401, "long files"),
+        ("gen/penode_gen/emission/templates/more.c.j2", "\n" * 401, "long files"),
         ("test/more.mk", "\n" * 401, "long files"),
         ("sil/firmware/more.c", LONG_C, "long functions"),
         ("sil/firmware/more.h", f'extern "C" {{\n{LONG_C}}}\n', "long functions"),

@@ -24,9 +24,9 @@ import numpy as np
 import penode_gen
 import penode_sil.training
 from penode_gen.model import Model
-from penode_gen.untrained import untrained
+from penode_gen.reading.untrained import untrained
 from penode_sil.errors import UserError
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 from penode_sil.training import threads
 from penode_sil.training.result import Force, Trained
 from penode_sil.training.story import Options, train

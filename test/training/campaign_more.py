@@ -15,7 +15,7 @@ import numpy as np
 from kept import kept
 
 import penode_gen
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 from penode_sil.training import threads
 from penode_sil.training.story import Options, train
 

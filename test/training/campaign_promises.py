@@ -24,12 +24,12 @@ import kept as parts
 import numpy as np
 
 import penode_gen
-from penode_gen import promises
 from penode_gen.model import Model, Promises
 from penode_gen.networks import Affine, Dense, Network
-from penode_gen.untrained import untrained
+from penode_gen.reading.untrained import untrained
+from penode_gen.sets import promises
 from penode_sil.errors import UserError
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 from penode_sil.training import curve, curves, data, judge, promised, story, threads, unfold
 from penode_sil.training.engine import Engine
 from penode_sil.training.problem import Problem

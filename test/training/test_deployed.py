@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_gen.network_files import read_network
 from penode_gen.networks import Dense, Network
+from penode_gen.reading.network_files import read_network
 from penode_sil.scenario import Exchange
 from penode_sil.schedule import exchange_calls
 from penode_sil.targets import Pil, Sil

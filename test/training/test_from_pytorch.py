@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from onnx import TensorProto, helper, numpy_helper
 
 from penode_gen import load
-from penode_gen.network_files import read_network
+from penode_gen.reading.network_files import read_network
 from penode_sil.cli import cli
 
 PAGE = Path(__file__).parents[2] / "sil" / "FROM_PYTORCH.md"

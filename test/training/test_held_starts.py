@@ -11,7 +11,7 @@ import generator
 import numpy as np
 
 import penode_gen
-from penode_sil.measured import load
+from penode_sil.recordings.measured import load
 from penode_sil.training import curves, data, held_starts, solve, story, threads
 from penode_sil.training.engine import Engine
 from penode_sil.training.problem import Problem

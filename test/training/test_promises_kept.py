@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from penode_gen.model import Promises
-from penode_gen.untrained import untrained
+from penode_gen.reading.untrained import untrained
 from penode_sil.training import curve, unfold
 
 

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from onnx.reference import ReferenceEvaluator
 
 import penode_gen
-from penode_gen.network_files import read_network
+from penode_gen.reading.network_files import read_network
 from penode_sil.cli import cli
 from penode_sil.errors import UserError
 

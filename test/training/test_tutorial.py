@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from penode_gen import load
-from penode_gen.promises import broken
+from penode_gen.sets.promises import broken
 from penode_sil.cli import cli
 
 PAGE = Path(__file__).parents[2] / "sil" / "TRAINING.md"

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from ..emit_c import VERSION
+from ..emission.model_c import VERSION
 from ..model import Model
 from .a2l_entries import Characteristic, Measurement, Measurements, characteristics, instance_of, page
 from .a2l_lists import static_lists

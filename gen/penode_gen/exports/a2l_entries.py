@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import layout, sets, units
+from .. import units
 from ..flags import FLAGS
 from ..model import Model
+from ..sets import layout, packing
 from .elf_types import Place, Program, type_name
 from .interface import ExportError
 
@@ -82,7 +83,7 @@ def page(model: Model, program: Program) -> Place:
     size = program.find(f"{names[1]}[0]").size
     found = program.bytes_at(head.address, 8)
     order = "little" if program.little_endian else "big"
-    expected = (sets.layout(model, _FLOATS[size]), layout.length(model))
+    expected = (packing.layout(model, _FLOATS[size]), layout.length(model))
     if tuple(int.from_bytes(found[i : i + 4], order) for i in (0, 4)) != expected or values.size != expected[1] * size:
         raise ExportError(
             f"{program.path}: its sets are not those of {model.path.name}; generate the C of this model file again, and link it"

@@ -9,9 +9,9 @@ from typing import Any
 
 import sympy as sp
 
-from .. import expressions as ex
-from ..causalise import Causal, Step, causalise
-from ..emit_c import VERSION
+from ..algebra import expressions as ex
+from ..algebra.causalise import Causal, Step, causalise
+from ..emission.model_c import VERSION
 from ..model import Model
 from . import efmu_variables as ev, galec_text as text
 from .efmu_networks import Function, functions

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from ..emit_c import VERSION
+from ..emission.model_c import VERSION
 from ..model import Model
 from .efmu_schemas import DIALECTS
 from .interface import ExportError

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from ..emit_c import VERSION
+from ..emission.model_c import VERSION
 from ..model import Model
 from . import efmu_manifest
 from .efmu_code import Block

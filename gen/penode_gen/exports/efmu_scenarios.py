@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import layout, sets
 from ..model import Model
-from ..numeric import Numeric
+from ..sets import layout, packing
+from ..twins.numeric import Numeric
 from .efmu_code import METHODS
 from .efmu_variables import Variable
 from .interface import ExportError
@@ -114,7 +114,7 @@ def _exchange(model: Model, asked: str | None) -> tuple[float, str] | None:
 
 
 def _changes(model: Model, variables: list[Variable], name: str) -> list[tuple[Variable, Array, Array]]:
-    before, after = (sets.set_values(model, n, np.float64) for n in ("default", name))
+    before, after = (packing.set_values(model, n, np.float64) for n in ("default", name))
     pairs = [(v, *(layout.gather(v.element, values).reshape(v.shape) for values in (before, after))) for v in variables if v.element]
     return [(v, a, b) for v, a, b in pairs if not np.array_equal(a, b)]
 

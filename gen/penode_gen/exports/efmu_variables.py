@@ -11,10 +11,11 @@ from math import prod
 
 import numpy as np
 
-from .. import layout, sets, units
-from ..causalise import Causal
-from ..mechanics import state_unit
+from .. import units
+from ..algebra.causalise import Causal
+from ..algebra.mechanics import state_unit
 from ..model import Model
+from ..sets import layout, packing
 from . import galec_text as text
 from .fmu_variables import unit_definitions
 from .interface import ExportError
@@ -124,7 +125,7 @@ def _first(minimum: float | None, maximum: float | None) -> float:
 
 def _tunable(model: Model) -> list[Variable]:
     """Arrays of the parameter sets; a matrix of one column is a vector, as the public compliance checker knows no other."""
-    values = sets.set_values(model, "default", np.float64) if model.sets or model.tunable else np.zeros(1)
+    values = packing.set_values(model, "default", np.float64) if model.sets or model.tunable else np.zeros(1)
     about = {p.name: p.description for p in model.tunable} | {n: p.description for n, p in model.networks.items()}
     found = []
     for a in layout.arrays(model):

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..emit_c import VERSION, render
+from ..emission.model_c import VERSION, render
 from ..model import Model
 from . import fmu_variables as fv
 from .fmi_functions import functions
@@ -65,7 +65,7 @@ def context(model: Model, options: Options, fmi: int) -> dict[str, Any]:
     found = fv.variables(model, dtype(options))
     groups = fv.groups(found)
     arrays, block = [], 0
-    from .. import layout
+    from ..sets import layout
 
     for array in layout.arrays(model):
         shape = (*array.shape, 1, 1)

@@ -12,8 +12,9 @@ from math import prod
 
 import numpy as np
 
-from .. import layout, sets, units
+from .. import units
 from ..model import Model
+from ..sets import layout, packing
 from .interface import ExportError
 
 BETWEEN = ("held", "linear")  # choices of input_between_samples
@@ -140,7 +141,7 @@ def variables(model: Model, dtype: type = np.float32) -> list[Variable]:
             "state at the end of the last communication step by the inputs",
             shape=(n_x, n_u),
         )
-    values = sets.set_values(model, "default", dtype)
+    values = packing.set_values(model, "default", dtype)
     described = {p.name: p.description for p in model.tunable} | {n: p.description for n, p in model.networks.items()}
     for array in layout.arrays(model):
         start = tuple(map(float, np.ravel(layout.gather(array, values))))
@@ -182,7 +183,7 @@ def _signals(table: _Table, model: Model) -> None:
 
 
 def _state_units(model: Model) -> dict[str, str]:
-    from ..mechanics import state_unit
+    from ..algebra.mechanics import state_unit
 
     return {name: units.si(state_unit(model, name)) for name in model.states}
 

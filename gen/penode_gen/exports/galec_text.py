@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import sympy as sp
 
-from .. import expressions as ex, functions
+from ..algebra import expressions as ex, functions
 from .interface import ExportError
 
 _RESERVED = frozenset(

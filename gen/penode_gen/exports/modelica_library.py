@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..emit_c import VERSION
+from ..emission.model_c import VERSION
 from ..model import Model
 from ..networks import Affine, Dense, Network
 from .interface import ExportError

@@ -8,10 +8,10 @@ import numpy as np
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
-from .. import expressions as ex
-from ..causalise import aliases
-from ..emit_c import VERSION
-from ..mechanics import Relation, balances, forces, kinematics, meanings, state_unit
+from ..algebra import expressions as ex
+from ..algebra.causalise import aliases
+from ..algebra.mechanics import Relation, balances, forces, kinematics, meanings, state_unit
+from ..emission.model_c import VERSION
 from ..model import Model
 from ..networks import Affine, Network
 from .interface import ExportError

@@ -12,7 +12,8 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.printing.str import StrPrinter
 
-from .. import expressions as ex, functions, units
+from .. import units
+from ..algebra import expressions as ex, functions
 from .interface import ExportError
 
 _RESERVED = frozenset(

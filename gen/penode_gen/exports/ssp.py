@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import layout, sets
-from ..emit_c import VERSION
+from ..emission.model_c import VERSION
 from ..model import Model
 from ..networks import Affine
+from ..sets import layout, packing
 from . import fmu2, fmu3, fmu_files, fmu_variables as fv
 from .archive import zipped
 from .interface import Exporter, ExportError, Option, Options
@@ -46,7 +46,7 @@ def schedule(model: Model, text: str) -> list[dict[str, Any]]:
 
 def values(model: Model, name: str, dtype: type, scalar: bool) -> list[dict[str, Any]]:
     """The parameters of a set: name, shape and text of the values; `scalar`: a parameter for each element."""
-    numbers, found = sets.set_values(model, name, dtype), []
+    numbers, found = packing.set_values(model, name, dtype), []
     for array in layout.arrays(model):
         elements = layout.gather(array, numbers)
         if scalar:

@@ -10,7 +10,7 @@ from xml.sax.saxutils import escape
 
 import jinja2
 
-from ..emit_c import compiled_templates
+from ..emission.model_c import compiled_templates
 
 # C strings: what C99 can write, byte by byte; octal, since a hexadecimal escape has no end
 _C = {i: f"\\{i:03o}" for i in (*range(32), 34, 63, 92, 127)}

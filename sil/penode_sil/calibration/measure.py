@@ -19,7 +19,7 @@ from ..console import FILE, note, progress
 from ..errors import UserError, hint
 from ..mdf_write import write_mf4
 from ..output import Column, check_writable
-from ..units import UnitError, quantity
+from ..recordings.units import UnitError, quantity
 from . import address as addresses, pages
 from .a2l_read import A2l, Entry
 from .codes import Slave

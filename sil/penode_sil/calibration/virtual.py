@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
-from penode_gen import exports, placeholder
+from penode_gen import exports
+from penode_gen.algebra import placeholder
 
 from .. import scenario as scenarios
 from ..building import FLAGS, ROOT, build_once, compiler_version, generated, model_options, sources_in

@@ -17,10 +17,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen import fold, units
+from penode_gen import units
 from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 from penode_gen.networks import Affine, Dense, Network, layer_slope, layer_value
+from penode_gen.sets import fold
 
 from .explanation import Explanation
 from .hypotheses import Basis, size

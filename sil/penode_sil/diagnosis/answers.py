@@ -13,7 +13,7 @@ import numpy as np
 import penode_gen
 from penode_gen.model import Model
 
-from ..measured import Measured
+from ..recordings.measured import Measured
 from . import explanation, plausible, residual, weighed
 from .entries import extends
 from .explanation import Explanation

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from penode_gen import units
 from penode_gen.model import Model
 
-from ..measured import Measured
+from ..recordings.measured import Measured
 from . import dropouts
 from .explanation import Explanation
 from .result import Cause, Value

@@ -16,7 +16,7 @@ import numpy as np
 import penode_gen
 from penode_gen.model import Model
 
-from ..measured import Measured
+from ..recordings.measured import Measured
 from . import (
     absorb,
     echo,

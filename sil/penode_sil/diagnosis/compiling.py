@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 import penode_gen
-from penode_gen import fold
-from penode_gen.causalise import Causal, causalise
+from penode_gen.algebra.causalise import Causal, causalise
 from penode_gen.model import Model
-from penode_gen.numeric import Numeric
+from penode_gen.sets import fold
+from penode_gen.twins.numeric import Numeric
 
 from ..batch import Batch
 

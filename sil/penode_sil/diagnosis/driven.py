@@ -16,7 +16,7 @@ import numpy as np
 
 from penode_gen.model import Model
 
-from ..measured import Measured
+from ..recordings.measured import Measured
 from . import noise
 from .compiling import moving
 from .noise import Experiment

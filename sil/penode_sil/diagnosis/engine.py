@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from penode_gen.model import Model
 
 from ..errors import UserError
-from ..measured import Measured, with_shared_rails
+from ..recordings.measured import Measured, with_shared_rails
 from . import dropouts, plausible, search, weighed
 from .advice import advised
 from .answers import by_innovations, recorded

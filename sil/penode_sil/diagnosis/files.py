@@ -14,7 +14,7 @@ from pathlib import Path
 import penode_gen
 
 from ..errors import UserError, hint
-from ..measured import load
+from ..recordings.measured import load
 from . import report
 from .engine import diagnose
 from .result import Diagnosis

@@ -12,7 +12,7 @@ import numpy as np
 from penode_gen import units
 from penode_gen.model import Model
 
-from ..measured import Measured
+from ..recordings.measured import Measured
 from .driven import experiment
 from .study import begin, loss
 from .worth import SYSTEMATIC

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.interpolate import CubicSpline
 
-from ..noise import Noise
+from ..recordings.noise import Noise
 
 Array = NDArray[np.float64]
 POLES = (0.0, 0.3, 0.5, 0.7, 0.8, 0.87, 0.92, 0.95, 0.97, 0.985)  # of slow noise, per sample

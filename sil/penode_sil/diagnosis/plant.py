@@ -18,8 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen import fold, laws, mechanics
+from penode_gen import laws
+from penode_gen.algebra import mechanics
 from penode_gen.model import GROUND, Element, Input, Model, Parameter, Signal, State
+from penode_gen.sets import fold
 
 from .compiling import functions
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
-from penode_gen.emit_c import compiled_templates
+from penode_gen.emission.model_c import compiled_templates
 from penode_gen.model import Model
 
 from ..output import whole

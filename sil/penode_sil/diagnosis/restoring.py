@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
-from penode_gen.causalise import CausaliseError
+from penode_gen.algebra.causalise import CausaliseError
 from penode_gen.laws import for_angles
 from penode_gen.model import GROUND, Input, Model, ModelError, Signal
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
-from ..measured import Measured
+from ..recordings.measured import Measured
 
 OUTSIDE = "outside_taxonomy"  # kind of what has no name
 NOTHING = {"scale": 1.0, "gain": 1.0}  # sizes without any effect; 0 for others

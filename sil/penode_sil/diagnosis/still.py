@@ -16,9 +16,9 @@ from penode_gen import units
 from penode_gen.model import Input, Model, Signal
 
 from ..errors import UserError
-from ..measured import Measured
-from ..raster import SHORTEST
-from ..recording import aliases, pick, read
+from ..recordings import aliases, pick, read
+from ..recordings.measured import Measured
+from ..recordings.raster import SHORTEST
 
 Array = NDArray[np.float64]
 Channel = TypeVar("Channel", Signal, Input)

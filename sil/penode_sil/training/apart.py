@@ -17,8 +17,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from penode_gen import expressions as ex
-from penode_gen.causalise import causalise
+from penode_gen.algebra import expressions as ex
+from penode_gen.algebra.causalise import causalise
 from penode_gen.model import Model
 
 from .curve import Curve

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 import penode_gen
 from penode_gen.model import Model
-from penode_gen.network_files import read_network
 from penode_gen.networks import Affine, Network, NetworkError
+from penode_gen.reading.network_files import read_network
 
 from ..errors import UserError
 from .curve import Curve

@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from penode_gen.model import Model
 
 from ..errors import UserError
-from ..measured import Measured
+from ..recordings.measured import Measured
 from .drive import Drive, drive
 from .settings import SETTINGS
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import sympy as sp
 from sympy.printing.c import C99CodePrinter
 
-from penode_gen import expressions as ex
-from penode_gen.causalise import causalise
+from penode_gen.algebra import expressions as ex
+from penode_gen.algebra.causalise import causalise
 from penode_gen.model import Model
 
 

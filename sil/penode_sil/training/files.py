@@ -18,8 +18,8 @@ from penode_gen.model import Model
 
 from ..diagnosis.files import all_or_none
 from ..errors import UserError
-from ..measured import load
 from ..output import whole
+from ..recordings.measured import load
 from . import begin, onnx_file, report, resume, threads
 from .engine import compiler
 from .result import Trained

@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen import sets
 from penode_gen.model import Model
+from penode_gen.sets import packing
 
 from ..batch import Batch
-from ..measured import Measured
+from ..recordings.measured import Measured
 from .data import Noise
 from .port import Port, inputs_of
 from .problem import Point, Problem
@@ -96,5 +96,5 @@ def with_networks(model: Model, networks: dict[str, object], parameters: dict[st
         parameters=model.sets["default"].parameters | {k: v for k, v in parameters.items() if k in model.sets["default"].parameters},
     )
     changed = {n: replace(p, value=parameters[n]) for n, p in model.parameters.items() if n in parameters}
-    digest = sets.digest(replace(model, sets={"default": default}))
+    digest = packing.digest(replace(model, sets={"default": default}))
     return replace(model, sets=model.sets | {"default": default}, parameters=model.parameters | changed, digest=digest)

@@ -20,7 +20,7 @@ _NODES = {"relu": "Relu", "tanh": "Tanh", "sigmoid": "Sigmoid", "softplus": "Sof
 
 
 def model(network: Network, name: str, text: str, properties: Mapping[str, str]) -> onnx.ModelProto:
-    """The network in float; the same layers come back from penode_gen.network_files.read_network."""
+    """The network in float; the same layers come back from penode_gen.reading.network_files.read_network."""
     constants: list[onnx.TensorProto] = []
     nodes: list[onnx.NodeProto] = []
     now = "x"

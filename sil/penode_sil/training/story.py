@@ -15,12 +15,13 @@ import scipy
 from numpy.typing import NDArray
 
 import penode_gen
-from penode_gen import fold, promises, units
+from penode_gen import units
 from penode_gen.model import Model, NetworkPort
 from penode_gen.networks import Network
+from penode_gen.sets import fold, promises
 
 from ..errors import UserError
-from ..measured import Measured
+from ..recordings.measured import Measured
 from . import apart, bands, begin, curves, data, dense, ends, held_starts, heldout, judge, kinks, promised, unfold, unknown
 from .curve import Curve
 from .curves import Tell

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from penode_gen import laws
 from penode_gen.model import Model
-from penode_gen.numeric import along
+from penode_gen.twins.numeric import along
 
 from ..plant import Place
 from . import memory

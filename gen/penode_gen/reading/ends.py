@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What a model file says of mechanisms: bodies that move or turn, points, actuators, and what elements may act between."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Any, Iterable
+
+from .. import model as m, units
+from ..algebra import expressions as ex, sampled
+from ..algebra.mechanics import combination
+from ..laws import LAWS, for_angles
+from .network_tables import UNKNOWN, NetworkTables
+from .places import show
+from .tables import NAME, same
+
+INERTIA = {"mass": ("kg", "z", "v", "m"), "inertia": ("kg*m^2", "phi", "omega", "rad")}  # key: unit, names and unit of the states
+ACTUATORS = {"gain": {"gain": "1"}, "lag": {"time": "s"}}  # laws and the units of their arguments
+LEVER = 'write a point with the lever arm in [points], such as tip = "arm*phi", and let the element act on it'
+
+
+class EndTables(NetworkTables):
+    """Reads [bodies], [points] and [actuators], and the ends of elements."""
+
+    made: dict[str, tuple[str, ...]]  # parameters made from quantities, and where
+    kinds: dict[str, str]  # what elements may act on -> its unit, "m" or "rad"
+
+    def argument(self, where: tuple[str, ...], key: str, text: str, unit: str, new: str, parameters: dict[str, m.Parameter]) -> str:
+        """Name of the parameter that `text` names, or of a new one made from a quantity such as '35 N'."""
+        where = (*where, key)
+        if NAME.fullmatch(text):
+            if text not in parameters:
+                near = difflib.get_close_matches(text, parameters, 1)
+                self.problem(
+                    where,
+                    f"'{text}' is no parameter",
+                    f"did you mean '{near[0]}'?" if near else f"add it to [parameters] or write a quantity in {unit}",
+                )
+            elif not same(parameters[text].unit, unit):
+                self.problem(where, f"'{text}' is in {parameters[text].unit}, needed is {unit}", "use a parameter of that unit")
+            return text
+        value = self.quantity(where, text, unit)
+        if new in parameters:
+            self.problem(where, f"this quantity would become the parameter '{new}', which there is already", f"name that one, or rename it")
+        else:
+            parameters[new] = m.Parameter(new, value, unit, description=f"{key} of {where[1]}")
+            self.made[new] = where
+        return new
+
+    # -- what moves -----------------------------------------------------------------------------------------------
+
+    def bodies(self, parameters: dict[str, m.Parameter]) -> Iterable[m.Body]:
+        for name, entry in self.section("bodies").items():
+            where = ("bodies", name)
+            given = [key for key in INERTIA if key in entry]
+            if len(given) != 1:
+                self.problem(
+                    where,
+                    "has both a mass and an inertia" if given else "'mass' is missing",
+                    "add mass = ... for a body that moves, or inertia = ... for one that turns",
+                )
+                given = given or ["mass"]
+            key = given[0]
+            unit, z, v, length = INERTIA[key]
+            mass = (
+                self.argument(where, key, entry[key], unit, f"{'J' if key == 'inertia' else 'm'}_{name}", parameters)
+                if key in entry
+                else ""
+            )
+            if mass in parameters and parameters[mass].value <= 0.0:
+                self.problem(
+                    where, f"{key} '{entry[key]}' is not above zero", f"give a positive {key}; write a massless point as plain equations"
+                )
+            for part in ("position", "velocity"):
+                if part in entry:
+                    self.name((*where, part), entry[part])
+            start = tuple(
+                self.quantity((*where, part), entry[part], of) if part in entry else 0.0
+                for part, of in (("start_position", length), ("start_velocity", f"{length}/s"))
+            )
+            self.kinds[name] = length
+            yield m.Body(name, mass, entry.get("position", f"{z}_{name}"), entry.get("velocity", f"{v}_{name}"), start, key == "inertia")
+
+    def actuators(
+        self, inputs: tuple[m.Input, ...], parameters: dict[str, m.Parameter], sample_time: float
+    ) -> tuple[list[m.Point], list[m.State], list[m.Equation], list[m.Sampled]]:
+        """Actuated signals: a gain is a combination of its input, a lag is a state with an equation, others work on samples."""
+        of: dict[str, str] = {i.name: i.unit for i in inputs}
+        made_by: dict[str, str] = {}
+        points, states, equations, late = [], [], [], []
+        for name, entry in self.section("actuators").items():
+            where = ("actuators", name)
+            law, source = entry.get("law", ""), entry.get("input", "")
+            if source not in of:
+                if source:
+                    self.problem((*where, "input"), f"'{source}' is no input or earlier actuator", f"known are {', '.join(of) or 'none'}")
+                continue
+            if law in sampled.LAWS:
+                found = sampled.read(where, entry, of[source], made_by.get(source, ""), sample_time, self.problem)
+                late += [found] if found else []
+                of[name], made_by[name] = of[source], law
+                continue
+            if law not in ACTUATORS:
+                if law:
+                    self.problem((*where, "law"), f"law '{law}' is unknown", f"known are {', '.join((*ACTUATORS, *sampled.LAWS))}")
+                continue
+            arguments = {}
+            for key, unit in ACTUATORS[law].items():
+                if key in entry:
+                    arguments[key] = self.argument(where, key, entry[key], unit, f"{name}_{key}", parameters)
+                else:
+                    self.problem(where, f"'{key}' is missing", f"add {key} = ...")
+            for key in sorted({"samples", "gain", "time", *(("start",) if law == "gain" else ())} & set(entry) - set(arguments)):
+                self.problem((*where, key), f"the law '{law}' has no {key}", "remove it")
+            if len(arguments) < len(ACTUATORS[law]):
+                continue
+            of[name], made_by[name] = of[source], law
+            if law == "gain":
+                points.append(m.Point(name, f"{arguments['gain']}*{source}", of[source]))
+            else:
+                value = parameters[arguments["time"]].value if arguments["time"] in parameters else 1.0
+                if value <= 0.0:
+                    self.problem((*where, "time"), "is not above zero", 'give a positive time, or write law = "gain"')
+                start = self.quantity((*where, "start"), entry["start"], of[source]) if "start" in entry else 0.0
+                states.append(m.State(name, of[source], start, f"{source} behind a lag"))
+                equations.append(m.Equation(name, f"der({name})*{arguments['time']} = {source} - {name}"))
+        for name in of:
+            if same(of[name], "m") and of[name] != UNKNOWN or _angle(of[name]):
+                self.kinds[name] = "rad" if _angle(of[name]) else "m"
+        return points, states, equations, late
+
+    def points(
+        self,
+        bodies: tuple[m.Body, ...],
+        inputs: tuple[m.Input, ...],
+        states: Iterable[m.State],
+        earlier: list[m.Point],
+        parameters: dict[str, m.Parameter],
+    ) -> Iterable[m.Point]:
+        """Linear combinations of positions; `earlier`: those that actuators are."""
+        unit_of = {p.name: p.unit for p in parameters.values()} | {i.name: i.unit for i in (*inputs, *states, *earlier)}
+        unit_of |= {b.position: b.unit for b in bodies if b.position}
+        moving = {name: (ex.symbol(name),) * 2 for name in unit_of if name not in parameters}
+        for name, text in self.entries("points").items():
+            where = ("points", name)
+            self.name(where, name)
+            if not isinstance(text, str):
+                self.problem(where, f"{show(text)} is no text", 'write it as "z - a*theta"')
+                continue
+            try:
+                position = combination(text, moving, set(parameters))[0]
+                dimension = units.dimension_of(position, lambda leaf: units.dimension(unit_of[leaf.name]))
+            except ex.ExpressionError as error:
+                self.problem(where, str(error), 'write positions, inputs and points with parameters as coefficients, such as "z - a*theta"')
+                continue
+            except units.UnitError as error:
+                self.problem(where, str(error), "mend the units: an arm in m times an angle in rad is a length")
+                continue
+            unit = {units.dimension("m"): "m", units.NONE: "rad"}.get(dimension)
+            if unit is None:
+                self.problem(where, f"is measured in {units.describe(dimension)}", "a point is a length or an angle: mend the coefficients")
+                continue
+            self.kinds[name] = unit_of[name] = unit
+            moving[name] = (ex.symbol(name),) * 2
+            yield m.Point(name, text, unit)
+
+    # -- what acts ------------------------------------------------------------------------------------------------
+
+    def ends(self, where: tuple[str, ...], ends: list[Any], inputs: tuple[m.Input, ...]) -> tuple[str, str]:
+        """The two ends of an element."""
+        known = [*self.kinds, m.GROUND]
+        if len(ends) != 2 or not all(isinstance(e, str) for e in ends) or ends[0] == ends[1]:
+            self.problem(where, f"{show(ends)} does not name two different ends", 'write between = ["body", "wheel"]')
+            return m.GROUND, m.GROUND
+        for end in ends:
+            if unfit := next((i for i in inputs if i.name == end and end not in self.kinds), None):
+                if unfit.unit != UNKNOWN:
+                    self.problem(where, f"input '{end}' is in {unfit.unit}, an end needs a position", "use an input in m or rad")
+            elif end not in known:
+                near = difflib.get_close_matches(end, known, 1)
+                self.problem(
+                    where,
+                    f"end {show(end)} is no body, point, input or ground",
+                    f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}",
+                )
+        if {"m", "rad"} == {self.kinds[end] for end in ends if end in self.kinds}:
+            turning = next(end for end in ends if self.kinds[end] == "rad")
+            moves = next(end for end in ends if end != turning)
+            self.problem(where, f"'{turning}' turns and '{moves}' moves along a line", LEVER)
+        return ends[0], ends[1]
+
+    def of_ends(self, ends: tuple[str, str], unit: str) -> str:
+        """A law's unit between these ends."""
+        return for_angles(unit) if any(self.kinds.get(end) == "rad" for end in ends) else unit
+
+    def law_element(
+        self, where: tuple[str, ...], ends: tuple[str, str], law: str, entry: dict[str, Any], parameters: dict[str, m.Parameter]
+    ) -> m.Element:
+        """An element with a named law."""
+        arguments = {
+            key: self.argument(where, key, entry[key], self.of_ends(ends, unit), f"{where[1]}_{key}", parameters)
+            for key, unit in LAWS[law].arguments.items()
+            if key in entry
+        }
+        return m.Element(where[1], ends, law, arguments)
+
+    def law_states(self, elements: Iterable[m.Element]) -> Iterable[m.State]:
+        """The states that the laws of elements bring along."""
+        for e in elements:
+            for name, state in LAWS[e.law].states.items() if e.law in LAWS else ():
+                yield m.State(e.state(name), self.of_ends(e.ends, state.unit), description=f"{name} of {e.name}")
+
+    def network_element(self, name: str, ends: tuple[str, str], entry: dict[str, Any], networks: dict[str, m.NetworkPort]) -> m.Element:
+        where = ("elements", name)
+        network = entry.get("network", "")
+        if network not in networks:
+            if "network" in entry:
+                near = difflib.get_close_matches(network, networks, 1)
+                self.problem(
+                    (*where, "network"),
+                    f"network {show(network)} is not declared",
+                    f"did you mean '{near[0]}'?" if near else "add it to [networks]",
+                )
+            return m.Element(name, ends, "network")
+        port = networks[network]
+        length, force = self.of_ends(ends, "m"), self.of_ends(ends, "N")
+        kinds = {"deflection": length, "rate": f"{length}/s"}
+        takes = () if network in self.unsure else port.input_units
+        inputs = entry.get("inputs")
+        if inputs is None:  # the units say which is meant
+            inputs = [next((k for k, u in kinds.items() if same(u, unit)), "") for unit in takes]
+            for unit in (unit for unit, kind in zip(takes, inputs) if not kind):
+                self.problem(
+                    where,
+                    f"network '{network}' takes {unit or 'a number without unit'}, an element has a deflection in {length} and a rate in {length}/s",
+                    "mend the unit in [networks]",
+                )
+        else:
+            for kind, unit in zip(inputs, takes):
+                if kind not in list(kinds):
+                    self.problem((*where, "inputs"), f"{show(kind)} is neither deflection nor rate", 'write inputs = ["deflection"]')
+                elif not same(kinds[kind], unit):
+                    self.problem(
+                        (*where, "inputs"),
+                        f"the network takes {unit or 'a number without unit'}, but {kind} is in {kinds[kind]}",
+                        "mend the unit in [networks]",
+                    )
+            if takes and len(inputs) != len(takes):
+                self.problem((*where, "inputs"), f"{len(inputs)} inputs for a network of {len(takes)}", "give one for each")
+        if not same(port.output_unit, force):
+            what = "a force" if force == "N" else "a torque"
+            self.problem(where, f"network '{network}' gives {port.output_unit}, an element needs {what}", f"declare its output in {force}")
+        return m.Element(name, ends, "network", network=network, network_inputs=tuple(inputs))
+
+
+def _angle(unit: str) -> bool:
+    """Does a unit measure an angle? Without a dimension alone it might be a share."""
+    try:
+        return units.is_angle(unit)
+    except units.UnitError:
+        return False
