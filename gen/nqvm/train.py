@@ -44,9 +44,9 @@ os.environ["OPENBLAS_CORETYPE"] = "HASWELL"
 
 import argparse
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Callable
 
 import numpy as np
 import onnx

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from pickle import PickleError
-from typing import Callable
 
 import pint
 import sympy as sp
@@ -120,7 +120,7 @@ def dimension_of(expr: sp.Expr, of: Callable[[sp.Basic], Dimension]) -> Dimensio
             total = total * (part if part is not None else NONE)
         return total
     if expr.is_Pow:
-        base, exponent = expr.args
+        _base, exponent = expr.args
         if not exponent.is_number:
             if parts[0] or parts[1]:
                 raise UnitError(f"'{expr}': a power with a variable exponent needs numbers without unit")

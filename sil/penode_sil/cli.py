@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from . import environment  # isort: split
-
 import gc
 import json
 import os
@@ -15,6 +13,7 @@ import click
 
 import penode_gen
 
+from . import environment  # noqa: F401 isort: split
 from .calibration.measure import measure
 from .calibration.serve import serve
 from .calibration.stage import compare, stage

@@ -10,6 +10,7 @@ faster, which counts where pieces are short (a recording has a knot at each samp
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -65,7 +66,7 @@ def _pieces(instance: Instance, duration: float, set_length: int, sample_time: f
     cuts = {0.0, duration} | {time for time, _ in changes} | {time for hold in holds for time in hold} | knots
     edges = sorted(cut for cut in cuts if 0.0 <= cut <= duration)
     pieces = []
-    for begin, end in zip(edges, edges[1:]):
+    for begin, end in itertools.pairwise(edges):
         middle = 0.5 * (begin + end)
         name = [name for time, name in changes if time < middle][-1]
         pieces.append(_Piece(begin, end, name, any(a < middle < b for a, b in holds)))
@@ -157,7 +158,7 @@ def solve(
                 done = reached
                 progress(solver.t)
         x = solver.y
-    return Trajectory(rows_x, rows_y, rows_z, tuple(int(round(e.time / model.sample_time)) + 1 for e in instance.exchanges))
+    return Trajectory(rows_x, rows_y, rows_z, tuple(round(e.time / model.sample_time) + 1 for e in instance.exchanges))
 
 
 def run(

@@ -337,7 +337,7 @@ def load(path: Path, model: Any, set_length: int) -> Scenario:
 
 def sample_times(scenario: Scenario, sample_time: float) -> NDArray[np.float64]:
     """The raster 0, h, 2h, ... up to the duration [s]."""
-    return np.arange(int(round(scenario.duration / sample_time)) + 1) * sample_time
+    return np.arange(round(scenario.duration / sample_time) + 1) * sample_time
 
 
 def sampled(scenario: Scenario, model: Any, times: NDArray[np.float64]) -> NDArray[np.float64]:

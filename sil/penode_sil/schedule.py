@@ -36,7 +36,7 @@ class Call:
 
 def exchange_calls(model: Any, exchange: Exchange, dtype: type) -> list[Call]:
     """The calls of one exchange. The last of them stands between the sample of its time and the next one."""
-    last = int(round(exchange.time / model.sample_time)) + 1
+    last = round(exchange.time / model.sample_time) + 1
     if exchange.how == "rollback":
         return [Call(last, "rollback")]
     if exchange.how == "select":

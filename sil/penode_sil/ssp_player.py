@@ -39,7 +39,7 @@ def play(path: Path, record: Path | None, tell: Any = lambda line: None) -> list
     if stop is None:
         raise UserError(f"{path}: it has no stop time; give inputs with --input")
     with _component(path, system, tell) as fmu:
-        steps = int(round(stop / fmu.step_size))
+        steps = round(stop / fmu.step_size)
         rows = _run(path, system, fmu, table, steps)
     times = np.arange(steps + 1) * fmu.step_size
     names = [*system.inputs, *system.outputs]

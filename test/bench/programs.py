@@ -228,9 +228,7 @@ def _frame(start: int, functions: dict[int, list[cortex_m4.Instruction]]) -> tup
         where = f"{at.address:#x}: {at.text}"
         if at.name in ("push", "vpush") or (at.name.startswith(("stm", "vstm")) and " sp!" in at.text):
             taken += 4 * at.count
-        elif m := re.search(r"\[sp, #-(\d+)\]!", at.text):
-            taken += int(m[1])
-        elif m := re.match(r"subw?(?:\.\w)? sp, (?:sp, )?#(\d+)$", at.text):
+        elif (m := re.search(r"\[sp, #-(\d+)\]!", at.text)) or (m := re.match(r"subw?(?:\.\w)? sp, (?:sp, )?#(\d+)$", at.text)):
             taken += int(m[1])
         elif re.match(r"(sub|mov)\S* sp,|add\S* sp, (?!sp, #|#)", at.text):
             raise ValueError(f"{where}: a frame of variable size")

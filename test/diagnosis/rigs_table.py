@@ -50,7 +50,7 @@ def moves(model: Path) -> bool:
     """Whether a model file, or one that it extends, has bodies."""
     text = tomllib.loads(model.read_text())
     base = text.get("model", {}).get("extends")
-    return "bodies" in text or base is not None and moves(model.parent / base)
+    return "bodies" in text or (base is not None and moves(model.parent / base))
 
 
 def predicted(command: str, model: Path, recording: Path, rig: dict) -> float | None:

@@ -36,8 +36,8 @@ def test_a_watched_number_is_the_number(limit):
 
 
 def test_comparisons_are_noted_both_ways_and_with_what_a_threshold_is_multiplied_into(limit):
-    assert 0.6 > limit
-    assert not 0.9 > 2.0 * limit
+    assert limit < 0.6
+    assert not 2.0 * limit < 0.9
     assert np.float64(0.6) > limit
     assert outcomes() == [2, 1]
 
@@ -87,7 +87,7 @@ def test_only_cases_that_a_threshold_decides_are_run_without_it(tmp_path, monkey
 
     def run(campaign, cases, off):
         calls.append((campaign, list(cases), json.loads(off.read_text()) if off else None))
-        return {case: off is None for case in cases}
+        return dict.fromkeys(cases, off is None)
 
     monkeypatch.setattr(ablate, "run", run)
     assert ablate.switched_off("a.ONCE", ablate.read([notes]), {"worlds_campaign.py": ["1:1"]}).startswith(

@@ -12,7 +12,7 @@ from hidden import cases, effects, energy, plants, roads
 from hidden.bench import NOTHING, Bench, Drive
 from hidden.cases import KINDS
 from hidden.effects import FORMS, OUTSIDE, Change
-from hidden.solver import GROUND, KNOT_RATE, MOTION, RATE, Kind, Law, World, knots, simulate
+from hidden.solver import GROUND, MOTION, RATE, Kind, Law, World, knots, simulate
 from scipy import signal as dsp
 from scipy.integrate import solve_ivp
 
@@ -309,7 +309,7 @@ def test_truth_is_what_can_be_read_from_a_loop(name):
 
 def test_maxwell_branch_has_the_complex_stiffness_of_its_truth():
     """At 1 Hz, k j w tau / (1 + j w tau)."""
-    s, v, force, truth = measured_loop("one_branch", 0.3)
+    s, _v, force, truth = measured_loop("one_branch", 0.3)
     turn = 2j * np.pi * truth["relaxation_time"]
     wave = np.exp(-2j * np.pi * np.arange(len(s)) / RATE)
     assert (force @ wave) / (s @ wave) == pytest.approx(truth["stiffness"] * turn / (1 + turn), rel=1e-3)
@@ -342,7 +342,7 @@ def test_absorber_has_the_frequency_of_its_truth():
 
 @pytest.mark.parametrize("name", [f.name for f in FORMS if f.kind == "coulomb_friction"])
 def test_friction_level_at_high_rate_is_the_stated_force(name):
-    s, v, force, truth = measured_loop(name, 0.2)
+    _s, v, force, truth = measured_loop(name, 0.2)
     fast = np.abs(v) > 0.97 * np.abs(v).max()
     assert np.mean((force * np.sign(v))[fast]) == pytest.approx(
         truth["force"], rel=0.01
@@ -351,7 +351,7 @@ def test_friction_level_at_high_rate_is_the_stated_force(name):
 
 @pytest.mark.parametrize("name", ["linear_stop", "power_stop", "progressive_rubber", "hertz_stop"])
 def test_stop_acts_beyond_its_gap_only(name):
-    s, v, force, truth = measured_loop(name, 3.0)
+    s, _v, force, truth = measured_loop(name, 3.0)
     touched = np.abs(force) > 0.002 * np.abs(force).max()  # the table rounds the corner by less
     assert np.abs(s[touched]).min() == pytest.approx(truth["gap"], rel=0.15)  # depth 0.002^(1/2.5) = 8 % of at most 1.5 gaps
     assert touched.any() and (np.sign(force[touched]) == np.sign(s[touched])).all(), "it pushes back"
@@ -359,7 +359,7 @@ def test_stop_acts_beyond_its_gap_only(name):
 
 @pytest.mark.parametrize("name", ["dead_band", "off_centre"])
 def test_total_spring_force_is_flat_over_the_whole_play(name):
-    s, v, force, truth = measured_loop(name, 0.3)
+    s, _v, force, truth = measured_loop(name, 0.3)
     total = force + RIG["c"] * s
     flat = np.abs(np.gradient(total)) < 0.5 * RIG["c"] * np.abs(np.gradient(s))
     assert np.ptp(s[flat]) == pytest.approx(truth["gap"], rel=0.02)

@@ -246,7 +246,7 @@ class Block:
         subscripts = list(self._many(parts[1].children, scope))
         self._want(len(subscripts) == len(of.shape), tree, f"{label} has {len(of.shape)} dimensions")
         for (_, at), size in zip(subscripts, of.shape):
-            inside = at.span is not None and 1 <= at.span[0] and at.span[1] <= size
+            inside = at.span is not None and at.span[0] >= 1 and at.span[1] <= size
             self._want(inside, tree, f"a subscript of {label} is not known to lie in 1 .. {size}")
         return f"{text}[{', '.join(f'{i} - 1' for i, _ in subscripts)}]", Of(of.kind)
 

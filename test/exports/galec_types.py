@@ -76,7 +76,7 @@ REAL, BOOLEAN, INTEGER = Of("Real"), Of("Boolean"), Of("Integer")
 # Built-in functions: types of the arguments, and of the result. A shape of -1 stands for any length.
 _ANY = {1: Of("Real", (-1,)), 2: Of("Real", (-1, -1))}
 BUILT_IN: dict[str, tuple[tuple[Of, ...], Of]] = {
-    **{n: ((REAL,), REAL) for n in ("absolute", "sign", "sqrt", "exp", "ln", "sin", "cos", "atan", "tanh")},
+    **dict.fromkeys(("absolute", "sign", "sqrt", "exp", "ln", "sin", "cos", "atan", "tanh"), ((REAL,), REAL)),
     "min": ((REAL, REAL), REAL),
     "max": ((REAL, REAL), REAL),
     "isNaN": ((REAL,), BOOLEAN),

@@ -268,7 +268,7 @@ def test_schemas_of_a_folder(efmu: dict[str, bytes], tmp_path: Path) -> None:
     ],
 )
 def test_what_has_no_form_is_one_line(nqvm: Any, tmp_path: Path, change: str, line: str) -> None:
-    head = '[model]\nextends = "{}"\nname = "other"\n'.format(nqvm.path)
+    head = f'[model]\nextends = "{nqvm.path}"\nname = "other"\n'
     path, output = tmp_path / "m.toml", tmp_path / "m.fmu"
     path.write_text(change.replace("[model]\n", head) if "[model]" in change else head + change)
     done = CliRunner().invoke(cli, ["export", str(path), "--format", "efmu", "-o", str(output)])

@@ -45,7 +45,7 @@ def test_the_page_for_fmpy(nqvm: Any, tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.chdir(tmp_path)
     space: dict[str, Any] = {}
     for block in blocks(page, "python"):
-        exec(block, space)  # noqa: S102 - our own page
+        exec(block, space)
     assert space["result"]["set_id"][-1] == penode_gen.set_head(nqvm, "altered_friction")[2] and "body height" in capsys.readouterr().out
     assert space["result"]["z_b"][0] == np.float32(0.02) and len(space["result"]) > 100
     assert space["set_id"] == 1000 and 0.001 < space["z_b"] < 0.03  # a road of 0.01 m

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import subprocess
@@ -27,7 +28,7 @@ def write_model(folder: Path) -> Path:
             "weights": (rng.standard_normal((n_out, n_in)) / 16).tolist(),
             "bias": [0.0] * n_out,
         }
-        for n_in, n_out in zip(widths, widths[1:])
+        for n_in, n_out in itertools.pairwise(widths)
     ]
     (folder / "big.json").write_text(json.dumps({"layers": layers}))
     (folder / "big.toml").write_text(lag("big", "big.json"))

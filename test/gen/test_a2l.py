@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import re
 import shutil
 import struct
@@ -74,7 +75,7 @@ def test_blocks_are_the_weights_of_the_file(rich: tuple[penode_gen.Model, dict],
                 weights = np.vstack([weights, found.reshape(entry.sizes[1], entry.sizes[0]).T])  # the first size is the fastest
         assert (weights == np.array(layer["weights"], np.float32)).all()
         total += weights.size
-    assert total == sum(a * b for a, b in zip(SIZES, SIZES[1:]))
+    assert total == sum(a * b for a, b in itertools.pairwise(SIZES))
     mass = a2l.characteristics["m"]
     assert (mass.sizes, mass.unit) == ((), "kg") and np.frombuffer(in_elf(program, mass.address, 4), "<f4")[0] == 2.0
     names = {f"n2.weights_1.rows_{rows}" for rows in ("0_15", "16_19", "20_20", "21_21")}

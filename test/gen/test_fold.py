@@ -200,7 +200,7 @@ def test_random_networks(tmp_path, seed, show):
     draw = np.random.default_rng(seed)
     sizes = [1, *draw.integers(1, 24, draw.integers(1, 4)), 1]
     layers: list[Affine | Dense] = []
-    for m, n in zip(sizes, sizes[1:]):
+    for m, n in itertools.pairwise(sizes):
         weights = draw.standard_normal((n, m)) * 10.0 ** draw.uniform(-1.5, 0.5, (n, 1))
         bias = draw.standard_normal(n)
         if n > 2 and seed % 3 == 0:

@@ -63,7 +63,7 @@ def difference(function, at, index):
 
 
 # Differences: third derivatives (about 1e3) * 1e-10 / 6, and rounding 2^-53 of values of 1e3 (rates of 0.1 m in 5 ms) over 1e-5.
-TOLERANCE = dict(rtol=1e-6, atol=2e-7)
+TOLERANCE = {"rtol": 1e-6, "atol": 2e-7}
 
 
 def test_derivatives_of_the_sensors(kind):
@@ -301,7 +301,7 @@ def test_inf_is_held_whatever_a_range_says(tmp_path, what):
         instance, twin = sil.instance(), sil.instance()
         for row in u[:5]:
             instance.step(row), twin.step(row)
-        x, y, status = instance.step(bad)
+        x, _y, status = instance.step(bad)
         assert status & BIT["input_nonfinite"] and x.tobytes() == twin.get_state().tobytes() and np.array_equal(instance.get_input(), u[4])
         for row in u[5:]:
             for a, b in zip(instance.step(row), twin.step(row)):

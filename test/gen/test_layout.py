@@ -97,7 +97,7 @@ def case(request, tmp_path):
 
 def test_gather_gives_back_what_the_files_hold(case):
     """The arrays come from the network's own file: nothing here knows how sets are streamed."""
-    sizes, model, data = case
+    _sizes, model, data = case
     for name, shift in (("default", 0.25), ("other", 0.5)):
         values = penode_gen.set_values(model, name, np.float64)
         want = expected(data[name], shift)

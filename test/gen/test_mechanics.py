@@ -88,7 +88,7 @@ def load(tmp_path):
 
 def car_rates(x: np.ndarray, road: float, steer: float) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations [heave, pitch, wheel, shaft] and forces of CAR, by hand: each force with its lever arm."""
-    z, theta, z_w, phi, v, omega, v_w, omega_s = x
+    z, theta, z_w, phi, v, omega, _v_w, omega_s = x
     a, b, ratio = 1.2, 1.5, 3.0
     s_tie = z_w - (z + 0.5 * (b - a) * theta)
     v_rear, v_out, s_out = v + b * omega, ratio * omega_s - omega, ratio * phi - theta

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+import itertools
 import json
-import os
 import re
 import sys
 from pathlib import Path
@@ -357,7 +357,7 @@ FAULTS = [
 
 def network_json(path: Path, sizes: list[int], bias: float = 0.0) -> None:
     """A network that gives its bias."""
-    layers = [{"activation": "relu", "weights": [[0.0] * m] * n, "bias": [0.0] * n} for m, n in zip(sizes, sizes[1:])]
+    layers = [{"activation": "relu", "weights": [[0.0] * m] * n, "bias": [0.0] * n} for m, n in itertools.pairwise(sizes)]
     layers[-1]["bias"] = [bias] * sizes[-1]
     path.write_text(json.dumps({"layers": layers, "trained_range": {"min": [-1.0] * sizes[0], "max": [1.0] * sizes[0]}}))
 

@@ -156,7 +156,7 @@ def test_pieces_are_the_exact_ones():
         assert found[0].start is None and found[-1].end is None
         assert (found[0].slope, found[-1].slope) == (line.slopes[0], line.slopes[-1])
         places = sorted({Fraction(0), *line.places, *(p.start for p in found[1:])})
-        for x in places + [places[0] - 1, places[-1] + 1]:
+        for x in [*places, places[0] - 1, places[-1] + 1]:
             here = next(p for p in found if (p.start is None or p.start <= x) and (p.end is None or x <= p.end))
             at = min(max(x, line.places[0]), line.places[-1])
             i = max(k for k, place in enumerate(line.places) if place <= at)

@@ -240,7 +240,7 @@ def test_reference_means_what_the_file_says(tmp_path, name):
     numeric = penode_gen.numeric(model, case.chosen)
     for x, u, r in points(case, model, 50):
         # a few dozen operations, each within 1.1e-16, and sums that lose two digits to cancellation
-        close = dict(rtol=1e-12, atol=1e-12)
+        close = {"rtol": 1e-12, "atol": 1e-12}
         for found, expected in ((numeric.rates, case.rates), (numeric.outputs, case.outputs), (numeric.sensors, case.sensors)):
             np.testing.assert_allclose(found(x, u, r), expected(x, u, r), **close)
 

@@ -65,8 +65,8 @@ def test_a_set_that_breaks_a_promise_is_refused_and_says_where(pieces, tmp_path)
     select, breach = sil.function("tune_select"), Breach()
     limit = 130000.0
     factor = 1.05 * limit / steepest(sil)
-    bad, kept = steeper(sil, factor)
-    good, kept_too = steeper(sil, 0.9 * limit / steepest(sil))
+    bad, _kept = steeper(sil, factor)
+    good, _kept_too = steeper(sil, 0.9 * limit / steepest(sil))
     before = [instance.step([0.01])[2] for _ in range(3)]
     assert select(instance._self, ctypes.byref(bad)) == BIT["set_promise"]
     assert sil.function("tune_breach")(instance._self, ctypes.byref(breach)) == 0
@@ -89,8 +89,8 @@ def test_networks_that_keep_their_promises_do_not_hide_the_breach_of_another(tmp
     )
     sil = Sil(penode_gen.load(path))
     instance, breach = sil.instance(), Breach()
-    bad, kept = steeper(sil, 10.0)
-    good, kept_too = steeper(sil, 1.0)
+    bad, _kept = steeper(sil, 10.0)
+    good, _kept_too = steeper(sil, 1.0)
     for chosen, status in ((bad, BIT["set_promise"]), (good, 0)):
         assert sil.function("tune_select")(instance._self, ctypes.byref(chosen)) == status
         assert sil.function("tune_breach")(instance._self, ctypes.byref(breach)) == 0
@@ -100,7 +100,7 @@ def test_networks_that_keep_their_promises_do_not_hide_the_breach_of_another(tmp
 def test_init_refuses_it_as_well(tmp_path):
     sil = Sil(model(tmp_path, 0))
     instance = sil.instance()
-    bad, kept = steeper(sil, 10.0)
+    bad, _kept = steeper(sil, 10.0)
     assert sil.function("init")(instance._self, ctypes.byref(bad), None) == BIT["set_promise"]
     assert sil.function("step")(instance._self, None, None) == BIT["badarg"]  # not initialised
 
@@ -113,5 +113,5 @@ def test_a_model_that_does_not_look_is_found(tmp_path):
     assert times == 1
     (tmp_path / "c" / "promised.c").write_text(source)
     sil = Sil(chosen, source=tmp_path / "c", compiler=("gcc", "-O2", "-Wno-unused"))
-    bad, kept = steeper(sil, 10.0)
+    bad, _kept = steeper(sil, 10.0)
     assert sil.function("tune_select")(sil.instance()._self, ctypes.byref(bad)) == 0

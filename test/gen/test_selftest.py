@@ -171,7 +171,7 @@ def test_input_stays_in_its_range_and_reaches_the_envelope(monkeypatch):
     context = _Emitter(model).context()
     chosen = selftest.model_context(context)["levels"]
     low, step = (float(chosen[0][k].removesuffix("F")) for k in ("low", "step"))
-    assert -0.3 <= low and low + 255 * step <= 0.3
+    assert low >= -0.3 and low + 255 * step <= 0.3
     machine, number, rates = Evaluator(context, np.float32), 1, []
     start = machine.x
     for level in range(selftest.LEVELS):

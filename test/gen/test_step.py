@@ -64,7 +64,7 @@ def test_order_of_convergence(tmp_path, method, input, show):
             atol=1e-14,
         ).y[:, -1]
         errors.append(np.max(np.abs(run.x[-1] - exact)))
-    orders = [math.log2(a / b) for a, b in zip(errors, errors[1:])]
+    orders = [math.log2(a / b) for a, b in itertools.pairwise(errors)]
     show(f"{method}, input {input}: error {errors[-1]:.1e} at 1 ms, order {orders[0]:.2f}, {orders[1]:.2f}")
     # the leading error term dominates by about h/tau = 1 ms / 50 ms; what is left moves the slope by that share
     assert abs(orders[-1] - ORDERS[method]) < 0.1
@@ -107,9 +107,9 @@ def test_rate_of_an_input_at_a_sample(tmp_path, input, order, share):
 def flatten(jacobian: np.ndarray, n_x: int, n_u: int, n_y: int, moving: int) -> dict[str, np.ndarray]:
     """The parts of the jacobian struct by name; `moving`: how many inputs before this one the outputs depend on themselves."""
     shapes = {"x_x": (n_x, n_x), "x_u_before": (n_x, n_u), "x_u": (n_x, n_u)}
-    shapes |= {name: (n_x, n_u) for name in ("x_u_earlier", "x_u_earliest")[: max(moving - 1, 0)]}
+    shapes |= dict.fromkeys(("x_u_earlier", "x_u_earliest")[: max(moving - 1, 0)], (n_x, n_u))
     shapes |= {"y_x": (n_y, n_x), "y_u": (n_y, n_u)}
-    shapes |= {name: (n_y, n_u) for name in ("y_u_before", "y_u_earlier", "y_u_earliest")[:moving]}
+    shapes |= dict.fromkeys(("y_u_before", "y_u_earlier", "y_u_earliest")[:moving], (n_y, n_u))
     parts, at = {}, 0
     for name, (rows, columns) in shapes.items():
         parts[name] = jacobian[at : at + rows * columns].reshape(rows, columns)
@@ -154,7 +154,7 @@ def test_step_jacobian_against_differences(tmp_path, method, input, outside):
         assert np.array_equal(instance.get_state(), plain[:n_x]) and np.array_equal(y, plain[n_x:])  # to the bit
         j = flatten(found, n_x, n_u, n_y, moving)
         # differences: third derivative (about 1e3) * 1e-10 / 6 + rounding 1e-16 / 1e-5 * values of 1e2; relative 1e-6
-        tolerance = dict(rtol=1e-6, atol=2e-7)
+        tolerance = {"rtol": 1e-6, "atol": 2e-7}
         for i in range(n_x):
             column = difference(lambda v: step(v, *past), x, i)
             np.testing.assert_allclose(j["x_x"][:, i], column[:n_x], **tolerance)

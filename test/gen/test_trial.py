@@ -69,7 +69,7 @@ def test_a_set_that_overflows_is_refused_and_the_running_one_goes_on(sil):
     """The spring's output times 1e36: finite weights, a good checksum, and Inf within a few samples."""
     instance, twin = sil.instance(), sil.instance()
     drive(instance, 0, 60), drive(twin, 0, 60)
-    bad, kept = changed(sil, **{f"_{FACTOR}": 1e30})
+    bad, _kept = changed(sil, **{f"_{FACTOR}": 1e30})
     assert select(instance, bad) == BIT["set_trial"]
     assert instance.status().flags & BIT["set_trial"]
     assert drive(instance, 60, 50) == drive(twin, 60, 50)
@@ -99,13 +99,13 @@ def test_a_set_that_leads_too_far_from_the_running_one_is_refused(tmp_path):
     for bound, expected in ((0.9 * distance, BIT["set_trial"]), (1.1 * distance, 0)):
         instance = Sil(model(tmp_path, bound=f"{bound:.9g}")).instance()
         drive(instance, 0, 60)
-        own, kept = changed(instance.sil, **{f"_{FACTOR}": 8.0})
+        own, _kept = changed(instance.sil, **{f"_{FACTOR}": 8.0})
         assert select(instance, own) == expected
 
 
 def test_without_samples_there_is_nothing_to_try_on(sil):
     instance = sil.instance()
-    bad, kept = changed(sil, **{f"_{FACTOR}": 1e30})
+    bad, _kept = changed(sil, **{f"_{FACTOR}": 1e30})
     assert select(instance, bad) == 0
 
 
@@ -127,7 +127,7 @@ def test_only_samples_without_a_gap_count(sil):
     """A held sample ends the row of samples: what the set does to older ones does not count."""
     instance = sil.instance()
     drive(instance, 0, 60)
-    bad, kept = changed(sil, **{f"_{FACTOR}": 1e30})
+    bad, _kept = changed(sil, **{f"_{FACTOR}": 1e30})
     assert instance.step([np.nan])[2] & BIT["input_nonfinite"]
     assert select(instance, bad) == 0
 
@@ -135,7 +135,7 @@ def test_only_samples_without_a_gap_count(sil):
 def test_rollback_is_not_tried(sil):
     """It leads to a set that has run, and may be all that is left to do."""
     instance = sil.instance()
-    bad, kept = changed(sil, **{f"_{FACTOR}": 1e30})
+    bad, _kept = changed(sil, **{f"_{FACTOR}": 1e30})
     assert select(instance, bad) == 0
     instance.step([0.0])
     instance.step([0.0])
@@ -171,7 +171,7 @@ def answers(folder, fault):
         sil = Sil(chosen, source=code)
         instance = sil.instance()
         drive(instance, 0, 60)
-        bad, kept = changed(sil, **{f"_{FACTOR}": factor})
+        bad, _kept = changed(sil, **{f"_{FACTOR}": factor})
         found.append(select(instance, bad))
     return found
 

@@ -99,7 +99,7 @@ VERIFY_FAULTS = {
 
 def loaded(name: str) -> penode_gen.Model:
     """A model of gen/ or of small/, or one of these that holds or rolls back."""
-    folder, _, file = name.rpartition("/")
+    _folder, _, file = name.rpartition("/")
     if file in ("small_hold", "small_layers_rollback"):
         base, _, reaction = file.rpartition("_")
         model = penode_gen.load(gate.HERE / "small" / f"{base}.toml")

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 from fractions import Fraction
 
 import numpy as np
@@ -14,7 +15,7 @@ DECREASING = 0x2
 
 def _plain(draw: np.random.Generator, sizes: list[int]) -> list[tuple[np.ndarray, np.ndarray]]:
     layers = []
-    for m, n in zip(sizes, sizes[1:]):
+    for m, n in itertools.pairwise(sizes):
         spread = 10.0 ** draw.uniform(-1.5, 0.5, (n, 1))
         layers.append((draw.standard_normal((n, m)) * spread, draw.standard_normal(n) * draw.choice([0.0, 0.1, 1.0])))
     return layers
@@ -125,6 +126,6 @@ def promises(draw: np.random.Generator, made: Net, line: Line) -> list[Promise]:
     found += [Promise(MAX_SLOPE, about(max(map(abs, line.slopes)))), Promise(MAX_SLOPE, about(max(map(abs, line.slopes))))]
     if line.slopes[0] == line.slopes[-1] == 0 or draw.random() < 0.1:
         found += [Promise(MAX_FORCE, about(max(map(abs, line.values)))), Promise(MAX_FORCE, about(max(map(abs, line.values))))]
-    if line.slopes[0] >= 0 and line.slopes[-1] >= 0 or draw.random() < 0.1:
+    if (line.slopes[0] >= 0 and line.slopes[-1] >= 0) or draw.random() < 0.1:
         found += [Promise(DISSIPATIVE), Promise(DISSIPATIVE, about(line.driving()))]
     return found + [Promise(ZERO_AT_ZERO)] * (draw.random() < 0.2)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -244,7 +244,7 @@ class Margins:
         places, clamp = line.places, net.clamp
         self.start = min(places, key=abs)
         self.error = Hull(net, self.start, number, around=False).error
-        middle = [(a + b) / 2 for a, b in zip(places, places[1:])]
+        middle = [(a + b) / 2 for a, b in pairwise(places)]
         size = abs(places[0]) + abs(places[-1]) + 1
         self.outer = () if clamp else (Hull(net, places[0] - size, number), Hull(net, places[-1] + size, number))
         smallest = float(np.finfo(net.real).tiny) / float(np.finfo(net.real).eps)

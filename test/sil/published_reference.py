@@ -54,7 +54,7 @@ def road_of_chirp(t: Array) -> Array:
     The phase turns by at most 2 pi * 16 Hz * 1 ms = 0.1 rad in a piece, so that 6 nodes leave (0.1)^12/12! of it.
     """
     nodes, weights = np.polynomial.legendre.leggauss(6)
-    edges = np.arange(int(round(t[-1] * 1000)) + 1) * 1e-3
+    edges = np.arange(round(t[-1] * 1000) + 1) * 1e-3
     middle = 0.5e-3 * (nodes + 1.0)
     at = edges[:-1, None] + middle
     pieces = 0.15 * np.sin(np.pi / 2 + 2 * np.pi * (at + 0.125 * at * at)) @ weights * 0.5e-3

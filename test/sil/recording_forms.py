@@ -86,7 +86,7 @@ def _named(*units: str) -> list[str]:
 def _two_clocks() -> bytes:
     time = np.arange(COUNT) * STEP
     rows = ["time [s],x_in [m],acc [m/s^2],time [s],turning [rad/s],tau [N*m]"]
-    x, acc, turning, tau = signals(time)
+    x, acc, _turning, _tau = signals(time)
     later = signals(time + 0.5 * STEP)
     rows += [f"{t:.9g},{a:.9g},{b:.9g},{t + 0.5 * STEP:.9g},{c:.9g},{d:.9g}" for t, a, b, c, d in zip(time, x, acc, *later[2:])]
     return "\n".join(rows).encode()

@@ -173,7 +173,7 @@ def test_what_is_wrong_with_one_input_stands_in_a_row(tmp_path):
 
 
 def test_an_input_that_an_actuator_of_the_file_takes_is_left(tmp_path):
-    model, _ = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
+    _model, _ = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
     for own in ('slow = { input = "tau", law = "lag", time = "5 ms" }', 'slow = { input = "tau", law = "delay", samples = 3 }'):
         text = (tmp_path / "model.toml").read_text().replace("[elements]", f"[actuators]\n{own}\n[elements]").replace("-tau", "-slow")
         (tmp_path / "slow.toml").write_text(text)
@@ -183,7 +183,7 @@ def test_an_input_that_an_actuator_of_the_file_takes_is_left(tmp_path):
 
 def test_two_sensors_have_a_limit_each(tmp_path):
     """Forms that are adopted one after the other have names of their own, in any bench the same."""
-    model, (e,) = swing(tmp_path, lambda s, v: 0.0, seconds=2.0)
+    model, (_e,) = swing(tmp_path, lambda s, v: 0.0, seconds=2.0)
     both = replace(model, sensors=(*model.sensors, replace(model.sensors[0], name="again")))
     names = []
     for number, index in enumerate((0, 1)):

@@ -109,7 +109,7 @@ def test_a_frozen_value_is_found_and_a_coarse_one_is_none(quantum):
 
 def test_a_coarse_sensor_that_is_mostly_at_rest_has_none():
     """At rest it says 0 as its model does, in motion one of two values half a quantum away."""
-    x = np.where(T < 0.6 * T[-1], 0.0, 1.0) * MOVE
+    x = np.where(0.6 * T[-1] > T, 0.0, 1.0) * MOVE
     model = np.stack([x, x], axis=1)
     y = np.stack([0.28 * np.round((x + 0.02 * np.random.default_rng(6).normal(size=N)) / 0.28), x], axis=1)
     assert not bursts([recording(y)], [model])[0].any()
@@ -121,7 +121,7 @@ def test_a_coarse_sensor_that_is_mostly_at_rest_has_none():
 def test_a_sensor_that_is_noisier_in_motion_has_none(louder):
     """As one of a coarse converter is: at rest it says the same again and again. Beyond 14 deviations at rest are up to 1 % of all."""
     draw = np.random.default_rng(3)
-    size = np.where(T < 0.6 * T[-1], 1.0, louder)
+    size = np.where(0.6 * T[-1] > T, 1.0, louder)
     y = np.stack([MOVE + 1e-3 * size * draw.normal(size=N), MOVE], axis=1)
     (found,) = bursts([recording(y)], [np.stack([MOVE, MOVE], axis=1)])
     assert not found.any()

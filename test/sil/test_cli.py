@@ -70,7 +70,7 @@ def test_scenario_on_all_targets_agrees(penode, folder):
     ]
     assert exact[:, 1].max() == pytest.approx(10.0)
     header_sil, sil = tables["sil"]
-    assert header_sil == header[:5] + ["plain.status [1]"] + header[5:] + ["changed.status [1]"]
+    assert header_sil == [*header[:5], "plain.status [1]", *header[5:], "changed.status [1]"]
     assert np.array_equal(sil, tables["pil:host"][1])
     z = [(header.index(name), header_sil.index(name)) for name in ("plain.z [mm]", "changed.z [mm]")]
     # a bump of 0.1 s under straight lines of 1 ms: h^2/8 * 0.005 * (2 pi / 0.1)^2 = 2.5e-6 m of the foot

@@ -122,7 +122,7 @@ def test_lines_and_repeats_at_random_make_no_clock(seed):
 
 @pytest.mark.parametrize("lost", [0.05, 0.3])
 def test_samples_that_are_lost_hide_no_clock(lost):
-    instants, samples = slow(7)
+    _instants, samples = slow(7)
     held = np.where(np.random.default_rng(2).random(N) < lost, np.nan, samples[np.arange(N) // 7])
     found = own_samples(TIME, held)
     assert found.how == "held" and found.every == pytest.approx(7.0, rel=1e-3)

@@ -111,7 +111,7 @@ def without(columns: dict[str, np.ndarray], *names: str) -> dict[str, np.ndarray
 def test_a_wrong_unit_or_sign_is_an_error_that_says_which(diagnose, changes, line):
     columns = drive()
     lines = diagnose({name: changes.get(name, 1.0) * values for name, values in columns.items()})
-    assert len(lines) == sum(name != "z_road" for name in changes) or list(changes) == ["z_road"] and len(lines) == 1
+    assert len(lines) == sum(name != "z_road" for name in changes) or (list(changes) == ["z_road"] and len(lines) == 1)
     assert any(line in text for text in lines), lines
 
 

@@ -114,7 +114,7 @@ def test_spikes_are_found(move, noise, quantum):
 
 
 def test_faults_of_several_kinds_are_told_apart():
-    x, draw = measured(random, 0.02, 1e-3)
+    x, _draw = measured(random, 0.02, 1e-3)
     x = np.clip(x, -1.5, 1.5)
     calm = np.flatnonzero(np.abs(x) < 1.0)
     a, b, c = (calm[np.searchsorted(calm, at)] for at in (5000, 9000, 15_000))

@@ -289,7 +289,7 @@ def test_values_come_back_as_written(tmp_path, values):
 
 def test_a_minute_at_2_khz_is_read_in_less_than_a_second(tmp_path):
     draw = np.random.default_rng(1).normal(size=(120_001, 5))
-    rows = "".join("%.4f,%.9g,%.9g,%.9g,%.9g,%.9g\n" % (5e-4 * k, *row) for k, row in enumerate(draw.tolist()))
+    rows = "".join("{:.4f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n".format(5e-4 * k, *row) for k, row in enumerate(draw.tolist()))
     path = write(tmp_path, "time [s]," + ",".join(f"c{k} [m]" for k in range(5)) + "\n" + rows)
     spent = []
     for _ in range(3):

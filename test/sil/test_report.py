@@ -228,7 +228,7 @@ def test_values_can_be_read_back_from_paths(found):
         n = [int(k) for k in re.findall(r"-?\d+", part)]
         x += list(np.cumsum([n[0], *n[2::2]]))
         y += list(np.cumsum([n[1], *n[3::2]]))
-    factor = f.y.unit.startswith("µ") and 1e6 or f.y.unit == "mm" and 1e3 or 1.0
+    factor = (f.y.unit.startswith("µ") and 1e6) or (f.y.unit == "mm" and 1e3) or 1.0
     low, high = f.y.low, f.y.high
     assert np.allclose(np.array(x) / fig.WIDE * f.x.high, c.time, atol=0.51 / fig.WIDE * f.x.high)
     assert np.allclose(high - np.array(y) / fig.HIGH * (high - low), factor * c.before.values, atol=0.51 / fig.HIGH * (high - low))
@@ -381,7 +381,7 @@ def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path, monkeypatch):
         place["after_rms"] < place["before_rms"]
         and written["residual"]["signals"][0]["after_rms"] <= written["residual"]["signals"][0]["before_rms"]
     )
-    assert SAMPLES * STEP == pytest.approx(written["data"][0]["seconds"], abs=2 * STEP)
+    assert pytest.approx(written["data"][0]["seconds"], abs=2 * STEP) == SAMPLES * STEP
 
 
 def test_price_is_compiled_once(model, monkeypatch, extended):

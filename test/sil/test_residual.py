@@ -164,7 +164,7 @@ def test_channels_say_where_and_how_much(stiff):
         assert s["whiteness"]["before"]["p_value"] < 1e-6 and "after" not in s["whiteness"]
         total = np.sqrt(np.mean([p["before"] ** 2 for p in s["time"]]))  # stretches are equal to a sample of 100
         assert total == pytest.approx(s["before_rms"], rel=0.01)
-    assert len(e.time) > 0.99 * SAMPLES and STEP == pytest.approx(e.step)
+    assert len(e.time) > 0.99 * SAMPLES and pytest.approx(e.step) == STEP
 
 
 def test_bad_samples_change_no_level():

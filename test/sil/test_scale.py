@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import subprocess
@@ -47,7 +48,7 @@ def wide(folder: Path, sizes: list[int], activation: str = "relu", seed: int = 1
             "weights": (draw.standard_normal((n, m)) / m**0.5).tolist(),
             "bias": draw.standard_normal(n).tolist(),
         }
-        for m, n in zip(sizes, sizes[1:])
+        for m, n in itertools.pairwise(sizes)
     ]
     folder.mkdir(exist_ok=True)
     (folder / "net.json").write_text(json.dumps({"layers": layers}))
@@ -85,7 +86,7 @@ def text(model: penode_gen.Model, folder: Path) -> int:
 
 def work(sizes: list[int]) -> tuple[int, int]:
     """Multiply-adds and neurons."""
-    return sum(m * n for m, n in zip(sizes, sizes[1:])), sum(sizes[1:])
+    return sum(m * n for m, n in itertools.pairwise(sizes)), sum(sizes[1:])
 
 
 SIZES = [

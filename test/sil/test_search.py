@@ -117,7 +117,7 @@ def test_a_fit_that_failed_begins_with_another_law():
 @pytest.mark.parametrize("deviations, left", [((30.0, 1.0), ["m_b"]), ((30.0, 20.0), []), ((1.0, 2.0), ["c_t", "m_b"])])
 def test_a_parameter_that_another_one_does_without_goes(deviations, left):
     """Two wrong parameters, so many deviations off their nominal values: 7.7 are worth a cause."""
-    assert (NEW + 10.0) ** 0.5 == pytest.approx(7.7, abs=0.1)
+    assert pytest.approx(7.7, abs=0.1) == (NEW + 10.0) ** 0.5
     names = ("m_b", "c_t")
     terms = tuple(Term(Candidate("wrong_parameter", name, 0, False, name), 0.0) for name in names)
     free = [SimpleNamespace(target=name, value=100.0 + d, unit=1.0) for name, d in zip(names, deviations)]

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -78,7 +79,7 @@ def test_road_has_the_spectrum_of_its_class():
 def test_each_class_is_twice_as_high_as_the_one_before():
     t = np.linspace(0.0, 5.0, 100)
     heights = [Road(ROAD_CLASSES[name], 10.0, 1, 0.5).value(t) for name in "ABCD"]  # Gd(n0) grows fourfold
-    for lower, higher in zip(heights, heights[1:]):
+    for lower, higher in itertools.pairwise(heights):
         assert np.allclose(higher, 2.0 * lower, rtol=1e-14, atol=0.0)
 
 

@@ -9,7 +9,7 @@ import json
 import numpy as np
 import pytest
 from conftest import HERE
-from test_cli import MODEL, table
+from test_cli import table
 
 import penode_gen
 from penode_sil import replay, starts

@@ -21,6 +21,8 @@ import penode_gen
 BENCH = Path(__file__).resolve().parents[1] / "bench"
 sys.path.insert(0, str(BENCH))
 
+import itertools
+
 import bench  # needs the path above
 import cortex_m4
 import figures
@@ -66,7 +68,7 @@ def test_cycles(code: str, low: tuple[int, ...], high: tuple[int, ...], tmp_path
     elf = assembled(f".syntax unified\n.thumb\n.fpu fpv4-sp-d16\n.global f\n.thumb_func\nf:\n{code}\n", tmp_path)
     instructions = cortex_m4.disassemble(elf)
     first = cortex_m4.base(instructions[0])
-    cost = [first, *(cortex_m4.after(*pair) for pair in zip(instructions, instructions[1:], strict=False))]
+    cost = [first, *(cortex_m4.after(*pair) for pair in itertools.pairwise(instructions))]
     assert [c[0] for c in cost if c] == list(low)
     assert [c[1] for c in cost if c] == list(high)
 

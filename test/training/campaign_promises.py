@@ -104,7 +104,7 @@ def kinks_of(net: Exact) -> list[Fraction]:
         for a, b, (left, under), (right, over) in zip(ends, ends[1:], values, values[1:]):
             for u, v in zip(left, right):
                 u, v = u * over, v * under  # over the same denominator
-                if u == v or (u > 0) == (v > 0) and u and v and a != ends[0] and b != ends[-1]:
+                if u == v or ((u > 0) == (v > 0) and u and v and a != ends[0] and b != ends[-1]):
                     continue
                 at = a - (b - a) * Fraction(u, v - u)
                 if a <= at <= b or (a == ends[0] and at < a) or (b == ends[-1] and at > b):
@@ -120,7 +120,7 @@ def breaks(given: Promises, network: Network) -> bool:
     places = [kinks[0] - 1, *kinks, kinks[-1] + 1]
     values = [net.value(x) for x in places]
     slopes = [(b - a) / (y - x) for x, y, a, b in zip(places, places[1:], values, values[1:])]
-    wrong = given.increasing and min(slopes) < 0 or given.decreasing and max(slopes) > 0
+    wrong = (given.increasing and min(slopes) < 0) or (given.decreasing and max(slopes) > 0)
     wrong |= given.max_slope is not None and max(map(abs, slopes)) > Fraction(given.max_slope)
     wrong |= given.zero_at_zero and net.value(Fraction(0)) != 0
     if given.dissipative is not None:

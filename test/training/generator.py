@@ -118,8 +118,8 @@ class Made:
 
 def make(truth: Truth, seed: int, noise: float = 1.0, speed: float = 5.0, seconds: float = 42.0) -> Made:
     """A recording."""
-    every = int(round(1e-3 / (2.0 * FINE)))
-    n = int(round((LEAD + seconds) * 1000.0))
+    every = round(1e-3 / (2.0 * FINE))
+    n = round((LEAD + seconds) * 1000.0)
     height, rate = road(seed, speed, n * 1e-3)
     y = np.zeros((n, 4))
     _library().measure(ctypes.byref(_filled(truth)), height.ctypes.data, rate.ctypes.data, n, every, 2.0 * FINE, y.ctypes.data)

@@ -14,7 +14,7 @@ import penode_gen
 from penode_gen.model import Promises
 from penode_gen.reading.untrained import untrained
 from penode_gen.sets import promises
-from penode_sil.training import bands, curve, data, dense, drive, promised, story, unfold
+from penode_sil.training import bands, curve, data, dense, drive, promised, unfold
 from penode_sil.training.engine import Engine
 from penode_sil.training.settings import SETTINGS
 from penode_sil.training.solve import Limits, least

@@ -8,9 +8,9 @@ unknowns, is solved symbolically. What is left is straight-line code without any
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Iterable
 
 import sympy as sp
 from sympy.core.function import Application, AppliedUndef

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..algebra import expressions as ex, functions, sampled
+from ..algebra import functions, sampled
 from ..algebra.causalise import Causal, Step
 from ..model import Model
 from ..networks import Affine, Dense, Layer

@@ -31,7 +31,7 @@ def transport(text: str) -> dict[str, Any]:
             return {"kind": kind, "baud": int(words[0])}
         if kind in ("can", "canfd") and len(words) == 2:
             master, slave = (int(word, 0) for word in words)
-            if 0 <= min(master, slave) and max(master, slave) < 1 << 29 and master != slave:
+            if min(master, slave) >= 0 and max(master, slave) < 1 << 29 and master != slave:
                 return {"kind": kind, "master": master, "slave": slave}
     except ValueError:
         pass

@@ -79,7 +79,7 @@ class Printer(StrPrinter):
 
     def _atom(self, e: sp.Expr) -> str:
         text = self._print(e)
-        return text if e.is_Symbol or e.is_Number and e >= 0 or e.is_Function else f"({text})"
+        return text if e.is_Symbol or (e.is_Number and e >= 0) or e.is_Function else f"({text})"
 
     def _print_Function(self, e: sp.Function) -> str:
         a = [self._print(x) for x in e.args]

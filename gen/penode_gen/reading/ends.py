@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import difflib
-from typing import Any, Iterable
+from collections.abc import Iterable
+from typing import Any
 
 from .. import model as m, units
 from ..algebra import expressions as ex, sampled
@@ -42,7 +43,7 @@ class EndTables(NetworkTables):
             return text
         value = self.quantity(where, text, unit)
         if new in parameters:
-            self.problem(where, f"this quantity would become the parameter '{new}', which there is already", f"name that one, or rename it")
+            self.problem(where, f"this quantity would become the parameter '{new}', which there is already", "name that one, or rename it")
         else:
             parameters[new] = m.Parameter(new, value, unit, description=f"{key} of {where[1]}")
             self.made[new] = where
@@ -126,7 +127,7 @@ class EndTables(NetworkTables):
                 states.append(m.State(name, of[source], start, f"{source} behind a lag"))
                 equations.append(m.Equation(name, f"der({name})*{arguments['time']} = {source} - {name}"))
         for name in of:
-            if same(of[name], "m") and of[name] != UNKNOWN or _angle(of[name]):
+            if (same(of[name], "m") and of[name] != UNKNOWN) or _angle(of[name]):
                 self.kinds[name] = "rad" if _angle(of[name]) else "m"
         return points, states, equations, late
 

@@ -7,8 +7,9 @@ from __future__ import annotations
 import difflib
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Iterable
+from typing import Any
 
 from .. import model as m
 from ..algebra import expressions as ex
@@ -19,7 +20,7 @@ from ..sets.fold import room
 from .ends import EndTables
 from .network_tables import ROOM, UNKNOWN
 from .places import one_line, show
-from .tables import C_PATTERN, MACROS, NAME, SECTIONS, same
+from .tables import C_PATTERN, MACROS, SECTIONS
 
 _MODEL_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 # A model of that name would have a header or a type that others have already.
@@ -325,7 +326,7 @@ class _Reader(EndTables):
 
     def macros(self, parameters: dict[str, m.Parameter], networks: dict[str, m.NetworkPort], model: str) -> None:
         """Constants of the generated C are in capitals: names that differ in case only would meet."""
-        seen = {n: "" for n in MACROS}
+        seen = dict.fromkeys(MACROS, "")
         for n in (*parameters, *networks):
             changes = n in networks or parameters[n].tunable
             for name in (f"AT_{n}",) if changes else (n, f"{n}_INVERSE"):

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Iterable
+from typing import Any
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class NetworkTables(Tables):
         required = networks if "default" in entries else ()
         if networks and "default" not in entries and isinstance(self.data.get("sets", {}), dict):
             self.problem(("sets",), "there is no set 'default'", "add [sets.default] with a file for each network")
-        allowed = {n: (str, dict) for n in networks} | dict.fromkeys(tunable, str)
+        allowed = dict.fromkeys(networks, (str, dict)) | dict.fromkeys(tunable, str)
         sets: dict[str, m.ParameterSet] = {}
         files: dict[str, Network | None] = dict.fromkeys(networks)  # of the set 'default', which the others build on
         values = {p.name: p.value for p in tunable.values()}

@@ -8,8 +8,9 @@ import difflib
 import hashlib
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Iterable
+from typing import Any
 
 from .. import model as m, units
 from ..algebra import expressions as ex

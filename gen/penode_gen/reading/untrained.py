@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ def untrained(entry: dict[str, Any], n_inputs: int, name: str) -> Network:
     width = (n_inputs, *layers, 1)
     dense = [
         Dense(np.zeros((o, i)), np.zeros(o), activation if k < len(layers) else "identity")
-        for k, (i, o) in enumerate(zip(width, width[1:]))
+        for k, (i, o) in enumerate(itertools.pairwise(width))
     ]
     scales = Affine(np.zeros(n_inputs), np.ones(n_inputs), "centre"), Affine(np.zeros(1), np.ones(1), "rescale")
     return Network((scales[0], *dense, scales[1]), None, None, f"{name} (untrained)")

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import units
 from ..model import Model, ParameterSet
-from ..networks import Affine, Dense, Network
+from ..networks import Dense, Network
 
 ABI = 2
 _FLOAT_MAX = float(np.finfo(np.float32).max)

@@ -9,7 +9,8 @@ Nothing of it runs the C. So what it computes is a known answer for a self-test 
 
 from __future__ import annotations
 
-from typing import Any, Callable
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import lru_cache, reduce
-from typing import Callable, Mapping, Sequence
 
 import numpy as np
 import sympy as sp

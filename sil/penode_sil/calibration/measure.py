@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import time
 from collections.abc import Callable
@@ -95,7 +96,7 @@ def choose(a2l: A2l, names: list[str]) -> list[Entry]:
     if several:
         raise UserError(f"--signals: {several[0]} is an array; name single numbers")
     places = sorted({(entry.address, entry.type.str): entry for entry in entries}.values(), key=lambda entry: entry.address)
-    for before, after in zip(places, places[1:]):
+    for before, after in itertools.pairwise(places):
         if after.address < before.address + before.size:  # pyxcp would leave out one of them
             raise UserError(f"--signals: {after.name} lies in the bytes of {before.name}; measure one after the other")
     return entries

@@ -99,8 +99,8 @@ def _lesson(
 def _movable(network: Network) -> bool:
     """Can the network be written as it is, with other weights?"""
     first, last = network.layers[0], network.layers[-1]
-    ends = (not isinstance(first, Affine) or first.form == "centre" and np.all(first.factor > 0.0)) and (
-        not isinstance(last, Affine) or last.form == "rescale" and np.all(last.factor > 0.0)
+    ends = (not isinstance(first, Affine) or (first.form == "centre" and np.all(first.factor > 0.0))) and (
+        not isinstance(last, Affine) or (last.form == "rescale" and np.all(last.factor > 0.0))
     )
     inner = network.layers[1:-1]
     return network.n_outputs == 1 and bool(ends) and all(isinstance(x, Dense) and x.activation != "step" for x in inner)

@@ -113,7 +113,7 @@ def by_noise(case: Case, study: Study, best: Explanation | None, judged: Judged)
         absorbed, more = absorbing(study, judged.named, learnt, case.unused, case.output)
         judged = replace(judged, notes=(*judged.notes, *more))
     case.tell(0.9, "showing what is wrong")
-    whole = judged.named is not None and (judged.named is judged.unnamed or best is not None and bool(judged.causes))
+    whole = judged.named is not None and (judged.named is judged.unnamed or (best is not None and bool(judged.causes)))
     shown = residual.show(study, judged.named.fit if whole else None, extended if whole else None, held, judged.verdict == "unexplained")
     return Diagnosis(
         judged.verdict,

@@ -105,7 +105,7 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
             if (
                 a > int(0.1 / e.step)
                 and b - a < longest
-                and (fades or less and np.mean(sinks) > 0.95)
+                and (fades or (less and np.mean(sinks) > 0.95))
                 and deep
                 and np.count_nonzero(inside) > 4
             ):

@@ -68,7 +68,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     explain it, or where they have causes and more than UNMODELLED wanders. If they were not asked before, they answer where they follow
     the recordings better, name the same, or find an input at fault; where neither has a name, parameters that predict the hold-out better stay."""
     vague = weighed.supports(study.model) and bool(guessed(study.model))
-    if vague or not study.model.inputs and weighed.misfit(study, study.null, case.log).size:
+    if vague or (not study.model.inputs and weighed.misfit(study, study.null, case.log).size):
         return _by_innovations(case, None, _weighed(case, study))
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
     case.tell(SEARCH[0], "looking for causes")
@@ -92,7 +92,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
         if _decides(w, beside.size, study, best, bool(faults)):
             return _by_innovations(case, best, w)
     study, judged = judge_explanations(case, study, explanations, faults, bursts)
-    sure = w if w and (w.verdict == "explained" or w.causes and w.level > weighed.UNMODELLED) else None
+    sure = w if w and (w.verdict == "explained" or (w.causes and w.level > weighed.UNMODELLED)) else None
     if sure and judged.verdict == "unexplained":  # before an extended model is made that nobody would see
         return _by_innovations(case, best, sure)
     answer = by_noise(case, study, best, judged)
@@ -116,13 +116,13 @@ def _decides(w: weighed.Weighed, level: float, study: Study, best: Explanation |
         return False
     if w.verdict == "unexplained":
         return level > weighed.UNMODELLED and (best is not None or not faulty)
-    return level > weighed.UNMODELLED or best is not None and _simpler(w, best)
+    return level > weighed.UNMODELLED or (best is not None and _simpler(w, best))
 
 
 def _simpler(w: weighed.Weighed, best: Explanation) -> bool:
     """Do innovations explain the same by fewer causes, or by as many and fewer laws?"""
     causes = max(len(w.causes), 1)
-    return causes < len(best.groups) or bool(w.causes) and causes == len(best.groups) and w.laws < len(best.terms)
+    return causes < len(best.groups) or (bool(w.causes) and causes == len(best.groups) and w.laws < len(best.terms))
 
 
 def _weighed(case: Case, study: Study) -> weighed.Weighed:

@@ -53,7 +53,7 @@ def acting(terms: Sequence[Term]) -> list[Term]:
     forceful = [t for t in terms if t.gain != 0.0 or not isinstance(t.candidate.what, Basis)]
     led = {t.group for t in forceful if not t.candidate.companion}
     bare = {t.group for t in forceful} - led
-    return [t for t in terms if t in forceful or t.group in bare and not t.candidate.companion]
+    return [t for t in terms if t in forceful or (t.group in bare and not t.candidate.companion)]
 
 
 def gains(terms: Sequence[Term], names: Sequence[str]) -> list[str | tuple[str, int]]:

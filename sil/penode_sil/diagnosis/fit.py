@@ -91,7 +91,7 @@ class Fit:
         precision = np.array([f.unit / f.sigma for f in self.free])
         curvature = self.jacobian.T @ self.jacobian + np.diag(precision**2)
         slope = self.jacobian.T @ self.residual - precision * np.array([f.offset for f in self.free])
-        stuck = [f.value <= f.low and s <= 0.0 or f.value >= f.high and s >= 0.0 for f, s in zip(self.free, slope)]
+        stuck = [(f.value <= f.low and s <= 0.0) or (f.value >= f.high and s >= 0.0) for f, s in zip(self.free, slope)]
         slope[stuck] = curvature[stuck] = curvature[:, stuck] = 0.0  # it would go beyond its bound
         scale = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
         normed = curvature / np.outer(scale, scale)

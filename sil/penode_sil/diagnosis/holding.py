@@ -14,6 +14,7 @@ only the delay. The search for a hold, and its comparison with a delay, therefor
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -126,7 +127,7 @@ def _of_recordings(bench: Bench) -> list[Array]:
     """Which updates [updates] are of each recording, as 1.0 and 0.0."""
     lengths = [len(r) // bench.update for r in bench.records]
     ends = np.cumsum([0, *lengths])
-    return [((np.arange(ends[-1]) >= a) & (np.arange(ends[-1]) < b)).astype(float) for a, b in zip(ends, ends[1:])]
+    return [((np.arange(ends[-1]) >= a) & (np.arange(ends[-1]) < b)).astype(float) for a, b in itertools.pairwise(ends)]
 
 
 def _steps(bench: Bench, index: int, period: float, phases: Array) -> Series:

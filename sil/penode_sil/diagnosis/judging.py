@@ -42,7 +42,7 @@ def judge(
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)
     if not explanations:
-        if evidence > DOUBT and excess > 0.15 * rows or alike > noise.ALIKE or pure or changed:
+        if (evidence > DOUBT and excess > 0.15 * rows) or alike > noise.ALIKE or pure or changed:
             return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0, evidence
         verdict = "explained" if faults else "not_identifiable" if evidence > DOUBT else "no_discrepancy"
         return tuple(faults), verdict, 1.0, evidence
@@ -51,7 +51,7 @@ def judge(
     gained, part = study.null.cost - best.fit.cost, share(study, best, left)
     if part < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > noise.ALIKE):
         return (Cause(OUTSIDE, "", {}, 1.0 - part),), "unexplained", part, evidence
-    shown = alike > noise.ALIKE or part < WHOLE and left > DOUBT * np.sqrt(2.0 * rows)
+    shown = alike > noise.ALIKE or (part < WHOLE and left > DOUBT * np.sqrt(2.0 * rows))
     patched = len(best.groups) > 1 and part < PATCHED and shown  # several causes, and still no whole
     twice = changed and alike > noise.ALIKE and part < PATCHED  # by two proofs something is left
     if patched or twice or changed > (1.0 - PATCHED) * gained:
@@ -60,7 +60,7 @@ def judge(
     if len(masses) > 1 and len(best.groups) == 1 and explaining.explain(study, masses[:1]).gain < refining.FILTER * best.gain:
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
     others = [t for t in best.terms if t.candidate.kind != CLOCK]
-    if not others or len(others) < len(best.terms) and explaining.explain(study, others).gain < MAIN * best.gain:
+    if not others or (len(others) < len(best.terms) and explaining.explain(study, others).gain < MAIN * best.gain):
         return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
     causes = [cause(study, explanations, group) for group in best.groups if group[0] != CLOCK]
     causes = [c for c in causes if worth(study, c)]
@@ -156,6 +156,6 @@ def resized(study: Study, e: Explanation, c: Cause) -> Cause:
     make up for that."""
     group = (c.kind, c.where)
     own = [t for t in e.terms if t.group == group]
-    if not own or c.kind == "hidden_resonance" and len(own) > 1:  # which share what one was
+    if not own or (c.kind == "hidden_resonance" and len(own) > 1):  # which share what one was
         return c
     return replace(c, parameters=sized.values(study, e, group))

@@ -10,6 +10,7 @@ road cannot be mistaken for a delay or a scale of a sensor.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -151,7 +152,7 @@ def _blows(taken: Array, sigma: float, f: Array, share: Array, power: Array, ste
     Parts of a quarter of a second, each half over the next, whose windows add up to 1. What is taken has no slow motion, which
     would leak through such short windows.
     """
-    half = max(int(round(0.125 / step)), 2)
+    half = max(round(0.125 / step), 2)
     window = np.sin(np.pi * (np.arange(2 * half) + 0.5) / (2 * half))
     long = np.pad(taken, (2 * half, 2 * half + -len(taken) % half))
     spectra = fft.rfft(sliding_window_view(long, 2 * half)[::half] * window, axis=1)
@@ -360,7 +361,7 @@ def correlation(experiments: Sequence[Experiment], metrics: Sequence[Metric], si
         r = m.spectrum(np.where(e.good, e.y - z, 0.0))
         w = np.einsum("fij,fj->fi", m.root, r)
         edges = [max(int(f / e.frequencies[1]), 1) for f in (*PARTS, TOP)]
-        for part, (low, high) in enumerate(zip(edges, edges[1:])):
+        for part, (low, high) in enumerate(itertools.pairwise(edges)):
             for band in np.array_split(w[low:high], max((high - low) // BINS, 1)):
                 if len(band) < 4:
                     continue

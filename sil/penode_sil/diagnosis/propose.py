@@ -99,7 +99,7 @@ def _taken(form: Form, terms: Sequence[Term]) -> bool:
     """Has the model that form already, or one of a curve of which a place has only one?"""
     there = [t.form for t in terms if t.form.where == form.where]
     one = catalogue.curve(form.kind)
-    return any((f.kind, f.note) == (form.kind, form.note) or one != form.kind and catalogue.curve(f.kind) == one for f in there)
+    return any((f.kind, f.note) == (form.kind, form.note) or (one != form.kind and catalogue.curve(f.kind) == one) for f in there)
 
 
 def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence[Motion]) -> list[tuple[Score, Form]]:

@@ -44,7 +44,7 @@ def pursue(r: Regression, pool: Sequence[int], base: Sequence[int] = (), terms: 
         usable = [p for p in pool if p not in chosen and (chosen or not alone or not r.candidates[p].companion)]
         if chosen and r.candidates[chosen[0]].kind == "hidden_resonance":
             break  # one mass; a second would be any filter
-        step, best = r.best_single([*base, *chosen], usable, costs)
+        _step, best = r.best_single([*base, *chosen], usable, costs)
         if best < 0:
             break
         new = r.gain([*base, *chosen, best])[0]

@@ -8,6 +8,7 @@ All is SI. `before` is the model as its file says, parameters within their toler
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +24,7 @@ from penode_gen.model import Model
 from .fit import Fit
 from .missing import Missing, missing_forces
 from .noise import Experiment
-from .restoring import LEAST, Surface, averages, cells, rms, short, surface_numbers, surfaces
+from .restoring import Surface, rms, short, surface_numbers, surfaces
 from .study import Study
 
 Array = NDArray[np.float64]
@@ -148,7 +149,7 @@ def stretches(time: Array, good: NDArray[np.bool_], *signals: Array) -> list[tup
     step = time[1] - time[0]
     return [
         (float(time[a]), float(time[b - 1] + step), [rms(x[a:b][good[a:b]]) for x in signals])
-        for a, b in zip(edges, edges[1:])
+        for a, b in itertools.pairwise(edges)
         if good[a:b].any()
     ]
 

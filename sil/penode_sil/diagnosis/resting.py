@@ -84,4 +84,4 @@ def rested(losses: Sequence[float], costs: Sequence[float], same: bool, starts: 
     """Did recordings start at rest? Losses, and what they cost with the causes, [in motion, at rest], whether the causes are the same,
     how many start states are free in motion, and how many numbers are of loads that take their place at rest, two of which any load has.
     Where the start states gain no more than noise gives them nothing moved, though it costs a load."""
-    return losses[1] < losses[0] + IDLE * (starts - max(loads - 2, 0)) or not same and costs[1] < costs[0] + MOVING * starts
+    return losses[1] < losses[0] + IDLE * (starts - max(loads - 2, 0)) or (not same and costs[1] < costs[0] + MOVING * starts)

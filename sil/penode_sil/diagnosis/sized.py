@@ -89,7 +89,7 @@ def values(study: Study, e: Explanation, group: Group) -> dict[str, Value]:
         middle = float(function(centre))
         slope = np.zeros(len(free))
         for i, f in enumerate(free):
-            if f.target[0] == "skew" or f.target[0] == "start" and group[0] != "damper_fading":
+            if f.target[0] == "skew" or (f.target[0] == "start" and group[0] != "damper_fading"):
                 continue
             step = min(0.1 * deviation[i], 0.01) if f.log else 0.1 * deviation[i]
             if step > 0.0:

@@ -89,7 +89,7 @@ def _slopes(terms: Sequence[Term], bench: Bench, quantity: str, x: Array) -> Slo
     along = Moved(x, zeros, np.arange(len(x)) * bench.step) if quantity == "s" else Moved(zeros, x, np.arange(len(x)) * bench.step)
     for gain, part in (pair for term in terms for pair in term.laws(bench.fit.values)):
         known = laws.LAWS.get(part.law)
-        if part.force is not None or known and known.states:
+        if part.force is not None or (known and known.states):
             low, high = low + min(gain, 0.0), high + max(gain, 0.0)
         else:
             force = force + gain * part.along(along)

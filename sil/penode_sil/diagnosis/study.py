@@ -119,7 +119,7 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
     levels = [np.tile(sigma**2, (e.band, 1)) for sigma, e in zip(guess, experiments)]
     metrics = [metric(e, l, np.zeros((e.band, len(declared), len(model.inputs)))) for e, l in zip(experiments, levels)]
     problem = Problem(model, experiments, metrics, set_name, 0.0)
-    z, x = problem.simulate(0, (), np.zeros((1, 0)), model.states)
+    _z, x = problem.simulate(0, (), np.zeros((1, 0)), model.states)
     pick = np.linspace(0, len(x[0]) - 1, 12).astype(int) if model.networks else [0]
     linear = plant.linearise(model, found, np.array(x[0][pick]), experiments[0].u[pick])
     for _ in range(2):

@@ -77,7 +77,7 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
             simple = explain(study, [*(t for t in e.terms if t.group != group), *new], start=e.fit, formulas=e.formulas)
             log(f"  plain {group} as {other[0]}, {simple.groups}: {simple.gain:.0f} for {e.gain:.0f}, {simple.score:.0f} for {e.score:.0f}")
             same = set(simple.groups) == {other if g == group else g for g in e.groups}
-            if same and (group == other and simple.gain > e.gain - COST or simple.score > e.score - COST):
+            if same and ((group == other and simple.gain > e.gain - COST) or simple.score > e.score - COST):
                 e = simple
     return joined(study, e, log)
 

@@ -48,7 +48,7 @@ def tone(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated
     """
     found = [Tone()]
     for e, m, z in zip(experiments, metrics, simulated):
-        size = int(round(1.0 / e.step))  # samples of a second
+        size = round(1.0 / e.step)  # samples of a second
         top = int(0.4 * size)
         sine = swept(e.u, e.step)
         if top < 6 * HALF or len(e.time) < 3 * size or (sine and not _moves(e.u, e.step)):
@@ -109,7 +109,7 @@ def _multiples(inputs: Array, step: float, top: int) -> NDArray[np.bool_]:
 
 def _seconds(signals: Array, step: float) -> Array:
     """Periodograms [seconds, f, any] of signals [n, any], each of one second, which overlap by half."""
-    size = int(round(1.0 / step))
+    size = round(1.0 / step)
     window = np.hanning(size)[:, None]
     parts = [signals[a : a + size] for a in range(0, len(signals) - size + 1, size // 2)]
     return np.array([np.abs(fft.rfft(x * window, axis=0)) ** 2 for x in parts]).reshape(len(parts), size // 2 + 1, signals.shape[1])

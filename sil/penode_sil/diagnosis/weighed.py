@@ -90,7 +90,7 @@ class Weighed:
 
 def supports(model: Model) -> bool:
     """Can innovations judge a model? Not yet where motion is prescribed, for nothing moves, nor laws of networks."""
-    return bool(model.bodies or model.states and not model.elements) and not model.networks
+    return bool(model.bodies or (model.states and not model.elements)) and not model.networks
 
 
 @lru_cache(maxsize=2)  # the search asks, and the engine asks for the same again
@@ -213,7 +213,7 @@ def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: 
     noise is all that is left."""
     if causes:
         return "explained" if share > ENOUGH else "partly_explained"
-    return "no_discrepancy" if not found.causes and (quiet or left < WORTH and found.found.terms) else "unexplained"
+    return "no_discrepancy" if not found.causes and (quiet or (left < WORTH and found.found.terms)) else "unexplained"
 
 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:

@@ -132,7 +132,7 @@ def shift(model: Model, bench: Bench, moved: Sequence[Motion], name: str) -> flo
     shares = []
     for e in model.elements:
         if e.law in LINEAR and name in e.arguments.values():
-            place, motion = next((p, m) for p, m in zip(bench.places, moved) if any(e.name == n for n, _ in p.elements))
+            _place, motion = next((p, m) for p, m in zip(bench.places, moved) if any(e.name == n for n, _ in p.elements))
             shares.append(abs(off) * (motion.s_rms if LINEAR[e.law] == "s" else motion.v_rms) / motion.force)
     log = next(f.log for f in bench.fit.free if f.target == name)
     return max(shares, default=abs(off / model.parameters[name].value)) * (1.0 if log else own(bench.model, bench.fit, [name]))

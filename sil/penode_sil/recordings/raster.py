@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,7 +77,7 @@ def parted(rows: NDArray[np.int64], time: Array) -> Clock:
     interval = float(np.median(np.diff(time)))
     cuts = np.flatnonzero(np.diff(time) > (BRIDGE + GAP) * interval) + 1
     bounds = [0, *cuts.tolist(), rows.size]
-    parts = [(a, b) for a, b in zip(bounds, bounds[1:]) if b - a > 1]
+    parts = [(a, b) for a, b in itertools.pairwise(bounds) if b - a > 1]
     lengths = [int(_ticks(time[a:b], interval)[-1]) for a, b in parts]
     if sum(lengths):
         interval = sum(float(time[b - 1] - time[a]) for a, b in parts) / sum(lengths)

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from .curve import Curve
 from .dense import Dense
-from .engine import Shape
 from .problem import Point, Problem
 from .solve import Fit
 

@@ -87,7 +87,7 @@ def spaced(low: float, high: float, count: int, power: float) -> Array:
     """`count` knots from low to high, dense about 0 by a power; one of them is 0 exactly, and those on both sides of it mirror each other."""
     low, high = min(low, 0.0), max(high, 0.0)
     wide = high ** (1.0 / power) + (-low) ** (1.0 / power)
-    left = int(round((count - 1) * (-low) ** (1.0 / power) / wide))
+    left = round((count - 1) * (-low) ** (1.0 / power) / wide)
     left = min(max(left, 1 if low < 0.0 else 0), count - 1 - (1 if high > 0.0 else 0))
     unit = wide / (count - 1)
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -73,7 +74,7 @@ def like(network: Network, scale: Array, size: float, zero: bool, seed: int) -> 
     layers = [layer for layer in network.layers if isinstance(layer, networks.Dense)]
     width = (layers[0].n_in, *(layer.n_out for layer in layers))
     random, parts = np.random.default_rng(seed), []
-    for k, (i, o) in enumerate(zip(width, width[1:])):
+    for k, (i, o) in enumerate(itertools.pairwise(width)):
         last = k == len(layers) - 1
         spread = 0.02 if last else np.sqrt((2.0 if layers[k].activation == "relu" else 1.0) / i)
         parts += [random.normal(0.0, spread / (np.sqrt(i) if last else 1.0), i * o), np.zeros(o) if last else random.normal(0.0, 0.5, o)]

@@ -49,7 +49,6 @@ class Options:
 
 def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], options: Options, tell: Tell) -> tuple[Model, Trained]:
     """The model with trained networks, and all that is known of them. UserError for what cannot be trained."""
-    started = time.process_time()
     model, known = _with_known(model, options)
     check(model)
     engine = Engine(model, [p.name for p in model.parameters.values() if p.tolerance > 0.0 and p.value != 0.0])

@@ -164,7 +164,7 @@ class Bench:
         """What an unknown start state can do to each recording; nothing if they start at rest."""
         found, n = [], len(self.plant.world().masses) if self.moving else 0
         for i, drive in enumerate(self.training):
-            rest = np.zeros(int(round(drive.duration * KNOT_RATE)) + 6)
+            rest = np.zeros(round(drive.duration * KNOT_RATE) + 6)
             for k in range(2 * n):
                 free = self.observe(simulate(self.plant.world(), rest, np.eye(2 * n)[k].reshape(2, n), 1), (), i)
                 found.append(self.white([free if j == i else {s: 0 * x for s, x in p.items()} for j, p in enumerate(self.linear_signals)]))

@@ -3,14 +3,13 @@
 """One case: recordings, the hidden effects, and the truth about them. Everything follows from (seed, index)."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from . import faults, forces, outside, plants  # the forms register themselves
+from . import faults, plants  # the forms register themselves
 from .bench import NOTHING, Bench, draw_bench, reach
 from .effects import FORMS, OUTSIDE, Change, Form, places
 from .plants import SIGNALS

@@ -174,7 +174,7 @@ def dropouts(r: Rng, at: Place, fill: Callable[[np.ndarray, int, int, Rng], np.n
     def build(size: float) -> Change:
         def holes(x: np.ndarray, rng: Rng, rate: float) -> np.ndarray:
             out = x.copy()
-            for _ in range(max(1, int(round(size * len(x) / rate / mean)))):
+            for _ in range(max(1, round(size * len(x) / rate / mean))):
                 n = int(np.clip(rng.exponential(mean), 0.005, 0.15) * rate)
                 first = int(rng.integers(int(0.1 * len(x)), len(x) - n - 1))
                 out[first : first + n] = fill(x, first, first + n, rng)

@@ -132,7 +132,7 @@ def draw(rng: np.random.Generator, hard: bool, kind: str) -> Plant:
             del value["m"]
     nominal = {name: float(f"{x:.4g}") for name, x in value.items()}
     known = 0.03 if hard else float(rng.choice([0.005, 0.01, 0.02]))
-    tolerance = {name: known for name in nominal}
+    tolerance = dict.fromkeys(nominal, known)
     if "m_b" in nominal and not hard:
         tolerance["m_b"] = float(rng.choice([0.01, 0.02, 0.03]))  # payload and fuel
     inside = {name: np.clip(0.4 * rng.standard_normal(), -1, 1) * tolerance[name] for name in nominal}

@@ -119,7 +119,7 @@ def _library() -> ctypes.CDLL:
 
 def knots(duration: float) -> np.ndarray:
     """Times [s] at which an input of this duration has to be given: two before 0 and three after the end."""
-    return (np.arange(int(round(duration * KNOT_RATE)) + 6) - 2) / KNOT_RATE
+    return (np.arange(round(duration * KNOT_RATE) + 6) - 2) / KNOT_RATE
 
 
 def simulate(world: World, motion: np.ndarray, start: np.ndarray | None = None, steps: int = STEPS) -> Motion:

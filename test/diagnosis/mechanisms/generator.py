@@ -74,7 +74,7 @@ def drawn(rng: np.random.Generator, **values: float) -> dict[str, float]:
 
 def halfcar(kinds: list[str], seeds: list[int], seconds: float) -> list[Case]:
     """Half-cars over the same road front and rear, 20 m/s and 2.6 m apart."""
-    t = np.arange(int(round(seconds / SAMPLE)) * HALVES + 1) * SAMPLE / HALVES
+    t = np.arange(round(seconds / SAMPLE) * HALVES + 1) * SAMPLE / HALVES
     rngs = [np.random.default_rng([seed, 1]) for seed in seeds]
     stated = {"m": 600.0, "J": 900.0, "mf": 40.0, "mr": 45.0, "cf": 18e3, "cr": 21e3, "df": 1300.0, "dr": 1500.0, "tf": 19e4, "tr": 20e4}
     each = [drawn(rng, **stated) for rng in rngs]
@@ -122,7 +122,7 @@ def halfcar(kinds: list[str], seeds: list[int], seconds: float) -> list[Case]:
 
 def drive(kinds: list[str], seeds: list[int], seconds: float) -> list[Case]:
     """Two-mass drives under a torque that reverses often."""
-    t = np.arange(int(round(seconds / SAMPLE)) * HALVES + 1) * SAMPLE / HALVES
+    t = np.arange(round(seconds / SAMPLE) * HALVES + 1) * SAMPLE / HALVES
     rngs = [np.random.default_rng([seed, 2]) for seed in seeds]
     stated = {"jm": 0.02, "jl": 0.8, "k": 900.0, "d": 3.0, "dl": 0.5, "dm": 0.03}
     each = [drawn(rng, **stated) for rng in rngs]

@@ -114,7 +114,7 @@ class Rig:
         names = {self.input: u[0]}
         for k, b in self.bodies.items():
             names |= {b["position"]: at[k][0], b["velocity"]: at[k][1]}
-        net = {k: 0 * u[0] for k in at}
+        net = dict.fromkeys(at, 0 * u[0])
         pulls = [(ends, f[i]) for i, ends in enumerate(self.places)]
         for k, e in self.elements.items():
             (z1, v1), (z2, v2) = (at[end] for end in e["between"])

@@ -41,7 +41,7 @@ def smooth(y: np.ndarray, step: float, order: int = 0) -> np.ndarray:
 def states(rig: Rig, r: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Deflections, rates and missing forces (samples, places)."""
     n, places, lin, u = len(rig.bodies), len(rig.places), rig.nominal, r.given
-    x, f, _ = rig.simulate(r, rig.start(r))
+    x, _f, _ = rig.simulate(r, rig.start(r))
     x = x[:, :, 0]
     acceleration = (x @ lin.a.T + u @ lin.b.T)[:, n:]
     moved = x @ lin.s.T + u @ lin.su.T

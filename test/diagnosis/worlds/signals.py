@@ -29,7 +29,7 @@ def beside(f: Array, *columns: Array) -> Array:
 
 def waves(rng: np.random.Generator, seconds: float, low: float, high: float, fall: float) -> Array:
     """Sines of random phase and frequency, falling with frequency, RMS 1, at the solver's step; 0 in the lead, then faded in."""
-    t = np.arange(int(round((seconds + LEAD) * RATE)) + 1) * STEP
+    t = np.arange(round((seconds + LEAD) * RATE) + 1) * STEP
     f = np.sort(np.exp(rng.uniform(np.log(low), np.log(high), 60)))
     size = f ** (0.5 - fall)
     wave = np.zeros(len(t))

@@ -124,7 +124,7 @@ class World:
 
     def _record(self, seconds: float) -> Record:
         rng, kind = self.rng, self.kind
-        n = int(round((seconds + LEAD) * RATE)) + 1
+        n = round((seconds + LEAD) * RATE) + 1
         first = np.zeros(2 * len(kind.masses))
         u, error = np.zeros((n, len(kind.inputs))), np.zeros((n, len(kind.inputs)))
         if kind.name == "swing":

@@ -14,6 +14,7 @@ import os
 
 os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
 
+import itertools
 import json
 import sys
 import time
@@ -39,7 +40,7 @@ SCALE = (0.03, 0.5), 1000.0  # of deflection [m] and its rate [m/s]; of forces [
 def weights(key: jax.Array) -> Tree:
     """Of a network; its output is small at first."""
     found = []
-    for n, (i, o) in enumerate(zip(WIDTH, WIDTH[1:])):
+    for n, (i, o) in enumerate(itertools.pairwise(WIDTH)):
         key, one, two = jax.random.split(key, 3)
         last = n == len(WIDTH) - 2
         found.append(

@@ -171,7 +171,7 @@ class Problem:
         rest = (fit.nu / np.sqrt(fit.variance))[fit.used]
         curvature = rows.T @ rows + np.diag(precisions(fit.free) ** 2)
         slope = -rows.T @ rest - prior_slopes(fit.free)
-        stuck = [f.value <= f.low and s <= 0.0 or f.value >= f.high and s >= 0.0 for f, s in zip(fit.free, slope)]
+        stuck = [(f.value <= f.low and s <= 0.0) or (f.value >= f.high and s >= 0.0) for f, s in zip(fit.free, slope)]
         slope[stuck] = 0.0
         curvature[stuck], curvature[:, stuck] = 0.0, 0.0
         size = np.sqrt(np.maximum(np.diag(curvature), 1e-30))

@@ -53,7 +53,7 @@ class Gains:
     def at(self, level: Level) -> Filter:
         """The steady filter: what an update does with the mean innovation since the one before."""
         n_x, n_z = len(self.plant.a), len(self.noise)
-        if not n_x or level.size == 0.0 and not self.input_noise.any():
+        if not n_x or (level.size == 0.0 and not self.input_noise.any()):
             return Filter.none(len(self.into), n_z)
         a = self.plant.a.copy()
         drive = np.zeros((n_x, n_x))
