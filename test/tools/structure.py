@@ -9,10 +9,14 @@ What is counted, in files that are written by hand (generated models in gen/*/c 
 long files         more than 400 lines: C, headers, Python, templates, make, Spin
 long functions     more than 60 lines: C from brace to brace, Python from `def` to its last line
 circular imports   modules of penode_gen and penode_sil, and C headers, that import themselves by way of others
+silenced lines     those with fmt: skip, fmt: off, noqa, type: ignore, clang-format off, NOLINT
+crowded folders    more than 25 files; generated models and files of data (.csv, .json, .png) do not count
 named thresholds   module-level numbers with an UPPER_CASE name in penode_sil: NAME = number, or arithmetic of numbers; the same
                    in a class Rules; without the next
 thresholds of innovations  the same in the rooms of the diagnosis by innovations, which are to replace the search by sensor noise: a
                    budget of 50, for all that is left of a diagnosis when that one has gone
+tabled numbers     numbers inside module-level tuples, tables and calls with an UPPER_CASE name in penode_sil: TABLE = (number, ...)
+compared numbers   numbers other than 0, 1 and -1 inside comparisons in penode_sil: x > 0.3
 settings of training  numbers of the class Settings of penode_sil.training, its one table: a budget
 runtime lines      lines of inc/penode and src together, without the next two; no ratchet but a budget: only more than kept fails
 elementary lines   the same of the functions that only some models call (pen_elementary.h), which no other program links
@@ -31,9 +35,22 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("inc", "src", "gen", "sil", "port", "test")
+DATA = {".csv", ".json", ".png"}
 KINDS = {".c", ".h", ".py", ".j2", ".mk", ".pml"}
 FILE_LINES = 400
 FUNCTION_LINES = 60
+FOLDER_FILES = 25
+SILENCED = re.compile(r"(?:#|//|/\*) ?(?:fmt: (?:skip|off)|noqa|type: ignore|clang-format off|NOLINT)")
+RATCHETS = (
+    "long files",
+    "long functions",
+    "circular imports",
+    "silenced lines",
+    "crowded folders",
+    "named thresholds",
+    "tabled numbers",
+    "compared numbers",
+)
 BUDGETS = ("thresholds of innovations", "settings of training", "runtime lines", "elementary lines", "wire protocol lines")
 ELEMENTARY = {"pen_elementary.h", "pen_parts.h", "pen_trig.c", "pen_atan.c", "pen_log.c", "pen_root.c"}
 
@@ -84,6 +101,41 @@ def python_functions(text: str) -> Iterator[tuple[int, int]]:
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield node.lineno, (node.end_lineno or node.lineno) - node.lineno + 1
+
+
+def is_number(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and type(node.value) in (int, float)
+
+
+def tabled(text: str) -> Iterator[int]:
+    """Lines of numbers inside module-level tuples, tables and calls with a name in capitals."""
+    for node in ast.parse(text).body:
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+        value = node.value if any(isinstance(t, ast.Name) and t.id.isupper() for t in targets) else None
+        if isinstance(value, ast.Tuple | ast.List | ast.Set | ast.Dict | ast.Call):
+            yield from (part.lineno for part in ast.walk(value) if is_number(part))
+
+
+def compared(text: str) -> Iterator[int]:
+    """Lines of numbers inside comparisons, but for 0 and 1."""
+    seen: set[int] = set()  # a comparison inside another one counts once
+    for node in ast.walk(ast.parse(text)):
+        for part in ast.walk(node) if isinstance(node, ast.Compare) else ():
+            if is_number(part) and part.value not in (0, 1) and id(part) not in seen:
+                seen.add(id(part))
+                yield part.lineno
+
+
+def crowded(root: Path) -> list[str]:
+    """Folders with more files than one can keep in mind."""
+    count: dict[str, int] = {}
+    for folder in FOLDERS:
+        for path in sorted((root / folder).rglob("*")):
+            parts = path.relative_to(root).parts
+            counts = path.is_file() and path.suffix not in DATA and "__pycache__" not in parts and "build" not in parts
+            if counts and not re.match(r"gen/[^/]+/c/", "/".join(parts)):
+                count["/".join(parts[:-1])] = count.get("/".join(parts[:-1]), 0) + 1
+    return [f"{name}: {n} files" for name, n in count.items() if n > FOLDER_FILES]
 
 
 def thresholds(text: str) -> Iterator[int]:
@@ -150,7 +202,8 @@ def budget(name: str) -> str:
 
 def look(root: Path) -> tuple[dict[str, int], Found]:
     """The counts, and what each of them is made of."""
-    found: Found = {kind: [] for kind in ("long files", "long functions", "circular imports", "named thresholds", *BUDGETS)}
+    found: Found = {kind: [] for kind in (*RATCHETS, *BUDGETS)}
+    found["crowded folders"] = crowded(root)
     files = sources(root)
     runtime = dict.fromkeys(BUDGETS, 0)
     for path in files:
@@ -158,11 +211,14 @@ def look(root: Path) -> tuple[dict[str, int], Found]:
         lines = text.count("\n")
         if lines > FILE_LINES:
             found["long files"].append(f"{name}: {lines} lines")
+        found["silenced lines"] += [f"{name}:{n}" for n, line in enumerate(text.splitlines(), 1) if SILENCED.search(line)]
         functions = c_functions(text) if path.suffix in {".c", ".h"} else python_functions(text) if path.suffix == ".py" else ()
         found["long functions"] += [f"{name}:{first}: {n} lines" for first, n in functions if n > FUNCTION_LINES]
         if name.startswith("sil/penode_sil/") and path.suffix == ".py":
             kind = NEWER if ROOMS.match(name) else TABLE if name.endswith("training/settings.py") else "named thresholds"
             found[kind] += [f"{name}:{line}" for line in thresholds(text)]
+            found["tabled numbers"] += [f"{name}:{line}" for line in tabled(text)]
+            found["compared numbers"] += [f"{name}:{line}" for line in compared(text)]
         if name.startswith(("inc/penode/", "src/")):
             runtime[budget(path.name)] += lines
     for package in ("gen/penode_gen", "sil/penode_sil"):
