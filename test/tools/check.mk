@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+#
+# `make check`: all that can be said about the sources without running the project; seconds. `make format` mends layout.
+
+CHECKS := check-types check-c check-lint check-pages check-structure check-format # the longest begin
+RUFF   := $(PYTHON) -m ruff
+
+.PHONY: check format $(CHECKS)
+check: $(CHECKS) ## Layout, lint and types of the Python, layout and lint of the C, references of all pages, the counts of structure.json
+
+check-format: | $(READY)
+	@test/check "layout of the Python" $(RUFF) format --check --quiet .
+check-lint: | $(READY)
+	@test/check "lint of the Python" $(RUFF) check --quiet .
+check-types: | $(READY)
+	@test/check "types of penode_gen and penode_sil" $(PYTHON) -m mypy -p penode_gen -p penode_sil
+check-pages: | $(READY)
+	@test/check "references of all pages" $(PYTHON) test/tools/pages.py
+check-structure: | $(READY)
+	@test/check "counts of structure.json" $(PYTHON) test/tools/structure.py
+check-c: | $(READY)
+	@test/tools/c_check
+
+format: | $(READY) ## Lay out the Python and the C, and sort imports
+	$(Q)$(RUFF) check --quiet --select I --fix .
+	$(Q)$(RUFF) format --quiet .
+	$(Q)test/tools/c_check --fix
