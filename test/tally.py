@@ -39,7 +39,7 @@ class Count(NamedTuple):
     skipped: int = 0
 
     def plus(self, other: Count) -> Count:
-        return Count(*(a + b for a, b in zip(self, other)))
+        return Count(*(a + b for a, b in zip(self, other, strict=True)))
 
     def __str__(self) -> str:
         return f"{self.passed} passed, {self.failed} failed, {self.skipped} skipped"

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -89,7 +90,7 @@ def _network(sizes: Sequence[int], activations: Sequence[str]) -> dict[str, obje
     draw = np.random.default_rng(1)
     layers = [
         {"activation": activation, "weights": draw.normal(size=(n, m)).tolist(), "bias": draw.normal(size=n).tolist()}
-        for m, n, activation in zip(sizes, sizes[1:], activations)
+        for (m, n), activation in zip(itertools.pairwise(sizes), activations, strict=True)
     ]
     edges = {"min": [-edge for edge in EDGE[: sizes[0]]], "max": list(EDGE[: sizes[0]])}
     return {"normalise": {"kind": "min-max"} | edges, "layers": layers, "trained_range": edges}

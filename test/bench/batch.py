@@ -12,6 +12,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -80,7 +81,8 @@ seat = { mass = "m_s", position = "z_s", velocity = "v_seat" }
 spring = { between = ["body", "wheel"], law = "linear_spring", stiffness = "c" }
 hard = { between = ["body", "wheel"], law = "cubic_spring", cubic = "cubic" }
 damper = { between = ["body", "wheel"], law = "expression", force = "d*v*(1 - fading*T)" }
-friction = { between = ["body", "wheel"], law = "stribeck_friction", breakaway = "F_s", coulomb = "F_c", stribeck = "v_s", transition = "v_t" }
+friction = { between = ["body", "wheel"], law = "stribeck_friction", breakaway = "F_s", coulomb = "F_c", \
+stribeck = "v_s", transition = "v_t" }
 square = { between = ["body", "wheel"], law = "quadratic_damper", coefficient = "quadratic" }
 rebound = { between = ["body", "wheel"], law = "rebound_damper", damping = "d_r" }
 bump = { between = ["body", "wheel"], law = "bump_stop", stiffness = "c_bump", gap = "gap_bump" }
@@ -161,7 +163,7 @@ def numpy_rates(model: penode_gen.Model) -> Callable[[float, np.ndarray, float],
 def numpy_loop(model: penode_gen.Model, u: np.ndarray) -> np.ndarray:
     """States [n, 4] of the RK4 step, one sample after the other."""
     f, h, x, found = numpy_rates(model), model.sample_time, np.zeros(4), []
-    for before, now in zip(np.append(u[0], u), u[:, 0]):
+    for before, now in zip(np.append(u[0], u[:-1]), u[:, 0], strict=True):
         if found:
             k1 = f(0.0, x, before)
             k2 = f(0.0, x + 0.5 * h * k1, 0.5 * (before + now))
@@ -174,7 +176,10 @@ def numpy_loop(model: penode_gen.Model, u: np.ndarray) -> np.ndarray:
 def scipy_loop(model: penode_gen.Model, u: np.ndarray) -> np.ndarray:
     """States [n, 4] by solve_ivp with one step a sample: the tolerances never reject one."""
     f, times = numpy_rates(model), np.arange(len(u)) * model.sample_time
-    right = lambda t, x: f(t, x, np.interp(t, times, u[:, 0]))
+
+    def right(t, x):
+        return f(t, x, np.interp(t, times, u[:, 0]))
+
     h = model.sample_time
     return solve_ivp(right, (0.0, times[-1]), np.zeros(4), "RK45", times, first_step=h, max_step=h, rtol=1e3, atol=1e3).y.T
 
@@ -202,7 +207,7 @@ def measure() -> list[dict[str, str | float]]:
                 varied = {name: model.parameters[name].value * np.linspace(0.9, 1.1, RUNS)}
                 keep = {"outputs": [s.name for s in model.outputs], "states": model.states}
                 contenders: dict[str, tuple[Callable[[], object], int]] = {
-                    " ".join(c): (lambda i=Sil(model, dtype, c).instance(): i.run(u), SAMPLES) for c in FLAGS
+                    " ".join(c): (partial(Sil(model, dtype, c).instance().run, u), SAMPLES) for c in FLAGS
                 }
                 contenders["batch"] = (lambda b=batch, p=varied, k=keep: b.run(u, parameters=p, **k), RUNS * SAMPLES)
                 ns = best(contenders)

@@ -290,7 +290,10 @@ def worse(new: list[Figures], kept: list[Figures]) -> list[str]:
 
 def check(figures: Figures) -> list[str]:
     """What is wrong with the code, or with what README.md says of it."""
-    wanted = lambda row: row["real"] == "float" and (row["machine"] == "m4f" or row["method"] == "RK4")
+
+    def wanted(row):
+        return row["real"] == "float" and (row["machine"] == "m4f" or row["method"] == "RK4")
+
     found = worse(our_figures(lambda text: None, wanted), figures["ours"]) + batch.too_slow(figures["batch"])
     if figures["accuracy"] != accuracy():
         found.append(f"accuracy: {accuracy()} instead of {figures['accuracy']}; run make figures")

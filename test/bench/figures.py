@@ -76,7 +76,7 @@ def hostile_inputs() -> np.ndarray:
 
 def exchange(model: penode_gen.Model, at: int) -> list[Call]:
     """Select another set for sample `at`, hold a few samples, go on."""
-    other = [name for name in model.sets if name != "default"][0]
+    other = next(name for name in model.sets if name != "default")
     return [Call(at, "select", set=other), Call(at + 20, "hold", on=True), Call(at + 30, "hold", on=False)]
 
 
@@ -114,7 +114,7 @@ def same(text: str, kept: str) -> bool:
     if len({" ".join(NUMBER.sub("0", b).split()) for b in blocks}) > 1:
         return False
     numbers = [list(map(float, NUMBER.findall(b))) for b in blocks]
-    return all(abs(a - b) <= 0.02 * max(a, b) for a, b in zip(*numbers)) if len(blocks) == 2 else True
+    return all(abs(a - b) <= 0.02 * max(a, b) for a, b in zip(*numbers, strict=True)) if len(blocks) == 2 else True
 
 
 def with_block(text: str, name: str, content: str) -> str:

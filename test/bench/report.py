@@ -144,7 +144,10 @@ def files(figures: Figures) -> dict[str, str]:
     """The model file of each column of the price table; ValueError if one has figures of two, or of one that was changed."""
     found = {}
     for title, (method, evaluator) in PRICES.items():
-        of_ours = lambda key: [r["model"] for r in figures[key] if (r["method"], r["evaluator"]) == (method, evaluator)]
+
+        def of_ours(key, method=method, evaluator=evaluator):
+            return [r["model"] for r in figures[key] if (r["method"], r["evaluator"]) == (method, evaluator)]
+
         exact = [row["file"] for row in figures["accuracy"] if row["model"] == title]
         names = {*of_ours("ours"), *of_ours("memory"), *exact}
         if len(names) != 1 or not all(name.endswith(".toml`") for name in names):

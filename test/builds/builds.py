@@ -136,7 +136,10 @@ def dialects() -> None:
     functions = sorted(set(re.findall(r"\(void\)(pen_\w+|nqvm\w*);", entries)))
     includes = "".join(f'#include "{str(h).split("/inc/")[-1].split("/c/")[-1]}"\n' for h in headers)
     table = "".join(f"    reinterpret_cast<any_t>(&{name}),\n" for name in functions)
-    text = f"{includes}typedef void (*any_t)();\nextern const any_t every[];\nconst any_t every[] = {{\n{table}}};\nint main() {{ return every[0] == nullptr; }}\n"
+    text = (
+        f"{includes}typedef void (*any_t)();\nextern const any_t every[];\nconst any_t every[] = {{\n"
+        f"{table}}};\nint main() {{ return every[0] == nullptr; }}\n"
+    )
     for c, cpp in (("gcc", "g++"), ("clang-19", "clang++-19")):
         with tempfile.TemporaryDirectory() as folder:
             place = copy(folder)
@@ -161,7 +164,10 @@ def dialects() -> None:
 
 # -- a whole program for a core without atomic instructions -----------------------------------------------------------
 
-MAIN = '#include "nqvm.h"\nnqvm_t model;\nnqvm_banks_t banks;\nint main(void)\n{\n    nqvm_u_t u = { 0 };\n    nqvm_y_t y;\n    return (int)(nqvm_init(&model, &nqvm_set_default, &banks) | nqvm_step(&model, &u, &y) | nqvm_tune_commit(&model));\n}\n'
+MAIN = (
+    '#include "nqvm.h"\nnqvm_t model;\nnqvm_banks_t banks;\nint main(void)\n{\n    nqvm_u_t u = { 0 };\n    nqvm_y_t y;\n'
+    "    return (int)(nqvm_init(&model, &nqvm_set_default, &banks) | nqvm_step(&model, &u, &y) | nqvm_tune_commit(&model));\n}\n"
+)
 
 
 def link(root: Path, core: str, level: str) -> str:

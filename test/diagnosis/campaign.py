@@ -19,7 +19,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -102,7 +102,8 @@ def run(seed: int, index: int, commands: dict[str, str], simulate: str, timeout:
 
 
 def alone(case: str, command: str, timeout: float, out: Path) -> float:
-    """Seconds that a case of the draw takes by itself, compilers left out: with a second one beside it, two share caches and units of a core."""
+    """Seconds that a case of the draw takes by itself, compilers left out: with a second one beside it, two share caches and units of a
+    core."""
     seed, index = map(int, case.split(":"))
     folder = out / "cases" / f"{seed}-{index}"
     shutil.rmtree(folder, ignore_errors=True)
@@ -132,7 +133,7 @@ def choose(seed: int, count: int, strata: set[str], kinds: set[str]) -> list[tup
 
 
 def line(row: dict) -> str:
-    hidden = " + ".join(f"{k} ({f}, {e:.0f})" for k, f, e in zip(row["kinds"], row["forms"], row["energies"])) or "nothing"
+    hidden = " + ".join(f"{k} ({f}, {e:.0f})" for k, f, e in zip(row["kinds"], row["forms"], row["energies"], strict=True)) or "nothing"
     answer = " + ".join(row["answer"]) or row["verdict"] or row["why"]
     return f"{row['command']} {row['case']} {row['stratum']}: {row['outcome']}: {hidden} -> {answer}, {row['seconds']} s"
 
@@ -221,6 +222,49 @@ def arguments() -> argparse.ArgumentParser:
     return parse
 
 
+def write(
+    asked: argparse.Namespace, commands: Mapping[str, str], seed: int, cases: int, rows: Mapping[str, list[dict]], paces: Sequence[float]
+) -> None:
+    """Tables of the cases that are through, of so many: printed, and kept beside the rows."""
+    done = len(next(iter(rows.values())))
+    count = f"{done} cases" + f", the first of {cases}" * (done < cases)
+    tables = {name: score.summary(own) for name, own in rows.items()}
+    texts = {name: f"{score.text(own)}\n\n{score.confusion(own)}\n" for name, own in tables.items()}
+    side = score.compare(tables)
+    if not asked.brief:
+        print("".join(f"\n{name}: {commands[name]}\n{own}" for name, own in texts.items()) + f"\n{side}\n")
+    said = (
+        f"Code of {commit()}. Seconds are of the processor for a whole command, imports and files included, compilers not; "
+        f"to count to ten million took it {paces[0]:.2f} s before and {paces[1]:.2f} s after."
+    )
+    if again := sum("alone" in r for r in next(iter(rows.values()))):
+        said += (
+            f" Of the {again} cases of more than {asked.alone:g} s with {asked.jobs} at a time, "
+            "the time is that of a second run by themselves."
+        )
+    page = [
+        f"# Campaign of {count}, seed {seed}\n\n{said}\n\n{side}\n",
+        *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items()),
+    ]
+    for path in filter(None, (asked.out / "campaign.md", asked.page)):
+        path.write_text("".join(page))
+    result = {"seed": seed, "commands": commands, "tables": tables, "rows": rows}
+    (asked.out / "campaign.json").write_text(json.dumps(result, indent=1))
+    print(f"one case again: --only SEED:INDEX; all rows: {asked.out / 'campaign.json'}")
+
+
+def gated(own: Sequence[dict], seed: int, seconds: float) -> int:
+    """Print the gates that a command's rows fail; exit code 1 if there are any."""
+    gates = score.gate(own)
+    failed = list(filter(None, gates.values()))
+    print("".join(f"gate: {p}\n" for p in failed), end="")
+    right = sum(r["right"] for r in own)
+    print(
+        f"{len(gates) - len(failed)} passed, {len(failed)} failed in {seconds:.0f}s: gates of {len(own)} cases, {right} right, seed {seed}"
+    )
+    return 1 if failed else 0
+
+
 def main() -> int:
     parse = arguments()
     asked = parse.parse_args()
@@ -261,38 +305,9 @@ def main() -> int:
                 note(asked.out, [row])
         except KeyboardInterrupt:  # its tables are of the cases so far
             pool.shutdown(wait=False, cancel_futures=True)
-    done = len(next(iter(rows.values())))
-    count = f"{done} cases" + f", the first of {len(chosen)}" * (done < len(chosen))
-    tables = {name: score.summary(own) for name, own in rows.items()}
-    texts = {name: f"{score.text(own)}\n\n{score.confusion(own)}\n" for name, own in tables.items()}
-    side = score.compare(tables)
-    if not asked.brief:
-        print("".join(f"\n{name}: {commands[name]}\n{own}" for name, own in texts.items()) + f"\n{side}\n")
     paces.append(pace())
-    said = (
-        f"Code of {commit()}. Seconds are of the processor for a whole command, imports and files included, compilers not; "
-        f"to count to ten million took it {paces[0]:.2f} s before and {paces[1]:.2f} s after."
-    )
-    if again := sum("alone" in r for r in next(iter(rows.values()))):
-        said += f" Of the {again} cases of more than {asked.alone:g} s with {asked.jobs} at a time, the time is that of a second run by themselves."
-    page = [
-        f"# Campaign of {count}, seed {seed}\n\n{said}\n\n{side}\n",
-        *(f"\n## {name}\n\n```\n{own}```\n" for name, own in texts.items()),
-    ]
-    for path in filter(None, (asked.out / "campaign.md", asked.page)):
-        path.write_text("".join(page))
-    result = {"seed": seed, "commands": commands, "tables": tables, "rows": rows}
-    (asked.out / "campaign.json").write_text(json.dumps(result, indent=1))
-    print(f"one case again: --only SEED:INDEX; all rows: {asked.out / 'campaign.json'}")
-    if not asked.gate:
-        return 0
-    own = next(iter(rows.values()))
-    gates = score.gate(own)
-    failed = list(filter(None, gates.values()))
-    print("".join(f"gate: {p}\n" for p in failed), end="")
-    took, right = time.monotonic() - begin, sum(r["right"] for r in own)
-    print(f"{len(gates) - len(failed)} passed, {len(failed)} failed in {took:.0f}s: gates of {len(own)} cases, {right} right, seed {seed}")
-    return 1 if failed else 0
+    write(asked, commands, seed, len(chosen), rows, paces)
+    return gated(next(iter(rows.values())), seed, time.monotonic() - begin) if asked.gate else 0
 
 
 if __name__ == "__main__":

@@ -74,5 +74,5 @@ def claims(causes: Sequence[Mapping], correct: Sequence[bool], nominal: Mapping[
             "right": ok,
             "nothing": may_be_nothing(c, nominal),
         }
-        for c, ok in zip(causes, correct)
+        for c, ok in zip(causes, correct, strict=True)
     ]

@@ -48,7 +48,10 @@ def main(arguments: list[str] | None = None) -> int:
     draw = json.loads(kept.read_text())
     if others := {c.split(":")[0] for c in new} - {str(draw["seed"])}:  # by its cases: a campaign --only SEED:INDEX has no seed of its own
         print(
-            f"{asked.rows}: seed {', '.join(sorted(others))}; the frozen draw has {draw['seed']}: run the campaign with --seed {draw['seed']}",
+            (
+                f"{asked.rows}: seed {', '.join(sorted(others))}; the frozen draw has {draw['seed']}: "
+                f"run the campaign with --seed {draw['seed']}"
+            ),
             file=sys.stderr,
         )
         return 2

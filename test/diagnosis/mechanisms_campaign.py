@@ -19,8 +19,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from mechanisms.generator import KINDS, WHERE, Case, cases
 
@@ -31,6 +30,7 @@ from penode_sil.diagnosis import noise, study
 from penode_sil.diagnosis.missing import missing_forces
 from penode_sil.recordings.measured import load
 
+HERE = Path(__file__).resolve().parent
 LIMIT = 0.05  # of the RMS of the true hidden force
 
 

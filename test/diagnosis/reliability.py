@@ -103,7 +103,8 @@ def text(t: Mapping) -> str:
         )
     low, high = wilson(t["right"], t["named"])
     lines.append(
-        f"over all: {t['named']} named causes of {t['cases']} cases, {100 * t['stated']:.1f} % stated, {100 * t['right'] / t['named']:.1f} % right "
+        f"over all: {t['named']} named causes of {t['cases']} cases, {100 * t['stated']:.1f} % stated, "
+        f"{100 * t['right'] / t['named']:.1f} % right "
         f"({100 * low:.1f} .. {100 * high:.1f}): {100 * apart(t):+.1f} points (asked: within {100 * APART:.0f})"
     )
     lines.append(f"named with an interval that holds the model without the cause: {len(t['nothing'])} (asked: none)")

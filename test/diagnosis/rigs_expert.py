@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a plain fit by an expert reaches on a rig: the law that is known to be in it, least squares, free start; nothing of the diagnosis in it."""
+"""What a plain fit by an expert reaches on a rig: the law that is known to be in it, least squares, free start; nothing of the diagnosis in
+it."""
 
 from __future__ import annotations
 

@@ -128,7 +128,10 @@ def shown(value: float | None, unit: str) -> str:
 def row(r: dict) -> str:
     """A line of the table."""
     sizes = " | ".join(shown(r[k], r["unit"]) for k in ("before", "fitted", "after", "expert"))
-    return f"| {r['rig']}: {r['case']} | {' + '.join(r['names']) or r['verdict']} | {'yes' if r['right'] else 'no'} | {sizes} | {r['seconds']:.0f} s |"
+    return (
+        f"| {r['rig']}: {r['case']} | {' + '.join(r['names']) or r['verdict']} "
+        f"| {'yes' if r['right'] else 'no'} | {sizes} | {r['seconds']:.0f} s |"
+    )
 
 
 HEAD = """# Real rigs

@@ -51,7 +51,7 @@ def pairing(causes: Sequence[Mapping], effects: Sequence[Mapping], bound: float,
     """Cause -> effect if every cause explains another effect and only effects below the bound are left; else None."""
     for order in permutations(range(len(effects)), len(causes)):
         left = [e for i, e in enumerate(effects) if i not in order]
-        if all(explains(c, effects[i], told) for c, i in zip(causes, order)) and all(e["energy"] < bound for e in left):
+        if all(explains(c, effects[i], told) for c, i in zip(causes, order, strict=True)) and all(e["energy"] < bound for e in left):
             return dict(enumerate(order))
     return None
 
@@ -151,7 +151,7 @@ def allowed_failures(rates: Sequence[float], risk: float) -> int:
     """
     chance = [1.0]  # of k failures
     for rate in rates:
-        chance = [rate * a + (1 - rate) * b for a, b in zip([*chance, 0.0], [0.0, *chance])]
+        chance = [rate * a + (1 - rate) * b for a, b in zip([*chance, 0.0], [0.0, *chance], strict=True)]
     return next(k for k in range(len(chance)) if sum(chance[k + 1 :]) < risk)
 
 
@@ -250,11 +250,15 @@ def text(out: Mapping) -> str:
         low, high = s["wilson95"]
         other = ", ".join(f"{n} {what}" for what, n in s["outcomes"].items() if what != "right")
         lines.append(
-            f"{name:<16}{s['right']:>4} of {s['n']:<3}{_percent(s['share']):>8}  {_percent(low)} .. {_percent(high):<9}{_percent(s['demanded'], 0):>7}  {other}"
+            f"{name:<16}{s['right']:>4} of {s['n']:<3}{_percent(s['share']):>8}  {_percent(low)} .. "
+            f"{_percent(high):<9}{_percent(s['demanded'], 0):>7}  {other}"
         )
     lines += ["", f"{'kind':<20}{'common':>9}{'foreign':>10}{'hard':>9}  answered instead"]
     for kind, own in out["kinds"].items():
-        cell = lambda name: f"{own[name]['right']}/{own[name]['n']}" if name in own else "-"
+
+        def cell(name, own=own):
+            return f"{own[name]['right']}/{own[name]['n']}" if name in own else "-"
+
         instead = sum((Counter(s["instead"]) for s in own.values()), Counter())
         lines.append(
             f"{kind:<20}{cell('single_common'):>9}{cell('single_foreign'):>10}{cell('hard'):>9}  "
@@ -266,8 +270,14 @@ def text(out: Mapping) -> str:
         f"parameters of effects above the noise ({a['n']}): median error {_percent(a['median_error'], 2)} (asked 1 %), "
         f"95 % within {_percent(a['error_95'], 2)} (asked 6 %)",
         f"parameters of all effects ({p['n']}): median error {_percent(p['median_error'], 2)}, 95 % within {_percent(p['error_95'], 2)}",
-        f"95 % intervals ({c['n']}): cover {_percent(c['share'])} of the truths (asked 90 .. 98 %), {_percent(c['wilson95'][0])} .. {_percent(c['wilson95'][1])}",
-        f"hold-out inside the trained range ({g['n']}): {_percent(g['within_5_percent_of_floor'])} within 5 % of the noise floor (asked 95 %)",
+        (
+            f"95 % intervals ({c['n']}): cover {_percent(c['share'])} of the truths (asked 90 .. 98 %), "
+            f"{_percent(c['wilson95'][0])} .. {_percent(c['wilson95'][1])}"
+        ),
+        (
+            f"hold-out inside the trained range ({g['n']}): "
+            f"{_percent(g['within_5_percent_of_floor'])} within 5 % of the noise floor (asked 95 %)"
+        ),
         f"time a case: median {t['median']} s, 90 % within {t['q90']} s (asked 10 s), longest {t['longest']} s (asked 40 s); "
         f"compilers, in a first call, beside that: median {t['compiling']} s",
     ]
@@ -287,7 +297,10 @@ def confusion(out: Mapping) -> str:
 
 def compare(tables: Mapping[str, Mapping]) -> str:
     """Several commands on the same cases side by side, as a Markdown table."""
-    number = lambda x: "-" if x is None else f"{x:.3g}"
+
+    def number(x):
+        return "-" if x is None else f"{x:.3g}"
+
     first = next(iter(tables.values()))
     lines = ["| | " + " | ".join(tables) + " |", "|---|" + "---|" * len(tables)]
 
@@ -305,7 +318,7 @@ def compare(tables: Mapping[str, Mapping]) -> str:
     for which, of in (("parameters_above_noise", "above the noise"), ("parameters", "of any size")):
         row(
             f"parameter error, effects {of}: median; 95 % within",
-            lambda t: f"{_percent(t[which]['median_error'])}; {_percent(t[which]['error_95'])}",
+            lambda t, which=which: f"{_percent(t[which]['median_error'])}; {_percent(t[which]['error_95'])}",
         )
     row("95 % intervals cover", lambda t: _percent(t["coverage"]["share"]))
     row("hold-out RMSE / noise floor before, median", lambda t: number(t["gain"]["all"]["before"]))

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE / "ablation"))
+sys.path.insert(0, str(Path(__file__).resolve().parent / "ablation"))
 
 import ablate
 import probes
+
+HERE = Path(__file__).resolve().parent
 
 
 @pytest.fixture
@@ -25,7 +26,7 @@ def limit(monkeypatch):
 
 
 def outcomes() -> list[int]:
-    return [sum(column) for column in zip(*probes.SEEN.values())]
+    return [sum(column) for column in zip(*probes.SEEN.values(), strict=True)]
 
 
 def test_a_watched_number_is_the_number(limit):

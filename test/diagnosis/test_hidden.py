@@ -2,6 +2,7 @@
 # Copyright (c) 2026 the penode authors
 """The generator of hidden effects: its integrator, roads, noise, and what the truth file claims."""
 
+import itertools
 import json
 import tomllib
 from dataclasses import replace
@@ -79,7 +80,10 @@ def test_quarter_vehicle_against_scipy(extra, kind):
 
     Tables are cubic over points 0.24 % apart in the argument, so a curve with a width of eight points or more errs below 1e-6.
     """
-    road = lambda t: 5e-3 * np.sin(2 * np.pi * 8 * t) * (1 - np.exp(-5 * np.maximum(t, 0))) ** 3
+
+    def road(t):
+        return 5e-3 * np.sin(2 * np.pi * 8 * t) * (1 - np.exp(-5 * np.maximum(t, 0))) ** 3
+
     world = a_plant("quarter", CAR).world()
     curve = (lambda x: extra(x, 0)) if kind == Kind.DEFLECTION_CURVE else (lambda x: extra(0, x))
     motion = simulate(replace(world, laws={**world.laws, "extra": Law(kind, 0, 1, (), curve)}), road(knots(3.0)))
@@ -119,7 +123,8 @@ MEMORY = {  # law of plant.c, and its state equation and force written out again
 
 @pytest.mark.parametrize("name", MEMORY)
 def test_laws_with_memory_against_scipy(name):
-    """Under a prescribed sine. Slips have a corner where the rate changes sign: one step of error 1/2 (h v')^2 there, below 1e-6 of the level."""
+    """Under a prescribed sine. Slips have a corner where the rate changes sign: one step of error 1/2 (h v')^2 there, below 1e-6 of the
+    level."""
     law, rate, force = MEMORY[name]
     a, w = 0.02, 2 * np.pi * 1.5
     motion = simulate(World((), {"law": law}), a * np.sin(w * knots(2.0)))
@@ -135,12 +140,13 @@ def test_laws_with_memory_against_scipy(name):
         atol=1e-12,
         max_step=1e-3,
     ).y[0]
-    expected = np.array([force(*now, rate(*now)) for now in zip(x, v, q)])
+    expected = np.array([force(*now, rate(*now)) for now in zip(x, v, q, strict=True)])
     assert np.abs(motion.reaction - expected).max() < 1e-5 * np.abs(expected).max()
 
 
 def test_energy_balance_of_a_car_with_friction_and_stop():
-    """Work of the road = energy stored + losses. Trapezoids at 4 kHz: (2 pi 35 / 4000)^2 / 12 = 2.5e-4 at the highest frequency; 1e-3 allowed."""
+    """Work of the road = energy stored + losses. Trapezoids at 4 kHz: (2 pi 35 / 4000)^2 / 12 = 2.5e-4 at the highest frequency; 1e-3
+    allowed."""
     bench = a_bench()
     friction, stop = (lambda v: 90 * np.tanh(v / 2e-3)), (lambda s: -9e4 * np.maximum(-s - 0.01, 0))
     change = Change({}, {"rub": Law(Kind.RATE_CURVE, 0, 1, (), friction), "stop": Law(Kind.DEFLECTION_CURVE, 0, 1, (), stop)})
@@ -174,12 +180,13 @@ def test_step_of_the_recordings_is_fine_enough(form):
 
 @pytest.mark.parametrize("road_class", "ABCD")
 def test_road_has_the_spectrum_of_iso_8608(road_class):
-    """G(n) = G(n0) (n / n0)^-2 from 0.5 to 15 Hz. Welch: about 2 x 600 s / 8 s = 150 averages in 8 bands of 12 bins or more: 3 s.d. = 3 / sqrt(1800) = 7 %."""
+    """G(n) = G(n0) (n / n0)^-2 from 0.5 to 15 Hz. Welch: about 2 x 600 s / 8 s = 150 averages in 8 bands of 12 bins or more: 3 s.d. = 3 /
+    sqrt(1800) = 7 %."""
     speed = 20.0
     t = np.arange(600 * 200) / 200
     f, psd = dsp.welch(roads.iso8608(np.random.default_rng(8), road_class, speed)(t), 200, nperseg=1600)
     spatial = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}[road_class] * (f[1:] / speed / 0.1) ** -2  # m^3 over cycles/m
-    for low, high in zip(*(np.geomspace(1, 15, 9)[i:][:8] for i in (0, 1))):
+    for low, high in itertools.pairwise(np.geomspace(1, 15, 9)):
         band = (f[1:] >= low) & (f[1:] < high + 1)
         assert np.mean(psd[1:][band] * speed / spatial[band]) == pytest.approx(1, abs=0.08)
 
@@ -196,7 +203,8 @@ def test_chirp_keeps_its_amplitude_or_its_velocity(constant_velocity):
 
 @pytest.mark.parametrize("noise", [energy.Noise(0.1), energy.Noise(0.1, 0.6, 0.95), energy.Noise(0.1, quantum=0.2)])
 def test_noise_has_the_stated_level_and_spectrum(noise):
-    """200 000 samples: the level within 3 % (coloured: some 5000 independent ones), bands of 400 periodogram bins or more within 15 % = 3 s.d."""
+    """200 000 samples: the level within 3 % (coloured: some 5000 independent ones), bands of 400 periodogram bins or more within 15 % = 3
+    s.d."""
     n = 200_000
     wave = 3.0 * np.sin(np.arange(n) * 0.01)  # rounding is white when the signal crosses many steps
     x = noise.rounded(wave + noise.draw(np.random.default_rng(4), n)) - wave
@@ -300,7 +308,8 @@ READINGS = {
 
 @pytest.mark.parametrize("name", READINGS)
 def test_truth_is_what_can_be_read_from_a_loop(name):
-    """Rounded corners and the far ends of the loop leave 3 %; a Bouc-Wen loop of 20 mm gets to 1 % of its limit, and bends by 5 % where it is read."""
+    """Rounded corners and the far ends of the loop leave 3 %; a Bouc-Wen loop of 20 mm gets to 1 % of its limit, and bends by 5 % where it
+    is read."""
     size, read = READINGS[name]
     s, v, force, truth = measured_loop(name, size)
     for parameter, value in read(s, v, force).items():
@@ -394,7 +403,8 @@ def test_bias_has_the_energy_that_arithmetic_gives():
 
 
 def test_deviation_inside_the_tolerance_has_little_energy_and_beyond_it_much():
-    """A shift of one prior width, 0.4 of 1 %, costs at most 1 in chi-square after the re-fit; of ten widths 100, less what other parameters take."""
+    """A shift of one prior width, 0.4 of 1 %, costs at most 1 in chi-square after the re-fit; of ten widths 100, less what other parameters
+    take."""
     bench = a_bench()
     one, ten = (bench.left(widths * 0.004 * bench.of_parameters["d"]) for widths in (1, 10))
     assert 0.5 < one <= 1 and ten == pytest.approx(100 * one)
@@ -430,7 +440,7 @@ def test_case_follows_from_seed_and_index(tmp_path):
         cases.write_truth(case.truth(), tmp_path / f"{name}.json")
     files = ["model.toml", "train_1.csv", "holdout_1.csv"]
     a, b, c = ([(tmp_path / name / f).read_bytes() for f in files] + [(tmp_path / f"{name}.json").read_bytes()] for name in "abc")
-    assert a == b and all(x != y for x, y in zip(a, c))
+    assert a == b and all(x != y for x, y in zip(a, c, strict=True))
 
 
 def test_explainer_sees_model_and_recordings_and_no_truth(tmp_path):
@@ -454,7 +464,7 @@ def test_null_recordings_are_the_true_linear_plant_and_noise():
     for index in (1, 9, 15):
         case = cases.make(21, index)
         clean = [case.bench.observe(m, (), i) for i, m in enumerate(case.motions)]
-        parts = [{s: seen[s] - c[s] for s in seen} for (_, seen), c in zip(case.measured, clean)][:-1]
+        parts = [{s: seen[s] - c[s] for s in seen} for (_, seen), c in zip(case.measured, clean, strict=True)][:-1]
         white = case.bench.white(parts)
         count = sum(x.size for p in parts for x in p.values())
         if case.bench.input_noise == 0:
@@ -491,7 +501,7 @@ def test_settled_force_and_bias_of_the_deflection_are_answers_of_each_other():
 def test_bias_that_wanders_may_be_a_load_that_does():
     """Of a height over a single mass: it goes along with so slow a load; no acceleration tells."""
     case = cases.make(717678205, 3)
-    assert [(e.form.name, e.where) for e in case.effects][0] == ("warming_up", "z_mass")
+    assert next((e.form.name, e.where) for e in case.effects) == ("warming_up", "z_mass")
     assert [r["kind"] for r in case.rivals(0)] == ["constant_force"]
 
 

@@ -30,7 +30,8 @@ def test_a_free_angle_of_many_deviations_is_no_force(monkeypatch):
 
 
 def test_generator_keeps_the_balance_of_power():
-    """Drive: work of the torque = losses + energy. Trapezoids at 1 kHz of what moves at 12 Hz or less: (2 pi 12/1000)^2/12 = 5e-4; 2e-3 allowed."""
+    """Drive: work of the torque = losses + energy. Trapezoids at 1 kHz of what moves at 12 Hz or less: (2 pi 12/1000)^2/12 = 5e-4; 2e-3
+    allowed."""
     case = generator.drive(["friction"], [5], 3.0)[0]
     rng = np.random.default_rng([5, 2])
     p = generator.drawn(rng, jm=0.02, jl=0.8, k=900.0, d=3.0, dl=0.5, dm=0.03)

@@ -193,7 +193,9 @@ def test_errors_and_intervals_count_for_common_forms_that_are_named_themselves()
 
 
 def test_errors_are_told_of_effects_above_the_noise_and_of_all():
-    told = lambda value: said(cause("coulomb_friction", "damper", force={"value": value}))
+    def told(value):
+        return said(cause("coulomb_friction", "damper", force={"value": value}))
+
     own = [score.score(truth(FRICTION | {"ratio": ratio}), told(value), 1.0) for ratio, value in ((0.99, 44.0), (1.0, 40.4), (3.0, 40.0))]
     out = score.summary(own)
     assert (out["parameters"]["n"], out["parameters"]["error_95"]) == (3, pytest.approx(0.1))
@@ -227,7 +229,7 @@ def test_gate_of_unlike_cases_is_that_of_the_enumeration():
     rates, risk = [0.998, 0.97, 0.9, 0.9, 0.85, 0.6], 1e-2
     chance = [0.0] * (len(rates) + 1)
     for right in itertools.product((True, False), repeat=len(rates)):
-        chance[right.count(False)] += math.prod(p if r else 1 - p for r, p in zip(right, rates))
+        chance[right.count(False)] += math.prod(p if r else 1 - p for r, p in zip(right, rates, strict=True))
     k = score.allowed_failures(rates, risk)
     assert sum(chance[k + 1 :]) < risk <= sum(chance[k:])
 

@@ -48,7 +48,7 @@ def test_stated_ratio_by_another_way(index):
         "power": lambda: p[0] * s**3,
         "stribeck": lambda: p[0] * (1 + p[3] / (1 + (v / p[2]) ** 2)) * v / np.hypot(v, p[1]),
     }[law.law]()
-    wrong = sum(f for x, f in zip(case.plant.laws, fine.force) if x.role == "mis" and x.place == law.place)
+    wrong = sum(f for x, f in zip(case.plant.laws, fine.force, strict=True) if x.role == "mis" and x.place == law.place)
     if case.kind.inputs:
         wrong = wrong - case.actuator * case.records["train_1"].error[:: world.EVERY, 0]
     wrong = wrong - case.scale[law.place] * 0.02 * case._force(law.place, case.first) * case.records["train_1"].gust[:: world.EVERY]

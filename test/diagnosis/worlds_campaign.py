@@ -50,8 +50,11 @@ def one(seed: int, index: int, stratum: str, tolerances: bool | None, command: s
 
 def line(row: Mapping) -> str:
     """A row in words."""
-    hidden = " + ".join(f"{k} {x:.1f}" for k, x in zip(row["kinds"], row["ratios"])) or "nothing"
-    return f"{row['case']} {row['plant']} {row['outcome']}: {hidden} -> {' + '.join(row['answer']) or row['verdict'] or row['why']}, {row['seconds']} s"
+    hidden = " + ".join(f"{k} {x:.1f}" for k, x in zip(row["kinds"], row["ratios"], strict=True)) or "nothing"
+    return (
+        f"{row['case']} {row['plant']} {row['outcome']}: "
+        f"{hidden} -> {' + '.join(row['answer']) or row['verdict'] or row['why']}, {row['seconds']} s"
+    )
 
 
 def share(rows: Sequence[Mapping], what: str) -> str:
@@ -88,7 +91,8 @@ def page(rows: Sequence[Mapping], about: str) -> str:
     times = sorted(r["seconds"] for r in rows)
     out.append(f"\nOne textbook law a name: {sum(n <= m for n, m in laws)} of {len(laws)} rightly named." if laws else "")
     out.append(
-        f"Time on one core: median {times[len(times) // 2]:.0f} s, 90 % within {times[int(0.9 * (len(times) - 1))]:.0f} s, longest {times[-1]:.0f} s.\n"
+        f"Time on one core: median {times[len(times) // 2]:.0f} s, "
+        f"90 % within {times[int(0.9 * (len(times) - 1))]:.0f} s, longest {times[-1]:.0f} s.\n"
     )
     return "\n".join([*out, "## Not right\n", *(f"- {line(r)}" for r in rows if not r["right"])]) + "\n"
 
@@ -140,7 +144,10 @@ def main() -> int:
             print(line(rows[-1]), flush=True)
     text = page(
         rows,
-        f"Seed {seed}, {code}, `{args.command}`{', no tolerances' * args.no_tolerance}. Effects 3 to 10 times the mis-modelling at their place.",
+        (
+            f"Seed {seed}, {code}, `{args.command}`{', no tolerances' * args.no_tolerance}. "
+            "Effects 3 to 10 times the mis-modelling at their place."
+        ),
     )
     (args.out / "WORLDS.md").write_text(text)
     print(text)

@@ -81,11 +81,12 @@ def rightly(causes: Sequence[Mapping], effects: Sequence[Mapping]) -> list[bool]
     """Which named causes are right. Those that `outcome` does not count by themselves, as companions or parts of a whole, are."""
     counted = without_companions(together(causes, effects), effects)
     correct = right(causes, effects, explains)
-    return [ok or not any(c is x for x in counted) for c, ok in zip(causes, correct)]
+    return [ok or not any(c is x for x in counted) for c, ok in zip(causes, correct, strict=True)]
 
 
 def score(truth: Mapping, diagnosis: Mapping | None, nominal: Mapping[str, float] | None = None) -> dict:
-    """One row; `covered`: whether each 95 % interval of a parameter that the truth names holds it; `nominal`: parameters of the model file."""
+    """One row; `covered`: whether each 95 % interval of a parameter that the truth names holds it; `nominal`: parameters of the model
+    file."""
     what, effects = outcome(truth, diagnosis), truth["effects"]
     causes = named(diagnosis or {})
     covered = []

@@ -29,8 +29,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parents[0] / "prove"), str(HERE.parents[0] / "sil")]
+sys.path.extend(str(Path(__file__).resolve().parents[1] / room) for room in ("exports", "prove", "sil"))
 import gate  # needs the path above
 import readers_check
 from lag import lag
@@ -42,6 +41,7 @@ from penode_sil.cli import cli
 from penode_sil.errors import UserError
 from penode_sil.guard import guarded
 
+HERE = Path(__file__).resolve().parent
 LIMIT = 60  # [s] of wall-clock time for one file
 FORK = 50  # files for a process
 KEPT = b"this file stood here before"
@@ -232,7 +232,7 @@ def given(importer: Importer, seeds: range) -> Iterator[bytes]:
 def search(importer: Importer, seeds: range, folder: Path, command: Any = cli) -> None:
     """Give it all files; problems are kept with the file that brought them."""
     files = list(given(importer, seeds))
-    for seed, data, wrong in zip(seeds, files, many(importer, files, folder, command)):
+    for seed, data, wrong in zip(seeds, files, many(importer, files, folder, command), strict=True):
         if wrong:
             kept = gate.BUILD / "imports" / f"{importer.name.replace(' ', '-')}-{seed}{importer.suffix}"
             kept.parent.mkdir(parents=True, exist_ok=True)
@@ -287,7 +287,8 @@ def importers(folder: Path) -> list[Importer]:
 
 
 def check(seeds: range, only: str = "") -> Iterator[Importer]:
-    """So many files for each importer (or those whose name has one of `only`, parted by commas, in it), which is returned when it has had all."""
+    """So many files for each importer (or those whose name has one of `only`, parted by commas, in it), which is returned when it has had
+    all."""
     with tempfile.TemporaryDirectory() as outer:
         place = Path(outer, "files")
         place.mkdir()
@@ -311,7 +312,10 @@ def main() -> int:
     for importer in check(range(1000, 1000 + chosen.files), chosen.only):
         count = Counter(taken=importer.taken, refused=importer.refused)
         good &= gate.report(
-            f"imports: {importer.name}: {chosen.files} files: {count['taken']} taken, {count['refused']} refused in {len(importer.lines)} kinds of lines",
+            (
+                f"imports: {importer.name}: {chosen.files} files: {count['taken']} taken, "
+                f"{count['refused']} refused in {len(importer.lines)} kinds of lines"
+            ),
             importer.problems[:10],
         )
     return int(not good)

@@ -75,7 +75,8 @@ class Production:
 
 @dataclass
 class Scenario:
-    """A table with what its columns mean. `stimuli` and `tuned`: (variable, index or None, column); `outputs`: (variable, column, tolerance)."""
+    """A table with what its columns mean. `stimuli` and `tuned`: (variable, index or None, column); `outputs`: (variable, column,
+    tolerance)."""
 
     name: str
     lines: list[str]

@@ -245,7 +245,7 @@ class Block:
             return text, of
         subscripts = list(self._many(parts[1].children, scope))
         self._want(len(subscripts) == len(of.shape), tree, f"{label} has {len(of.shape)} dimensions")
-        for (_, at), size in zip(subscripts, of.shape):
+        for (_, at), size in zip(subscripts, of.shape, strict=True):
             inside = at.span is not None and at.span[0] >= 1 and at.span[1] <= size
             self._want(inside, tree, f"a subscript of {label} is not known to lie in 1 .. {size}")
         return f"{text}[{', '.join(f'{i} - 1' for i, _ in subscripts)}]", Of(of.kind)
@@ -273,7 +273,7 @@ class Block:
 
     def _sum(self, tree: lark.Tree[Any], scope: _Scope) -> tuple[str, Of]:
         text, of = self._expression(tree.children[0], scope)
-        for sign, part in zip(tree.children[1::2], tree.children[2::2]):
+        for sign, part in zip(tree.children[1::2], tree.children[2::2], strict=True):
             other, right = self._expression(part, scope)
             self._want(
                 of.kind != "Boolean" and fits(right, Of(of.kind, of.shape)),
@@ -285,7 +285,7 @@ class Block:
 
     def _product(self, tree: lark.Tree[Any], scope: _Scope) -> tuple[str, Of]:
         text, of = self._expression(tree.children[0], scope)
-        for sign, part in zip(tree.children[1::2], tree.children[2::2]):
+        for sign, part in zip(tree.children[1::2], tree.children[2::2], strict=True):
             other, right = self._expression(part, scope)
             found = product(of, right) if sign == "*" else of if of.kind == "Real" and right == REAL else None
             self._want(found is not None, tree, f"{of.kind}{list(of.shape)} {sign} {right.kind}{list(right.shape)}")
@@ -317,7 +317,7 @@ class Block:
         found = list(self._many(tree.children[1:], scope))
         wanted, result = BUILT_IN.get(label) or self._functions.get(label) or (None, REAL)
         self._want(wanted is not None, tree, f"there is no function {label}")
-        alike = len(found) == len(wanted or ()) and all(fits(of, w) for (_, of), w in zip(found, wanted or ()))
+        alike = len(found) == len(wanted or ()) and all(fits(of, w) for (_, of), w in zip(found, wanted or (), strict=True))
         self._want(alike, tree, f"{label} takes other arguments")
         if label in self._functions:
             self._called.add(label)

@@ -26,9 +26,9 @@ def distances(model: Any, u: np.ndarray, real: type, text: str = "", signals: fr
     states, outputs = [f"'state.{s}'" for s in model.states], [name for name, kind in block.kinds.items() if kind == "output"]
     found = np.empty_like(wanted)
     for k, row in enumerate(u):
-        block.values |= {i.name: real(v) for i, v in zip(model.inputs, row)}
+        block.values |= {i.name: real(v) for i, v in zip(model.inputs, row, strict=True)}
         assert block.run("DoStep") == signals
         found[k] = [block.values[name] for name in (*states, *outputs)]
-        block.values |= {name: real(v) for name, v in zip(states, run.x[k])}
+        block.values |= {name: real(v) for name, v in zip(states, run.x[k], strict=True)}
     unit = np.spacing(np.abs(wanted).max(axis=0).astype(real))
     return np.abs(found.astype(float) - wanted.astype(float)) / unit

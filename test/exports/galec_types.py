@@ -88,7 +88,7 @@ BUILT_IN: dict[str, tuple[tuple[Of, ...], Of]] = {
 
 def fits(given: Of, wanted: Of) -> bool:
     """May a value of one type be where another is wanted? Nothing is converted."""
-    alike = len(given.shape) == len(wanted.shape) and all(w in (-1, g) for g, w in zip(given.shape, wanted.shape))
+    alike = len(given.shape) == len(wanted.shape) and all(w in (-1, g) for g, w in zip(given.shape, wanted.shape, strict=True))
     return given.kind == wanted.kind and alike
 
 

@@ -291,8 +291,10 @@ def test_names_that_the_language_keeps_are_quoted(tmp_path: Path) -> None:
     """Inputs, parameters, states and outputs named as keywords and functions; no input at all; names that it cannot have."""
     path = tmp_path / "m.toml"
     path.write_text(
-        '[model]\nname = "block"\nsample_time = "1 ms"\nmethod = "heun"\n[parameters]\nsignal = { value = 1, unit = "s" }\nx = { value = 2, unit = "m", tunable = true }\n'
-        '[states]\ntanh1D = { unit = "m", start = 0.5 }\n[equations]\nlag = "der(tanh1D)*signal = x - tanh1D"\n[outputs]\nlimit = { value = "tanh1D + x", unit = "m" }\n'
+        '[model]\nname = "block"\nsample_time = "1 ms"\nmethod = "heun"\n[parameters]\nsignal = { value = 1, unit = "s" }\n'
+        'x = { value = 2, unit = "m", tunable = true }\n'
+        '[states]\ntanh1D = { unit = "m", start = 0.5 }\n[equations]\nlag = "der(tanh1D)*signal = x - tanh1D"\n'
+        '[outputs]\nlimit = { value = "tanh1D + x", unit = "m" }\n'
         'x = { value = "tanh1D", unit = "m" }\n'
     )
     with pytest.raises(exports.ExportError, match="'x' would be two variables of the eFMU"):

@@ -62,7 +62,7 @@ def test_the_weights_change_at_two_seconds(nqvm: Any, efmu: dict[str, bytes]) ->
     changes = [(time, values) for time, _, values in scenario.rows() if values]
     assert [time for time, _ in changes] == [0.0, 2.0]
     first = 1 + len(scenario.stimuli) + len(scenario.outputs)
-    for (_, values), chosen in zip(changes, ("default", "altered_friction")):
+    for (_, values), chosen in zip(changes, ("default", "altered_friction"), strict=True):
         expected = penode_gen.set_values(nqvm, chosen, np.float64)
         arrays = {f"'{a.name}'": np.ravel(layout.gather(a, expected)) for a in layout.arrays(nqvm)}
         assert all(values[at - first] == arrays[name][index] for name, index, at in scenario.tuned)
@@ -95,7 +95,8 @@ def small(folder: Path, more: str = "") -> Any:
     """A lag with a tunable time constant in two sets."""
     path = folder / "lag.toml"
     path.write_text(
-        '[model]\nname = "lag"\nsample_time = "10 ms"\nmethod = "heun"\n[parameters]\nT = { value = 1, unit = "s", tunable = true }\n[inputs]\nu = { unit = "m" }\n'
+        '[model]\nname = "lag"\nsample_time = "10 ms"\nmethod = "heun"\n[parameters]\n'
+        'T = { value = 1, unit = "s", tunable = true }\n[inputs]\nu = { unit = "m" }\n'
         '[states]\nx = { unit = "m" }\n[equations]\nlag = "der(x)*T = u - x"\n[outputs]\ny = { value = "x", unit = "m" }\n'
         f'[sets.default]\n[sets.slow]\nT = "2 s"\n{more}'
     )

@@ -49,7 +49,8 @@ def test_the_dialect_of_dymola(nqvm: Any, tmp_path: Path) -> None:
 
 
 def check(files: dict[str, bytes], folder: Path) -> tuple[int, str]:
-    """Return code and text of the checker, which keeps working files beside itself: a copy, in which Python's mode rU, gone since 3.11, is r."""
+    """Return code and text of the checker, which keeps working files beside itself: a copy, in which Python's mode rU, gone since 3.11, is
+    r."""
     assert CHECKER is not None and EFMI is not None
     program = folder / "checker"
     if not program.exists():

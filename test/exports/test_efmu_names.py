@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Names of a model file that are also those of an eFMU's own things: identifiers of its manifests, columns of its tables, words of its C."""
+"""Names of a model file that are also those of an eFMU's own things: identifiers of its manifests, columns of its tables, words of its
+C."""
 
 from __future__ import annotations
 
@@ -64,7 +65,8 @@ def test_a_signal_called_time_has_a_column_of_its_own(tmp_path: Path) -> None:
     ids=["capitals", "locals"],
 )
 def test_names_of_the_c_around_the_model_are_clear_of_names(tmp_path: Path, names: dict[str, str]) -> None:
-    """Every macro that the wrapper defines starts with the block's own prefix, which no name of a model file has; it compiles without a warning."""
+    """Every macro that the wrapper defines starts with the block's own prefix, which no name of a model file has; it compiles without a
+    warning."""
     for name, data in lag(tmp_path, **names).items():
         if name.startswith("ProductionCode_32bit/"):
             (tmp_path / Path(name).name).write_bytes(data)

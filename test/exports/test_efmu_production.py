@@ -113,7 +113,8 @@ def test_the_how_to_of_the_documentation(production: Any, tmp_path: Path) -> Non
     code = re.search(r"```c\n(static nqvm_efmu_t block;.*?)```", (ROOT / "gen" / "EXPORTS.md").read_text(), re.S)[1]
     first, rest = code.split("\n", 1)
     (tmp_path / "main.c").write_text(
-        f'#include "nqvm_efmu.h"\n{first}\nint main(void)\n{{\n{rest}    return (block.sets == 1U) ? (int)block.error_signal_status : 1;\n}}\n'
+        f'#include "nqvm_efmu.h"\n{first}\nint main(void)\n{{\n'
+        f"{rest}    return (block.sets == 1U) ? (int)block.error_signal_status : 1;\n}}\n"
     )
     library = production(np.float32).library
     subprocess.run(
@@ -128,8 +129,10 @@ def test_names_of_the_structure_itself(tmp_path: Path) -> None:
     """A model without parameters to tune, whose names are those of the structure: it compiles without a warning, and runs as SiL."""
     path = tmp_path / "m.toml"
     path.write_text(
-        '[model]\nname = "m"\nsample_time = "1 ms"\nmethod = "heun"\n[inputs]\nsets = { unit = "m" }\nstaged = { unit = "m" }\n[parameters]\nbanks = { value = 1, unit = "s" }\n'
-        '[states]\nx = { unit = "m", start = 0.5 }\n[equations]\nlag = "der(x)*banks = sets - staged - x"\n[outputs]\ninstance = { value = "x", unit = "m" }\n'
+        '[model]\nname = "m"\nsample_time = "1 ms"\nmethod = "heun"\n[inputs]\nsets = { unit = "m" }\n'
+        'staged = { unit = "m" }\n[parameters]\nbanks = { value = 1, unit = "s" }\n'
+        '[states]\nx = { unit = "m", start = 0.5 }\n[equations]\nlag = "der(x)*banks = sets - staged - x"\n'
+        '[outputs]\ninstance = { value = "x", unit = "m" }\n'
     )
     model = penode_gen.load(path)
     block = Production(contents(export(model, tmp_path)), np.float32, tmp_path)

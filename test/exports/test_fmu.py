@@ -160,8 +160,10 @@ def test_a_state_of_another_export_is_refused(tmp_path: Path) -> None:
     for k in (3, 4):
         path = tmp_path / f"{k}.toml"
         path.write_text(
-            f'[model]\nname = "lag"\nsample_time = "1 ms"\n[parameters]\nk = {{ value = {k}, unit = "1" }}\nT = {{ value = 1, unit = "s", tunable = true }}\n'
-            '[inputs]\nu = { unit = "m" }\n[states]\nx = { unit = "m" }\n[equations]\nq = "der(x) = (k*u - x)/T"\n[outputs]\ny = { value = "x", unit = "m" }\n'
+            f'[model]\nname = "lag"\nsample_time = "1 ms"\n[parameters]\nk = {{ value = {k}, unit = "1" }}\n'
+            f'T = {{ value = 1, unit = "s", tunable = true }}\n'
+            '[inputs]\nu = { unit = "m" }\n[states]\nx = { unit = "m" }\n[equations]\n'
+            'q = "der(x) = (k*u - x)/T"\n[outputs]\ny = { value = "x", unit = "m" }\n'
         )
         (tmp_path / str(k)).mkdir()
         masters.append(Master(Unpacked(export(penode_gen.load(path), 3, tmp_path / str(k)), tmp_path / f"unpacked{k}")).initialise())
@@ -268,7 +270,8 @@ def test_a_refused_set_is_a_warning_with_its_reason(tmp_path: Path, nqvm: Any) -
     """A promise of the model file that the written set breaks; the running set stays, and the next good one is taken."""
     path = tmp_path / "promised.toml"
     path.write_text(
-        f'[model]\nextends = "{nqvm.path}"\nname = "promised"\n[networks]\nspring_net = {{ inputs = ["m"], output = "N", max_slope = "130000 N/m" }}\n'
+        f'[model]\nextends = "{nqvm.path}"\nname = "promised"\n[networks]\n'
+        f'spring_net = {{ inputs = ["m"], output = "N", max_slope = "130000 N/m" }}\n'
     )
     model = penode_gen.load(path)
     master = Master(Unpacked(export(model, 3, tmp_path), tmp_path / "unpacked"), logging=True).initialise()
@@ -315,8 +318,10 @@ def test_models_without_inputs_states_sensors_or_sets(tmp_path: Path) -> None:
     """What C cannot leave empty is left out of the FMU all the same."""
     swing = tmp_path / "swing.toml"
     swing.write_text(
-        '[model]\nname = "swing"\nsample_time = "1 ms"\n[parameters]\nm = { value = 2, unit = "kg" }\nc = { value = 200, unit = "N/m", tunable = true }\n'
-        '[bodies]\nbob = { mass = "m", start_position = "10 mm" }\n[elements]\ns = { between = ["bob", "ground"], law = "linear_spring", stiffness = "c" }\n'
+        '[model]\nname = "swing"\nsample_time = "1 ms"\n[parameters]\nm = { value = 2, unit = "kg" }\n'
+        'c = { value = 200, unit = "N/m", tunable = true }\n'
+        '[bodies]\nbob = { mass = "m", start_position = "10 mm" }\n[elements]\n'
+        's = { between = ["bob", "ground"], law = "linear_spring", stiffness = "c" }\n'
         '[outputs]\nx = { value = "z_bob", unit = "m" }\n'
     )
     gain = tmp_path / "gain.toml"

@@ -73,7 +73,7 @@ def test_directional_derivatives_in_float(unpacked: Unpacked, double: Unpacked) 
     master, u = Master(unpacked).initialise(z_road=0.0), chirp(0.5)[:-1, 0].astype(float)
     small, large = [], []
     for x in u:
-        state = dict(zip(STATES, master.get(*STATES)))
+        state = dict(zip(STATES, master.get(*STATES), strict=True))
         small.append(by_road(master, x, 1))
         twin = Master(double, start_time=0.0).initialise(z_road=x, **state)
         large.append(by_road(twin, x, 1))

@@ -184,7 +184,7 @@ def test_memory_at_its_addresses_is_that_of_the_running_fmu(opened: Unpacked, nq
 def test_one_instance_at_a_time(opened: Unpacked) -> None:
     first = Master(opened)
     second = Master.__new__(Master)
-    with pytest.raises(Exception, match="[Ff]ailed to instantiate|instantiate"):
+    with pytest.raises(Exception, match=r"[Ff]ailed to instantiate|instantiate"):
         second.__init__(opened)
     assert second.log[-1][0] == ERROR and "one instance in a process" in second.log[-1][2]
     first.fmu.freeInstance()

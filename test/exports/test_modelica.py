@@ -81,7 +81,8 @@ def test_a_foreign_compiler_reads_the_values_of_the_record(nqvm: Any, tmp_path: 
         [f"  Real {name}_[{shape}];\n" for name, shape in names] + ["equation\n"] + [f"  {name}_ = params.{name};\n" for name, _ in names]
     )
     (tmp_path / "Probe.mo").write_text(
-        f"{fixed}\nmodel Probe\n  damper_net_parameters params;\n  Real x(start=0.0, fixed=true);\n{''.join(lines)}  der(x) = 1.0;\nend Probe;\n"
+        f"{fixed}\nmodel Probe\n  damper_net_parameters params;\n  Real x(start=0.0, fixed=true);\n"
+        f"{''.join(lines)}  der(x) = 1.0;\nend Probe;\n"
     )
     result = rumoca.Session().load(str(tmp_path / "Probe.mo"), model="Probe").simulate(0.01, dt=0.01)
     from penode_gen.exports.modelica_model import arrays
@@ -148,7 +149,7 @@ def same(a: Any, b: Any) -> bool:
     return (
         a.architecture == b.architecture
         and ranges
-        and all(np.array_equal(x, y) for p, q in zip(a.layers, b.layers) for x, y in zip(parts(p), parts(q)))
+        and all(np.array_equal(x, y) for p, q in zip(a.layers, b.layers, strict=True) for x, y in zip(parts(p), parts(q), strict=True))
     )
 
 

@@ -32,7 +32,8 @@ def imported(name: str, folder: Path, library: Path = LIBRARY) -> Any:
 
 
 def test_a_swing_moves_as_in_the_foreign_compiler(tmp_path: Path) -> None:
-    """rumoca's own simulation of the same file, its solver to 1e-10. Float in C: 2000 steps of 0.5 ulp of 0.01 m (4.7e-10 m) are 9.3e-7 m at most."""
+    """rumoca's own simulation of the same file, its solver to 1e-10. Float in C: 2000 steps of 0.5 ulp of 0.01 m (4.7e-10 m) are 9.3e-7 m
+    at most."""
     ours = Sil(imported("Swing", tmp_path)).run(np.zeros((SAMPLES, 1))).y[:, 0]
     exact = rumoca.SimConfig(rtol=1e-10, atol=1e-12)
     theirs = rumoca.Session().load(str(LIBRARY), model="Translation.Swing").simulate(2.0, dt=STEP, config=exact)["body.s"]
@@ -146,7 +147,8 @@ def test_other_lines(tmp_path: Path) -> None:
         "model M\n  Real x;\nequation\n  der(x) = -x;\nend M;": "x has no unit, and none follows from a sum",
         'model M\n  Real x(unit = "bogus2");\nequation\n  der(x) = -x;\nend M;': "which is not known",
         'model M\n  Real x[3](each unit = "m");\nequation\n  der(x) = -x;\nend M;': "only Real scalars are",
-        'model M\n  parameter Real y(unit = "m") = 1;\n  Real x(unit = "m");\nequation\n  x = y;\nend M;': "nothing in it changes with time",
+        'model M\n  parameter Real y(unit = "m") = 1;\n'
+        '  Real x(unit = "m");\nequation\n  x = y;\nend M;': "nothing in it changes with time",
         "model M" + " Real x;" * 500_000: "characters; name the file of the model alone",
     }.items():
         path.write_text(text)

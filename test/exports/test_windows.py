@@ -99,7 +99,8 @@ def test_the_same_sources_give_the_same_bytes(unpacked: Unpacked, tmp_path: Path
 @pytest.mark.long
 @pytest.mark.skipif(shutil.which("wine64") is None, reason="wine64 is not installed: the Windows binary is not run")
 def test_it_computes_the_same_in_wine(unpacked: Unpacked, held: Any, tmp_path: Path) -> None:
-    """A minute of the chirp with a set selected at 2 s, from a master that is a Windows program: equal to the bit to SiL with held inputs."""
+    """A minute of the chirp with a set selected at 2 s, from a master that is a Windows program: equal to the bit to SiL with held
+    inputs."""
     version, refer = unpacked.version, unpacked.reference
     master = tmp_path / "master.exe"
     source = Path(__file__).with_name("windows_master.c")

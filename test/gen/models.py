@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -36,7 +37,8 @@ mass = {{ mass = "m", position = "q", velocity = "v", start_position = "10 mm" }
 [elements]
 foot = {{ between = ["mass", "z"], law = "linear_spring", stiffness = "k" }}
 {foot_damper}
-friction = {{ between = ["mass", "ground"], law = "stribeck_friction", breakaway = "3 N", coulomb = "2 N", stribeck = "0.2 m/s", transition = "0.3 m/s" }}
+friction = {{ between = ["mass", "ground"], law = "stribeck_friction", breakaway = "3 N", coulomb = "2 N", \
+stribeck = "0.2 m/s", transition = "0.3 m/s" }}
 net = {{ between = ["mass", "ground"], law = "network", network = "n2", inputs = ["deflection", "rate"] }}
 push = {{ between = ["mass", "ground"], law = "expression", force = "F_lag - F" }}
 
@@ -95,7 +97,7 @@ def network_file(path: Path, sizes: list[int], activations: list[str], seed: int
     draw = np.random.default_rng(seed)
     layers = [
         {"activation": a, "weights": (draw.standard_normal((n, m)) / np.sqrt(m)).tolist(), "bias": (0.3 * draw.standard_normal(n)).tolist()}
-        for m, n, a in zip(sizes, sizes[1:], activations)
+        for (m, n), a in zip(itertools.pairwise(sizes), activations, strict=True)
     ]
     n = sizes[0]
     data = {

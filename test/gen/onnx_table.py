@@ -41,7 +41,8 @@ def main() -> None:
     for kind in sorted(read):
         print(f"| {kind} | {read[kind]} | {cases[kind]} |")
     print(
-        f"\n{len(set(cases) - set(read))} other operators have cases with such an input. Why cases are refused:\n\n| reason | cases |\n|---|---|"
+        f"\n{len(set(cases) - set(read))} other operators have cases with such an input. Why cases are refused:\n"
+        "\n| reason | cases |\n|---|---|"
     )
     for text, count in why.most_common(12):
         print(f"| {text} | {count} |")

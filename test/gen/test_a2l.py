@@ -130,7 +130,8 @@ def test_a2ltool_finds_the_same_addresses_in_the_elf(program: Path, text: str, t
 
 @pytest.mark.skipif(not A2LTOOL.exists(), reason="a2ltool is not installed: pip install a2ltool")
 def test_a2ltool_makes_the_same_measurements_out_of_the_types_in_the_elf(program: Path, text: str, tmp_path: Path) -> None:
-    """The second way: types, sizes and addresses without us. It does not carry to the set, which is one array in C: one block without names."""
+    """The second way: types, sizes and addresses without us. It does not carry to the set, which is one array in C: one block without
+    names."""
     made = tmp_path / "made.a2l"
     links = {
         name: re.search(rf'MEASUREMENT {re.escape(name)} .*?SYMBOL_LINK "(.*?)"', text, re.S)[1]
@@ -231,7 +232,8 @@ def test_program_of_another_model_or_without_debug_information_is_refused(
 def test_members_that_have_no_type_in_a2l_are_left_out_and_the_others_lie_where_they_are(tmp_path: Path, dwarf: int) -> None:
     source, elf = tmp_path / "shown.c", tmp_path / "shown"
     source.write_text(
-        "struct { unsigned a : 3, b : 5; float c; long double d; __int128 e; short f[2]; } shown = { .c = 1.5F, .f = { 7, -8 } };\nint main(void) { return 0; }\n"
+        "struct { unsigned a : 3, b : 5; float c; long double d; __int128 e; short f[2]; } shown = { .c = 1.5F, .f = { 7, -8 } };\n"
+        "int main(void) { return 0; }\n"
     )
     subprocess.run(["gcc", f"-gdwarf-{dwarf}", "-gstrict-dwarf", "-no-pie", source, "-o", elf], check=True)
     program = elf_types.read_program(elf)

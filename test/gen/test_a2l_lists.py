@@ -28,7 +28,9 @@ pytestmark = pytest.mark.skipif(importlib.util.find_spec("elftools") is None, re
 
 LISTS = """#include "penode/pen_xcp_static.h"
 static struct { float a; uint16_t b[2]; } shown = { 1.0F, { 2U, 3U } };
-static const pen_xcp_entry_t constant[4] = { { (const uint8_t *)&shown.a, 4U }, { (const uint8_t *)&shown.b[1], 2U }, { NULL, 0U }, { (const uint8_t *)&shown, 8U } };
+static const pen_xcp_entry_t constant[4] = {
+    { (const uint8_t *)&shown.a, 4U }, { (const uint8_t *)&shown.b[1], 2U }, { NULL, 0U }, { (const uint8_t *)&shown, 8U }
+};
 static const pen_xcp_static_t list[3] = { { 2U, 2U, constant }, { 3U, 1U, NULL }, { 1U, 4U, NULL } };
 const pen_xcp_statics_t penode_daq_lists = { 3U, list };
 int main(void) { return penode_daq_lists.list[0].entry[0].byte[0]; }
@@ -79,7 +81,10 @@ def test_lists_are_those_of_the_constants(tmp_path: Path) -> None:
             "make it, its lists and their entries constants",
         ),
         (
-            '#include "penode/pen_xcp_static.h"\nconst pen_xcp_statics_t penode_daq_lists = { 1U, (const pen_xcp_static_t *)16 }; int main(void) { return 0; }',
+            (
+                '#include "penode/pen_xcp_static.h"\n'
+                "const pen_xcp_statics_t penode_daq_lists = { 1U, (const pen_xcp_static_t *)16 }; int main(void) { return 0; }"
+            ),
             "is not in the file",
         ),
     ],
@@ -130,7 +135,10 @@ def test_units_of_the_model_file_are_shown(scaled: tuple[penode_gen.Model, Path]
 
 
 def test_conversions_of_other_tools_are_read() -> None:
-    text = '/begin PROJECT p "" /begin MODULE m "" {} /begin MEASUREMENT x "" FLOAT32_IEEE c 0 0 0 1 ECU_ADDRESS 0x10 /end MEASUREMENT /end MODULE /end PROJECT'
+    text = (
+        '/begin PROJECT p "" /begin MODULE m "" {} /begin MEASUREMENT x "" FLOAT32_IEEE c 0 0 0 1 '
+        "ECU_ADDRESS 0x10 /end MEASUREMENT /end MODULE /end PROJECT"
+    )
     for method, unit, shown in (
         ('/begin COMPU_METHOD c "" RAT_FUNC "%6.3" "degC" COEFFS 0 2 10 0 0 4 /end COMPU_METHOD', "degC", 1.0),  # 4 * 3 = 2 x + 10
         ('/begin COMPU_METHOD c "" LINEAR "%6.3" "degC" COEFFS_LINEAR 2 -5 /end COMPU_METHOD', "degC", 1.0),

@@ -7,8 +7,10 @@ from __future__ import annotations
 import ctypes
 import itertools
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -63,7 +65,7 @@ def write(folder: Path, network: Network, name: str = "net") -> None:
     (folder / f"{name}.json").write_text(json.dumps(data))
 
 
-def model(folder: Path, network: Network, more: str = "", others: dict[str, Network] = {}) -> penode_gen.Model:
+def model(folder: Path, network: Network, more: str = "", others: Mapping[str, Network] = MappingProxyType({})) -> penode_gen.Model:
     """A model whose output is the network; `more` goes into [model], `others` are further sets."""
     write(folder, network)
     for name, other in others.items():

@@ -1,17 +1,14 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The interface of generated models: derivatives of sensors and first samples, inputs before a step, saved instances, ranges, shared sets."""
+"""The interface of generated models: derivatives of sensors and first samples, inputs before a step, saved instances, ranges."""
 
 from __future__ import annotations
 
-import itertools
-import subprocess
 from pathlib import Path
 
 import models
 import numpy as np
 import pytest
-from test_emit import COMPILERS, REALS, STRICT
 
 import penode_gen
 from penode_sil.building import ROOT
@@ -31,7 +28,8 @@ def rich(folder: Path, input: str = "linear", method: str = "rk4", head: str = "
     text = path.read_text().replace("[sensors]\n", SENSORS).replace("[model]\n", f"[model]\n{head}")
     for name, bounds in ranges.items():
         unit = {"F": "N", "z": "m"}[name]
-        assert (line := f'{name} = {{ unit = "{unit}" }}') in text
+        line = f'{name} = {{ unit = "{unit}" }}'
+        assert line in text
         text = text.replace(line, f'{name} = {{ unit = "{unit}", {bounds} }}')
     path.write_text(text)
     return penode_gen.load(path)
@@ -77,12 +75,12 @@ def test_derivatives_of_the_sensors(kind):
         z_x = found[: N_Z * N_X].reshape(N_Z, N_X)
         z_u = found[N_Z * N_X :].reshape(1 + moving, N_Z, N_U)  # along u(k), u(k-1), ...
         for i in range(N_X):
-            np.testing.assert_allclose(z_x[:, i], difference(lambda v: started(sil, past, v).sensors(), x, i), **TOLERANCE)
+            np.testing.assert_allclose(z_x[:, i], difference(lambda v, past=past: started(sil, past, v).sensors(), x, i), **TOLERANCE)
         for back in range(5):
             for i in range(N_U):
                 along = z_u[back, :, i] if back <= moving else np.zeros(N_Z)
                 if back < behind:
-                    column = difference(lambda v: started(sil, v, x).sensors(), past, (behind - 1 - back, i))
+                    column = difference(lambda v, x=x: started(sil, v, x).sensors(), past, (behind - 1 - back, i))
                     np.testing.assert_allclose(along, column, **TOLERANCE)
                 else:
                     assert not along.any()  # there was no such sample
@@ -152,7 +150,8 @@ def test_derivatives_after_an_input_was_set(kind):
 
 
 def test_input_before_the_step(kind):
-    """Whatever came before: a set input is to the step what a single sample of it would be, to the bit, and so are the steps that follow."""
+    """Whatever came before: a set input is to the step what a single sample of it would be, to the bit, and so are the steps that
+    follow."""
     _, sil = kind
     draw = np.random.default_rng(9)
     for behind in range(6):
@@ -160,12 +159,12 @@ def test_input_before_the_step(kind):
         instance, twin = started(sil, past, x), started(sil, [before], x)
         assert instance.set_input(before) == 0 and np.array_equal(instance.get_input(), before)
         for u in later:
-            for a, b in zip(instance.step(u), twin.step(u)):
+            for a, b in zip(instance.step(u), twin.step(u), strict=True):
                 assert np.array_equal(a, b)
             assert np.array_equal(instance.sensors(), twin.sensors()) and np.array_equal(instance.get_input(), u)
     assert names(instance.set_input([np.nan, 0.0])) == ["input_nonfinite"] and np.array_equal(instance.get_input(), later[-1])
     assert names(instance.set_input([0.0, -np.inf])) == ["input_nonfinite"]
-    for a, b in zip(instance.step(u), twin.step(u)):
+    for a, b in zip(instance.step(u), twin.step(u), strict=True):
         assert np.array_equal(a, b)
 
 
@@ -304,7 +303,7 @@ def test_inf_is_held_whatever_a_range_says(tmp_path, what):
         x, _y, status = instance.step(bad)
         assert status & BIT["input_nonfinite"] and x.tobytes() == twin.get_state().tobytes() and np.array_equal(instance.get_input(), u[4])
         for row in u[5:]:
-            for a, b in zip(instance.step(row), twin.step(row)):
+            for a, b in zip(instance.step(row), twin.step(row), strict=True):
                 assert np.array_equal(a, b)
 
 
@@ -330,84 +329,5 @@ def test_input_before_the_step_keeps_to_its_range(tmp_path, what):
     assert names(status) == ([] if what == "report" else ["input_range"])
     assert np.array_equal(instance.get_input(), {"report": bad, "clamp": [0.75, 0.03], "hold": good}[what])
     for u in ([0.1, 0.01], [0.2, -0.01], [0.3, 0.0]):
-        for a, b in zip(instance.step(u), twin.step(u)):
+        for a, b in zip(instance.step(u), twin.step(u), strict=True):
             assert np.array_equal(a, b)
-
-
-# -- sets that several methods of a model share -------------------------------------------------------------------------
-
-SHARING = ("nqvm", "nqvm_euler", "nqvm_folded")
-MAIN = """
-#include "nqvm.h"
-#include "nqvm_euler.h"
-#include "nqvm_folded.h"
-static nqvm_t a;
-static nqvm_euler_t b;
-static nqvm_folded_t c;
-int main(void)
-{
-    const nqvm_u_t u = { (pen_real_t)0.01 };
-    const nqvm_euler_u_t v = { (pen_real_t)0.01 };
-    const nqvm_folded_u_t w = { (pen_real_t)0.01 };
-    nqvm_y_t y;
-    nqvm_euler_y_t z;
-    nqvm_folded_y_t f;
-    pen_status_t status = nqvm_init(&a, &nqvm_set_default, NULL) | nqvm_euler_init(&b, &nqvm_euler_set_default, NULL);
-    status |= nqvm_folded_init(&c, &nqvm_set_altered_friction, NULL);
-    for (int k = 0; k < 9; k++) {
-        status |= nqvm_step(&a, &u, &y) | nqvm_euler_step(&b, &v, &z) | nqvm_folded_step(&c, &w, &f);
-    }
-    return ((status == PEN_OK) && (&nqvm_set_default == &nqvm_folded_set_default)) ? 0 : 1;
-}
-"""
-
-
-@pytest.fixture(scope="module")
-def sharing(tmp_path_factory):
-    """The C of the three in one folder."""
-    folder = tmp_path_factory.mktemp("sharing")
-    for name in SHARING:
-        penode_gen.generate(penode_gen.load(NQVM / f"{name}.toml"), folder, self_test=False)
-    return folder
-
-
-def test_shared_sets_are_the_same_whoever_writes_them(sharing):
-    texts = [penode_gen.render(penode_gen.load(NQVM / f"{name}.toml"), self_test=False) for name in SHARING]
-    shared = set(texts[0]) & set(texts[1]) & set(texts[2])
-    assert shared == {"nqvm_sets.h", "nqvm_params.c", "nqvm_layout.json"}
-    assert all(text[name] == texts[0][name] for text in texts for name in shared)
-    assert sorted(p.name for p in sharing.iterdir()) == sorted({*texts[0], *texts[1], *texts[2]})
-
-
-@pytest.mark.parametrize("real", REALS, ids=["float", "double"])
-def test_three_methods_link_into_one_program(sharing, tmp_path, real):
-    (tmp_path / "main.c").write_text(MAIN)
-    sources = [*sorted(sharing.glob("*.c")), *sorted((ROOT / "src").glob("*.c")), tmp_path / "main.c"]
-    subprocess.run(
-        [
-            "gcc",
-            "-std=c99",
-            "-O1",
-            *real,
-            f"-I{ROOT}/inc",
-            f"-I{ROOT}/port/gnu",
-            f"-I{sharing}",
-            *map(str, sources),
-            "-o",
-            str(tmp_path / "a.out"),
-        ],
-        check=True,
-    )
-    subprocess.run([tmp_path / "a.out"], check=True)
-    table = subprocess.run(["nm", tmp_path / "a.out"], check=True, capture_output=True, text=True).stdout
-    for name in ("set_default", "set_altered_friction", "value_default", "value_altered_friction"):
-        assert [line.split()[2] for line in table.splitlines() if line.endswith(name)] == [f"nqvm_{name}"]  # once
-
-
-@pytest.mark.parametrize("compiler", COMPILERS)
-def test_three_methods_in_one_translation_unit(sharing, tmp_path, compiler):
-    for order, real in itertools.product((SHARING, SHARING[::-1]), REALS):
-        unit = tmp_path / "unit.c"
-        unit.write_text("".join(f'#include "{name}.c"\n' for name in (*order, "nqvm_params")))
-        result = subprocess.run([compiler, *STRICT, *real, f"-I{sharing}", str(unit)], capture_output=True, text=True)
-        assert (result.returncode, result.stderr) == (0, "")

@@ -210,7 +210,7 @@ def test_the_c_goes_by_this_table(tmp_path, sizes, scaled, dtype):
     assert instance.begin((table["layout"][real], table["length"], 9, zlib.crc32(values.tobytes()))) == 0
     assert instance.write(0, values) == 0 and instance.commit() == 0
     dense = len(sizes) - 1
-    for k in range(20):
+    for _ in range(20):
         u = draw.uniform(-1, 1, sizes[0]).astype(dtype)
         h = u.astype(float)
         h = (h - arrays["net.shift_1"]) * arrays["net.factor_1"] if scaled else h

@@ -225,7 +225,7 @@ def test_actuators(load):
     wanted = 0.8 * (3.0 - 2.0 * np.exp(-t / 0.02))
     assert np.max(np.abs(run.y[:, 0] - wanted)) < 1e-7 * 2.4
     assert np.max(np.abs(run.z[:, 0] - run.y[:, 0] / 0.5)) < 1e-12
-    x = dict(zip(model.states, run.x.T))
+    x = dict(zip(model.states, run.x.T, strict=True))
     assert np.max(np.abs(run.z[:, 1] - (x["v_load"] - (0.1 - x["ram"]) / 0.05))) < 1e-12
 
 

@@ -295,7 +295,7 @@ def test_start_values_and_scaled_units(tmp_path):
 
 
 def test_set_that_is_not_there(tmp_path):
-    with pytest.raises(KeyError, match="thermal.toml has no set 'cold'; it has default, other"):
+    with pytest.raises(KeyError, match=r"thermal\.toml has no set 'cold'; it has default, other"):
         penode_gen.numeric(loaded(tmp_path, "thermal"), "cold")
 
 

@@ -255,7 +255,7 @@ def test_external_weights(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_network(path).evaluate(x), expected, rtol=0, atol=400 * np.finfo(float).eps)
     data = tmp_path / "net.onnx.data"
     data.write_bytes(data.read_bytes()[:40])
-    with pytest.raises(NetworkError, match="net.onnx: .*; ") as caught:
+    with pytest.raises(NetworkError, match=r"net\.onnx: .*; ") as caught:
         read_network(path)
     assert "\n" not in str(caught.value)
     data.unlink()

@@ -101,10 +101,10 @@ def test_input_of_other_type(tmp_path: Path, name: str) -> None:
 
 def test_file_that_is_none(tmp_path: Path) -> None:
     path = tmp_path / "net.onnx"
-    with pytest.raises(NetworkError, match="net.onnx: no such file; "):
+    with pytest.raises(NetworkError, match=r"net\.onnx: no such file; "):
         read_network(path)
     path.mkdir()
-    with pytest.raises(NetworkError, match="net.onnx: no such file; "):
+    with pytest.raises(NetworkError, match=r"net\.onnx: no such file; "):
         read_network(path)
 
 

@@ -89,7 +89,7 @@ def test_odd_by_subtraction(activation: str, tmp_path: Path) -> None:
     assert [layer.n_out for layer in network.layers] == [10, 2]
     at_zero = np.zeros(2, np.float32)  # summed in order, in float: pairs cancel to the bit
     hidden = Network(network.layers[:1], None, None, "hidden").evaluate(np.zeros(3)).astype(np.float32)
-    for column, value in zip(network.layers[1].weights.astype(np.float32).T, hidden):
+    for column, value in zip(network.layers[1].weights.astype(np.float32).T, hidden, strict=True):
         at_zero += column * value
     assert np.all(at_zero == 0.0)
 

@@ -109,7 +109,7 @@ def test_c_batch_and_evaluator_agree_to_the_bit(load, tmp_path, method, input, s
     assert all(np.array_equal(a, b[0]) for a, b in ((run.x, batch.x), (run.y, batch.y), (run.z, batch.z)))
     assert np.array_equal(batch.x[1], Sil(model, dtype).run(u[::-1]).x)
     machine = Evaluator(_Emitter(model).context(), dtype)
-    for sample, x, y in zip(u, run.x, run.y):
+    for sample, x, y in zip(u, run.x, run.y, strict=True):
         assert machine.step(sample.astype(dtype)) and np.array_equal(machine.x, x) and np.array_equal(machine.y, y)
     penode_gen.generate(model, tmp_path)
     include = [f"-I{place}" for place in (ROOT / "inc", ROOT / "port" / "gnu", tmp_path)]
@@ -125,7 +125,7 @@ def test_the_torque_between_samples_is_held_and_not_joined(load):
     u, h = inputs(60), 2e-3
     signals = np.array(by_hand(*u.T.tolist()))
     run = Sil(model, np.float64).run(u)
-    x = dict(zip(model.states, run.x.T))
+    x = dict(zip(model.states, run.x.T, strict=True))
     speed = smooth = 0.0
     for k in range(1, 60):
         level, fade = signals[k - 1, 2], np.exp(-h / 0.02)
@@ -140,7 +140,7 @@ def test_the_exact_solution_is_what_smaller_steps_come_to(load):
     n = 60
     u, times = inputs(n), np.arange(n) * 2e-3
     plan = scenario.Instance("late", "default")
-    signals = {name: Samples(times, column) for name, column in zip(("tau", "z"), u.T)}
+    signals = {name: Samples(times, column) for name, column in zip(("tau", "z"), u.T, strict=True)}
     exact = mil.solve(model, plan, signals, float(times[-1]), times, 1)
     run = Sil(model, np.float64).run(u)
     assert np.max(np.abs(exact.y - run.y)) < 1e-12
@@ -177,7 +177,7 @@ def test_a_saved_instance_continues_with_the_same_bits(load):
         saved = first.save()
         assert second.restore(saved) == 0
         for k in range(cut, 60):
-            assert all(np.array_equal(a, b) for a, b in zip(first.step(u[k]), second.step(u[k])))
+            assert all(np.array_equal(a, b) for a, b in zip(first.step(u[k]), second.step(u[k]), strict=True))
     for at in range(len(saved) - 4 * 8, len(saved)):  # the end of the rings, and their checksum
         broken = bytearray(saved)
         broken[at] ^= 1
@@ -216,8 +216,8 @@ def test_set_input_restarts_the_past(load):
 
 
 def test_the_jacobian_is_that_of_differences(load):
-    """Of the step along its inputs and signals, by states and outputs that follow from changed samples. Central differences of 1e-5 err by 1e-10 of
-    the third derivative of tanh(v/0.3), 7e-8 per sample of 2 ms; 1e-6 of derivatives up to 0.1."""
+    """Of the step along its inputs and signals, by states and outputs that follow from changed samples. Central differences of 1e-5 err by
+    1e-10 of the third derivative of tanh(v/0.3), 7e-8 per sample of 2 ms; 1e-6 of derivatives up to 0.1."""
     model = load(drive(input="parabola"))
     sil, n, k = Sil(model, np.float64), 7, 20
     u = inputs(40)
@@ -317,7 +317,7 @@ def test_faults_are_found(load, runtime, tmp_path, fault):
     lines = subprocess.run(
         [str(program)], input="".join(f"{a!r} {b!r}\n" for a, b in u.tolist()), text=True, capture_output=True, check=True
     ).stdout
-    found = [tuple(map(float, line.split())) for line, good in zip(lines.splitlines(), np.isfinite(u).all(axis=1)) if good]
+    found = [tuple(map(float, line.split())) for line, good in zip(lines.splitlines(), np.isfinite(u).all(axis=1), strict=True) if good]
     assert (found == [(w[1], w[0]) for w in by_hand(*inputs(40).T.tolist())]) is (fault is None)
 
 

@@ -157,7 +157,7 @@ def test_networks_of_every_shape(tmp_path, short):
 def test_committed_models(tmp_path, compiler):
     """At every optimisation, in float and in double."""
     files = [*RUNTIME, *sorted(NQVM.glob("*.c"))]
-    for level, (real, flags) in zip(("-O1", "-O2", "-O3"), [*REALS.items(), *REALS.items()]):
+    for level, (real, flags) in zip(("-O1", "-O2", "-O3"), itertools.cycle(REALS.items()), strict=False):
         options = ["-std=c99", level, *flags, "-ffp-contract=off", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{NQVM}", "-shared", "-fPIC"]
         subprocess.run([compiler, *options, "-o", tmp_path / f"{level}.so", *files], check=True)
         library = ctypes.CDLL(str(tmp_path / f"{level}.so"))

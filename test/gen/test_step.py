@@ -56,7 +56,7 @@ def test_order_of_convergence(tmp_path, method, input, show):
         data = json.loads((tmp_path / "n2.json").read_text())
         damping = 3.0 if input != "held" else 0.0
         exact = solve_ivp(
-            lambda t, x: models.rich_by_hand(data, t, x, force, foot, foot_rate, damping),
+            lambda t, x, data=data, damping=damping: models.rich_by_hand(data, t, x, force, foot, foot_rate, damping),
             (0.0, duration),
             [0.01, 0.0, 0.5],
             method="DOP853",
@@ -87,7 +87,8 @@ F = {{ value = "F_damper", unit = "N" }}
 @pytest.mark.parametrize("input, order, share", [("linear", 1, 1 / 2), ("parabola", 2, 1 / 3), ("cubic", 3, 1 / 4)])
 def test_rate_of_an_input_at_a_sample(tmp_path, input, order, share):
     """Of a sine at 5 Hz a line errs by h/2 of the second derivative, the parabola by h^2/3 of the third, the cubic by
-    h^3/4 of the fourth (Taylor at the sample); what that leaves out is a share of 2 pi f h = 0.06 at most. Two samples make a line; a bad one is passed over."""
+    h^3/4 of the fourth (Taylor at the sample); what that leaves out is a share of 2 pi f h = 0.06 at most. Two samples make a line; a bad
+    one is passed over."""
     omega = 2 * math.pi * 5
     for h in (2e-3, 1e-3):
         path = tmp_path / f"{input}_{h}.toml"
@@ -126,52 +127,51 @@ def test_step_jacobian_against_differences(tmp_path, method, input, outside):
     n_x, n_u, n_y = 3, 2, 2
     size = n_x * n_x + max(moving + 1, 2) * n_x * n_u + n_y * n_x + n_y * n_u * (1 + moving)
 
-    def started(x, earliest, earlier, before):
+    def started(behind, x, *past):
         instance = sil.instance()
-        for u in (earliest, earlier, before)[-behind:]:
+        for u in past[-behind:]:
             instance.step(u)
         instance.set_state(x)
         return instance
 
-    def step(x, earliest, earlier, before, now):
-        instance = started(x, earliest, earlier, before)
-        state, y, status = instance.step(now)
+    def step(behind, *given):
+        state, y, status = started(behind, *given[:-1]).step(given[-1])
         assert status in (0, EXTRA)
         return np.concatenate([state, y])
 
-    def difference(function, at, i):
-        d = np.zeros_like(at)
+    def difference(behind, given, of, i):
+        d = np.zeros_like(given[of])
         d[i] = 1e-5
-        return (function(at + d) - function(at - d)) / 2e-5
+        far, near = (step(behind, *(v + sign * d if k == of else v for k, v in enumerate(given))) for sign in (1, -1))
+        return (far - near) / 2e-5
 
     for behind in (1, 2, 3, 3, 3, 3):
-        x, past = draw.uniform(-0.5, 0.5, n_x), draw.uniform(-1, 1, (4, n_u)) * [1, 0.1]
-        earliest, earlier, before, now = past
-        instance = started(x, earliest, earlier, before)
-        y, found, status = instance.step_jacobian(now, size)
+        given = draw.uniform(-0.5, 0.5, n_x), *(draw.uniform(-1, 1, (4, n_u)) * [1, 0.1])  # state, then inputs, the earliest first
+        instance = started(behind, *given[:-1])
+        y, found, status = instance.step_jacobian(given[-1], size)
         assert status in (0, EXTRA)
-        plain = step(x, *past)
+        plain = step(behind, *given)
         assert np.array_equal(instance.get_state(), plain[:n_x]) and np.array_equal(y, plain[n_x:])  # to the bit
         j = flatten(found, n_x, n_u, n_y, moving)
         # differences: third derivative (about 1e3) * 1e-10 / 6 + rounding 1e-16 / 1e-5 * values of 1e2; relative 1e-6
         tolerance = {"rtol": 1e-6, "atol": 2e-7}
         for i in range(n_x):
-            column = difference(lambda v: step(v, *past), x, i)
+            column = difference(behind, given, 0, i)
             np.testing.assert_allclose(j["x_x"][:, i], column[:n_x], **tolerance)
             np.testing.assert_allclose((j["y_x"] @ j["x_x"])[:, i], column[n_x:], rtol=1e-6, atol=1e-5)
         for i in range(n_u):
-            column = difference(lambda v: step(x, earliest, earlier, v, now), before, i)
+            column = difference(behind, given, 3, i)
             np.testing.assert_allclose(j["x_u_before"][:, i], column[:n_x], **tolerance)
             direct = j["y_u_before"][:, i] if moving else 0.0
             np.testing.assert_allclose((j["y_x"] @ j["x_u_before"])[:, i] + direct, column[n_x:], rtol=1e-6, atol=1e-5)
-            column = difference(lambda v: step(x, earliest, earlier, before, v), now, i)
+            column = difference(behind, given, 4, i)
             np.testing.assert_allclose(j["x_u"][:, i], column[:n_x], **tolerance)
             np.testing.assert_allclose((j["y_x"] @ j["x_u"])[:, i] + j["y_u"][:, i], column[n_x:], rtol=1e-6, atol=1e-5)
-            column = difference(lambda v: step(x, earliest, v, before, now), earlier, i)
+            column = difference(behind, given, 2, i)
             along, direct = (j["x_u_earlier"][:, i], j["y_u_earlier"][:, i]) if moving > 1 else (np.zeros(n_x), 0.0)
             np.testing.assert_allclose(along, column[:n_x], **tolerance)
             np.testing.assert_allclose(j["y_x"] @ along + direct, column[n_x:], rtol=1e-6, atol=1e-5)
-            column = difference(lambda v: step(x, v, earlier, before, now), earliest, i)
+            column = difference(behind, given, 1, i)
             along, direct = (j["x_u_earliest"][:, i], j["y_u_earliest"][:, i]) if moving > 2 else (np.zeros(n_x), 0.0)
             np.testing.assert_allclose(along, column[:n_x], **tolerance)
             np.testing.assert_allclose(j["y_x"] @ along + direct, column[n_x:], rtol=1e-6, atol=1e-5)
@@ -188,7 +188,7 @@ def test_jacobian_through_relu_networks(tmp_path, method):
         x = draw.uniform(-1, 1, 4) * [0.04, 0.02, 0.5, 0.8]
         before, now = draw.uniform(-0.02, 0.02, (2, 1))
 
-        def start(state):
+        def start(state, before=before):
             instance = sil.instance()
             instance.step(before)
             instance.set_state(state)

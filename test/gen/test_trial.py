@@ -91,7 +91,7 @@ def test_a_set_that_leads_too_far_from_the_running_one_is_refused(tmp_path):
         sil = Sil(model(tmp_path, trial=0))
         path = sil.instance()
         drive(path, 0, 11)
-        own, kept = changed(sil, **{f"_{FACTOR}": factor})
+        own, _ = changed(sil, **{f"_{FACTOR}": factor})
         assert select(path, own) == 0
         apart.append([path.step([road(k)])[1][0] for k in range(11, 60)])
     distance = float(np.max(np.abs(np.subtract(*apart))))

@@ -30,7 +30,7 @@ def test_double_and_a_port_of_ones_own(tree: Path, tmp_path: Path):
     built = build.subdirectory(tree, tmp_path, "-DPEN_REAL_DOUBLE=ON", f"-DPENODE_PORT={port}")
     assert built == build.reference(tmp_path / "reference", double=True)
     (tmp_path / "nowhere").mkdir()
-    with pytest.raises(Fails, match="PENODE_PORT=nowhere: there is no pen_port_target.h"):
+    with pytest.raises(Fails, match=r"PENODE_PORT=nowhere: there is no pen_port_target\.h"):
         build.subdirectory(tree, tmp_path / "nowhere", "-DPENODE_PORT=nowhere")
 
 

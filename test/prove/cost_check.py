@@ -32,16 +32,16 @@ def promised() -> dict[tuple[str, str], int]:
         found |= {(name, "-O2"): int(fast), (name, "-Os"): int(small)}
     net = r"-1: (\d+) instructions, with its slope (\d+); optimised for size (\d+) and (\d+)"
     keys = [(name, level) for level in ("-O2", "-Os") for name in ("pen_net16", "pen_net16_slope")]
-    found |= dict(zip(keys, map(int, re.search(net, text["pen_net16"]).groups())))
+    found |= dict(zip(keys, map(int, re.search(net, text["pen_net16"]).groups()), strict=True))
     for n, cost in re.findall(r"(\d+): (\d+)", re.search(r"-O2: n = (.*?)\. Stack", text["pen_solve"])[1]):
         found["pen_solve_" + n, "-O2"] = int(cost)
     found["pen_solve2", "-O2"] = int(re.search(r"Cost: about (\d+) instructions", text["pen_solve"])[1])
     halving = int(re.search(r"(\d+) instructions for each halving of capacity, 7 halvings", text["pen_fold"])[1])
     found |= {(f"pen_fold_find_{n}", "-O2"): HALVINGS * halving for n in (96, 128)}
     note = re.search(r"Cost: (\d+) instructions, at -Os (\d+)", text["pen_status"])
-    found |= {("pen_status_note_step", level): int(n) for level, n in zip(("-O2", "-Os"), note.groups())}
+    found |= {("pen_status_note_step", level): int(n) for level, n in zip(("-O2", "-Os"), note.groups(), strict=True)}
     test = re.search(r"pen_selftest +(\d+) / (\d+) instructions", text["pen_selftest"])
-    found |= {("pen_selftest", level): int(n) for level, n in zip(("-O2", "-Os"), test.groups())}
+    found |= {("pen_selftest", level): int(n) for level, n in zip(("-O2", "-Os"), test.groups(), strict=True)}
     return found
 
 
@@ -52,7 +52,7 @@ def of_selftest() -> list[str]:
     model = re.search(r"NAME_selftest +(\d+) / (\d+) bytes", text).groups()
     folder = gate.ROOT / "gen" / "nqvm" / "c"
     for source, said in ((gate.ROOT / "src" / "pen_selftest.c", runtime), (folder / "nqvm_selftest.c", model)):
-        for level, bytes_said in zip(("-O2", "-Os"), map(int, said)):
+        for level, bytes_said in zip(("-O2", "-Os"), map(int, said), strict=True):
             out = WORK / "selftest.o"
             gate.make([PORT / "cc", MACHINES["m4f"], "-std=c99", level, f"-I{folder}", "-c", "-o", out, source])
             columns = gate.run(["arm-none-eabi-size", out]).stdout.split("\n")[1].split()

@@ -174,7 +174,7 @@ def main() -> int:
         good &= gate.report(f"coverage, {build}: {shares}", missing)
         figures[build] = {kind: f"{a} of {b}" for kind, (a, b) in total.items()}
     noticed = [bool(measure(build, [p for p in programs if p.name != name])[1]) for name in NEEDED]
-    for name, found in zip(NEEDED, noticed):
+    for name, found in zip(NEEDED, noticed, strict=True):
         good &= gate.report(f"coverage: seeded fault: {name} left out", [] if found else ["not found"])
     gate.keep("coverage", figures | {"faults": [f"{name} left out" for name in NEEDED], "faults found": sum(noticed)})
     return int(not good)

@@ -27,8 +27,8 @@ ENTRIES = {
 }
 FILES = "pen_xcp*.c"  # no other entry analyses them
 
-# Its loops over bytes are unrolled; states are merged elsewhere. The two contexts share words, each of which only one of them writes, and no
-# index depends on one of the other's but by a comparison: so volatile is left out.
+# Its loops over bytes are unrolled; states are merged elsewhere. The two contexts share words, each of which only one of them writes, and
+# no index depends on one of the other's but by a comparison: so volatile is left out.
 WORDS = ["-Dvolatile="]
 _KEPT = "pen_tuning_write:40,pen_tuning_write_bytes:40,xcp_at:20,xcp_upload:20,xcp_build_checksum:40"
 _RELATED = "pen_tuning_write,pen_tuning_write_bytes,pen_serial_get_bytes,pen_serial_put_bytes,pen_xcp_download_command"

@@ -59,7 +59,10 @@ FAULTS = {
     "the set given to init is not compared": (
         "pen_saved.c",
         (
-            "(pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||\n               (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) ||",
+            (
+                "(pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||\n"
+                "               (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) ||"
+            ),
             0,
             "",
         ),

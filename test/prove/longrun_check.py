@@ -60,8 +60,8 @@ def rounding(constants: dict[str, float]) -> list[float]:
     A stage starts at x + (h*node)*k: the sum, and three operations in what is added. Forces take the differences of such
     states and multiply; a network adds offset + slope*(x - centre). Four additions make the sum of the forces. What a stage
     is off also moves the next one, by h times the steepest change of a rate, the damper's on the wheel: 0.001 s * 40 800
-    N*s/m / 90 kg = 0.454. So 1 / (1 - 0.454) < 1.85 times the error of one stage covers all four. The new state: six weighted rates, added with four roundings, times h/6,
-    itself rounded twice, added to the old state.
+    N*s/m / 90 kg = 0.454. So 1 / (1 - 0.454) < 1.85 times the error of one stage covers all four. The new state: six weighted rates, added
+    with four roundings, times h/6, itself rounded twice, added to the old state.
     """
     m = MOST
     z, rate = U * (m["z"] + 3 * H * m["rate"]), U * (m["rate"] + 3 * H * m["a"])  # start of a stage

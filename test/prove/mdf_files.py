@@ -10,7 +10,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
 
 import numpy as np
@@ -57,8 +57,8 @@ def forked(path: Path, asked: str) -> tuple[int, bytes]:
             try:
                 os.dup2(out.fileno(), 1)
                 sys.stdout = stream = os.fdopen(1, "w")
-                sys.stderr = open(os.devnull, "w")
-                mdf._main(str(path), asked)
+                with open(os.devnull, "w") as nowhere, redirect_stderr(nowhere):
+                    mdf._main(str(path), asked)
                 stream.flush()
                 code = 0
             finally:

@@ -134,7 +134,8 @@ def bench(name: str, flags: list[str], only: str = "*") -> Bench:
 
 
 def faults(source: Path, share: int, first: int, must: set[Fault]) -> Iterator[tuple[Fault, Path]]:
-    """The mutants of a file that compile, differ from it in what they do, and from each other: each `share`-th from `first` on, and those of `must`."""
+    """The mutants of a file that compile, differ from it in what they do, and from each other: each `share`-th from `first` on, and those
+    of `must`."""
     place = WORK / source.stem
     place.mkdir()
     gate.make([MUTATE, source, "c", "--noCheck", "--mutantDir", place])

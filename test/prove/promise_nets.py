@@ -48,6 +48,26 @@ def _net(draw: np.random.Generator, layers, scaled: bool, real: type, clamp: boo
     return Net(chain, *numbers(sorted([low, high])), clamp, real)
 
 
+def _off_at_zero(draw: np.random.Generator, layers: list[tuple[np.ndarray, np.ndarray]], eps: float) -> None:
+    """Make neurons switch on away from 0 only, in place."""
+    w, b = layers[0]
+    b[:] = -np.abs(w[:, 0]) * draw.choice([0.0, 0.01, 1.0], len(b)) * draw.uniform(0.5, 1.0, len(b))
+    side = np.sign(w[:, 0]) if len(layers) == 2 else np.ones(len(b))
+    layers[1] = (np.abs(layers[1][0]) * side, -np.abs(layers[1][1]) * (len(layers) > 2))
+    layers[-1][1][:] = draw.choice([0.0, 0.0, eps * eps, -eps])
+    if draw.random() < 0.3:  # or all but
+        layers[-1][0][0, -1] *= -draw.choice([1e-3, 1.0])
+
+
+def _crowded(draw: np.random.Generator, eps: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Kinks next to each other, up and down against a slope."""
+    n, steep = draw.integers(5, 9), 10.0 ** draw.uniform(-1.0, 2.0)
+    at = 1.0 + eps * np.cumsum(draw.integers(0, 5, n)) * draw.choice([1.0, 4.0, 1e3])
+    up = steep * (-1.0) ** np.arange(n) * (1.0 + 1e-3 * draw.random(n))
+    back = 0.3 * steep * draw.choice([-1.0, 1.0])
+    return [(np.append(np.ones(n), [1.0, -1.0])[:, None], np.append(-at, [0.0, 0.0])), (np.append(up, [back, -back])[None, :], np.zeros(1))]
+
+
 def net(draw: np.random.Generator) -> Net:
     """One network of a kind that is drawn as well."""
     real = np.float32 if draw.random() < 0.7 else np.float64
@@ -81,13 +101,7 @@ def net(draw: np.random.Generator) -> Net:
             w[0], b[0] = 0.0, draw.choice([0.0, -1.0, 1.0])
             w[-1], b[-1] = w[len(b) // 2], b[len(b) // 2]
     elif kind == 7:  # off at 0: dissipative without a band, or next to it
-        w, b = layers[0]
-        b[:] = -np.abs(w[:, 0]) * draw.choice([0.0, 0.01, 1.0], len(b)) * draw.uniform(0.5, 1.0, len(b))
-        side = np.sign(w[:, 0]) if len(layers) == 2 else np.ones(len(b))
-        layers[1] = (np.abs(layers[1][0]) * side, -np.abs(layers[1][1]) * (len(layers) > 2))
-        layers[-1][1][:] = draw.choice([0.0, 0.0, eps * eps, -eps])
-        if draw.random() < 0.3:  # or all but
-            layers[-1][0][0, -1] *= -draw.choice([1e-3, 1.0])
+        _off_at_zero(draw, layers, eps)
     elif kind == 8:  # rises everywhere, or all but
         layers = [(np.abs(w), b) for w, b in layers]
         if draw.random() < 0.5:
@@ -101,15 +115,8 @@ def net(draw: np.random.Generator) -> Net:
     elif kind == 10:  # far from 1: subnormal results, and values next to what overflows
         power = draw.integers(-60, 40)
         layers = [(w * 2.0**power, b * 2.0**power) for w, b in layers]
-    elif kind == 11:  # more kinks next to each other than patterns are gone through, up and down against a slope
-        n, steep = draw.integers(5, 9), 10.0 ** draw.uniform(-1.0, 2.0)
-        at = 1.0 + eps * np.cumsum(draw.integers(0, 5, n)) * draw.choice([1.0, 4.0, 1e3])
-        up = steep * (-1.0) ** np.arange(n) * (1.0 + 1e-3 * draw.random(n))
-        back = 0.3 * steep * draw.choice([-1.0, 1.0])
-        layers = [
-            (np.append(np.ones(n), [1.0, -1.0])[:, None], np.append(-at, [0.0, 0.0])),
-            (np.append(up, [back, -back])[None, :], np.zeros(1)),
-        ]
+    elif kind == 11:  # more kinks next to each other than patterns are gone through
+        layers = _crowded(draw, eps)
     return _net(draw, layers, scaled, real, clamp, low, high)
 
 

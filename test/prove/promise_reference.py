@@ -61,13 +61,13 @@ class Line:
         rows = [(Fraction(1), [Fraction(0)], Fraction(1))]  # slope before all places, values, slope behind them
         for layer in net.layers:
             if layer.kind in ("centre", "rescale"):
-                pairs = [(Fraction(p), Fraction(q)) for p, q in zip(layer.weights[0], layer.bias)]
+                pairs = [(Fraction(p), Fraction(q)) for p, q in zip(layer.weights[0], layer.bias, strict=True)]
                 if layer.kind == "centre":
-                    rows = [(a * q, [(v - p) * q for v in values], b * q) for (a, values, b), (p, q) in zip(rows, pairs)]
+                    rows = [(a * q, [(v - p) * q for v in values], b * q) for (a, values, b), (p, q) in zip(rows, pairs, strict=True)]
                 else:
-                    rows = [(a * p, [v * p + q for v in values], b * p) for (a, values, b), (p, q) in zip(rows, pairs)]
+                    rows = [(a * p, [v * p + q for v in values], b * p) for (a, values, b), (p, q) in zip(rows, pairs, strict=True)]
                 continue
-            rows = [_sum(weights, bias, rows, len(places)) for weights, bias in zip(layer.weights, layer.bias)]
+            rows = [_sum(weights, bias, rows, len(places)) for weights, bias in zip(layer.weights, layer.bias, strict=True)]
             if layer.kind == "relu":
                 places, rows = _rectified(places, rows)
         ((before, values, behind),) = rows
@@ -100,13 +100,13 @@ class Line:
         """The largest force along the motion, the outermost pieces apart; at the place seen at 0, either sign moves."""
         near = min(self.places, key=abs)
         found = abs(self.values[self.places.index(near)])
-        for x, v in zip(self.places, self.values):
+        for x, v in zip(self.places, self.values, strict=True):
             found = max(found, -v if x > near else v if x < near else abs(v))
         return found
 
 
 def _sum(weights: Sequence[float], bias: float, rows, n: int):
-    used = [(Fraction(w), row) for w, row in zip(weights, rows) if w != 0.0]
+    used = [(Fraction(w), row) for w, row in zip(weights, rows, strict=True) if w != 0.0]
     b = Fraction(bias)
     return (
         sum((w * row[0] for w, row in used), Fraction(0)),
@@ -157,8 +157,8 @@ class Hull:
     At x: value, its margin `error`, the least and the most slope that must keep a promise there, as the header has it.
 
     C = (inputs + 10) EPS for each layer. A neuron counts as one that may switch if its value is below 6 of its errors, or
-    it switches within 8 EPS |x|; up to OPEN of them are put on and off in every combination. `number` is float where that is exact enough beside the margins, or Fraction. What is
-    exactly 0 at x has no error; with `around` only if it is so next to x, too.
+    it switches within 8 EPS |x|; up to OPEN of them are put on and off in every combination. `number` is float where that is exact enough
+    beside the margins, or Fraction. What is exactly 0 at x has no error; with `around` only if it is so next to x, too.
     """
 
     OPEN = 4
@@ -172,7 +172,7 @@ class Hull:
         for layer in net.layers:
             if layer.kind in ("centre", "rescale"):
                 c = 12 * eps
-                for i, (p, q) in enumerate(zip(map(number, layer.weights[0]), map(number, layer.bias))):
+                for i, (p, q) in enumerate(zip(map(number, layer.weights[0]), map(number, layer.bias), strict=True)):
                     if layer.kind == "centre":
                         still, size, factor = h[i] == p and e[i] == 0 and not (around and t[i]), abs((h[i] - p) * q), q
                         h[i] = (h[i] - p) * q
@@ -187,18 +187,21 @@ class Hull:
             c = (layer.n_in + 10) * eps
             flat = not any(t) and not any(r)
             still = not any(h) and not any(e) and (flat or not around)
-            burden = [ej + c * abs(hj) + tiny for ej, hj in zip(e, h)]
-            sway = [rj + c * abs(tj) + tiny for rj, tj in zip(r, t)]
+            burden = [ej + c * abs(hj) + tiny for ej, hj in zip(e, h, strict=True)]
+            sway = [rj + c * abs(tj) + tiny for rj, tj in zip(r, t, strict=True)]
             W = [[number(w) for w in row] for row in layer.weights]
             b = [number(v) for v in layer.bias]
-            y = [bi + sum(w * hj for w, hj in zip(row, h)) for bi, row in zip(b, W)]
-            s = [sum(w * tj for w, tj in zip(row, t)) for row in W]
-            e = [zero if still else c * abs(bi) + sum(abs(w) * g for w, g in zip(row, burden)) + tiny for bi, row in zip(b, W)]
-            r = [zero if flat else sum(abs(w) * g for w, g in zip(row, sway)) + tiny for row in W]
+            y = [bi + sum(w * hj for w, hj in zip(row, h, strict=True)) for bi, row in zip(b, W, strict=True)]
+            s = [sum(w * tj for w, tj in zip(row, t, strict=True)) for row in W]
+            e = [
+                zero if still else c * abs(bi) + sum(abs(w) * g for w, g in zip(row, burden, strict=True)) + tiny
+                for bi, row in zip(b, W, strict=True)
+            ]
+            r = [zero if flat else sum(abs(w) * g for w, g in zip(row, sway, strict=True)) + tiny for row in W]
             h, t = y, s
             if layer.kind == "relu":
                 states.append([])
-                for i, (v, slope) in enumerate(zip(y, s)):
+                for i, (v, slope) in enumerate(zip(y, s, strict=True)):
                     open_ = abs(v) <= max(6 * e[i], near * (abs(slope) + r[i])) and (e[i] > 0 or v != 0 or slope != 0 or r[i] != 0)
                     states[-1].append(None if open_ else v > 0)
                     if open_:
@@ -221,17 +224,20 @@ class Hull:
         for layer in net.layers:
             if layer.kind in ("centre", "rescale"):
                 factors = [number(v) for v in (layer.bias if layer.kind == "centre" else layer.weights[0])]
-                r = [zero if ti == 0 and ri == 0 else abs(f) * ri + 12 * eps * abs(ti * f) + tiny for f, ti, ri in zip(factors, t, r)]
-                t = [f * ti for f, ti in zip(factors, t)]
+                r = [
+                    zero if ti == 0 and ri == 0 else abs(f) * ri + 12 * eps * abs(ti * f) + tiny
+                    for f, ti, ri in zip(factors, t, r, strict=True)
+                ]
+                t = [f * ti for f, ti in zip(factors, t, strict=True)]
                 continue
             flat, c = not any(t) and not any(r), (layer.n_in + 10) * eps
-            sway = [rj + c * abs(tj) + tiny for rj, tj in zip(r, t)]
+            sway = [rj + c * abs(tj) + tiny for rj, tj in zip(r, t, strict=True)]
             W = [[number(w) for w in row] for row in layer.weights]
-            r = [zero if flat else sum(abs(w) * g for w, g in zip(row, sway)) + tiny for row in W]
-            t = [sum(w * tj for w, tj in zip(row, t)) for row in W]
+            r = [zero if flat else sum(abs(w) * g for w, g in zip(row, sway, strict=True)) + tiny for row in W]
+            t = [sum(w * tj for w, tj in zip(row, t, strict=True)) for row in W]
             if layer.kind == "relu":
                 on = [next(chosen) if state is None else state for state in next(rows)]
-                t, r = [ti if o else zero for ti, o in zip(t, on)], [ri if o else zero for ri, o in zip(r, on)]
+                t, r = [ti if o else zero for ti, o in zip(t, on, strict=True)], [ri if o else zero for ri, o in zip(r, on, strict=True)]
         return t[0], r[0]
 
 
@@ -293,14 +299,14 @@ def zero_bits(net: Net) -> bool:
     h = [x]
     for layer in net.layers:
         if layer.kind == "centre":
-            h = [(v - real(p)) * real(q) for v, p, q in zip(h, layer.weights[0], layer.bias)]
+            h = [(v - real(p)) * real(q) for v, p, q in zip(h, layer.weights[0], layer.bias, strict=True)]
         elif layer.kind == "rescale":
-            h = [v * real(p) + real(q) for v, p, q in zip(h, layer.weights[0], layer.bias)]
+            h = [v * real(p) + real(q) for v, p, q in zip(h, layer.weights[0], layer.bias, strict=True)]
         else:
             y = []
-            for weights, bias in zip(layer.weights, layer.bias):
+            for weights, bias in zip(layer.weights, layer.bias, strict=True):
                 total = real(bias)
-                for w, v in zip(weights, h):
+                for w, v in zip(weights, h, strict=True):
                     total = total + real(w) * v
                 y.append(max(total, real(0.0)) if layer.kind == "relu" else total)
             h = y

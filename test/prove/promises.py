@@ -39,7 +39,8 @@ def look(data: Any, path: list[str]) -> Any:
     key, *rest = path
     if isinstance(data, list) and "=" in key:
         wanted = re.findall(r"(\w+)=(.*?)(?=,\w+=|$)", key)
-        data = {key: row for row in data if all(row.get(k) == v for k, v in wanted)}
+        rows = [row for row in data if all(row.get(k) == v for k, v in wanted)]
+        data = {key: rows[-1]} if rows else {}
     elif isinstance(data, list):
         return look(data[int(key)], rest)
     if not isinstance(data, dict):

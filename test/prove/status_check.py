@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Gate: NaN or Inf anywhere, an input out of its range, are reported, and the last good state is kept: every method, layered, folded and smooth."""
+"""Gate: NaN or Inf anywhere, an input out of its range, are reported, and the last good state is kept: every method, layered, folded and
+smooth."""
 
 from __future__ import annotations
 

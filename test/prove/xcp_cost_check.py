@@ -45,7 +45,7 @@ def problems(said: dict[str, tuple[int, int]], found: dict[str, tuple[int, int]]
     return wrong + [
         f"{name}: {found[name]}, the page says {said[name]}"
         for name in found
-        if name in said and any(abs(a - b) > SHARE * b for a, b in zip(found[name], said[name]))
+        if name in said and any(abs(a - b) > SHARE * b for a, b in zip(found[name], said[name], strict=True))
     ]
 
 

@@ -62,8 +62,8 @@ def table(
     time = np.arange(round((COUNT - 1) * STEP / step) + 1) * step
     columns = [time, *signals(time)]
     rows = [list(header)] + ([list(units)] if units else [])
-    for values in zip(*columns):
-        cells = [(digits % (value * factor)).replace(".", decimal) for value, factor in zip(values, scale)]
+    for values in zip(*columns, strict=True):
+        cells = [(digits % (value * factor)).replace(".", decimal) for value, factor in zip(values, scale, strict=True)]
         if stamp is not None:
             cells[0] = stamp(float(values[0]))
         rows.append([*cells, *more])
@@ -80,7 +80,7 @@ def _german(time: float) -> str:
 
 
 def _named(*units: str) -> list[str]:
-    return [f"{name} [{unit}]" for name, unit in zip(BARE, units)]
+    return [f"{name} [{unit}]" for name, unit in zip(BARE, units, strict=True)]
 
 
 def _two_clocks() -> bytes:
@@ -88,7 +88,9 @@ def _two_clocks() -> bytes:
     rows = ["time [s],x_in [m],acc [m/s^2],time [s],turning [rad/s],tau [N*m]"]
     x, acc, _turning, _tau = signals(time)
     later = signals(time + 0.5 * STEP)
-    rows += [f"{t:.9g},{a:.9g},{b:.9g},{t + 0.5 * STEP:.9g},{c:.9g},{d:.9g}" for t, a, b, c, d in zip(time, x, acc, *later[2:])]
+    rows += [
+        f"{t:.9g},{a:.9g},{b:.9g},{t + 0.5 * STEP:.9g},{c:.9g},{d:.9g}" for t, a, b, c, d in zip(time, x, acc, *later[2:], strict=True)
+    ]
     return "\n".join(rows).encode()
 
 

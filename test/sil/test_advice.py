@@ -109,7 +109,7 @@ def test_pairs_of_the_catalogue_are_of_its_kinds():
     ],
 )
 def test_advice_for_each_verdict(d, parts):
-    assert len(d.advice) == len(parts) and all(part in text for part, text in zip(parts, d.advice)), d.advice
+    assert len(d.advice) == len(parts) and all(part in text for part, text in zip(parts, d.advice, strict=True)), d.advice
     text = screen(d)
     assert all(part in text for part in parts)
 

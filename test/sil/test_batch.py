@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -49,7 +50,8 @@ other = {{ mass = "m", position = "r", velocity = "v_r" }}
 [elements]
 foot = {{ between = ["mass", "z"], law = "linear_spring", stiffness = "k" }}
 {foot_damper}
-friction = {{ between = ["mass", "ground"], law = "stribeck_friction", breakaway = "3 N", coulomb = "2 N", stribeck = "0.2 m/s", transition = "0.3 m/s" }}
+friction = {{ between = ["mass", "ground"], law = "stribeck_friction", breakaway = "3 N", coulomb = "2 N", \
+stribeck = "0.2 m/s", transition = "0.3 m/s" }}
 stop = {{ between = ["mass", "other"], law = "bump_stop", stiffness = "3000 N/m", gap = "1 mm" }}
 both = {{ between = ["mass", "other"], law = "expression", force = "k*s/(1 + (s/q_0)^2) + where(v < 0, d_0, 2*d_0)*v" }}
 net = {{ between = ["mass", "ground"], law = "network", network = "two", inputs = ["deflection", "rate"] }}
@@ -103,7 +105,7 @@ def network(path: Path, sizes: list[int], activations: list[str]) -> None:
     draw = np.random.default_rng(len(sizes) + sum(sizes))
     layers = [
         {"activation": a, "weights": (draw.standard_normal((n, m)) / np.sqrt(m)).tolist(), "bias": (0.3 * draw.standard_normal(n)).tolist()}
-        for m, n, a in zip(sizes, sizes[1:], activations)
+        for (m, n), a in zip(itertools.pairwise(sizes), activations, strict=True)
     ]
     n = sizes[0]
     scaling = {
@@ -171,7 +173,8 @@ CHOICES = [
 
 
 @pytest.mark.parametrize(
-    "choices, dtype", sample([(choices, dtype) for dtype in TYPES for choices in CHOICES], *zip(CHOICES, TYPES * len(CHOICES)))
+    "choices, dtype",
+    sample([(choices, dtype) for dtype in TYPES for choices in CHOICES], *zip(CHOICES, itertools.cycle(TYPES), strict=False)),
 )
 def test_each_lane_has_the_bits_of_the_step(tmp_path, choices, dtype):
     model = rich(tmp_path, *choices)
@@ -221,7 +224,7 @@ def test_a_parameter_in_a_lane_is_that_parameter_in_the_model_file(tmp_path, osc
     values = {"m": [2.0, 1.7, 2.3], "c": [800.0, 800.0, 1234.5], "d": [4.0, 3.3, 7.0]}
     run = Batch(oscillator, dtype).run(u, parameters=values, **everything(oscillator))
     text = (HERE / "models" / "oscillator.toml").read_text()
-    for lane, (m, c, d) in enumerate(zip(*values.values())):
+    for lane, (m, c, d) in enumerate(zip(*values.values(), strict=True)):
         varied = (
             text.replace("value = 2,", f"value = {m},")
             .replace("value = 800,", f"value = {c},")
@@ -341,7 +344,7 @@ def rk4_by_hand(u: np.ndarray, m: complex, c: complex, d: complex, h: float = 1e
         return np.array([x[1], -(c * (x[0] - foot) + d * x[1]) / m])
 
     x, found = np.zeros(2, complex), []
-    for before, now in zip(np.append(u[0], u), u):
+    for before, now in zip(np.append(u[0], u[:-1]), u, strict=True):
         if found:
             k1 = rate(x, before)
             k2 = rate(x + 0.5 * h * k1, 0.5 * (before + now))

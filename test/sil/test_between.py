@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -78,8 +79,8 @@ def test_noise_beside_a_motion_of_nine_samples_a_period():
 
 
 def test_noise_that_is_low_passed_or_seldom_is_not_lost():
-    """What a file states holds unless neighbours are nearer; of what is resampled to 0.4 of the rate more than half of the noise is seen, for
-    the last band, 0.375 to 0.44, lies across that; of a slow sensor, whose samples have no neighbours, the file's word counts."""
+    """What a file states holds unless neighbours are nearer; of what is resampled to 0.4 of the rate more than half of the noise is seen,
+    for the last band, 0.375 to 0.44, lies across that; of a slow sensor, whose samples have no neighbours, the file's word counts."""
     white = np.random.default_rng(6).standard_normal(20000)
     low = signal.filtfilt(*signal.butter(8, 0.8), white)
     assert 0.5 < samples.noise([[low]], np.zeros(1))[0] < 1.05
@@ -148,7 +149,7 @@ def term(how: str, where: str = "tau") -> Term:
 class Values:
     """Of a fit, as far as a file needs them."""
 
-    values: dict[str, float] = {}
+    values: ClassVar[dict[str, float]] = {}
 
     @staticmethod
     def value(target):

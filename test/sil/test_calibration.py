@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib.util
 import socket
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -56,13 +56,11 @@ class Bridge(threading.Thread):
             while (message := self.bus.recv(0.0)) is not None:
                 if message.arbitration_id == CAN_MASTER:
                     self.line.send(bytes(message.data))
-            try:
+            with contextlib.suppress(TimeoutError, ConnectionRefusedError):
                 self.bus.send(can.Message(arbitration_id=CAN_SLAVE, is_extended_id=False, data=self.line.recv(64)))
-            except (TimeoutError, ConnectionRefusedError):
-                pass
 
 
-@contextmanager
+@contextlib.contextmanager
 def reached(kind: str, model: Any, u: np.ndarray) -> Iterator[tuple[address.Address, virtual.Served]]:
     """A virtual controller, and where it is; `can` is 8-byte frames on a virtual bus."""
     if kind != "can":
@@ -194,7 +192,7 @@ def test_a2l_of_another_program_is_refused(tmp_path: Path) -> None:
     other = tmp_path / "other.a2l"
     with virtual.served(model, "tcp", "127.0.0.1", 0, drive(model)) as found, links.connected(address.parse(found.address)) as link:
         other.write_text(found.a2l.replace('EPK "nqvm ', 'EPK "nqvm_old '))
-        with pytest.raises(UserError, match='is that of "nqvm_old .*the controller is "nqvm '):
+        with pytest.raises(UserError, match=r'is that of "nqvm_old .*the controller is "nqvm '):
             link.a2l(other)
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A bulk write over TCP that is cut, on the master's side or the controller's: all of the set is in force, or nothing; reconnecting finds a clean state."""
+"""A bulk write over TCP that is cut, on the master's side or the controller's: all of the set is in force, or nothing; reconnecting finds a
+clean state."""
 
 from __future__ import annotations
 

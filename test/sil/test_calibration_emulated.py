@@ -59,7 +59,8 @@ def test_every_entry_and_then_an_exchange(running: tuple) -> None:
 
 
 def test_line_carries_eight_signals_each_step(running: tuple) -> None:
-    """45 bytes a step with stamp and head: 45 kB a second. At the divisor of port/cortex-m/uart.c, 25 MHz / 16, a line passes 156 kB; the emulator paces none."""
+    """45 bytes a step with stamp and head: 45 kB a second. At the divisor of port/cortex-m/uart.c, 25 MHz / 16, a line passes 156 kB; the
+    emulator paces none."""
     _, _, where, a2l = running
     for seconds in (0.5, 4.0, 20.0):  # as above
         log = measure.record(where, a2l, [*EIGHT, "sample"], seconds)
@@ -73,7 +74,7 @@ def test_line_carries_eight_signals_each_step(running: tuple) -> None:
 def test_inputs_that_it_cannot_hold_are_refused() -> None:
     model = penode_gen.load(NQVM)
     with (
-        pytest.raises(UserError, match="holds the inputs of 262.144 s, not of 262.145 s"),
+        pytest.raises(UserError, match=r"holds the inputs of 262\.144 s, not of 262\.145 s"),
         emulated.emulated(model, "m4f", "127.0.0.1", 0, np.zeros((262145, 1), np.float32)),
     ):
         pass

@@ -42,7 +42,7 @@ def file(step: float, guesses: dict[str, tuple[float, str]], spring: str = SPRIN
 def simulate(acceleration, u, h: float):
     """Position and rate [n] of a mass from rest under inputs u [n FINE], in steps of h/FINE; by Heun, whose error goes with its square."""
     dt, x, v, rows = h / FINE, 0.0, 0.0, []
-    for i, (now, after) in enumerate(zip(u, [*u[1:], u[-1]])):
+    for i, (now, after) in enumerate(zip(u, [*u[1:], u[-1]], strict=True)):
         if i % FINE == 0:
             rows.append((x, v))
         a = acceleration(x, v, now)
@@ -59,7 +59,7 @@ def write(path, h: float, u, sensor: str, z, drive: str = "u [N]") -> None:
 def diagnosed(folder, penode, model: str, records) -> dict:
     """What the command says of a model and two recordings, for training and hold-out."""
     (folder / "model.toml").write_text(model)
-    for name, arguments in zip(("train.csv", "hold.csv"), records):
+    for name, arguments in zip(("train.csv", "hold.csv"), records, strict=True):
         write(folder / name, *arguments)
     penode("diagnose", folder / "model.toml", "--data", folder / "train.csv", "--holdout", folder / "hold.csv", "-o", folder / "out")
     return json.loads((folder / "out" / "diagnosis.json").read_text())
@@ -68,9 +68,9 @@ def diagnosed(folder, penode, model: str, records) -> dict:
 def waves(rng, count: int, low: float, high: float, n: int, h: float):
     """A sum of `count` sines between two frequencies [Hz] of rms 1, at every fine step [n FINE]."""
     t = np.arange(n * FINE) * h / FINE
-    return sum(np.sin(2 * math.pi * f * t + p) for f, p in zip(rng.uniform(low, high, count), rng.uniform(0, 7, count))) / math.sqrt(
-        0.5 * count
-    )
+    return sum(
+        np.sin(2 * math.pi * f * t + p) for f, p in zip(rng.uniform(low, high, count), rng.uniform(0, 7, count), strict=True)
+    ) / math.sqrt(0.5 * count)
 
 
 def kinds(found: dict) -> list[str]:
@@ -142,8 +142,8 @@ def converters(seeds, noise: float):
 
 
 def test_a_converter_that_holds_its_output_is_a_delay(tmp_path, penode):
-    """Half a sample of delay, which is 2 % of what acts and all that is missed. No bushing, of which a third of the force would be needed for
-    the like of it."""
+    """Half a sample of delay, which is 2 % of what acts and all that is missed. No bushing, of which a third of the force would be needed
+    for the like of it."""
     records, model = converters((7, 8), 1e-3)
     found = diagnosed(tmp_path, penode, model, records)
     assert kinds(found) in (["sensor_delay"], ["input_delay"])  # the same to a plant that does not change
@@ -227,15 +227,16 @@ def test_a_sensor_cut_off_in_front_of_its_noise(tmp_path, penode):
 
 
 def test_a_limit_that_bends_the_fit(tmp_path, penode):
-    """A limit at 1.3 of the rms, in a file without tolerances: the parameters that fit it best are far off, and their motion stays below it."""
-    records = []
+    """A limit at 1.3 of the rms, in a file without tolerances: the parameters that fit it best are far off, and their motion stays below
+    it."""
+    records, limit = [], 0.0
     for seed in (11, 12):
         rng = np.random.default_rng(seed)
         u = 10.0 * waves(rng, 20, 0.2, 4.0, 5000, 2e-3)
         states = simulate(lambda x, v, u: (u - 12.0 * v - 900.0 * (x + 6e-4 * math.sin(x / 3e-3))) / 2.0, u, 2e-3)
         x, v = states.T[:2]
         a = (u[::FINE] - 12.0 * v - 900.0 * (x + 6e-4 * np.sin(x / 3e-3))) / 2.0
-        limit = 1.3 * np.std(x) if not records else limit
+        limit = limit or 1.3 * np.std(x)
         seen = np.column_stack([np.clip(x, -limit, limit) + 2e-5 * rng.standard_normal(len(x)), a + 0.02 * rng.standard_normal(len(x))])
         records.append((2e-3, u, "x [m],a [m/s^2]", seen))
     sensor = 'x = { value = "x", unit = "m", noise = 2e-5 }\na = { value = "der(v)", unit = "m/s^2", noise = 0.02 }'

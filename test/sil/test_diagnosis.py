@@ -100,7 +100,7 @@ def drive(z: np.ndarray, force, mass: float = M_B, load: float = 0.0, stiffer: f
         return [v_b, v_w, (load - pull) / mass, (pull - C_T * (z_w - height(time))) / M_W]
 
     x = solve_ivp(rates, (0.0, t[-1]), np.zeros(4), method="RK45", rtol=1e-7, atol=1e-10, max_step=STEP, t_eval=t).y
-    a = np.array([rates(time, state)[2:] for time, state in zip(t, x.T)])
+    a = np.array([rates(time, state)[2:] for time, state in zip(t, x.T, strict=True)])
     return {"a_body": a[:, 0], "a_wheel": a[:, 1], "deflection": x[0] - x[1], "z_b": x[0]}
 
 
@@ -208,7 +208,7 @@ def test_derivatives_go_on_from_those_of_before(model, sound):
     size = np.sqrt(np.sum(fit.jacobian**2, axis=0))
     way, other = np.random.default_rng(1).standard_normal((2, len(fit.free))) / (100.0 * size)
     other -= way * ((size * way) @ (size * other)) / np.sum((size * way) ** 2)
-    free = tuple(replace(f, value=float(f.at(step))) for f, step in zip(fit.free, way))
+    free = tuple(replace(f, value=float(f.at(step))) for f, step in zip(fit.free, way, strict=True))
     there = fit.secant(free, fit.residual + np.random.default_rng(2).standard_normal(len(fit.residual)))
     assert np.allclose(there.jacobian @ way, fit.residual - there.residual, atol=1e-9)
     assert np.allclose(there.jacobian @ other, fit.jacobian @ other, atol=1e-9)
@@ -257,7 +257,8 @@ def test_a_way_that_cannot_be_simulated_is_not_gone(model, sound, monkeypatch):
 
 
 def test_a_fit_that_cannot_be_simulated_ends(model, sound, monkeypatch):
-    """Where a simulation grows without bounds, but not to infinity, it is a fit of no use, and no error: rates of its sensors are finite."""
+    """Where a simulation grows without bounds, but not to infinity, it is a fit of no use, and no error: rates of its sensors are
+    finite."""
     one = study.null_study(model, [experiment(m, model) for m in sound])
     problem = Problem(model, one.experiments, one.metrics)
     sensors = problem.sensors
@@ -332,7 +333,7 @@ def test_transfer_of_a_place_is_that_of_the_equations(model):
     linear = plant.linearise(model, found, np.zeros((1, 4)), np.zeros((1, 1)))
     f = np.array([0.3, 1.2, 4.0, 11.0, 30.0])
     k = next(i for i, p in enumerate(found) if p.name == "spring")
-    for row, w in zip(linear.transfer(f)[:, :3, 1 + k], 2.0 * np.pi * f):
+    for row, w in zip(linear.transfer(f)[:, :3, 1 + k], 2.0 * np.pi * f, strict=True):
         suspension = C + 1j * w * D
         a = np.array([[suspension - M_B * w**2, -suspension], [-suspension, suspension + C_T - M_W * w**2]])
         z = np.linalg.solve(a, [-1.0, 1.0])
@@ -576,7 +577,7 @@ def test_a_bushing_that_hardens_is_refined_by_one(tmp_path, model):
         return [x[2], x[3], -pull / M_B, (pull - C_T * (x[1] - spline(time))) / M_W, v - held / relaxation]
 
     x = solve_ivp(rates, (0.0, t[-1]), np.zeros(5), method="RK45", rtol=1e-7, atol=1e-10, max_step=STEP, t_eval=t).y
-    a = np.array([rates(time, state)[2:4] for time, state in zip(t, x.T)])
+    a = np.array([rates(time, state)[2:4] for time, state in zip(t, x.T, strict=True)])
     path = record(tmp_path / "hardens.csv", z, {"a_body": a[:, 0], "a_wheel": a[:, 1], "deflection": x[0] - x[1]}, 15)
     one = studied(path, model)
     r = study.regression(one, one.null, [])
@@ -613,7 +614,7 @@ def test_friction_that_yields_a_little_is_coulomb(tmp_path, model):
         return [x[2], x[3], -pull / M_B, (pull - C_T * (x[1] - spline(time))) / M_W, (v - abs(v) * slip) / 5e-5]
 
     x = solve_ivp(rates, (0.0, t[-1]), np.zeros(5), method="LSODA", rtol=1e-7, atol=1e-10, max_step=STEP, t_eval=t).y
-    a = np.array([rates(time, state)[2:4] for time, state in zip(t, x.T)])
+    a = np.array([rates(time, state)[2:4] for time, state in zip(t, x.T, strict=True)])
     path = record(tmp_path / "yields.csv", z, {"a_body": a[:, 0], "a_wheel": a[:, 1], "deflection": x[0] - x[1]}, 15)
     one = studied(path, model)
     laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == "falling_friction"]
@@ -689,7 +690,7 @@ def test_a_mount_in_series_takes_all_of_the_damper(tmp_path):
         return [x[1], (pull(time) - c * x[0] - mount) / m, mount / d]
 
     x = solve_ivp(rates, (0.0, t[-1]), np.zeros(3), rtol=1e-8, atol=1e-11, max_step=STEP, t_eval=t).y
-    a = np.array([rates(time, state)[1] for time, state in zip(t, x.T)])
+    a = np.array([rates(time, state)[1] for time, state in zip(t, x.T, strict=True)])
     rng = np.random.default_rng(4)
     columns = [t, pull(t), a + 0.02 * rng.standard_normal(SAMPLES), x[0] + 1e-4 * rng.standard_normal(SAMPLES)]
     header = "time [s],pull [N],a [m/s^2],z [m]"
@@ -784,7 +785,7 @@ def test_what_is_foretold_is_as_good_as_the_true_law(tmp_path, model):
         .replace("[parameters]", 'input = "parabola"\n[parameters]')
     )
     true = Sil(penode_gen.load(tmp_path / "true.toml")).instance().run(road(6)[:, None]).z
-    for (name, gain), said in zip(found.gain.items(), true.T):
+    for (name, gain), said in zip(found.gain.items(), true.T, strict=True):
         assert gain.after_rmse < 1.08 * np.sqrt(np.mean((held[0].z[name] - said) ** 2)), name
 
 
@@ -844,7 +845,7 @@ def test_a_mass_on_rubber_is_foretold(tmp_path, model):
             return [v_b, v_w, v, (rubber - pull) / M_B, (pull - C_T * (z_w - z(time))) / M_W, -rubber / m, (q - z_b - slip) / tau]
 
         x = solve_ivp(rates, (0.0, t[-1]), np.zeros(7), method="RK45", rtol=1e-7, atol=1e-10, max_step=STEP, t_eval=t).y
-        a = np.array([rates(time, state)[3:5] for time, state in zip(t, x.T)])
+        a = np.array([rates(time, state)[3:5] for time, state in zip(t, x.T, strict=True)])
         sensors = {"a_body": a[:, 0], "a_wheel": a[:, 1], "deflection": x[0] - x[1]}
         paths.append(record(tmp_path / f"{seed}.csv", road(seed), sensors, seed + 10))
     found = diagnosis.diagnose(model, load(paths[:1], model), load(paths[1:], model))
@@ -863,7 +864,9 @@ def test_two_bends_of_a_sensor_are_one_cube_in_the_file(model, sound):
     text, extended = extension.extend_file(base, e, ())
     assert text.count("curve_deflection = ") == 1
     y = 0.02
-    want = sum(f.value * y**3 / b.what.shape**2 for f, b in zip((f for f in e.fit.free if f.target[0] == "fault"), (rails, gain)))
+    want = sum(
+        f.value * y**3 / b.what.shape**2 for f, b in zip((f for f in e.fit.free if f.target[0] == "fault"), (rails, gain), strict=True)
+    )
     sensor = next(s for s in extended.sensors if s.name == "deflection").expression.replace("^", "**")
     curve = extended.parameters["curve_deflection"].value
     assert eval(sensor, {"z_b": y, "z_w": 0.0, "curve_deflection": curve}) - y == pytest.approx(want, rel=1e-5)
@@ -1088,7 +1091,8 @@ def test_a_cause_that_makes_the_holdout_worse_is_not_shipped(tmp_path, model, so
 
 
 def test_tolerances_that_make_the_holdout_worse_are_not_shipped(tmp_path, model, sound):
-    """A spring that is stiffer in the training by its tolerance, and as it should be in the hold-out: nothing is wrong, nothing is changed."""
+    """A spring that is stiffer in the training by its tolerance, and as it should be in the hold-out: nothing is wrong, nothing is
+    changed."""
     z = road(5)
     train = load([record(tmp_path / "stiffer.csv", z, drive(z, lambda s, v: 0.01 * C * s), 15)], model)
     found = diagnosis.diagnose(model, train, sound, tmp_path / "out")

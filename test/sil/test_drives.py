@@ -77,10 +77,10 @@ def drive(folder, shaft, bearing, seed=1, seconds=12.0, zero=0.0):
             seen.append(x[:2])
         p = rates(*x, torque[i])
         mid = 0.5 * (torque[i] + torque[i + 1])
-        q = rates(*(y + 0.5 * h * s for y, s in zip(x, p)), mid)
-        r = rates(*(y + 0.5 * h * s for y, s in zip(x, q)), mid)
-        s = rates(*(y + h * v for y, v in zip(x, r)), torque[i + 1])
-        x = tuple(y + h / 6.0 * (a + 2.0 * b + 2.0 * c + e) for y, a, b, c, e in zip(x, p, q, r, s))
+        q = rates(*(y + 0.5 * h * s for y, s in zip(x, p, strict=True)), mid)
+        r = rates(*(y + 0.5 * h * s for y, s in zip(x, q, strict=True)), mid)
+        s = rates(*(y + h * v for y, v in zip(x, r, strict=True)), torque[i + 1])
+        x = tuple(y + h / 6.0 * (a + 2.0 * b + 2.0 * c + e) for y, a, b, c, e in zip(x, p, q, r, s, strict=True))
     angles = np.array(seen) + np.array([1e-4, 5e-5]) * rng.standard_normal((n, 2))
     (folder / "model.toml").write_text(DRIVE)
     rows = np.column_stack([np.arange(n) * STEP, torque[:-1:FINE], angles])
@@ -109,9 +109,9 @@ def touching(s, gap, rounding=0.0005):
 
 @pytest.mark.parametrize("bent", (0.04, 0.06))
 def test_friction_where_little_acts(tmp_path, bent, show):
-    """Friction of 0.017 N*m rms at the load, beside the 0.04 N*m of its bearing, and a shaft that is bent by 2 and 4 % of its 0.36 N*m: what
-    the shaft does is more of the innovations, and the friction is named, not its bearing's damping; with more waves once a curve of the
-    shaft is in the model. Its size within its interval widened by 15 %: so much is the mean of its arc tangent below 0.02 N*m."""
+    """Friction of 0.017 N*m rms at the load, beside the 0.04 N*m of its bearing, and a shaft that is bent by 2 and 4 % of its 0.36 N*m:
+    what the shaft does is more of the innovations, and the friction is named, not its bearing's damping; with more waves once a curve of
+    the shaft is in the model. Its size within its interval widened by 15 %: so much is the mean of its arc tangent below 0.02 N*m."""
     model, experiments = drive(tmp_path, lambda s: K * s + waves(bent, s), lambda v: 0.02 * 2.0 / math.pi * math.atan(v / 0.01))
     found = answered(model, experiments)
     show([(c.kind, c.where, {k: (v.value, v.ci95) for k, v in c.parameters.items()}) for c in found.causes])
@@ -121,7 +121,8 @@ def test_friction_where_little_acts(tmp_path, bent, show):
 
 
 def shaken(friction, rough, seconds=12.0):
-    """A bearing's torque with noise of `rough` N*m rms below 60 Hz, which no model has. `drive` calls it four times per integration step."""
+    """A bearing's torque with noise of `rough` N*m rms below 60 Hz, which no model has. `drive` calls it four times per integration
+    step."""
     noise = np.convolve(np.random.default_rng(3).standard_normal(int(seconds / STEP) * FINE + 12), np.hanning(12), "same")
     noise, calls = np.repeat(noise * rough / np.std(noise), 4), itertools.count()
     return lambda v: friction(v) + noise[next(calls)]
@@ -129,8 +130,9 @@ def shaken(friction, rough, seconds=12.0):
 
 @pytest.mark.parametrize("rough, force", [(0.02, 0.015), (0.015, 0.012)])
 def test_damping_does_not_stand_for_friction(tmp_path, rough, force, show):
-    """Friction of a seventh of what acts in a bearing that is shaken by more than that: a damping that the file does not vouch for takes most
-    of it, and leaves a fifth of the misfit to friction. With friction in the model the damping is as the file has it, so friction is the cause."""
+    """Friction of a seventh of what acts in a bearing that is shaken by more than that: a damping that the file does not vouch for takes
+    most of it, and leaves a fifth of the misfit to friction. With friction in the model the damping is as the file has it, so friction is
+    the cause."""
     model, experiments = drive(tmp_path, lambda s: K * s, shaken(lambda v: force * 2.0 / math.pi * math.atan(v / 0.005), rough))
     found = answered(model, experiments)
     show([(c.kind, c.where, {k: (v.value, v.ci95) for k, v in c.parameters.items()}) for c in found.causes])
@@ -212,8 +214,8 @@ def test_what_a_small_form_hides():
 
 @pytest.mark.parametrize("scale", (1.0, 500.0))
 def test_angles_that_are_off_by_the_same_are_another_start(scale):
-    """Two sensors off by 6 and 5 mrad, of which a start that moves both does all but 1 mrad: which of them is off is not seen. Another sensor
-    is off by itself, however much noisier it is."""
+    """Two sensors off by 6 and 5 mrad, of which a start that moves both does all but 1 mrad: which of them is off is not seen. Another
+    sensor is off by itself, however much noisier it is."""
     rng = np.random.default_rng(8)
     first, second, third = rng.standard_normal((3, 300))
     slopes = np.stack([first, second, third / scale, first + second], axis=-1)[:, None, :]

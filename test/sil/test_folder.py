@@ -239,9 +239,11 @@ def test_what_cannot_begin_is_said_in_one_line_and_leaves_nothing(place, penode,
 def test_a_cluster_without_workers_or_with_another_penode_is_refused(place, cluster, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(folder, "PATIENCE", 0.5)
-    with distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=60) as idle:
-        with pytest.raises(UserError, match="the cluster has no workers; start some"):
-            folder.diagnose(job(place, tmp_path / "out"), scheduler=idle.scheduler_address)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=60) as idle,
+        pytest.raises(UserError, match="the cluster has no workers; start some"),
+    ):
+        folder.diagnose(job(place, tmp_path / "out"), scheduler=idle.scheduler_address)
     monkeypatch.setattr(folder.metadata, "version", lambda name: "0.0.1")
     with pytest.raises(UserError, match=r"has penode 0.0.1; install [\d.]+ there as here"):
         folder.diagnose(job(place, tmp_path / "out"), scheduler=cluster)

@@ -33,10 +33,7 @@ def test_form_is_read_as_the_plain_one(tmp_path, name):
     plain, found = values(tmp_path, FORMS["plain"]), values(tmp_path, form)
     shift = COUNT - len(found)  # of two clocks only what both cover
     assert shift <= 1
-    if shift:
-        exact = np.column_stack(signals((np.arange(len(found)) + 0.5) * STEP))
-    else:
-        exact = plain
+    exact = np.column_stack(signals((np.arange(len(found)) + 0.5) * STEP)) if shift else plain
     assert found.shape == exact.shape
     assert np.max(np.abs(found - exact) / np.max(np.abs(plain), axis=0)) <= 2.0 * form.tolerance  # both are rounded
 

@@ -27,9 +27,9 @@ MODEL = model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS)
 
 
 def recording(path: Path, how: str, period: float, seed: int, top: float) -> Path:
-    """A rig under a random force up to `top` [Hz] that acts late, or in steps, of a period [s], or whose first sensor is late, or whose second
-    has an offset; a sine in its spring and in its damper makes it a little wrong everywhere. Simulated in steps of a quarter millisecond,
-    written every 2 ms."""
+    """A rig under a random force up to `top` [Hz] that acts late, or in steps, of a period [s], or whose first sensor is late, or whose
+    second has an offset; a sine in its spring and in its damper makes it a little wrong everywhere. Simulated in steps of a quarter
+    millisecond, written every 2 ms."""
     rng = np.random.default_rng(seed)
     step, n = STEP / FINE, SAMPLES * FINE
     t = np.arange(n) * step
@@ -40,8 +40,9 @@ def recording(path: Path, how: str, period: float, seed: int, top: float) -> Pat
     late = max(round(period / step), 1)
     acts = {"delay": np.interp(t - 0.5 * period, t, u), "hold": u[np.arange(n) // late * late]}.get(how, u)
     linear = StateSpace([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]], [[0.0], [1.0 / MASS]], [[1.0, 0.0], [0.0, 1.0]], [[0.0], [0.0]])
+    waves = np.zeros(n)
     for _ in range(3):  # the waves act along the motion that they make: a fixed point
-        x, v = lsim(linear, acts if _ == 0 else acts + waves, t, interp=False)[1].T
+        x, v = lsim(linear, acts + waves, t, interp=False)[1].T
         waves = 0.03 * (STIFFNESS * np.std(x) * np.sin(3.0 * x / np.std(x)) + DAMPING * np.std(v) * np.sin(2.5 * v / np.std(v)))
     a = (acts + waves - STIFFNESS * x - DAMPING * v) / MASS
     if how == "sensor":

@@ -58,19 +58,19 @@ def swing(folder, torque, seed=1, k=0.64, tolerance=", tolerance = 0.05", second
     drive *= 0.25 / np.std(drive)
     x, seen = np.zeros(2), []
     fine = 4
+
+    def rate(y, i, share):
+        tau = drive[i] + (drive[i + 1] - drive[i]) * share / fine
+        return np.array([y[1], (tau - 0.64 * y[0] - 0.004 * y[1] - torque(y[0], y[1])) / 0.01])
+
+    s = h / fine
     for i in range(n):
         seen.append(x[0])
         for j in range(fine):
-
-            def rate(y, share):
-                tau = drive[i] + (drive[i + 1] - drive[i]) * (j + share) / fine
-                return np.array([y[1], (tau - 0.64 * y[0] - 0.004 * y[1] - torque(y[0], y[1])) / 0.01])
-
-            s = h / fine
-            a = rate(x, 0.0)
-            b = rate(x + 0.5 * s * a, 0.5)
-            c = rate(x + 0.5 * s * b, 0.5)
-            x = x + s / 6.0 * (a + 2.0 * b + 2.0 * c + rate(x + s * c, 1.0))
+            a = rate(x, i, j)
+            b = rate(x + 0.5 * s * a, i, j + 0.5)
+            c = rate(x + 0.5 * s * b, i, j + 0.5)
+            x = x + s / 6.0 * (a + 2.0 * b + 2.0 * c + rate(x + s * c, i, j + 1.0))
     rows = np.column_stack([np.arange(n) * h, drive[:n], np.array(seen) + 1e-4 * rng.standard_normal(n)])
     (folder / "model.toml").write_text(SWING.format(k=k, tolerance=tolerance))
     np.savetxt(folder / "train_1.csv", rows, delimiter=",", header="time [s],tau [N*m],phi [rad]", comments="", fmt="%.9g")

@@ -39,7 +39,10 @@ def found(*groups: tuple[str, str], left: float = 0.0, score: float = 1000.0, ga
 def values(monkeypatch):
     """What parameters have been found: {kind: {name: (value, low, high)}}; a test may change it."""
     said: dict[str, dict[str, tuple[float, float, float]]] = {}
-    made = lambda study, best, group: {k: Value(v, "1", (low, high)) for k, (v, low, high) in said.get(group[0], {}).items()}
+
+    def made(study, best, group):
+        return {k: Value(v, "1", (low, high)) for k, (v, low, high) in said.get(group[0], {}).items()}
+
     monkeypatch.setattr(judging.sized, "values", made)
     return said
 
@@ -178,7 +181,7 @@ def test_a_resonance_needs_little_damping_and_one_mass(values, monkeypatch):
     two = found(mass)
     two.terms *= 2
     for share, answer in ((0.92, OUT), (0.94, ([mass[0]], "explained"))):
-        monkeypatch.setattr(judging.explaining, "explain", lambda study, terms: found(mass, gain=share * two.gain))
+        monkeypatch.setattr(judging.explaining, "explain", lambda study, terms, share=share: found(mass, gain=share * two.gain))
         assert judged(two) == answer
 
 
@@ -264,7 +267,7 @@ def test_a_drift_of_clocks_has_no_name(values, monkeypatch):
     drift, stop = (judging.CLOCK, ""), ("bump_stop", "spring")
     assert judged(found(drift)) == OUT
     for share, answer in ((0.4, OUT), (0.6, (["bump_stop"], "explained"))):
-        monkeypatch.setattr(judging.explaining, "explain", lambda study, terms: found(stop, gain=share * 1000.0))
+        monkeypatch.setattr(judging.explaining, "explain", lambda study, terms, share=share: found(stop, gain=share * 1000.0))
         assert judged(found(stop, drift)) == answer
     (cause,), _, _, _ = judging.judge(STUDY, [found(stop), found(drift, score=999.0)], [], 0.0, 0.0, False)
     assert cause.alternatives == () and cause.confidence < 0.7

@@ -45,7 +45,7 @@ def measured(path: Path, friction: float, seed: int, n: int = 4000) -> np.ndarra
     """A recording of that rotor, with friction or without, in 20 steps of RK4 a sample; its speed without noise."""
     draw = np.random.default_rng(seed)
     t = np.arange(n) * 1e-3
-    waves = zip(draw.uniform(0.2, 0.6, 12), np.linspace(0.4, 9.0, 12), draw.uniform(0.0, 6.28, 12))
+    waves = zip(draw.uniform(0.2, 0.6, 12), np.linspace(0.4, 9.0, 12), draw.uniform(0.0, 6.28, 12), strict=True)
     tau = sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in waves)
     speed, w, level = np.zeros(n), 0.0, 0.0
     for k in range(n):

@@ -29,7 +29,7 @@ A = -1.0 * np.sin(2.0 * np.pi * 1.5 * T + 0.7) + 0.01 * DRAW.normal(size=N)  # m
 def write(path: Path, columns: dict[str, np.ndarray]) -> Path:
     with open(path, "w") as file:
         file.write(",".join(columns) + "\n")
-        for row in zip(*columns.values()):
+        for row in zip(*columns.values(), strict=True):
             file.write(",".join("" if np.isnan(value) else f"{value:.9g}" for value in row) + "\n")
     return path
 
@@ -141,7 +141,10 @@ def test_rounded_stamps_are_a_regular_clock_and_scattered_ones_are_said(record, 
 
 def test_faster_rows_are_filtered_alike_and_bad_ones_spread_no_further_than_the_filter(tmp_path, oscillator):
     time = np.arange(16_000) * 5e-4
-    wave = lambda phase: np.sin(2.0 * np.pi * 40.0 * time + phase)
+
+    def wave(phase):
+        return np.sin(2.0 * np.pi * 40.0 * time + phase)
+
     a = wave(0.5) + 0.05 * np.random.default_rng(2).normal(size=time.size)
     a[4000:4010] = np.nan
     path = write(tmp_path / "r.csv", {"t_s": time, "foot_mm": wave(0.0), "a_m_s2": a, "z_mm": wave(2.0)})

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ KNEE = "-k*(max(v - knee, 0) + min(v + knee, 0))"
 HUMP = "2.3316439815971242*k*exp(-(v/width)^2)*v/width"
 
 
-def term(kind: str, law: str, gain: str, shapes: dict[str, float] = {}) -> Term:
+def term(kind: str, law: str, gain: str, shapes: Mapping[str, float] = MappingProxyType({})) -> Term:
     basis = Basis(kind, 0, law, (gain, ""), {k: (x, "") for k, x in shapes.items()}, 1, ())
     return Term(Candidate(kind, "spring", 1, False, basis), 1.0)
 
@@ -86,7 +87,10 @@ def test_the_force_of_friction_is_where_its_line_begins(damping):
 def test_a_little_that_yields_is_no_hysteresis():
     """Where an element yields far with a fifth of its friction it is friction; where all of it does, hysteresis."""
     stiff = ("coulomb_friction", "coulomb_friction", "force", {"force": 20.0, "transition": 1e-3})
-    yielding = lambda force: ("bouc_wen", "bouc_wen", "force", {"force": force, "presliding": 0.003})
+
+    def yielding(force):
+        return ("bouc_wen", "bouc_wen", "force", {"force": force, "presliding": 0.003})
+
     assert named(naming._friction, stiff, yielding(5.0)) == "coulomb_friction"
     assert named(naming._friction, yielding(5.0)) == "bouc_wen"
     hump = ("coulomb_friction", HUMP, "k", {"k": 20.0, "width": 0.5})  # friction of a gain of its own counts as well
@@ -110,7 +114,7 @@ def test_friction_is_there_at_once(width, kind):
 )
 def test_a_stop_leaves_room(gaps, kind):
     sides = ("bump_stop", "rebound_stop")
-    laws = [("bump_stop", law, "stiffness", {"stiffness": 1e4, "gap": g * REACH}) for law, g in zip(sides, gaps)]
+    laws = [("bump_stop", law, "stiffness", {"stiffness": 1e4, "gap": g * REACH}) for law, g in zip(sides, gaps, strict=False)]
     assert named(naming._spring, *laws) == kind
 
 
@@ -128,7 +132,10 @@ def test_a_tyres_curve_that_is_a_straight_line_is_its_stiffness(quadratic, name)
     laws = [("quadratic_spring", "quadratic", quadratic), ("linear_spring", "stiffness", 1e5)]
     terms = [term("tyre_nonlinear", law, gain) for law, gain, _ in laws]
     s = np.linspace(-REACH, REACH, 401)
-    terms = [replace(t, candidate=replace(t.candidate, what=replace(t.candidate.what, series=(f,)))) for t, f in zip(terms, (s * s, s))]
+    terms = [
+        replace(t, candidate=replace(t.candidate, what=replace(t.candidate.what, series=(f,))))
+        for t, f in zip(terms, (s * s, s), strict=True)
+    ]
     tyre = SimpleNamespace(name="tyre", law="linear_spring", arguments={"stiffness": "c_t"})
     model = SimpleNamespace(elements=[tyre], parameters={"c_t": SimpleNamespace(tolerance=0.1)})
     places = [SimpleNamespace(elements=(("tyre", 1),))]

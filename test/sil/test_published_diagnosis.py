@@ -38,12 +38,12 @@ def recordings(shared, tmp_path_factory):
         z = size * road_of_chirp(t)
         road = CubicSpline(t, z)
 
-        def rates(time: float, x: np.ndarray) -> list[float]:
+        def rates(time: float, x: np.ndarray, road: CubicSpline = road) -> list[float]:
             force = 10e3 * (x[0] - x[1]) + 800.0 * (x[2] - x[3]) + spring(x[0] - x[1]) + friction(x[2] - x[3])
             return [x[2], x[3], -force / 350.0, (force - 300e3 * (x[1] - road(time))) / 90.0]
 
         x = solve_ivp(rates, (0.0, t[-1]), np.zeros(4), method="LSODA", rtol=1e-8, atol=1e-11, max_step=1e-3, t_eval=t).y
-        a = np.array([rates(time, state)[2] for time, state in zip(t, x.T)])
+        a = np.array([rates(time, state)[2] for time, state in zip(t, x.T, strict=True)])
         rng = np.random.default_rng(seed)
         signals = {"a_body": a, "deflection": x[0] - x[1]}
         columns = [t, z, *(y + NOISE[k] * rng.standard_normal(len(t)) for k, y in signals.items())]

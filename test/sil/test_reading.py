@@ -243,7 +243,8 @@ def cli_model(tmp_path):
     (tmp_path / "m.toml").write_text(
         '[model]\nname = "rig"\nsample_time = "1 ms"\n[parameters]\nm = { value = 300.0, unit = "kg" }\nc = { value = 2e4, unit = "N/m" }\n'
         '[inputs]\nz_road = { unit = "m" }\n[bodies]\nbody = { mass = "m", position = "z", velocity = "v" }\n[elements]\n'
-        'spring = { between = ["body", "z_road"], law = "linear_spring", stiffness = "c" }\n[outputs]\nz_out = { value = "z", unit = "m" }\n'
+        'spring = { between = ["body", "z_road"], law = "linear_spring", stiffness = "c" }\n'
+        '[outputs]\nz_out = { value = "z", unit = "m" }\n'
         '[sensors]\na_body = { value = "der(v)", unit = "m/s^2" }\n'
     )
     return tmp_path / "m.toml"

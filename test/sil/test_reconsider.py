@@ -78,7 +78,8 @@ def grown(forms: Sequence[Accepted], scores: dict[tuple[str, ...], float], rest:
 
 
 def test_a_first_choice_that_stood_in_for_two_is_exchanged():
-    """Friction and an asymmetric damper look like a degressive one, until the asymmetry is known; then friction takes most of what is left."""
+    """Friction and an asymmetric damper look like a degressive one, until the asymmetry is known; then friction takes most of what is
+    left."""
     first, second = accepted(0, trial("degressive", 600.0)), accepted(1, trial("asymmetric", 1300.0))
     scores = {
         ("degressive_damper", "asymmetric_damper"): 1300.0,

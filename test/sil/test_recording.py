@@ -63,10 +63,10 @@ def test_broken_recordings_name_row_channel_and_remedy(tmp_path, text, expected)
 
 
 def test_file_that_is_not_there_or_no_text(tmp_path):
-    with pytest.raises(UserError, match="No such file.*; name a CSV file"):
+    with pytest.raises(UserError, match=r"No such file.*; name a CSV file"):
         read_csv(tmp_path / "none.csv")
     (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00time")
-    with pytest.raises(UserError, match="no CSV text.*; give a comma-separated file"):
+    with pytest.raises(UserError, match=r"no CSV text.*; give a comma-separated file"):
         read_csv(tmp_path / "b.csv")
 
 
@@ -204,7 +204,7 @@ def test_mdf_groups_keep_their_clocks_until_a_raster_is_asked_for(mdf):
 def test_mdf_samples_marked_as_invalid_are_missing(mdf):
     (table,) = read(mdf((T, {"a": ("m", T, np.arange(500) == 7)})), ["a"])
     assert np.flatnonzero(np.isnan(table.columns["a"])).tolist() == [7]
-    with pytest.raises(UserError, match="r.mf4: sample 8: channel a has no finite value there; cut"):
+    with pytest.raises(UserError, match=r"r\.mf4: sample 8: channel a has no finite value there; cut"):
         table.channel("a", "m")
 
 

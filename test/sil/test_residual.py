@@ -10,7 +10,7 @@ from scipy import stats
 from test_diagnosis import MODEL, SAMPLES, STEP, C, D, drive, record, road
 
 import penode_gen
-from penode_sil.diagnosis import noise, residual, study
+from penode_sil.diagnosis import noise, residual, restoring, study
 from penode_sil.diagnosis.driven import experiment
 from penode_sil.recordings.measured import load
 
@@ -113,7 +113,7 @@ def test_stretches_find_a_burst():
 
 def test_averages_need_enough_samples():
     rows, columns = np.array([0] * 6 + [1] * 4), np.zeros(10, dtype=int)
-    found = residual.averages(np.arange(10.0), rows, columns, (2, 1))
+    found = restoring.averages(np.arange(10.0), rows, columns, (2, 1))
     assert found[0, 0] == 2.5 and np.isnan(found[1, 0])
 
 

@@ -32,7 +32,7 @@ def test_rigs(name, show):
     study = null_study(model, [experiment(m, model) for m in recordings])
     assert {p.name for p in study.places} == {"gravity"}
     limit = {"pendulum": 0.015, "robot_joint": 0.0335}[name]
-    for e, z in zip(study.experiments, study.null.simulated):
+    for e, z in zip(study.experiments, study.null.simulated, strict=True):
         left = float(np.sqrt(np.mean((e.y - z)[e.good] ** 2)))
         show(f"{name}: {left * 1e3:.2f} mrad")
         assert left < limit
@@ -76,7 +76,7 @@ def test_states_and_equations_only(tmp_path):
     t = np.arange(1000) * 0.01
     T = np.exp(-t / 2.0) + 0.01 * np.random.default_rng(1).standard_normal(1000)
     record = tmp_path / "cooling.csv"
-    record.write_text("time [s],T [K]\n" + "".join(f"{a:.3f},{b:.6f}\n" for a, b in zip(t, T)))
+    record.write_text("time [s],T [K]\n" + "".join(f"{a:.3f},{b:.6f}\n" for a, b in zip(t, T, strict=True)))
     study = null_study(model, [experiment(m, model) for m in load([record], model)])
     assert study.places == () and abs(study.null.value("tau") - 2.0) < 0.02
     assert placeless(study.places) == "the model has no elements and no bodies: causes are looked for in its parameters and sensors"

@@ -68,7 +68,7 @@ def drive(z: np.ndarray, h: float, friction: float) -> dict[str, np.ndarray]:
         k2 = rates(x + 0.5 * h * k, u)
         k3 = rates(x + 0.5 * h * k2, u)
         x = x + h / 6.0 * (k + 2.0 * k2 + 2.0 * k3 + rates(x + h * k3, u))
-    return dict(zip(NOISE, np.array(seen).T))
+    return dict(zip(NOISE, np.array(seen).T, strict=True))
 
 
 class Bench:
@@ -128,7 +128,7 @@ def singles(table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 def diagnosed(folder: Path, table: dict[str, np.ndarray]):
     (folder / "model.toml").write_text(MODEL)
     header = ",".join(f"{name} [{UNITS[name]}]" for name in table)
-    lines = (",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in zip(*table.values()))
+    lines = (",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in zip(*table.values(), strict=True))
     (folder / "run.csv").write_text("\n".join([header, *lines]) + "\n")
     model = penode_gen.load(folder / "model.toml")
     recordings = load([folder / "run.csv"], model)

@@ -161,7 +161,7 @@ def test_input_without_a_signal_is_named(tmp_path, oscillator):
 
 
 def test_missing_and_broken_files(tmp_path, oscillator):
-    with pytest.raises(UserError, match="No such file.*; name a scenario file"):
+    with pytest.raises(UserError, match=r"No such file.*; name a scenario file"):
         scenarios.load(tmp_path / "none.toml", oscillator, 1)
     with pytest.raises(UserError, match=r"no TOML text.*line 1.*; correct it there"):
         load(tmp_path, oscillator, "duration = = 3")

@@ -120,7 +120,7 @@ def test_a_parameter_that_another_one_does_without_goes(deviations, left):
     assert pytest.approx(7.7, abs=0.1) == (NEW + 10.0) ** 0.5
     names = ("m_b", "c_t")
     terms = tuple(Term(Candidate("wrong_parameter", name, 0, False, name), 0.0) for name in names)
-    free = [SimpleNamespace(target=name, value=100.0 + d, unit=1.0) for name, d in zip(names, deviations)]
+    free = [SimpleNamespace(target=name, value=100.0 + d, unit=1.0) for name, d in zip(names, deviations, strict=True)]
     fit = SimpleNamespace(free=free, covariance=lambda: np.eye(2))
     model = SimpleNamespace(parameters={name: SimpleNamespace(value=100.0) for name in names})
     e = Explanation(terms, SimpleNamespace(names=names), None, fit, 0.0)
@@ -136,7 +136,10 @@ def test_the_strongest_other_kind_counts_what_is_taken():
 def test_a_play_with_a_half_beside_it_has_two_halves(play, half, gaps):
     """A play of 3 mm to either side and a half as strong one of 2 mm: what it takes of the spring's travel; where there is no play, or
     none is left of it, the terms stay."""
-    shapes = lambda gap: {"gap": (gap, "m")}
+
+    def shapes(gap):
+        return {"gap": (gap, "m")}
+
     laws = [("backlash", play, shapes(0.003)), (HALVES[0], half, shapes(0.002))]
     group = Candidate("backlash", "spring", 1, False, None)
     terms = tuple(Term(replace(group, what=Basis("backlash", 0, law, ("k", "N/m"), gap, 1, ())), gain) for law, gain, gap in laws)

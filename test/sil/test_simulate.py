@@ -133,7 +133,7 @@ def test_several_recordings_are_compiled_once_and_written_to_folders(penode, fol
     header, values = table(folder / "far" / "away" / "a.csv")
     [(units, columns, _)], _ = mdf.read(folder / "out" / "a_seen.mf4", None)
     assert {f"{n} [{u}]" for n, u in units.items()} == set(header)
-    for name, column in zip(header, values.T):
+    for name, column in zip(header, values.T, strict=True):
         assert np.allclose(columns[name.partition(" ")[0]], column, rtol=1e-8)  # nine digits in the text
 
 

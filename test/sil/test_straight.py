@@ -33,8 +33,8 @@ def test_a_parameter_is_off_where_no_slope_is_that_of_the_file(own, slopes, off)
 
 
 def recording(path, stiffness: float, difference: float, waves: float) -> None:
-    """A mass on a spring that is softer in rebound by `difference`, with a sine of `waves` of its force, under random tones up to 8 Hz: Heun in
-    twentieths of a sample, whose error is (30/s 1e-4 s)^2/12, below 1e-6."""
+    """A mass on a spring that is softer in rebound by `difference`, with a sine of `waves` of its force, under random tones up to 8 Hz:
+    Heun in twentieths of a sample, whose error is (30/s 1e-4 s)^2/12, below 1e-6."""
     rng, n, fine = np.random.default_rng(3), 6000, 20
     tones, phases = rng.uniform(0.3, 8.0, 30), rng.uniform(0.0, 7.0, 30)
     t = np.arange(n * fine + 1) * STEP / fine
@@ -57,7 +57,8 @@ def recording(path, stiffness: float, difference: float, waves: float) -> None:
 
 @pytest.mark.parametrize("waves", (0.0, 0.03))
 def test_a_stiffness_behind_an_asymmetric_spring_is_named(tmp_path, penode, waves):
-    """25 % more stiffness beside a difference of its sides: both are named, also where nothing else is missed, and innovations do not decide."""
+    """25 % more stiffness beside a difference of its sides: both are named, also where nothing else is missed, and innovations do not
+    decide."""
     (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.03, SENSORS))
     recording(tmp_path / "train.csv", 1.25 * STIFFNESS, 0.3 * STIFFNESS, waves)
     penode("diagnose", tmp_path / "rig.toml", "--data", tmp_path / "train.csv", "-o", tmp_path / "out")
@@ -70,8 +71,8 @@ def test_a_stiffness_behind_an_asymmetric_spring_is_named(tmp_path, penode, wave
 
 @pytest.mark.parametrize("difference", (0.02, 0.4))
 def test_an_asymmetric_spring_about_the_stiffness_of_the_file(tmp_path, penode, difference):
-    """The parameter is not named. Half of the difference is what bends, and abs(x) beside x of a normal motion has 0.6 of its rms: in all about
-    half of the difference, and a note where that is small."""
+    """The parameter is not named. Half of the difference is what bends, and abs(x) beside x of a normal motion has 0.6 of its rms: in all
+    about half of the difference, and a note where that is small."""
     (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.03, SENSORS))
     recording(tmp_path / "train.csv", STIFFNESS, difference * STIFFNESS, 0.0)
     penode("diagnose", tmp_path / "rig.toml", "--data", tmp_path / "train.csv", "-o", tmp_path / "out")

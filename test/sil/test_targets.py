@@ -81,7 +81,7 @@ def test_steps_are_the_same_everywhere(name, monkeypatch, show):
     nqvm, u = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml"), chirp(steps)
     digests = {" ".join(compiler): Sil(nqvm, compiler=compiler).run(u).digest for compiler in COMPILERS}
     with ThreadPoolExecutor(2) as pool:  # the work is done by other processes
-        digests |= zip(BOARDS, pool.map(lambda machine: Pil(nqvm, machine).run(u).digest, BOARDS))
+        digests |= zip(BOARDS, pool.map(lambda machine: Pil(nqvm, machine).run(u).digest, BOARDS), strict=True)
     show(f"{name}, hash of {steps} steps: {digests['gcc -O2'][:16]} on {', '.join(digests)}")
     assert len(set(digests.values())) == 1, digests
 

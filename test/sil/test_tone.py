@@ -105,7 +105,10 @@ def test_a_resonance_is_none(known, damping, loud):
     draw, t = np.random.default_rng(8), np.arange(30_000) * 1e-3
     w, z = 2 * np.pi * 13.0, damping
     mode = signal.cont2discrete(([2 * z * w, 0.0], [1.0, 2 * z * w, w * w]), 1e-3, "bilinear")
-    shaken = lambda: signal.lfilter(loud * mode[0].ravel(), mode[1], draw.normal(size=len(t)))[:, None]
+
+    def shaken():
+        return signal.lfilter(loud * mode[0].ravel(), mode[1], draw.normal(size=len(t)))[:, None]
+
     y = draw.normal(size=(len(t), 1)) + shaken()
     response = signal.freqz(loud * mode[0].ravel(), mode[1], np.linspace(0.0, np.pi, len(t) // 2 + 1))[1]
     more = {"power": 1.0 + np.abs(response) ** 2} if known == "noise" else {"model": shaken()}

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import re
 import subprocess
@@ -18,10 +19,7 @@ from samples import sample
 
 import penode_gen
 
-BENCH = Path(__file__).resolve().parents[1] / "bench"
-sys.path.insert(0, str(BENCH))
-
-import itertools
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench"))
 
 import bench  # needs the path above
 import cortex_m4
@@ -191,7 +189,7 @@ def test_readme_is_compared_to_the_word_and_to_two_percent_of_a_number():
 
 # -- one model under each heading -------------------------------------------------------------------------------------
 
-KEPT = json.loads((BENCH / "bench.json").read_text())
+KEPT = json.loads((Path(bench.__file__).with_name("bench.json")).read_text())
 COMMITTED = figures.ROOT / "gen" / "nqvm" / "c"
 FILE = re.compile(r"`(\w+\.(?:toml|py))`")
 
@@ -225,7 +223,7 @@ def test_two_models_under_one_heading_are_refused(part: str, wrong: str) -> None
     key = "file" if part == "accuracy" else "model"
     row = next(row for row in other[part] if row[key] == "`nqvm_euler.toml`")
     row[key] = wrong
-    with pytest.raises(ValueError, match="explicit Euler: figures of .* and of"):
+    with pytest.raises(ValueError, match=r"explicit Euler: figures of .* and of"):
         report.prices(other)
 
 

@@ -4,7 +4,8 @@
 
 Force errors are RMS over 2 sigma of the visited range, in % of the force's span there. Processor time is that from the read recording to
 the networks, and its ratio to a fixed loop of a million steps of plain Python, timed before and after it (clock.py). Ratios are the largest
-of the parameters' errors against each other; hold-out is the larger of both sensors' errors over their noise, inside the trained range. The band covers: share of places where truth is within 2 sigma.
+of the parameters' errors against each other; hold-out is the larger of both sensors' errors over their noise, inside the trained range. The
+band covers: share of places where truth is within 2 sigma.
 """
 
 from __future__ import annotations
@@ -164,7 +165,8 @@ def line(rows: list[dict[str, object]]) -> str:
 
 
 HEAD = (
-    "| case | converged | processor s | over the fixed loop | force error, % of span | ratios off, % | parameters off, % | hold-out over noise, % | masked, % | covered by 2 sigma, % | scale reported |\n"
+    "| case | converged | processor s | over the fixed loop | force error, % of span | ratios off, % | parameters off, % "
+    "| hold-out over noise, % | masked, % | covered by 2 sigma, % | scale reported |\n"
     "|---|---|---|---|---|---|---|---|---|---|---|"
 )
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Part of `make campaign-train`: plain Adam on whole trajectories (rivals/adam.py) on the recording of seed 1, once to its end, beside penode's own.
+"""Part of `make campaign-train`: plain Adam on whole trajectories (rivals/adam.py) on the recording of seed 1, once to its end, beside
+penode's own.
 
 It is called again where it was stopped. Errors are those of campaign.py; both know the physical parameters and learn the start state.
 """
@@ -66,7 +67,10 @@ def main() -> None:
         f"{facts['seconds']:.0f} s of processor time ({facts['seconds'] / loop:.0f} fixed loops), chi2/N {min(facts['losses']):.2f}, "
         f"force error {off['spring']:.2f} % (spring), {off['damper']:.2f} % (damper){ours}"
     )
-    label = f"JAX, {facts['epoch']} epochs, rate {facts['rate']:g}; an epoch {facts['scan']['epoch']:.2f} s, in diffrax {facts['diffrax']['epoch']:.2f} s"
+    label = (
+        f"JAX, {facts['epoch']} epochs, rate {facts['rate']:g}; an epoch {facts['scan']['epoch']:.2f} s, "
+        f"in diffrax {facts['diffrax']['epoch']:.2f} s"
+    )
     given.work.with_suffix(".json").write_text(json.dumps([(label, figure, True)]), encoding="utf-8")
     print(label, figure, flush=True)
 

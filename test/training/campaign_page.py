@@ -2,8 +2,8 @@
 # Copyright (c) 2026 the penode authors
 """The page of `make campaign-train`: what its parts measured, beside what is asked; a part that has not run is named.
 
-Parts write what they find into a folder: `rows.jsonl` (a training a line), and `damping.json`, `promises.json`, `rigs.json` and `adam.json` (rows of text, and
-whether each is as it must be).
+Parts write what they find into a folder: `rows.jsonl` (a training a line), and `damping.json`, `promises.json`, `rigs.json` and `adam.json`
+(rows of text, and whether each is as it must be).
 """
 
 from __future__ import annotations
@@ -20,9 +20,12 @@ Row = dict[str, Any]
 FOLDER = Path("build/campaign-train")
 OPEN = "not measured"
 STOPS = (
-    "A stop of `x1, stops and degressive damper` turns within a cell of the spring's knots. Moved along its input until the turns meet knots, by half a cell to some millimetres, "
-    "the curve leaves less than in its place, where straight pieces miss the turn; only samples at which the damper's rate passes 0 speak against it (1 N there is 0.1 mm). The first curves are "
-    "straight at 0, which helps the worst of five (9.2 to 5.9 %), and a turn that is seen is reported. Knots that follow the turn by Gauss-Newton come nearer, by a tenth of what is left in each "
+    "A stop of `x1, stops and degressive damper` turns within a cell of the spring's knots. "
+    "Moved along its input until the turns meet knots, by half a cell to some millimetres, "
+    "the curve leaves less than in its place, where straight pieces miss the turn; "
+    "only samples at which the damper's rate passes 0 speak against it (1 N there is 0.1 mm). The first curves are "
+    "straight at 0, which helps the worst of five (9.2 to 5.9 %), and a turn that is seen is reported. "
+    "Knots that follow the turn by Gauss-Newton come nearer, by a tenth of what is left in each "
     "step of half a second, and end a third of the way short: tried, not kept."
 )
 
@@ -48,84 +51,98 @@ def covered(rows: list[Row]) -> float:
     return sum(shares) / max(len(shares), 1)
 
 
-def asked(rows: list[Row]) -> list[tuple[str, str, str, bool | None]]:
-    """What is asked, the bar, what was found, and whether that is enough (None: not measured)."""
-    found: list[tuple[str, str, str, bool | None]] = []
+Asked = tuple[str, str, str, bool | None]  # what, the bar, what was found, whether that is enough (None: not measured)
 
-    def add(what: str, bar: str, some: list[Row], text: Callable[[], str], good: Callable[[], bool]) -> None:
-        sound = [r for r in some if "failed" not in r]
-        seeds = f"{len(some)} trainings: " if some else ""
-        found.append((what, bar, seeds + text() if sound else OPEN, bool(good()) and len(sound) == len(some) if sound else None))
 
-    for case in ("x1, 1-16-16-1", "x1, 1-16-16-16-1"):
-        own = [r for r in rows if r["case"] == case]
-        seconds, off = (lambda own=own: most(own, lambda r: r["seconds"])), (lambda own=own: most(own, error))
-        add(
-            case,
-            "5 s of processor time, force error 1 % of span",
-            own,
-            lambda: f"{seconds():.1f} s, {off():.2f} %",
-            lambda: seconds() <= 5.0 and off() <= 1.0,
-        )
-    for case, bar, key in (
-        ("m_b weighed", "parameters within 1 %", "absolute"),
-        ("nothing weighed", "ratios within 1 %, scale reported", "ratios"),
-    ):
-        own = of(rows, case)
-        add(
-            f"x5, parameters off 10 %, {case}",
-            f"10 s, 2.5 %, {bar}",
-            own,
-            lambda own=own, key=key: (
-                f"{most(own, lambda r: r['seconds']):.1f} s, {most(own, error):.2f} %, {most(own, lambda r: r[key]):.2f} %"
-            ),
-            lambda own=own, key=key: (
-                most(own, lambda r: r["seconds"]) <= 10.0
-                and most(own, error) <= 2.5
-                and most(own, lambda r: r[key]) <= 1.0
-                and (key == "absolute" or all(r["scale"] for r in own if "failed" not in r))
-            ),
-        )
-    for noise, bar in (("x1", 2.0), ("x5", 4.0)):
-        own = of(rows, f"{noise}, tanh")
-        good = [r for r in own if r.get("converged")]
-        add(
-            f"{noise}, tanh 2-16-16-1",
-            f"60 s, {bar:g} %; 9 of 10 seeds converge, others say so",
-            own,
-            lambda good=good, own=own: (
-                f"{len(good)} converged, these {most(good, lambda r: r['seconds']):.1f} s, {most(good, error):.2f} %; the others report that they did not"
-            ),
-            lambda good=good, own=own, bar=bar: (
-                most(good, lambda r: r["seconds"]) <= 60.0 and most(good, error) <= bar and len(good) >= 0.9 * len(own)
-            ),
-        )
-    for what, some, bar in (("curves", [r for r in rows if "tanh" not in r["case"]], 2.0), ("end to end", of(rows, "tanh"), 5.0)):
-        add(
-            f"hold-out inside the trained range, {what}",
-            f"within {bar:g} % of the noise; at most 10 % masked",
-            some,
-            lambda some=some: f"{most(some, lambda r: r['holdout']):.2f} %, {most(some, lambda r: r['masked']):.1f} % masked",
-            lambda some=some, bar=bar: most(some, lambda r: r["holdout"]) <= bar and most(some, lambda r: r["masked"]) <= 10.0,
-        )
-    curves = [r for r in rows if r.get("covered") and not r.get("turns")]
-    add(
-        "bands of trained curves",
-        "2 sigma cover 90 to 98 %",
-        curves,
-        lambda: f"{2 * len(curves)} curves, {covered(curves):.1f} %",
-        lambda: 90.0 <= covered(curves) <= 98.0,
+def judged(what: str, bar: str, some: list[Row], text: Callable[[], str], good: Callable[[], bool]) -> Asked:
+    """A line of what is asked; `text` and `good` look at trainings that did not fail, and are called if there are any."""
+    sound = [r for r in some if "failed" not in r]
+    seeds = f"{len(some)} trainings: " if some else ""
+    return what, bar, seeds + text() if sound else OPEN, bool(good()) and len(sound) == len(some) if sound else None
+
+
+def seconds(rows: list[Row]) -> float:
+    """The longest time [s] of those that did not fail."""
+    return most(rows, lambda r: r["seconds"])
+
+
+def plain(rows: list[Row], case: str) -> Asked:
+    """Curves alone."""
+    own = [r for r in rows if r["case"] == case]
+    return judged(
+        case,
+        "5 s of processor time, force error 1 % of span",
+        own,
+        lambda: f"{seconds(own):.1f} s, {most(own, error):.2f} %",
+        lambda: seconds(own) <= 5.0 and most(own, error) <= 1.0,
     )
+
+
+def parameters_off(rows: list[Row], case: str, bar: str, key: str) -> Asked:
+    """Curves and wrong parameters; `key`: which of a row's errors counts."""
+    own = of(rows, case)
+    return judged(
+        f"x5, parameters off 10 %, {case}",
+        f"10 s, 2.5 %, {bar}",
+        own,
+        lambda: f"{seconds(own):.1f} s, {most(own, error):.2f} %, {most(own, lambda r: r[key]):.2f} %",
+        lambda: (
+            seconds(own) <= 10.0
+            and most(own, error) <= 2.5
+            and most(own, lambda r: r[key]) <= 1.0
+            and (key == "absolute" or all(r["scale"] for r in own if "failed" not in r))
+        ),
+    )
+
+
+def end_to_end(rows: list[Row], noise: str, bar: float) -> Asked:
+    """Networks that are trained as a whole."""
+    own = of(rows, f"{noise}, tanh")
+    good = [r for r in own if r.get("converged")]
+    return judged(
+        f"{noise}, tanh 2-16-16-1",
+        f"60 s, {bar:g} %; 9 of 10 seeds converge, others say so",
+        own,
+        lambda: f"{len(good)} converged, these {seconds(good):.1f} s, {most(good, error):.2f} %; the others report that they did not",
+        lambda: seconds(good) <= 60.0 and most(good, error) <= bar and len(good) >= 0.9 * len(own),
+    )
+
+
+def held_out(what: str, some: list[Row], bar: float) -> Asked:
+    """Recordings that training did not see."""
+    return judged(
+        f"hold-out inside the trained range, {what}",
+        f"within {bar:g} % of the noise; at most 10 % masked",
+        some,
+        lambda: f"{most(some, lambda r: r['holdout']):.2f} %, {most(some, lambda r: r['masked']):.1f} % masked",
+        lambda: most(some, lambda r: r["holdout"]) <= bar and most(some, lambda r: r["masked"]) <= 10.0,
+    )
+
+
+def bands(what: str, some: list[Row]) -> Asked:
+    """Bands of trained curves against the curves that are true."""
+    return judged(
+        what,
+        "2 sigma cover 90 to 98 %",
+        some,
+        lambda: f"{2 * len(some)} curves, {covered(some):.1f} %",
+        lambda: 90.0 <= covered(some) <= 98.0,
+    )
+
+
+def asked(rows: list[Row]) -> list[Asked]:
+    """All that is asked of trainings."""
     turns = [r for r in rows if r.get("covered") and r.get("turns")]
-    if turns:
-        add(
-            "the same, beside a turn between two knots, which is reported",
-            "2 sigma cover 90 to 98 %",
-            turns,
-            lambda: f"{2 * len(turns)} curves, {covered(turns):.1f} %",
-            lambda: 90.0 <= covered(turns) <= 98.0,
-        )
-    return found
+    return [
+        *(plain(rows, case) for case in ("x1, 1-16-16-1", "x1, 1-16-16-16-1")),
+        parameters_off(rows, "m_b weighed", "parameters within 1 %", "absolute"),
+        parameters_off(rows, "nothing weighed", "ratios within 1 %, scale reported", "ratios"),
+        *(end_to_end(rows, noise, bar) for noise, bar in (("x1", 2.0), ("x5", 4.0))),
+        held_out("curves", [r for r in rows if "tanh" not in r["case"]], 2.0),
+        held_out("end to end", of(rows, "tanh"), 5.0),
+        bands("bands of trained curves", [r for r in rows if r.get("covered") and not r.get("turns")]),
+        *([bands("the same, beside a turn between two knots, which is reported", turns)] if turns else []),
+    ]
 
 
 def table(folder: Path, name: str) -> list[tuple[str, str, bool]]:
@@ -158,7 +175,10 @@ def page(folder: Path) -> str:
             f"| {title} | | {OPEN} | open |"
         ]
     lines += [
-        "| trained set in the controller | hash of states of SiL and PiL equal; onnxruntime equal within rounding | not of this campaign: `test/training/test_deployed.py`, in `make test` | by test |"
+        (
+            "| trained set in the controller | hash of states of SiL and PiL equal; "
+            "onnxruntime equal within rounding | not of this campaign: `test/training/test_deployed.py`, in `make test` | by test |"
+        )
     ]
     lines += ["", STOPS] if of(rows, "stops") else []
     lines += ["", "## By case", "", campaign.HEAD]

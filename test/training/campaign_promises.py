@@ -3,14 +3,15 @@
 """`make campaign-promises`: do trained and random networks keep what the model file promises of them? By exact arithmetic.
 
 Random curves are brought within the limits that training puts on them; trained curves are what training made of a second of a plant whose
-forces break the promises. Both are written down as networks, whose numbers in float are taken as rational ones: their pieces are found layer by
-layer, and each piece and each kink is judged without rounding. The judge shares no code with what trains or certifies. It must
+forces break the promises. Both are written down as networks, whose numbers in float are taken as rational ones: their pieces are found
+layer by layer, and each piece and each kink is judged without rounding. The judge shares no code with what trains or certifies. It must
 also find faults that are put into the limits.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
 import tempfile
@@ -66,7 +67,7 @@ class Exact:
         h, over = [x.numerator], x.denominator
         for n, (rows, bias) in enumerate(self.layers[:depth]):
             h = [max(v, 0) for v in h] if n and self.relu[n - 1] else h
-            h = [sum((w * h[j] for j, w in row), b * over) for row, b in zip(rows, bias)]
+            h = [sum((w * h[j] for j, w in row), b * over) for row, b in zip(rows, bias, strict=True)]
             over <<= self.shift
         return h, over
 
@@ -101,8 +102,8 @@ def kinks_of(net: Exact) -> list[Fraction]:
         ends = [found[0] - 4, *found, found[-1] + 4]
         values = [net.units(x, depth) for x in ends]
         more = set(found)
-        for a, b, (left, under), (right, over) in zip(ends, ends[1:], values, values[1:]):
-            for u, v in zip(left, right):
+        for (a, b), ((left, under), (right, over)) in zip(itertools.pairwise(ends), itertools.pairwise(values), strict=True):
+            for u, v in zip(left, right, strict=True):
                 u, v = u * over, v * under  # over the same denominator
                 if u == v or ((u > 0) == (v > 0) and u and v and a != ends[0] and b != ends[-1]):
                     continue
@@ -119,12 +120,12 @@ def breaks(given: Promises, network: Network) -> bool:
     kinks = kinks_of(net)
     places = [kinks[0] - 1, *kinks, kinks[-1] + 1]
     values = [net.value(x) for x in places]
-    slopes = [(b - a) / (y - x) for x, y, a, b in zip(places, places[1:], values, values[1:])]
+    slopes = [(b - a) / (y - x) for (x, y), (a, b) in zip(itertools.pairwise(places), itertools.pairwise(values), strict=True)]
     wrong = (given.increasing and min(slopes) < 0) or (given.decreasing and max(slopes) > 0)
     wrong |= given.max_slope is not None and max(map(abs, slopes)) > Fraction(given.max_slope)
     wrong |= given.zero_at_zero and net.value(Fraction(0)) != 0
     if given.dissipative is not None:
-        wrong |= any((v if x > 0 else -v) < -Fraction(given.dissipative) for x, v in zip(places, values) if x != 0)
+        wrong |= any((v if x > 0 else -v) < -Fraction(given.dissipative) for x, v in zip(places, values, strict=True) if x != 0)
         wrong |= min(slopes[0], slopes[-1]) < 0
     return bool(wrong)
 
@@ -133,8 +134,8 @@ def breaks(given: Promises, network: Network) -> bool:
 
 
 def kept(given: Promises, random: np.random.Generator, layers: list[int], bound: Bound = promised.bound) -> tuple[bool, bool, bool]:
-    """A random curve, and what training's limits make of it: does each break a promise? And does training refuse it, as it does where no margin
-    is enough?"""
+    """A random curve, and what training's limits make of it: does each break a promise? And does training refuse it, as it does where no
+    margin is enough?"""
     network = untrained({"layers": layers}, 1, "net")
     count = unfold.capacity(network)
     others = random.uniform(-1.0, 1.0, count - 1)
@@ -160,7 +161,8 @@ def kept(given: Promises, random: np.random.Generator, layers: list[int], bound:
 
 
 def trained(count: int, seed: int, folder: Path, promising: bool = True) -> Iterator[tuple[Promises, Network | None]]:
-    """Networks of `count` trainings, two each, and what is promised of them; None for one that is refused. Without `promising`, trained freely."""
+    """Networks of `count` trainings, two each, and what is promised of them; None for one that is refused. Without `promising`, trained
+    freely."""
     model = penode_gen.load(HERE / "quarter.toml")
     shapes = {n: untrained({"layers": [10, 10]}, 1, n) for n in model.networks}
     model = replace(model, sets={"default": replace(model.sets["default"], networks=shapes)})
@@ -175,7 +177,7 @@ def trained(count: int, seed: int, folder: Path, promising: bool = True) -> Iter
         given = {p.name: GIVEN[random.integers(len(GIVEN))] for p in ports}
         own = replace(model, networks={n: replace(p, promises=given[n] if promising else Promises()) for n, p in model.networks.items()})
         found = _train(own, engine, ports, _window(records[random.integers(len(records))], random))
-        yield from ((given[p.name], n) for p, n in zip(ports, found))
+        yield from ((given[p.name], n) for p, n in zip(ports, found, strict=True))
 
 
 def _window(record: data.Record, random: np.random.Generator) -> data.Record:
@@ -244,7 +246,7 @@ def seen(name: str, count: int) -> int:
 def random_curves(seed: int, count: int) -> list[int]:
     """Of so many: broken before training's limits, after them, refused."""
     random = np.random.default_rng([1, seed])
-    return [sum(values) for values in zip(*(kept(GIVEN[k % len(GIVEN)], random, [8, 8]) for k in range(count)))]
+    return [sum(values) for values in zip(*(kept(GIVEN[k % len(GIVEN)], random, [8, 8]) for k in range(count)), strict=True)]
 
 
 def trained_curves(seed: int, count: int, folder: Path, promising: bool = True) -> list[int]:
@@ -258,7 +260,7 @@ def rows(given: argparse.Namespace) -> Iterator[tuple[str, str, bool]]:
     """Rows of the page, and whether each is as it must be."""
     done = given.out.with_suffix(".jsonl")
     some = [parts.kept(done, ["random", k], lambda k=k: random_curves(k, CHUNK)) for k in range(given.curves // CHUNK)]
-    before, after, refused = (sum(values) for values in zip(*some))
+    before, after, refused = (sum(values) for values in zip(*some, strict=True))
     yield (
         "random curves, broken before and after training's limits, refused",
         f"{before}, {after} and {refused} of {len(some) * CHUNK}",
@@ -269,7 +271,7 @@ def rows(given: argparse.Namespace) -> Iterator[tuple[str, str, bool]]:
             parts.kept(done, ["trained", k], lambda k=k: trained_curves(k, FEW, Path(folder))) for k in range(given.trained // (2 * FEW))
         ]
         wild = parts.kept(done, ["free"], lambda: trained_curves(0, FEW, Path(folder), promising=False))
-    wrong, none = (sum(values) for values in zip(*pairs))
+    wrong, none = (sum(values) for values in zip(*pairs, strict=True))
     every = 2 * FEW * len(pairs)
     yield "trained curves, broken, refused", f"{wrong} and {none} of {every}", wrong == 0 and none < every // 2
     yield "the same trained freely, broken", f"{wild[0]} of {2 * FEW - wild[1]}", wild[0] > 0

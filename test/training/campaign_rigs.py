@@ -2,9 +2,9 @@
 # Copyright (c) 2026 the penode authors
 """More of `make campaign-train`: networks beside the laws that the diagnosis finds in measured dampers.
 
-The first half of a recording is diagnosed; beside the laws of the extended model, as they are, stand a network of place and one of rate that are
-trained on the same half. RMS errors of the measured force are those of the second half, and of another recording where there is one, in the generated C:
-of the laws alone, and with the networks. Skipped where there are no recordings (RIGS_DIR).
+The first half of a recording is diagnosed; beside the laws of the extended model, as they are, stand a network of place and one of rate
+that are trained on the same half. RMS errors of the measured force are those of the second half, and of another recording where there is
+one, in the generated C: of the laws alone, and with the networks. Skipped where there are no recordings (RIGS_DIR).
 """
 
 from __future__ import annotations

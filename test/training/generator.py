@@ -44,7 +44,7 @@ class Truth:
     def force(self, which: int, s: Array, v: Array) -> Array:
         """Spring (0), damper (1) or both (2) at deflections s and rates v."""
         library, plant = _library(), _filled(self)
-        return np.array([library.force_of(ctypes.byref(plant), which, a, b) for a, b in zip(s, v)])
+        return np.array([library.force_of(ctypes.byref(plant), which, a, b) for a, b in zip(s, v, strict=True)])
 
 
 TWO_INPUTS = Truth(spring=0, damper=3, damper_by=(9000.0, 1.5e5, 60.0, 0.1))

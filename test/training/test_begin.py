@@ -96,7 +96,10 @@ def test_what_files_say(trained: Path) -> None:
         ("spring_net.onnx", "nonsense", "not an ONNX file"),
         (
             "other.toml",
-            '[model]\nname = "o"\nsample_time = "1 ms"\n[parameters]\nq = { value = 1, unit = "kg" }\n[outputs]\ny = { value = "q", unit = "kg" }\n',
+            (
+                '[model]\nname = "o"\nsample_time = "1 ms"\n[parameters]\nq = { value = 1, unit = "kg" }\n'
+                '[outputs]\ny = { value = "q", unit = "kg" }\n'
+            ),
             "no parameter and no network",
         ),
     ],

@@ -47,8 +47,8 @@ def test_onnxruntime_computes_the_same(trained: Path, name: str) -> None:
 
 
 def rounding(network: Network, x: np.ndarray) -> float:
-    """What float may be off, in all places x [n, 1]: each sum of n terms by (n + 1) half units of the sum of their sizes, each scaling by two,
-    carried on by the sizes of the weights; ReLU makes no difference larger."""
+    """What float may be off, in all places x [n, 1]: each sum of n terms by (n + 1) half units of the sum of their sizes, each scaling by
+    two, carried on by the sizes of the weights; ReLU makes no difference larger."""
     unit = 2.0**-24
     size, off = np.abs(x.astype(float)), np.zeros_like(x, dtype=float)
     for layer in network.layers:

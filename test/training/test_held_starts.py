@@ -20,8 +20,8 @@ HERE = Path(__file__).parent
 
 
 def test_start_far_from_that_of_the_model_file(tmp_path: Path) -> None:
-    """From 0 the model comes to another rest on a road that begins half a metre higher, where no step leads back; its errors there are the noise all the
-    same. A model whose spring pushes away leaves all bounds whatever the start is."""
+    """From 0 the model comes to another rest on a road that begins half a metre higher, where no step leads back; its errors there are the
+    noise all the same. A model whose spring pushes away leaves all bounds whatever the start is."""
     model = penode_gen.load(HERE / "quarter.toml")
     engine = Engine(model, [])
     ports = story.ports_of(model, engine)

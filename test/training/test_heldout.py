@@ -35,8 +35,8 @@ def fitted(folder: Path, spring: tuple[float, ...], sway: float) -> tuple[Proble
 
 
 def test_a_network_that_foretells_nothing_is_zero(tmp_path: Path) -> None:
-    """No force is missing, but there is a disturbance twenty times as loud as the noise, which curves follow; held-out parts show that they foretell
-    nothing. A spring that is missing is kept."""
+    """No force is missing, but there is a disturbance twenty times as loud as the noise, which curves follow; held-out parts show that they
+    foretell nothing. A spring that is missing is kept."""
     problem, point = fitted(tmp_path, (0.0, 0.03, 0.0, 0.0), 0.4)
     assert heldout.loud(problem, point)
     left = problem.scale * heldout.sizes(problem, point)

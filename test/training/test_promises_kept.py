@@ -18,7 +18,7 @@ from penode_sil.training import curve, unfold
 @pytest.mark.parametrize("given", campaign_promises.GIVEN, ids=range(4))
 def test_random_curves_keep_their_promises(given: Promises) -> None:
     random = np.random.default_rng(3)
-    before, after, refused = zip(*(campaign_promises.kept(given, random, [8, 8]) for _ in range(3)))
+    before, after, refused = zip(*(campaign_promises.kept(given, random, [8, 8]) for _ in range(3)), strict=True)
     assert all(before) and not any(after) and not any(refused)
 
 

@@ -21,7 +21,7 @@ PAGE = Path(__file__).parents[2] / "sil" / "TRAINING.md"
 
 def test_page_runs(recordings: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = PAGE.read_text(encoding="utf-8")
-    for path, name in zip(recordings, ("train.csv", "holdout.csv")):
+    for path, name in zip(recordings, ("train.csv", "holdout.csv"), strict=True):
         shutil.copy(path, tmp_path / name)
     (model,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "car.toml").write_text(model, encoding="utf-8")

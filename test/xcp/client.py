@@ -45,7 +45,7 @@ def fetch(master: Master, address: int, n: int) -> bytes:
 
 
 def shown(master: Master) -> dict[str, float]:
-    return dict(zip(("samples", "id", "adopted_at", "z_b"), struct.unpack("<IIIf", fetch(master, SHOWN, SHOWN_SIZE))))
+    return dict(zip(("samples", "id", "adopted_at", "z_b"), struct.unpack("<IIIf", fetch(master, SHOWN, SHOWN_SIZE)), strict=True))
 
 
 def after(master: Master, samples: int) -> dict[str, float]:

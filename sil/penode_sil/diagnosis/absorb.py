@@ -57,9 +57,9 @@ def taught(study: Study, e: Explanation) -> list[Taught]:
             continue
         port, network = study.model.networks[element.network], chosen[element.network]
         plain = all(units.factor(u) == 1.0 for u in (*port.input_units, port.output_unit))
-        own = [(t, n) for t, n in zip(e.terms, e.built.names) if _fits(study, t.candidate.what, element)]
+        own = [(t, n) for t, n in zip(e.terms, e.built.names, strict=True) if _fits(study, t.candidate.what, element)]
         if own and plain and _movable(network):
-            x, law = _lesson(study, element, network, Curve(*zip(*own)), values, own[0][0].candidate.what.place)
+            x, law = _lesson(study, element, network, Curve(*zip(*own, strict=True)), values, own[0][0].candidate.what.place)
             learnt, left = learn(network, x[:, None], network.evaluate(x[:, None])[:, 0] + law)
             if network.input_min is not None:
                 learnt = replace(learnt, input_min=np.array([np.min(x)]), input_max=np.array([np.max(x)]))
@@ -142,7 +142,7 @@ def derivatives(network: Network, x: Array) -> Array:
     for layer in network.layers:
         inputs.append(layer_value(layer, inputs[-1]))
     back, columns = np.ones((len(x), 1)), []
-    for layer, h in zip(network.layers[::-1], inputs[-2::-1]):
+    for layer, h in zip(network.layers[::-1], inputs[-2::-1], strict=True):
         if isinstance(layer, Affine):
             back = back * layer.factor
         else:

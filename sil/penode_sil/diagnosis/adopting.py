@@ -14,11 +14,12 @@ from .terms import Term, Trial, with_forms
 
 
 def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
-    """The bench with a trial's form in its model, and the terms that the form becomes there, one for each kind of law. Takes over the trial's
-    values for parameters that the bench has, and ignores the others. `number` makes the form's parameter names the same in every bench."""
+    """The bench with a trial's form in its model, and the terms that the form becomes there, one for each kind of law. Takes over the
+    trial's values for parameters that the bench has, and ignores the others. `number` makes the form's parameter names the same in every
+    bench."""
     moved = motions(Probe.of(bench))
     wide, (term,) = with_forms(bench, [t.form], moved, 90 + number)  # forms that are only tried have the number of their round, far below
-    names = dict(zip([f.target for f in t.term.free], term.free))
+    names = dict(zip([f.target for f in t.term.free], term.free, strict=True))
     own = {f.target: f for f in bench.fit.free}
     fitted = [
         replace(f, target=names[f.target].target) if f.target in names else f for f in t.fit.free if f.target in own or f.target in names
@@ -34,9 +35,9 @@ def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
 
 
 def steepened(bench: Bench, term: Term) -> Bench:
-    """Halves the width of a term's edges for as long as each halving gains PROMISE. The integration step is halved too, because a steeper edge is
-    stiffer. Later fits pay for these steps, so it stops where there would be more of them, and more than MOST_STEPS."""
-    edges = {f"{name}_{part.edge}" for name, part in zip(term.elements, term.form.parts) if part.edge}
+    """Halves the width of a term's edges for as long as each halving gains PROMISE. The integration step is halved too, because a steeper
+    edge is stiffer. Later fits pay for these steps, so it stops where there would be more of them, and more than MOST_STEPS."""
+    edges = {f"{name}_{part.edge}" for name, part in zip(term.elements, term.form.parts, strict=True) if part.edge}
     for _ in range(8 if edges else 0):  # down to 1e-4 of the rms rate: no plant turns faster
         free = tuple(replace(f, value=0.5 * f.value, low=0.5 * f.low) if f.target in edges else f for f in bench.fit.free)
         finer = replace(bench, fastest=2.0 * bench.fastest)
@@ -56,7 +57,7 @@ def apart(term: Term) -> list[Term]:
         return [term]
     found = []
     for kind in term.form.kinds:
-        own = [(n, p) for n, p in zip(term.elements, term.form.parts) if (p.kind or term.form.kind) == kind]
+        own = [(n, p) for n, p in zip(term.elements, term.form.parts, strict=True) if (p.kind or term.form.kind) == kind]
         names = tuple(n for n, _ in own)
         form = replace(term.form, kind=kind, parts=tuple(p for _, p in own), note="")
         found.append(Term(form, names, tuple(f for f in term.free if any(f.target.startswith(f"{n}_") for n in names))))

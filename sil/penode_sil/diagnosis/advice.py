@@ -52,7 +52,8 @@ def doubts(d: Diagnosis) -> list[Doubt]:
 
 
 def _posterior(d: Diagnosis, a: Named) -> float | None:
-    """Posterior of the likeliest set that contains it; 0 if the other sets hold 95 %; None if no set contains it, because no data here can tell."""
+    """Posterior of the likeliest set that contains it; 0 if the other sets hold 95 %; None if no set contains it, because no data here can
+    tell."""
     own = [x for x in d.explanations if any((c["kind"], c["where"]) == (a.kind, a.where) for c in x["causes"])]
     if not own:
         return None
@@ -60,7 +61,8 @@ def _posterior(d: Diagnosis, a: Named) -> float | None:
 
 
 def advised(d: Diagnosis, model: Model) -> Diagnosis:
-    """A diagnosis of a model with what follows from it: what would tell its causes from others, how often such causes are right, what to do next."""
+    """A diagnosis of a model with what follows from it: what would tell its causes from others, how often such causes are right, what to do
+    next."""
     causes = tuple(_with_alike(model, c) for c in d.causes)
     causes = tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives])) for c in causes)
     d = replace(d, causes=causes)
@@ -103,7 +105,8 @@ def _of_verdict(d: Diagnosis) -> list[str]:
     )
     if d.verdict == "partly_explained":
         found.append(
-            f"look for the rest: {1.0 - d.explained:.0%} of the avoidable residual is unexplained; the report shows where and when it occurs"
+            f"look for the rest: {1.0 - d.explained:.0%} of the avoidable residual is unexplained; "
+            "the report shows where and when it occurs"
         )
     return found
 
@@ -128,7 +131,8 @@ def _where_to_look(d: Diagnosis) -> list[str]:
         return ["compare signals and times of the largest residual in the report with what the plant did then"]
     shares = ", ".join(f"{p['place']} {p['share']:.0%}" for p in places[:3])
     return [
-        f"look at {places[0]['place']} first: give it a law in the model file, or train a network there (penode train), and diagnose again; "
+        f"look at {places[0]['place']} first: give it a law in the model file, "
+        "or train a network there (penode train), and diagnose again; "
         f"share of the residual that a missing force could make up for: {shares}"
     ]
 

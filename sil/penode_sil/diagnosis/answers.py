@@ -52,8 +52,8 @@ def alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
 def by_innovations(
     w: weighed.Weighed, best: Explanation | None, output: Path | None, remarks: Sequence[str], tell: Callable[[float, str], None]
 ) -> Diagnosis:
-    """The diagnosis of recordings that sensor noise alone cannot judge, from what was weighed, and of which `best` is what sensor noise would
-    say; without recordings and time, which the caller has."""
+    """The diagnosis of recordings that sensor noise alone cannot judge, from what was weighed, and of which `best` is what sensor noise
+    would say; without recordings and time, which the caller has."""
     study = w.study
     extended = w.model if output is None else write_extended(w.text, study.model, output)
     tell(0.9, "showing what is wrong")

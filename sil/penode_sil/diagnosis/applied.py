@@ -43,19 +43,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
         return re.sub(r"\b((?:[Fsv]_)?)(x\d+_\d+_\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
 
     values = fit.values
-    parameters = [
-        _changed(model, name, values[name]) for name in model.parameters if name in values and values[name] != model.parameters[name].value
-    ]
-    elements = []
-    for t in forces:
-        for name in t.elements:
-            own = next(e for e in bench.model.elements if e.name == name)
-            parameters += [
-                f"{named(p.name)} = {table({'value': values.get(p.name, p.value), 'unit': p.unit})}"
-                for p in bench.model.parameters.values()
-                if p.name.startswith(f"{name}_")
-            ]
-            elements.append(f"{named(name)} = {table(_element(own, named))}")
+    parameters, elements = _forces(model, bench, values, forces, named)
     driven = _driven(model, fit, terms, {*taken, *rename.values()})
     redirected = _redirected(model, driven)
     own = [(e, bench.places[t.form.index]) for t in forces for e in bench.model.elements if e.name in t.elements]
@@ -66,11 +54,39 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     delays = {j: d for j, d in delays.items() if d > late.SHORT * model.sample_time}
     sensors = [_sensor(model, j, text, values, offsets, limits, delays, driven) for j, text in enumerate(texts)]
     units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
-    outputs = [f"{s.name} = {table({**x, 'unit': units_of[s.name]})}" for s, x in zip(model.sensors, sensors) if x and s.name in units_of]
+    outputs = [
+        f"{s.name} = {table({**x, 'unit': units_of[s.name]})}"
+        for s, x in zip(model.sensors, sensors, strict=True)
+        if x and s.name in units_of
+    ]
     outputs += [x for x in redirected["outputs"] if x.split(" = ")[0] not in {o.split(" = ")[0] for o in outputs}]
     substeps = max((late.substeps(d, 0.0, model.sample_time) for d in delays.values()), default=1)
+    lines = _head(model, terms, substeps)
+    for title, entries in (
+        ("parameters", [*parameters, *driven.parameters]),
+        ("actuators", driven.actuators),
+        ("elements", [*redirected["elements"], *elements]),
+        ("states", driven.states),
+        ("equations", [*redirected["equations"], *driven.equations]),
+        ("outputs", outputs),
+        (
+            "sensors",
+            [
+                f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}"
+                for s, x in zip(model.sensors, sensors, strict=True)
+                if x
+            ],
+        ),
+    ):
+        if entries:
+            lines += [f"[{title}]", *entries, ""]
+    return Applied("\n".join(lines), tuple(driven.left))
+
+
+def _head(model: Model, terms: Sequence[Term], substeps: int) -> list[str]:
+    """Lines of a file that extends the model's, down to the end of [model]."""
     learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
-    lines = [
+    return [
         f"# What the recordings taught about {model.path.name}: {learnt or 'nothing but values'}.",
         "",
         "[model]",
@@ -80,18 +96,25 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
         *[f"substeps = {substeps}"] * (substeps > model.substeps),
         "",
     ]
-    for title, entries in (
-        ("parameters", [*parameters, *driven.parameters]),
-        ("actuators", driven.actuators),
-        ("elements", [*redirected["elements"], *elements]),
-        ("states", driven.states),
-        ("equations", [*redirected["equations"], *driven.equations]),
-        ("outputs", outputs),
-        ("sensors", [f"{s.name} = {table({**x, 'noise': s.noise / units.factor(s.unit)})}" for s, x in zip(model.sensors, sensors) if x]),
-    ):
-        if entries:
-            lines += [f"[{title}]", *entries, ""]
-    return Applied("\n".join(lines), tuple(driven.left))
+
+
+def _forces(
+    model: Model, bench: Bench, values: Mapping[str, float], forces: Sequence[Term], named: Callable[[str], str]
+) -> tuple[list[str], list[str]]:
+    """Entries of parameters, those of the model that differ and those of the new elements, and of these elements."""
+    parameters = [
+        _changed(model, name, values[name]) for name in model.parameters if name in values and values[name] != model.parameters[name].value
+    ]
+    elements = []
+    for name in (name for t in forces for name in t.elements):
+        own = next(e for e in bench.model.elements if e.name == name)
+        parameters += [
+            f"{named(p.name)} = {table({'value': values.get(p.name, p.value), 'unit': p.unit})}"
+            for p in bench.model.parameters.values()
+            if p.name.startswith(f"{name}_")
+        ]
+        elements.append(f"{named(name)} = {table(_element(own, named))}")
+    return parameters, elements
 
 
 def _names(model: Model) -> set[str]:

@@ -30,7 +30,7 @@ def start_of(model: Model, e: Experiment, study: Study, set_name: str = "") -> A
         return start
     problem = OutputError(study.model, study.experiments[:1], (), study.set_name, study.linear.fastest)
     x = np.array(problem.simulate(0, study.null.free, np.zeros((1, len(study.null.free))), study.model.states)[1][0])
-    size = dict(zip(study.model.states, 3.0 * np.sqrt(np.mean(np.where(np.abs(x) < 1e12, x, 0.0) ** 2, axis=0)) + 1e-9))
+    size = dict(zip(study.model.states, 3.0 * np.sqrt(np.mean(np.where(np.abs(x) < 1e12, x, 0.0) ** 2, axis=0)) + 1e-9, strict=True))
     record = Record.of(e)
     few = replace(record, u=record.u[:FIRST], y=record.y[:FIRST])
     wide = augmented(model, study.places)

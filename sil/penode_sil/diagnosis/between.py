@@ -15,8 +15,8 @@ CLOSE = 1e-3  # [s] sample time up to which parabolas between samples are close 
 
 
 def far(step: float, signals: Sequence[Array]) -> bool:
-    """Are samples `step` [s] apart too far for straight lines between them? More than CLOSE, or with fewer than 32 in a period of a signal [n, n_u],
-    whose rms a line misses by (2 pi/32)^2/12 = 0.3 %."""
+    """Are samples `step` [s] apart too far for straight lines between them? More than CLOSE, or with fewer than 32 in a period of a signal
+    [n, n_u], whose rms a line misses by (2 pi/32)^2/12 = 0.3 %."""
     rms, change = (
         np.sqrt(np.mean(np.concatenate(x) ** 2, axis=0))
         for x in ([s - np.mean(s, axis=0) for s in signals], [np.diff(s, axis=0) for s in signals])
@@ -36,8 +36,8 @@ def parts(time: Array, u: Array, rate: Array, count: int) -> Array:
 
     At the samples they are what they are, for that is what sensors see. In between, the middle one is such that the integral over each
     interval, which moves the plant, is that of the smooth input: a spline of degree 7, which shows an image of 3.3 samples a period by
-    (0.3/0.7)^8, where a cubic one shows (0.3/0.7)^4 (Unser, IEEE Signal Process. Mag. 16, 1999). Of 3, the last is such that the line to the
-    next sample has its rate, which sensors may see as well.
+    (0.3/0.7)^8, where a cubic one shows (0.3/0.7)^4 (Unser, IEEE Signal Process. Mag. 16, 1999). Of 3, the last is such that the line to
+    the next sample has its rate, which sensors may see as well.
     """
     h = float(time[1] - time[0])
     whole = _means(u)
@@ -53,8 +53,8 @@ def parts(time: Array, u: Array, rate: Array, count: int) -> Array:
 
 
 def _means(u: Array) -> Array:
-    """Of the smooth signals [..., n - 1, n_u] over each interval. At their ends they go on turned by half about them, for there the noise of
-    samples would count six times."""
+    """Of the smooth signals [..., n - 1, n_u] over each interval. At their ends they go on turned by half about them, for there the noise
+    of samples would count six times."""
     more, axis = min(16, u.shape[-2] - 1), u.ndim - 2
     before, after = (
         2.0 * u[..., [end], :] - u[..., rows, :][..., ::-1, :] for end, rows in ((0, slice(1, more + 1)), (-1, slice(-more - 1, -1)))

@@ -132,7 +132,7 @@ def by_noise(case: Case, study: Study, best: Explanation | None, judged: Judged)
 
 
 def _still_broken(case: Case, study: Study, best: Explanation, faults: list[Cause], bursts: Sequence[np.ndarray]) -> list[Cause]:
-    kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts))]
+    kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts), strict=True)]
     rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
     again = broken_sensors(
         study.model, case.train, study, best.fit.simulated, kept
@@ -195,8 +195,8 @@ def _sized(case: Case, study: Study, best: Explanation | None, judged: Judged) -
 
 
 def _with_a_size(study: Study, best: Explanation | None, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[Cause]]:
-    """Causes, and those left out because their size may be nothing; all of them, if nothing else were named. What was counted, not fitted, and
-    values of the file's own parameters have no such size."""
+    """Causes, and those left out because their size may be nothing; all of them, if nothing else were named. What was counted, not fitted,
+    and values of the file's own parameters have no such size."""
     fitted = set(best.groups) if best else set()
     nothing = [
         c for c in causes if (c.kind, c.where) in fitted and c.may_be_nothing and not c.parameters.keys() & study.model.parameters.keys()

@@ -40,7 +40,7 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> tuple[Score, For
         changes.append(change)
     gains = [s.gain for s in as_they_are(bench.fit, changes)]
     if len(bench.nominal) == len(bench.fit.free) and np.quantile(y, 0.998) - np.quantile(y, SHARES[0]) < 3.0 * bench.noise[index]:
-        gains = [max(pair) for pair in zip(gains, _gains_of_nominal(bench, index, limits))]
+        gains = [max(pair) for pair in zip(gains, _gains_of_nominal(bench, index, limits), strict=True)]
     best = int(np.argmax(gains))
     return Score(gains[best], np.ones(1)), Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[best])
 

@@ -22,7 +22,7 @@ LAST = 8  # samples: so far the end of a spline is felt
 def bursts(experiments: Sequence[Experiment], simulated: Sequence[Array]) -> list[NDArray[np.bool_]]:
     """Samples [n, n_z] of short bursts that one sensor alone shows: against neighbours far beyond its usual roughness."""
     found = []
-    for e, z in zip(experiments, simulated):
+    for e, z in zip(experiments, simulated, strict=True):
         r = np.where(e.good, e.y - z, 0.0)
         smooth = _bridged(r, e.good)
         rough = np.abs(np.diff(smooth, 2, axis=0, prepend=smooth[:1], append=smooth[-1:]))
@@ -64,7 +64,7 @@ def _frozen(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
     for j in range(r.shape[1]):
         same = np.concatenate([[0], (np.diff(e.y[:, j]) == 0.0).astype(np.int8), [0]])
         edges = np.flatnonzero(np.diff(same))
-        for a, b in zip(edges[::2], edges[1::2]):
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
             if b - a >= 4 and np.ptp(z[a : b + 1, j]) > 6.0 * usual[j] and e.good[a : b + 1, j].any():
                 found[a + 1 : b + 1, j] = True
         if np.mean(found[:, j]) > 0.2:  # that is no sensor at all, or slower than the raster
@@ -79,7 +79,7 @@ def repeats(y: Array, z: Array, good: NDArray[np.bool_], quantum: float, sigma: 
     edges = np.flatnonzero(np.diff(same.astype(np.int8), prepend=0, append=0))
     usual = max(quantum / (2.0 * np.sqrt(np.pi) * sigma), float(np.mean(same & good[1:])))  # chance of the same twice
     found = np.zeros(len(y), dtype=bool)
-    for a, b in zip(edges[::2], edges[1::2] + 1):
+    for a, b in zip(edges[::2], edges[1::2] + 1, strict=True):
         if len(y) * usual ** (b - a - 1) < CHANCE and np.ptp(z[a:b]) > quantum:
             found[a + (y[a] != 0.0) : b] = True
     return found & good
@@ -95,7 +95,7 @@ def _sunken(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:
         wide = np.convolve(far, np.ones(9), "same") > 0
         edges = np.flatnonzero(np.diff(np.concatenate([[0], wide.astype(np.int8), [0]])))
         empty = []
-        for a, b in zip(edges[::2], edges[1::2]):
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
             inside = far[a:b]
             y, model = e.y[a:b, j][inside], z[a:b, j][inside]
             sinks = (np.abs(y) < np.abs(model)) & (y * model > -0.1 * model**2) | (np.abs(y) < 0.05 * np.max(np.abs(model)))
@@ -134,7 +134,7 @@ def _decayed(y: Array) -> NDArray[np.bool_]:
     falls = even & less[1:] & less[:-1]
     for j in range(y.shape[1]):
         edges = np.flatnonzero(np.diff(falls[:, j].astype(np.int8), prepend=0, append=0))
-        for a, b in zip(edges[::2], edges[1::2]):
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
             if b - a >= STEADY:
                 found[a + 1 : b + 2, j] = True
     return found

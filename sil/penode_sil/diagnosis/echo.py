@@ -41,7 +41,7 @@ class Echo:
 def echo(study: Study, fit: Fit) -> Echo:
     """The clearest echo of any body in any recording that a fit leaves: late rather than early. Takes about as long as a simulation."""
     found, begin, n_z = [Echo()], 0, len(study.model.sensors)
-    for e, metric, paths in zip(study.experiments, study.metrics, watch(study, fit)):
+    for e, metric, paths in zip(study.experiments, study.metrics, watch(study, fit), strict=True):
         n, rows = len(e.time), 2 * e.band * n_z
         left = fit.residual[begin : begin + rows].view(complex)
         begin += rows

@@ -40,7 +40,7 @@ class _Effects:
         self.holes = [np.flatnonzero(~x.good.all(axis=0)) for x in experiments]  # sensors that have any
         self.metrics = [replace(m, root=m.root.astype(np.complex64)) for m in metrics]
         self.plain = [s.single() for s in seen]
-        self.white = [s.white(m) for s, m in zip(self.plain, self.metrics)]
+        self.white = [s.white(m) for s, m in zip(self.plain, self.metrics, strict=True)]
         self.turns: dict[tuple[int, int], Single] = {}
         self.shows: dict[tuple[int, int], Single] = {}
 
@@ -148,7 +148,7 @@ def _at_places(
             some = laws[i : i + TOGETHER]
             yield [Candidate(b.kind, where(b.kind, place, model), b.sign, b.companion, b) for b in some], partial(own.acted, k, some)
         if body is not None and (not kinds or "hidden_resonance" in kinds):
-            pull = [own.every * fft.rfft(np.gradient(m.v, step))[: x.band] for x, m in zip(own.experiments, motions)]
+            pull = [own.every * fft.rfft(np.gradient(m.v, step))[: x.band] for x, m in zip(own.experiments, motions, strict=True)]
             for f0 in RESONANCES:
                 masses = [Candidate("hidden_resonance", body, 1, False, ("absorber", k, float(f0), zeta)) for zeta in DAMPINGS]
                 yield masses, partial(own.pulled, k, pull, np.array([(f0, zeta) for zeta in DAMPINGS]))
@@ -160,7 +160,7 @@ def _of_sensors(
     """Faults of all sensors, and of the clock of all together."""
     experiments, step = own.experiments, own.every * own.experiments[0].step
     for j, name in enumerate(sensor_names):
-        times = [s.motions[0].t if s.motions else e.time for e, s in zip(experiments, seen)]
+        times = [s.motions[0].t if s.motions else e.time for e, s in zip(experiments, seen, strict=True)]
         faults = list(sensor_faults(j, [s.sensors[:, j] for s in seen], times, step, kinds))
         if faults:
             yield [Candidate(f.kind, name, f.sign, f.companion, f) for f in faults], partial(own.faulty, j, faults)

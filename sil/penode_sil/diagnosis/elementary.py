@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,7 @@ class _At:
     speed: float
     forces: dict[object, tuple[Array, ...]] = field(default_factory=dict)
 
-    def law(self, kind, name, gain, shapes, sign, function, companion=False, fixed={}) -> Basis | None:
+    def law(self, kind, name, gain, shapes, sign, function, companion=False, fixed=MappingProxyType({})) -> Basis | None:
         """A law whose force for gain 1 is a function of deflection, rate and time; None if its kind is not wanted."""
         if not self.wanted(kind):
             return None
@@ -51,7 +52,10 @@ def force_laws(
     place: int, p: Place, motions: Sequence[Motion], step: float, prescribed: bool, kinds: Collection[str] = ()
 ) -> Iterator[Basis]:
     """All elementary laws that may act at a place, or those of some kinds."""
-    wanted = lambda *any_of: not kinds or not kinds.isdisjoint(any_of)
+
+    def wanted(*any_of: str) -> bool:
+        return not kinds or not kinds.isdisjoint(any_of)
+
     if (p.role == "body" or GROUND in p.ends) and wanted("constant_force"):
         yield from _constant(place, motions)
     if p.role == "body":
@@ -67,17 +71,25 @@ def _tyre(at: _At) -> Iterator[Basis | None]:
     law, motions, speed, step = at.law, at.motions, at.speed, at.step
     yield law("tyre_damping", "linear_damper", DAMPING, {}, 1, lambda s, v, t: v)
     for tau in (0.0007, 0.002, 0.006, 0.02, 0.06):
-        yield law("tyre_damping", "maxwell_bushing", STIFFNESS, {"relaxation": (tau, "s")}, 1, lambda s, v, t: s - lag(s, tau, step))
+        yield law(
+            "tyre_damping", "maxwell_bushing", STIFFNESS, {"relaxation": (tau, "s")}, 1, lambda s, v, t, tau=tau: s - lag(s, tau, step)
+        )
     yield law("tyre_damping", "quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, 0, lambda s, v, t: v * np.abs(v), True)
     for w in (0.05, 0.2, 0.8):
         a = w * speed
         yield law(
-            "tyre_damping", "degressive_damper", DAMPING, {"knee": (a, "m/s")}, 0, lambda s, v, t: -v * np.abs(v) / (a + np.abs(v)), True
+            "tyre_damping",
+            "degressive_damper",
+            DAMPING,
+            {"knee": (a, "m/s")},
+            0,
+            lambda s, v, t, a=a: -v * np.abs(v) / (a + np.abs(v)),
+            True,
         )
     top = max(float(np.quantile(m.s, 0.9995)) for m in motions)
     for share in (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9):
         g = share * top
-        yield law("tyre_liftoff", "liftoff", STIFFNESS, {"static": (g, "m")}, 1, lambda s, v, t: -np.maximum(s - g, 0.0))
+        yield law("tyre_liftoff", "liftoff", STIFFNESS, {"static": (g, "m")}, 1, lambda s, v, t, g=g: -np.maximum(s - g, 0.0))
     for sign in (1, -1):
         yield law("tyre_nonlinear", "quadratic_spring", ("quadratic", "N/m^2"), {}, sign, lambda s, v, t: s * s)
         yield law("tyre_nonlinear", "cubic_spring", ("cubic", "N/m^3"), {}, sign, lambda s, v, t: s**3)
@@ -104,7 +116,7 @@ def _network(at: _At) -> Iterator[Basis | None]:
                     ("k", unit),
                     {} if stated else known,
                     sign,
-                    lambda s, v, t: side * np.maximum(side * (s if what == "s" else v) - gap, 0.0),
+                    lambda s, v, t, side=side, what=what, gap=gap: side * np.maximum(side * (s if what == "s" else v) - gap, 0.0),
                     fixed=known if stated else {},
                 )
                 yield law(
@@ -113,7 +125,7 @@ def _network(at: _At) -> Iterator[Basis | None]:
                     ("k", "N/m^2" if what == "s" else "N*s^2/m^2"),
                     {} if stated else known,
                     sign,
-                    lambda s, v, t: np.maximum(side * (s if what == "s" else v) - gap, 0.0) ** 2,
+                    lambda s, v, t, side=side, what=what, gap=gap: np.maximum(side * (s if what == "s" else v) - gap, 0.0) ** 2,
                     fixed=known if stated else {},
                 )
 
@@ -124,8 +136,8 @@ def _friction(at: _At) -> Iterator[Basis | None]:
     slide = [0.003, 0.01, 0.03, 0.06]
     for w in slide:
         a = w * speed
-        yield law("coulomb_friction", "coulomb_friction", FORCE, {"transition": (a, "m/s")}, 1, lambda s, v, t: np.tanh(v / a))
-        yield law("stribeck_friction", "coulomb_friction", FORCE, {"transition": (a, "m/s")}, 1, lambda s, v, t: np.tanh(v / a), True)
+        yield law("coulomb_friction", "coulomb_friction", FORCE, {"transition": (a, "m/s")}, 1, lambda s, v, t, a=a: np.tanh(v / a))
+        yield law("stribeck_friction", "coulomb_friction", FORCE, {"transition": (a, "m/s")}, 1, lambda s, v, t, a=a: np.tanh(v / a), True)
 
 
 def _hysteresis(at: _At) -> Iterator[Basis | None]:
@@ -156,7 +168,7 @@ def _stribeck(at: _At) -> Iterator[Basis | None]:
             ("k", "N"),
             {"width": (a, "m/s")},
             1,
-            lambda s, v, t: 2.3316439815971242 * np.exp(-((v / a) ** 2)) * v / a,
+            lambda s, v, t, a=a: 2.3316439815971242 * np.exp(-((v / a) ** 2)) * v / a,
         )
     for w, fall, rise in product((0.005, 0.015), (0.03, 0.06, 0.12, 0.2), (0.4, 1.2)):
         a, b = w * speed, fall * speed
@@ -166,14 +178,14 @@ def _stribeck(at: _At) -> Iterator[Basis | None]:
             FORCE,
             {"knee": (a, "m/s"), "width": (b, "m/s"), "rise": (rise, "1")},
             1,
-            lambda s, v, t: np.tanh(v / a) * (1.0 + rise * np.exp(-((v / b) ** 2))),
+            lambda s, v, t, a=a, rise=rise, b=b: np.tanh(v / a) * (1.0 + rise * np.exp(-((v / b) ** 2))),
         )
     for w in (0.003, 0.01, 0.03):
         for fall in (0.02, 0.06, 0.2):
             a, b = w * reach, fall * speed
             if a > 0.3 * speed * step and wanted("stribeck_friction"):
                 slipped = [slips(m.s, [a])[1] for m in motions]
-                rows = tuple(z / (1.0 + (m.v / b) ** 2) for z, m in zip(slipped, motions))
+                rows = tuple(z / (1.0 + (m.v / b) ** 2) for z, m in zip(slipped, motions, strict=True))
                 shapes = {"presliding": (a, "m"), "stribeck": (b, "m/s")}
                 yield Basis("stribeck_friction", place, "falling_friction", FORCE, shapes, 1, rows)
 
@@ -184,7 +196,9 @@ def _relaxation(at: _At) -> Iterator[Basis | None]:
     yield law("maxwell_bushing", "linear_damper", DAMPING, {}, -1, lambda s, v, t: v, True)
     yield law("maxwell_bushing", "linear_spring", STIFFNESS, {}, -1, lambda s, v, t: s, True)
     for tau in (0.0006, 0.0015, 0.004, 0.01, 0.025, 0.06, 0.15, 0.4, 1.0):
-        yield law("maxwell_bushing", "maxwell_bushing", STIFFNESS, {"relaxation": (tau, "s")}, 1, lambda s, v, t: s - lag(s, tau, step))
+        yield law(
+            "maxwell_bushing", "maxwell_bushing", STIFFNESS, {"relaxation": (tau, "s")}, 1, lambda s, v, t, tau=tau: s - lag(s, tau, step)
+        )
     for tau in (0.01, 0.06, 0.4):
         yield law(
             "maxwell_bushing",
@@ -192,7 +206,7 @@ def _relaxation(at: _At) -> Iterator[Basis | None]:
             ("cubic", "N/m^3"),
             {"relaxation": (tau, "s")},
             0,
-            lambda s, v, t: (s - lag(s, tau, step)) ** 3,
+            lambda s, v, t, tau=tau: (s - lag(s, tau, step)) ** 3,
             True,
         )
 
@@ -205,7 +219,7 @@ def _in_series(at: _At) -> Iterator[Basis | None]:
         ways += [(w * reach, max(0.001, step)) for w in GAPS]
     if not wanted("backlash", "maxwell_bushing"):
         ways = []
-    lost = [losses(m.s, step, *zip(*ways)) if ways else np.empty((0, len(m.s))) for m in motions]
+    lost = [losses(m.s, step, *zip(*ways, strict=True)) if ways else np.empty((0, len(m.s))) for m in motions]
     for row, (gap, tau) in enumerate(ways):
         kind, known = ("backlash", {}) if gap else ("maxwell_bushing", {"gap": (gap, "m")})
         shapes = {"relaxation": (tau, "s")} | ({} if known else {"gap": (gap, "m")})
@@ -228,7 +242,12 @@ def _damping(at: _At) -> Iterator[Basis | None]:
     for w in (0.06, 0.15, 0.4, 1.0, 2.5):
         a = w * speed
         yield law(
-            "degressive_damper", "degressive_damper", DAMPING, {"knee": (a, "m/s")}, 1, lambda s, v, t: -v * np.abs(v) / (a + np.abs(v))
+            "degressive_damper",
+            "degressive_damper",
+            DAMPING,
+            {"knee": (a, "m/s")},
+            1,
+            lambda s, v, t, a=a: -v * np.abs(v) / (a + np.abs(v)),
         )
     for w in GRID:
         a = w * speed
@@ -238,7 +257,7 @@ def _damping(at: _At) -> Iterator[Basis | None]:
             ("k", "N*s/m"),
             {"knee": (a, "m/s")},
             1,
-            lambda s, v, t: np.clip(v, -a, a) - v,
+            lambda s, v, t, a=a: np.clip(v, -a, a) - v,
         )
         if w > 0.1:
             b = 0.1 * a
@@ -248,7 +267,7 @@ def _damping(at: _At) -> Iterator[Basis | None]:
                 ("k", "N*s/m"),
                 {"knee": (a, "m/s"), "round": (b, "m/s")},
                 1,
-                lambda s, v, t: -b * (np.logaddexp(0.0, (v - a) / b) - np.logaddexp(0.0, (-v - a) / b)),
+                lambda s, v, t, b=b, a=a: -b * (np.logaddexp(0.0, (v - a) / b) - np.logaddexp(0.0, (-v - a) / b)),
             )
             yield law(
                 "quadratic_damper",
@@ -256,7 +275,7 @@ def _damping(at: _At) -> Iterator[Basis | None]:
                 ("k", "N*s/m"),
                 {"knee": (a, "m/s")},
                 1,
-                lambda s, v, t: v - np.clip(v, -a, a),
+                lambda s, v, t, a=a: v - np.clip(v, -a, a),
             )
     yield law("degressive_damper", "linear_damper", DAMPING, {}, 0, lambda s, v, t: v, True)
     yield law("quadratic_damper", "quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, 1, lambda s, v, t: v * np.abs(v))
@@ -270,7 +289,7 @@ def _uneven_damping(at: _At) -> Iterator[Basis | None]:
     for sign in (1, -1):
         yield law("asymmetric_damper", "k*abs(v)", ("k", "N*s/m"), {}, sign, lambda s, v, t: np.abs(v))
         a = 0.01 * speed
-        yield law("asymmetric_damper", BENDS["v"], ("k", "N*s/m"), {"knee": (a, "m/s")}, sign, lambda s, v, t: bent(v, a))
+        yield law("asymmetric_damper", BENDS["v"], ("k", "N*s/m"), {"knee": (a, "m/s")}, sign, lambda s, v, t, a=a: bent(v, a))
         yield law("asymmetric_damper", "k*v^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: v * v)
         yield law("asymmetric_damper", "k*max(v, 0)^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: np.maximum(v, 0.0) ** 2)
         yield law("asymmetric_damper", "k*min(v, 0)^2", ("k", "N*s^2/m^2"), {}, sign, lambda s, v, t: np.minimum(v, 0.0) ** 2)
@@ -282,7 +301,7 @@ def _uneven_damping(at: _At) -> Iterator[Basis | None]:
                 ("k", "N*s/m"),
                 {"knee": (a, "m/s")},
                 sign,
-                lambda s, v, t: np.maximum(np.abs(v) - a, 0.0),
+                lambda s, v, t, a=a: np.maximum(np.abs(v) - a, 0.0),
             )
     yield law("asymmetric_damper", "linear_damper", DAMPING, {}, 0, lambda s, v, t: v, True)
 
@@ -294,12 +313,12 @@ def _fading(at: _At) -> Iterator[Basis | None]:
     for sign in (1, -1):
         for w in (0.1, 0.3, 1.0, 10.0):
             a = w * last
-            yield law("damper_fading", "fading_damper", DAMPING, {"time": (a, "s")}, sign, lambda s, v, t: v * (1.0 - np.exp(-t / a)))
+            yield law("damper_fading", "fading_damper", DAMPING, {"time": (a, "s")}, sign, lambda s, v, t, a=a: v * (1.0 - np.exp(-t / a)))
         work = max(float(np.trapezoid(m.v**2, m.t)) for m in motions)
         for w, cool in ((0.3, 10.0), (1.0, 10.0), (10.0, 10.0), (10.0, 1.0)):
             a, b = w * work, cool * last
             shapes = {"work": (a, "m^2/s"), "cooling": (b, "s")}
-            yield law("damper_fading", "heating_damper", DAMPING, shapes, sign, lambda s, v, t: v * warm(v, t, a, b))
+            yield law("damper_fading", "heating_damper", DAMPING, shapes, sign, lambda s, v, t, a=a, b=b: v * warm(v, t, a, b))
 
 
 def _springs(at: _At) -> Iterator[Basis | None]:
@@ -311,7 +330,7 @@ def _springs(at: _At) -> Iterator[Basis | None]:
         yield law("cubic_spring", "k*s^5", ("k", "N/m^5"), {}, sign, lambda s, v, t: s**5)
         yield law("asymmetric_spring", "k*abs(s)", ("k", "N/m"), {}, sign, lambda s, v, t: np.abs(s))
         a = 0.01 * reach
-        yield law("asymmetric_spring", BENDS["s"], ("k", "N/m"), {"knee": (a, "m")}, sign, lambda s, v, t: bent(s, a))
+        yield law("asymmetric_spring", BENDS["s"], ("k", "N/m"), {"knee": (a, "m")}, sign, lambda s, v, t, a=a: bent(s, a))
         yield law("asymmetric_spring", "k*max(s, 0)^2", ("k", "N/m^2"), {}, sign, lambda s, v, t: np.maximum(s, 0.0) ** 2)
         yield law("asymmetric_spring", "k*min(s, 0)^2", ("k", "N/m^2"), {}, sign, lambda s, v, t: np.minimum(s, 0.0) ** 2)
         yield law("asymmetric_spring", "k*max(s, 0)^3", ("k", "N/m^3"), {}, sign, lambda s, v, t: np.maximum(s, 0.0) ** 3)
@@ -330,14 +349,31 @@ def _gaps(at: _At) -> Iterator[Basis | None]:
             g = w * far
             if g <= 0.0:
                 continue
-            yield law("bump_stop", name, STIFFNESS, {"gap": (g, "m")}, 1, lambda s, v, t: side * np.maximum(side * s - g, 0.0))
+            yield law(
+                "bump_stop", name, STIFFNESS, {"gap": (g, "m")}, 1, lambda s, v, t, side=side, g=g: side * np.maximum(side * s - g, 0.0)
+            )
             text = "k*max(s - gap, 0)^2" if side > 0 else "-k*min(s + gap, 0)^2"
-            yield law("bump_stop", text, ("k", "N/m^2"), {"gap": (g, "m")}, 1, lambda s, v, t: side * np.maximum(side * s - g, 0.0) ** 2)
+            yield law(
+                "bump_stop",
+                text,
+                ("k", "N/m^2"),
+                {"gap": (g, "m")},
+                1,
+                lambda s, v, t, side=side, g=g: side * np.maximum(side * s - g, 0.0) ** 2,
+            )
     for w in GAPS:
         g = w * reach
-        yield law("backlash", "backlash", STIFFNESS, {"gap": (g, "m")}, 1, lambda s, v, t: -np.clip(s, -g, g))
-        for side, text in zip((1, -1), HALVES):
-            yield law("backlash", text, ("k", "N/m"), {"gap": (g, "m")}, 1, lambda s, v, t: -side * np.clip(side * s, 0.0, g), True)
+        yield law("backlash", "backlash", STIFFNESS, {"gap": (g, "m")}, 1, lambda s, v, t, g=g: -np.clip(s, -g, g))
+        for side, text in zip((1, -1), HALVES, strict=True):
+            yield law(
+                "backlash",
+                text,
+                ("k", "N/m"),
+                {"gap": (g, "m")},
+                1,
+                lambda s, v, t, side=side, g=g: -side * np.clip(side * s, 0.0, g),
+                True,
+            )
 
 
 FAMILIES = (_network, _friction, _hysteresis, _stribeck, _relaxation, _in_series, _damping, _uneven_damping, _fading, _springs, _gaps)

@@ -62,11 +62,12 @@ def diagnose(
 
 
 def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
-    """Innovations answer where the file only guesses a parameter, on a free motion that the model misses, or where `_decides`. They are asked
-    first if more than UNMODELLED acts beside the best single cause, and answer at once if they explain it and little still wanders; else the
-    search by sensor noise goes on as long as it gets below UNMODELLED. If that search explains nothing, innovations answer where they
-    explain it, or where they have causes and more than UNMODELLED wanders. If they were not asked before, they answer where they follow
-    the recordings better, name the same, or find an input at fault; where neither has a name, parameters that predict the hold-out better stay."""
+    """Innovations answer where the file only guesses a parameter, on a free motion that the model misses, or where `_decides`. They are
+    asked first if more than UNMODELLED acts beside the best single cause, and answer at once if they explain it and little still wanders;
+    else the search by sensor noise goes on as long as it gets below UNMODELLED. If that search explains nothing, innovations answer where
+    they explain it, or where they have causes and more than UNMODELLED wanders. If they were not asked before, they answer where they
+    follow the recordings better, name the same, or find an input at fault; where neither has a name, parameters that predict the hold-out
+    better stay."""
     vague = weighed.supports(study.model) and bool(guessed(study.model))
     if vague or (not study.model.inputs and weighed.misfit(study, study.null, case.log).size):
         return _by_innovations(case, None, _weighed(case, study))
@@ -142,9 +143,9 @@ def unburst(model: Model, experiments: Sequence[Experiment], set_name: str) -> t
     for _ in range(AGAIN):
         if not any(b.any() for b in more):
             break
-        study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, more)], set_name)
+        study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, more, strict=True)], set_name)
         more = dropouts.bursts(study.experiments, study.null.simulated)
-        bursts = [b | m for b, m in zip(bursts, more)]
+        bursts = [b | m for b, m in zip(bursts, more, strict=True)]
     return study, other, bursts
 
 

@@ -17,7 +17,9 @@ from .naming import with_kinds
 from .study import Study, loss
 
 CLOSED = 1e-4  # of what there is to gain: a fit that gains less by an iteration is good enough to be compared
-HEAVY = 2e6  # steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause; and one law mends its form
+# steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause; and one law
+# mends its form
+HEAVY = 2e6
 ROUGH = 5e5  # the same: where it takes more, fits begin with longer steps
 
 
@@ -32,7 +34,7 @@ def explain(study: Study, terms: Sequence[Term], iterations: int = 12, start: Fi
         for i, f in enumerate(all_free(study.null.free, built))
     ]
     known = start if start is not None and start.whole and start.metrics is study.metrics else study.null
-    columns = {f.target: column for f, column in zip(known.free, known.jacobian.T)}
+    columns = {f.target: column for f, column in zip(known.free, known.jacobian.T, strict=True)}
     near = {i: columns[f.target] for i, f in enumerate(study.null.free) if f.target in columns and f.target not in built.loosened}
     most = rows(study) * np.log(max(study.null.cost / rows(study), 1.0))  # that noise of one level could gain by being as quiet as it may
     close = max(CLOSED * most, 0.5)
@@ -60,7 +62,7 @@ def gains(terms: Sequence[Term], names: Sequence[str]) -> list[str | tuple[str, 
     """What is free as the gain of each term."""
     found: list[str | tuple[str, int]] = []
     faults = 0
-    for term, name in zip(terms, names):
+    for term, name in zip(terms, names, strict=True):
         what = term.candidate.what
         if isinstance(what, Basis):
             found.append(term.own or f"{name}_{what.gain[0]}")
@@ -77,7 +79,7 @@ def fitted(terms: Sequence[Term], built: Extended, fit: Fit) -> list[Term]:
     """The terms with gains and shapes where the fit left them."""
     values = {name: p.value for name, p in built.model.parameters.items()} | {f.target: f.value for f in fit.free}
     found = []
-    for term, name, target in zip(terms, built.names, gains(terms, built.names)):
+    for term, name, target in zip(terms, built.names, gains(terms, built.names), strict=True):
         what, gain, bend = term.candidate.what, values[target], 0.0
         if isinstance(what, Basis):
             what = replace(what, shapes={k: (values[f"{name}_{k}"], u) for k, (_, u) in what.shapes.items()})
@@ -96,6 +98,6 @@ def heavy(e: Explanation) -> bool:
 
 def settled(study: Study, e: Explanation) -> Explanation:
     """The explanation fitted to the end in the noise of the study."""
-    free = [replace(f, value=v.value) for f, v in zip(all_free(study.null.free, e.built), e.fit.free)]
+    free = [replace(f, value=v.value) for f, v in zip(all_free(study.null.free, e.built), e.fit.free, strict=True)]
     problem = Problem(e.built.model, study.experiments, study.metrics, study.set_name, study.linear.fastest, e.built.faults)
     return replace(e, problem=problem, fit=problem.solve(free))

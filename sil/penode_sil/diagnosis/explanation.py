@@ -165,8 +165,8 @@ def level(found: Sequence[Explanation]) -> list[Explanation]:
     """Explanations with the same gain by formulas where all but a load or a bias is the same: one of these is no more a formula
     than the other."""
     beside = [unloaded(e) for e in found]
-    most = {rest: max(e.formulas for e, own in zip(found, beside) if own == rest) for rest in beside}
-    return [replace(e, formulas=most[rest]) for e, rest in zip(found, beside)]
+    most = {rest: max(e.formulas for e, own in zip(found, beside, strict=True) if own == rest) for rest in beside}
+    return [replace(e, formulas=most[rest]) for e, rest in zip(found, beside, strict=True)]
 
 
 def fault_of(c: Candidate) -> tuple[str, float] | None:
@@ -180,9 +180,9 @@ def law_of(c: Candidate) -> str:
 
 def missing(e: Explanation, group: Group) -> Fit:
     """The fit as it would be without a cause, to first order."""
-    names = {f"{n}_" for t, n in zip(e.terms, e.built.names) if t.group == group}
+    names = {f"{n}_" for t, n in zip(e.terms, e.built.names, strict=True) if t.group == group}
     shrinking = [("gap", "relaxation") if t.own else ("mass",) for t in e.terms]  # what goes to nothing with a cause
-    sizes = {f"{n}_{key}" for n, keys in zip(e.built.names, shrinking) for key in keys}
+    sizes = {f"{n}_{key}" for n, keys in zip(e.built.names, shrinking, strict=True) for key in keys}
     faults = [t.candidate.what for t in e.terms if t.group == group and isinstance(t.candidate.what, Fault)]
     own = []
     for i, f in enumerate(e.fit.free):

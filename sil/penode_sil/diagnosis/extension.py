@@ -62,7 +62,7 @@ def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[
     if any(c.kind == "integration_error" for c in causes):
         lines[-1:] = ['method = "rk4"', 'input = "linear"', ""]
     if e is not None:
-        substeps = max([1, *(_fine(study, t, n, e) for t, n in zip(e.terms, e.built.names))])
+        substeps = max([1, *(_fine(study, t, n, e) for t, n in zip(e.terms, e.built.names, strict=True))])
         values = {f.target: f.value for f in e.fit.free}
         delays = [(k[1], d) for k, d in values.items() if k[0] == "delay" and d > late.SHORT * model.sample_time]
         substeps = max([substeps, *(late.substeps(d, _rolled(values, j), model.sample_time) for j, d in delays)])
@@ -74,7 +74,7 @@ def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[
 def _renaming(e: Explanation, taken: Collection[str]) -> dict[str, str]:
     """Names of added elements by what they are for."""
     rename: dict[str, str] = {}
-    for term, name in zip(e.terms, e.built.names):
+    for term, name in zip(e.terms, e.built.names, strict=True):
         stem = term.candidate.kind.replace("network_extrapolation", "beyond_range")  # network_ is the generator's own
         rename[name] = unlike(stem, {*taken, *rename.values()})
     return rename
@@ -174,8 +174,9 @@ class _Written:
     def sections(self) -> tuple[tuple[str, list[str]], ...]:
         """Titles and entries, in the order of the file."""
         outputs = [
-            f"{s.name} = {table({'value': self.changed.get(s.name, self.named(s.expression)), 'unit': s.unit})}"  # one name means one quantity
-            for s, old in zip(self.e.built.model.outputs, self.study.model.outputs)
+            # one name means one quantity
+            f"{s.name} = {table({'value': self.changed.get(s.name, self.named(s.expression)), 'unit': s.unit})}"
+            for s, old in zip(self.e.built.model.outputs, self.study.model.outputs, strict=True)
             if s.expression != old.expression or s.name in self.changed
         ]
         return (
@@ -261,5 +262,5 @@ def _drift(e: Explanation, values: dict[object, float], sensor: int, name: str, 
     ]
     parts += [(k, f"*(1 - exp(-{f.shape:.7g}*{share}))") for f, k in own if f.what == "warming"]
     named = [f"drift_{name}_{n}" for n in range(1, len(parts) + 1)]
-    parameters += [f"{own} = {table({'value': size, 'unit': unit})}" for own, (size, _) in zip(named, parts)]
-    return " + ".join(own + shape for own, (_, shape) in zip(named, parts))
+    parameters += [f"{own} = {table({'value': size, 'unit': unit})}" for own, (size, _) in zip(named, parts, strict=True)]
+    return " + ".join(own + shape for own, (_, shape) in zip(named, parts, strict=True))

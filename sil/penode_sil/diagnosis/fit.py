@@ -91,7 +91,7 @@ class Fit:
         precision = np.array([f.unit / f.sigma for f in self.free])
         curvature = self.jacobian.T @ self.jacobian + np.diag(precision**2)
         slope = self.jacobian.T @ self.residual - precision * np.array([f.offset for f in self.free])
-        stuck = [(f.value <= f.low and s <= 0.0) or (f.value >= f.high and s >= 0.0) for f, s in zip(self.free, slope)]
+        stuck = [(f.value <= f.low and s <= 0.0) or (f.value >= f.high and s >= 0.0) for f, s in zip(self.free, slope, strict=True)]
         slope[stuck] = curvature[stuck] = curvature[:, stuck] = 0.0  # it would go beyond its bound
         scale = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
         normed = curvature / np.outer(scale, scale)
@@ -101,7 +101,9 @@ class Fit:
     def secant(self, free: tuple[Free, ...], residual: Array) -> Fit:
         """The fit at values near its own, where `residual` has been simulated; derivatives differ from its own by what that shows of
         them on the way there (Broyden 1965), in units in which all are as large. The sensors are those of before."""
-        way = np.array([np.log(new.value / f.value) if f.log else (new.value - f.value) / f.unit for f, new in zip(self.free, free)])
+        way = np.array(
+            [np.log(new.value / f.value) if f.log else (new.value - f.value) / f.unit for f, new in zip(self.free, free, strict=True)]
+        )
         weight = way * np.sum(self.jacobian**2, axis=0)
         missed = self.residual - residual - self.jacobian @ way
         chi2 = float(residual @ residual)
@@ -149,7 +151,8 @@ class Problem:
 
     @cached_property
     def rough(self) -> Problem | None:
-        """The same in longer steps than its laws allow: they lead near to the best values in less than half of the time, or there are none."""
+        """The same in longer steps than its laws allow: they lead near to the best values in less than half of the time, or there are
+        none."""
         exact = self.halved or self
         found = self._half(True) or Problem(self.model, self.experiments, self.metrics, self.set_name, self.fastest, self.faults, True)
         return found if 2 * found.steps <= exact.steps else None
@@ -171,7 +174,7 @@ class Problem:
 
     def _doubled(self, fit: Fit) -> Fit:
         """A fit of every second sample as one of all."""
-        signals = zip(self.experiments, fit.simulated)
+        signals = zip(self.experiments, fit.simulated, strict=True)
         whole = tuple(CubicSpline(e.time[::2], z)(e.time) for e, z in signals)
         return replace(fit, model=self.model, faults=tuple(self.faults), simulated=whole, metrics=self.metrics)
 
@@ -190,7 +193,7 @@ class Problem:
         """The same as they lie in memory, [n, n_z, runs], but for skews [n_z, runs] whose rates are still to be taken away."""
         start = np.tile(np.array(self.model.start, dtype=float), (len(shifts), 1))
         parameters, faults = {}, []
-        for f, shift in zip(free, shifts.T):
+        for f, shift in zip(free, shifts.T, strict=True):
             values = f.at(shift)
             if isinstance(f.target, str):
                 parameters[f.target] = values
@@ -286,7 +289,7 @@ class Problem:
     def _tried(self, free: Sequence[Free], steps: Array) -> tuple[Array, Array, Array]:
         """Residuals [steps, rows], values [free, steps] and costs after steps [steps, free]."""
         residuals = np.concatenate([self.residuals(e, *self.sensors(e, free, steps)[:2]) for e in range(len(self.experiments))], axis=1)
-        moved = np.stack([f.at(t) for f, t in zip(free, steps.T)])
+        moved = np.stack([f.at(t) for f, t in zip(free, steps.T, strict=True)])
         away = (moved - np.array([[f.origin] for f in free])) / np.array([[f.sigma] for f in free])
         costs = np.einsum("ij,ij->i", residuals, residuals) + np.sum(away**2, axis=0)
         return residuals, moved, np.where(np.isfinite(costs), costs, np.inf)
@@ -313,7 +316,7 @@ class Problem:
             r = self.residuals(e, *self.sensors(e, free, shifts)[:2])
             costs += np.einsum("ij,ij->i", r, r)
         best = int(np.argmin(np.where(np.isfinite(costs[:-1]), costs[:-1], np.inf)))
-        return _put(free, np.array([f.at(shift) for f, shift in zip(free, shifts[best])]))
+        return _put(free, np.array([f.at(shift) for f, shift in zip(free, shifts[best], strict=True)]))
 
     def complete(self, fit: Fit) -> Fit:
         """The fit with all of its derivatives as they are where it ended."""
@@ -371,7 +374,7 @@ def _halved(e: Experiment) -> Experiment:
 
 
 def _put(free: Sequence[Free], values: Array) -> tuple[Free, ...]:
-    return tuple(replace(f, value=float(v)) for f, v in zip(free, values))
+    return tuple(replace(f, value=float(v)) for f, v in zip(free, values, strict=True))
 
 
 @lru_cache(maxsize=KEPT)

@@ -91,7 +91,7 @@ def plan(job: Job) -> list[Job]:
     if len(set(names)) < len(names):  # a.csv and a.mf4, or of several folders
         above = os.path.commonpath([path.absolute().parent for path in paths])
         names = [str(path.absolute().relative_to(above)) for path in paths]
-    return [replace(job, data=(path,), output=job.output / name) for path, name in zip(paths, names)]
+    return [replace(job, data=(path,), output=job.output / name) for path, name in zip(paths, names, strict=True)]
 
 
 def _absolute(job: Job) -> Job:

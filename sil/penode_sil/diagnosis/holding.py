@@ -59,9 +59,9 @@ def propose(bench: Bench, index: int, delay: float) -> Form | None:
 
 
 def told_apart(bench: Bench, model: Model, trials: Sequence[Trial]) -> list[Trial]:
-    """The trials of a round (`model` contains all of them), with each hold scored against the delay of the same input at an update rate that
-    resolves its steps. Other trials keep their scores: interpolating between the samples of a late sensor lowers its noise, which would
-    bias the comparison."""
+    """The trials of a round (`model` contains all of them), with each hold scored against the delay of the same input at an update rate
+    that resolves its steps. Other trials keep their scores: interpolating between the samples of a late sensor lowers its noise, which
+    would bias the comparison."""
     delays = {t.form.index: t for t in trials if t.form.how == "input_delay"}
     return [_against(bench, model, t, delays[t.form.index]) if t.form.kind == KIND and t.form.index in delays else t for t in trials]
 
@@ -102,16 +102,16 @@ def _likeliest(bench: Bench, index: int, about: float) -> Series:
     series = [Series([s * wave(2.0 * np.pi * f * np.arange(len(s))) for s in slopes]) for f in frequencies for wave in (np.sin, np.cos)]
     late, *waves = changes(bench, index, [Series([-s / step for s in slopes]), *series])
     beside, own = Beside.of(bench.fit), _of_recordings(bench)
-    pairs = [[[w * one[:, None] for w in pair] for one in own] for pair in zip(waves[::2], waves[1::2])]
-    looks = [_look(beside, 1.0 / f, step, late, pair) for f, pair in zip(frequencies, pairs)]
+    pairs = [[[w * one[:, None] for w in pair] for one in own] for pair in zip(waves[::2], waves[1::2], strict=True)]
+    looks = [_look(beside, 1.0 / f, step, late, pair) for f, pair in zip(frequencies, pairs, strict=True)]
     steps = [_steps(bench, index, 1.0 / frequencies[k], looks[k][1]) for k in np.argsort([left for left, _ in looks])[:AT_ONCE]]
     tried = as_they_are(bench.fit, list(changes(bench, index, steps)))
     return steps[int(np.argmax([s.gain for s in tried]))]
 
 
 def _look(beside: Beside, period: float, step: float, late: Array, waves: Sequence[Sequence[Array]]) -> tuple[float, Array]:
-    """What a hold of so many samples leaves of the sum of squares, and its phases [periods], from the changes [updates, n_z] by a sine and a
-    cosine of each recording."""
+    """What a hold of so many samples leaves of the sum of squares, and its phases [periods], from the changes [updates, n_z] by a sine and
+    a cosine of each recording."""
     rest = beside.rest + 0.5 * period * step * beside.columns(late[:, :, None])[1][:, 0]
     phases = []
     for pair in waves:
@@ -132,7 +132,7 @@ def _of_recordings(bench: Bench) -> list[Array]:
 
 def _steps(bench: Bench, index: int, period: float, phases: Array) -> Series:
     """What a hold of so many samples adds to the input, with a phase [periods] for each recording."""
-    own = [held(r.u[:, index], period, p * period) - r.u[:, index] for r, p in zip(bench.records, phases)]
+    own = [held(r.u[:, index], period, p * period) - r.u[:, index] for r, p in zip(bench.records, phases, strict=True)]
     return Series(own, period * bench.step)
 
 

@@ -185,7 +185,7 @@ def _sensor_faults(
         if kinds and kind not in kinds:
             return None
         if (what, shape) not in series:
-            series[what, shape] = tuple(function(y, t) for y, t in zip(signals, times))
+            series[what, shape] = tuple(function(y, t) for y, t in zip(signals, times, strict=True))
         return Fault(kind, sensor, what, sign, series[what, shape], shape, companion)
 
     yield fault("sensor_bias", "bias", 0, lambda y, t: np.ones_like(y))
@@ -196,14 +196,16 @@ def _sensor_faults(
     for side in (1, -1):
         for w in (0.3, 0.5, 0.7, 0.85):
             edge = w * top
-            yield fault("sensor_clipping", "clip", 1, lambda y, t: -side * np.maximum(side * y - edge, 0.0), side * edge)
+            yield fault(
+                "sensor_clipping", "clip", 1, lambda y, t, side=side, edge=edge: -side * np.maximum(side * y - edge, 0.0), side * edge
+            )
     yield fault("sensor_clipping", "scale_bend", -1, lambda y, t: y**3 / max(top, 1e-300) ** 2, top, True)
     # slow or bent forms of the same
     last = max(float(t[-1]) for t in times)
     for w in (0.1, 0.3):
-        yield fault("sensor_bias", "warming", 0, lambda y, t: 1.0 - np.exp(-t / (w * last)), 1.0 / w, True)
+        yield fault("sensor_bias", "warming", 0, lambda y, t, w=w: 1.0 - np.exp(-t / (w * last)), 1.0 / w, True)
     for m in (1, 2, 3, 4):
-        yield fault("sensor_bias", "drift", 0, lambda y, t: Legendre.basis(m, (0.0, last))(t), float(m), True)
+        yield fault("sensor_bias", "drift", 0, lambda y, t, m=m: Legendre.basis(m, (0.0, last))(t), float(m), True)
     yield fault("sensor_scale", "scale_drift", 0, lambda y, t: y * (t / last - 0.5), 0.0, True)
     yield fault("sensor_scale", "scale_side", 0, lambda y, t: np.abs(y), 0.0, True)
     yield fault("sensor_scale", "scale_bend", 0, lambda y, t: y**3 / max(top, 1e-300) ** 2, top, True)
@@ -218,5 +220,5 @@ def rolled_off(y: Array, lag: float, step: float) -> Array:
 
 def clock(signals: Sequence[Array], times: Sequence[Array], step: float) -> Fault:
     """A clock of all sensors [n, n_z] that runs faster than that of the inputs, from the start of each recording on."""
-    series = tuple(t[:, None] * np.gradient(y, step, axis=0) for y, t in zip(signals, times))
+    series = tuple(t[:, None] * np.gradient(y, step, axis=0) for y, t in zip(signals, times, strict=True))
     return Fault(CLOCK, 0, "clock", 0, series)

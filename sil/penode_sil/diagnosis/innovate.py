@@ -49,7 +49,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
 
 
 def _found(rounds: Rounds, end: Grown, worth_naming: Sequence[bool]) -> Found:
-    named = [a for a, worth in zip(end.accepted, worth_naming) if worth]
-    small = tuple(a for a, worth in zip(end.accepted, worth_naming) if not worth)
+    named = [a for a, worth in zip(end.accepted, worth_naming, strict=True) if worth]
+    small = tuple(a for a, worth in zip(end.accepted, worth_naming, strict=True) if not worth)
     plain, _, named = rounds.beside(named) if small else (end.bench, end.scores, named)
     return Found(rounds, end, plain, tuple(named), small)

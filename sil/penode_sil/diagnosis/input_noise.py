@@ -19,9 +19,9 @@ from .worth import SYSTEMATIC
 
 
 def with_noise_of_inputs(model: Model, train: Sequence[Measured], set_name: str) -> tuple[Model, list[str]]:
-    """Returns the model with the white noise that recorded inputs show and the file does not state, and a note on it; the model as it is if the
-    sensors show that this noise drove the plant. A shaker's noise is a signal, that of a road sensor is not, and unless it is known, a lag of
-    the input is named, which smooths it. Noise below SYSTEMATIC of an input is ignored: any model gets more wrong."""
+    """Returns the model with the white noise that recorded inputs show and the file does not state, and a note on it; the model as it is if
+    the sensors show that this noise drove the plant. A shaker's noise is a signal, that of a road sensor is not, and unless it is known, a
+    lag of the input is named, which smooths it. Noise below SYSTEMATIC of an input is ignored: any model gets more wrong."""
     shown = {i.name: noise for k, i in enumerate(model.inputs) if not i.noise and (noise := _shown(train, i.name, k))}
     if not shown:
         return model, []

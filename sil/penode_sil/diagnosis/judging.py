@@ -105,7 +105,7 @@ def unsized(e: Explanation, c: Cause) -> bool:
     short to be known, though the laws together are sure."""
     if c.kind not in SIZES or c.parameters[SIZES[c.kind]].ci95[0] > 0.0:
         return False
-    laws = {n: t.candidate.what for t, n in zip(e.terms, e.built.names) if t.group == (c.kind, c.where)}
+    laws = {n: t.candidate.what for t, n in zip(e.terms, e.built.names, strict=True) if t.group == (c.kind, c.where)}
     if not any(isinstance(what, Basis) and what.law == "loose_damper" for what in laws.values()):
         return True
     gains = {f"{name}_{what.gain[0]}" for name, what in laws.items()}

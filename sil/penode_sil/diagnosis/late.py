@@ -26,8 +26,8 @@ class Late:
 
 
 def written(expression: str, names: Sequence[str], unit: str, delay: float, roll_off: float = 0.0) -> Late:
-    """An expression in `unit`, delayed by `delay` [s]. `roll_off`: second-order attenuation, in units of delay^2 (see `poles`). `names`: of the
-    delay, the delayed signal, and its rate times the delay."""
+    """An expression in `unit`, delayed by `delay` [s]. `roll_off`: second-order attenuation, in units of delay^2 (see `poles`). `names`: of
+    the delay, the delayed signal, and its rate times the delay."""
     time, late, rate = names
     stiff, drag, direct, own = poles(roll_off)
     slope = rate if stiff else f"{expression} - {late}"

@@ -35,7 +35,7 @@ def started(model: Model, e: Experiment, study: Study) -> tuple[Array, Array]:
     metrics = [metric(e, study.levels[0][:1].repeat(e.band, 0), np.zeros((e.band, len(model.sensors), len(model.inputs))))]
     problem = Problem(model, [e], metrics, study.set_name, study.linear.fastest)
     spread = [1.0] * (2 * len(model.bodies)) + [SPREAD.get(s.unit, 1.0) for s in model.extra_states]
-    free = tuple(Free(("start", 0, i), x, 1e-3, sigma=s) for i, (x, s) in enumerate(zip(start_of(model, e, study), spread)))
+    free = tuple(Free(("start", 0, i), x, 1e-3, sigma=s) for i, (x, s) in enumerate(zip(start_of(model, e, study), spread, strict=True)))
     fit = problem.solve(free)
     return np.array([f.value for f in fit.free]), fit.simulated[0]
 
@@ -68,8 +68,8 @@ def measure(
     outside, notes = [], []
     for e in holdout:
         both = (study, replace(study, set_name=set_name or study.set_name))
-        starts = [start_of(m, e, study, s.set_name) for m, s in zip((model, extended), both)]
-        before, after = (deployed(m, e, x, s.set_name) for m, x, s in zip((model, extended), starts, both))
+        starts = [start_of(m, e, study, s.set_name) for m, s in zip((model, extended), both, strict=True)]
+        before, after = (deployed(m, e, x, s.set_name) for m, x, s in zip((model, extended), starts, both, strict=True))
         dropped = bursts([e], [after])[0] & [s.name in lost for s in model.sensors]
         e = replace(e, good=e.good & ~dropped)
         paths = followed(extended, e, starts[1], both[1])
@@ -87,7 +87,8 @@ def measure(
             continue
         floor = float(noise[j])
         errors = [
-            np.concatenate([r.values[c.good] for c, r in zip(own, each)]) for each in ([c.before for c in own], [c.after for c in own])
+            np.concatenate([r.values[c.good] for c, r in zip(own, each, strict=True)])
+            for each in ([c.before for c in own], [c.after for c in own])
         ]
         share, ci95 = achieved(*errors, floor)
         beyond = float(np.mean(np.concatenate(outside)))

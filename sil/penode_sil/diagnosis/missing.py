@@ -117,7 +117,8 @@ class Walk:
 
 
 def _riccati(f: Array, noise: Array, h: Array) -> Array:
-    """Covariance of stationary predictions. States are counted in their deviations, which differ by many powers of ten. Raises LinAlgError."""
+    """Covariance of stationary predictions. States are counted in their deviations, which differ by many powers of ten. Raises
+    LinAlgError."""
     with np.errstate(invalid="ignore"):  # balancing of states that differ by more than doubles can
         p = linalg.solve_discrete_are(f.T, h.T, noise, np.eye(len(h)))
     size = np.sqrt(np.maximum(np.diag(p), 1e-300))
@@ -137,7 +138,7 @@ def recursion(a: Array, drive: Array) -> Array:
     values, modes = np.linalg.eig(a)
     if np.linalg.cond(modes) < 1e10:
         parts = np.tensordot(np.linalg.inv(modes), drive.astype(complex), (1, 1))  # [x, n, any]
-        found = np.stack([lfilter([1.0], [1.0, -value], part, axis=0) for value, part in zip(values, parts)])
+        found = np.stack([lfilter([1.0], [1.0, -value], part, axis=0) for value, part in zip(values, parts, strict=True)])
         return np.moveaxis(np.real(np.tensordot(modes, found, 1)), 0, 1)
     x, found = np.zeros_like(drive[0]), np.empty_like(drive)
     for k, d in enumerate(drive):
@@ -150,7 +151,7 @@ def missing_forces(study: Study) -> tuple[Missing, ...]:
     parts = [_Recording.of(study, k, study.null.free) for k in range(len(study.experiments))]
     nothing = sum(float(np.sum(p.residual**2)) for p in parts), sum(p.residual.size for p in parts)
     known = [(study.linear, study.linear.n_inputs + k) for k in range(len(study.places))]
-    found = [_at(place, *way, study.null.free, parts, EFFORT.strengths) for place, way in zip(study.places, known)]
+    found = [_at(place, *way, study.null.free, parts, EFFORT.strengths) for place, way in zip(study.places, known, strict=True)]
     ranked = sorted((f for f in found if f is not None), key=lambda f: f.left)
     ranked[: EFFORT.refined] = [_again(study, f) for f in ranked[: EFFORT.refined]]
     return tuple(f.result(nothing) for f in sorted(ranked, key=lambda f: f.left))
@@ -187,7 +188,7 @@ def _again(study: Study, found: _Found) -> _Found:
             linear = linearise(replace(study.model, parameters=known), [found.place], start, study.experiments[0].u[:1])
             column = linear.n_inputs
         parts = [_Recording.of(study, k, found.free, acting, force) for k, force in enumerate(found.forces)]
-        parts = [replace(p, residual=p.residual + _answer(linear, column, p, force)) for p, force in zip(parts, found.forces)]
+        parts = [replace(p, residual=p.residual + _answer(linear, column, p, force)) for p, force in zip(parts, found.forces, strict=True)]
         strengths = EFFORT.strengths if again < EFFORT.again - 1 else tuple(found.strength * x for x in EFFORT.finer)
         better = _at(found.place, linear, column, found.free, parts, strengths)
         if better is None:
@@ -264,7 +265,7 @@ def _at(
     units = [_unit(linear, column, p) for p in parts]
 
     def walking(strength: float) -> list[Walk] | None:
-        walks = [_walk(linear, column, p, unit, strength) for p, unit in zip(parts, units)]
+        walks = [_walk(linear, column, p, unit, strength) for p, unit in zip(parts, units, strict=True)]
         return None if any(w is None for w in walks) else walks
 
     shift = next((_shifts(free, parts, walks) for s in reversed(EFFORT.strengths) if (walks := walking(s))), None)
@@ -273,13 +274,13 @@ def _at(
         return None
     left, strength, walks = min(found, key=lambda f: f[0])
     forces, rest = [], 0.0
-    for p, walk, unit in zip(parts, walks, units):
+    for p, walk, unit in zip(parts, walks, units, strict=True):
         y = p.residual - p.slopes @ shift
         fade = _fade(len(y))
         x = walk.smoothed(y * fade) / fade
         forces.append(x[:, len(linear.a)] * unit)
         rest += float(np.sum((y - x @ walk.out.T) ** 2))
-    moved = tuple(replace(f, value=float(f.at(s))) for f, s in zip(free, shift))
+    moved = tuple(replace(f, value=float(f.at(s))) for f, s in zip(free, shift, strict=True))
     return _Found(place, left, strength, moved, tuple(forces), rest)
 
 
@@ -343,7 +344,7 @@ def _fade(n: int) -> Array:
 
 def _innovations(parts: Sequence[_Recording], walks: Sequence[Walk], of: Callable[[_Recording], Array]) -> list[Array]:
     """White if `of` a recording is what the walk makes."""
-    return [w.innovations(x * _fade(len(x)).reshape(-1, *[1] * (x.ndim - 1))) for p, w in zip(parts, walks) for x in (of(p),)]
+    return [w.innovations(x * _fade(len(x)).reshape(-1, *[1] * (x.ndim - 1))) for p, w in zip(parts, walks, strict=True) for x in (of(p),)]
 
 
 def _shifts(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[Walk]) -> Array:
@@ -360,5 +361,5 @@ def _shifts(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[W
 def _left(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[Walk], shift: Array) -> float:
     """-2 log likelihood."""
     r = [x.ravel() for x in _innovations(parts, walks, lambda p: p.residual - p.slopes @ shift)]
-    volume = sum(len(p.residual) * w.volume for p, w in zip(parts, walks))
-    return float(sum(x @ x for x in r) + sum((f.offset + f.unit * x / f.sigma) ** 2 for f, x in zip(free, shift)) + volume)
+    volume = sum(len(p.residual) * w.volume for p, w in zip(parts, walks, strict=True))
+    return float(sum(x @ x for x in r) + sum((f.offset + f.unit * x / f.sigma) ** 2 for f, x in zip(free, shift, strict=True)) + volume)

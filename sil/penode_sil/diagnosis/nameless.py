@@ -44,7 +44,7 @@ def fitted(study: Study, best: Explanation | None) -> Explanation | None:
     first, last = min(tries, key=lambda t: t[1])[0].layers
     parameters: dict[str, tuple[float, str]] = {}
     free = []
-    for i, (row, offset, k) in enumerate(zip(first.weights, first.bias, last.weights[0]), 1):
+    for i, (row, offset, k) in enumerate(zip(first.weights, first.bias, last.weights[0], strict=True), 1):
         for key, start, scale, unit in (
             ("a", row[0] / reach, 1.0 / reach, "1/m"),
             ("b", row[1] / speed, 1.0 / speed, "s/m"),

@@ -56,7 +56,7 @@ def with_kinds(terms: Sequence[Term], names: Sequence[str], fit: Fit, study: Stu
 
 
 def _friction(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
-    own = [name for term, name in zip(terms, names) if term.candidate.what.gain[0] == "force"]
+    own = [name for term, name in zip(terms, names, strict=True) if term.candidate.what.gain[0] == "force"]
     travel = sum(values[f"{name}_force"] * values.get(f"{name}_presliding", 0.0) for name in own)
     v = np.geomspace(0.004 * speed, speed, 200)
     f = Curve(terms, names)(np.zeros_like(v), v, values)
@@ -117,7 +117,7 @@ def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: 
 def _contact(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float) -> float:
     """Deflection where stops come into contact, on the side where they do later; `reach` without any. Laws with a smaller part of
     the force there mend the form of others."""
-    stops = [(t, n) for t, n in zip(terms, names) if t.candidate.kind == "bump_stop"]
+    stops = [(t, n) for t, n in zip(terms, names, strict=True) if t.candidate.kind == "bump_stop"]
     ends = np.array([-reach, reach])
     forces = np.array([np.abs(Curve([t], [n])(ends, np.zeros(2), values)) for t, n in stops]).reshape(-1, 2)
     gaps = np.array([abs(values.get(f"{n}_gap", reach)) for _, n in stops])
@@ -125,13 +125,13 @@ def _contact(terms: Sequence[Term], names: Sequence[str], values: Values, reach:
 
 
 def _tyre(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float, speed: float) -> str:
-    lost = [values[f"{n}_static"] for t, n in zip(terms, names) if t.candidate.what.law == "liftoff"]
+    lost = [values[f"{n}_static"] for t, n in zip(terms, names, strict=True) if t.candidate.what.law == "liftoff"]
     return "tyre_liftoff" if max(lost, default=0.0) > EDGE * reach else "tyre_nonlinear"
 
 
 def straight(model: Model, places: Sequence[Place], terms: Sequence[Term], names: Sequence[str], group: Group, values: Values) -> str:
     """The parameter of the linear element that a curve beside it only changes; empty if it is a curve, or there is none."""
-    own = [(t, n) for t, n in zip(terms, names) if t.group == group]
+    own = [(t, n) for t, n in zip(terms, names, strict=True) if t.group == group]
     if group[0] not in (*DAMPERS, "cubic_spring", "asymmetric_spring", "tyre_nonlinear"):
         return ""
     law, argument = ("linear_damper", "damping") if group[0] in DAMPERS else ("linear_spring", "stiffness")
@@ -167,7 +167,7 @@ class Curve:
     """The force of a group of terms over deflection or rate, for any values of what is free."""
 
     def __init__(self, terms: Sequence[Term], names: Sequence[str]):
-        self.parts = [(t, n) for t, n in zip(terms, names) if isinstance(t.candidate.what, Basis)]
+        self.parts = [(t, n) for t, n in zip(terms, names, strict=True) if isinstance(t.candidate.what, Basis)]
 
     def __call__(self, s: Array, v: Array, values: Values) -> Array:
         total = np.zeros_like(s)

@@ -312,20 +312,27 @@ def sensor_levels(
         p, b, r = (np.add.reduceat(x[:band], edges) / bins for x in (power[:, j], base, road))
         whole = float(np.mean(base))
         room = max((1.25 * sigma) ** 2 if sigma > 0.0 else 4.0 * whole, 1.1 * whole) - whole
-
-        def loss(k: int, share: float) -> float:
-            s = b + r + share * room * means[k]
-            return float(np.sum(bins * (np.log(s) + (np.minimum(p / s, 12.0) if robust else p / s))))
-
-        best = loss(0, 0.0), 0, 0.0
-        for k in range(len(POLES)) if coloured else ():
-            for share in SHARES:
-                if (new := loss(k, share)) < best[0] - 2.0:
-                    best = new, k, share
-        for finer in FINER if best[2] else ():
-            best = min(best, *((loss(best[1], x), best[1], x) for x in (best[2] / finer, min(best[2] * finer, 1.0))))
-        found[:, j] = base[:band] + best[2] * room * shapes[best[1]]
+        k, share = _slow_part(p, b + r, room, means, bins, robust) if coloured else (0, 0.0)
+        found[:, j] = base[:band] + share * room * shapes[k]
     return found
+
+
+def _slow_part(power: Array, known: Array, room: float, means: Array, bins: Array, robust: bool) -> tuple[int, float]:
+    """The pole of the slow noise of spectra `means` [POLES, bands], and its share of the room for it, that make a power [bands] likeliest
+    beside what is `known` of it."""
+
+    def loss(k: int, share: float) -> float:
+        s = known + share * room * means[k]
+        return float(np.sum(bins * (np.log(s) + (np.minimum(power / s, 12.0) if robust else power / s))))
+
+    best = loss(0, 0.0), 0, 0.0
+    for k in range(len(POLES)):
+        for share in SHARES:
+            if (new := loss(k, share)) < best[0] - 2.0:
+                best = new, k, share
+    for finer in FINER if best[2] else ():
+        best = min(best, *((loss(best[1], x), best[1], x) for x in (best[2] / finer, min(best[2] * finer, 1.0))))
+    return best[1:]
 
 
 @cache
@@ -357,7 +364,7 @@ def correlation(experiments: Sequence[Experiment], metrics: Sequence[Metric], si
     them is the mark of something that moves the plant. Over B bins, -2 (B - 1) log(1 - coherence) is chi-square of 2.
     """
     found, freedom = np.zeros(len(PARTS)), np.zeros(len(PARTS))
-    for e, m, z in zip(experiments, metrics, simulated):
+    for e, m, z in zip(experiments, metrics, simulated, strict=True):
         r = m.spectrum(np.where(e.good, e.y - z, 0.0))
         w = np.einsum("fij,fj->fi", m.root, r)
         edges = [max(int(f / e.frequencies[1]), 1) for f in (*PARTS, TOP)]

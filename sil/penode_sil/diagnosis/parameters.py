@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Parameters that differ from the model file in a fit to innovations: which are causes, and which only make up for laws that are missing."""
+"""Parameters that differ from the model file in a fit to innovations: which are causes, and which only make up for laws that are
+missing."""
 
 from __future__ import annotations
 
@@ -26,8 +27,8 @@ from .worth import SYSTEMATIC, WORTH, Z_95, shift, undetermined
 
 @dataclass(frozen=True)
 class Judged:
-    """What the parameters of a fit amount to: `causes`, those that are wrong; `notes` on others that are off; and names of the `absorbed`, which
-    are off beside the named forms alone, but within their limits once the small forms are in the model too."""
+    """What the parameters of a fit amount to: `causes`, those that are wrong; `notes` on others that are off; and names of the `absorbed`,
+    which are off beside the named forms alone, but within their limits once the small forms are in the model too."""
 
     causes: tuple[Cause, ...]
     notes: tuple[str, ...]
@@ -35,8 +36,8 @@ class Judged:
 
 
 def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float, log: Callable[[str], None]) -> Judged:
-    """Judges each parameter by its value beside the named forms alone, in a bench that has moved along `moved`, and by its value beside all forms
-    that were found. Causes have this `confidence`."""
+    """Judges each parameter by its value beside the named forms alone, in a bench that has moved along `moved`, and by its value beside all
+    forms that were found. Causes have this `confidence`."""
     plain, whole = found.plain.fit, found.bench.fit.values
     shared = straight.beside(model, found.plain, _straight(terms_of(found.named)), moved)
     shared_by_all = straight.beside(model, found.bench, _straight(found.terms), moved)
@@ -53,12 +54,14 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
             notes.append(f"{p.name} is {value:.4g} {unit} beside what was found at its place, which shares its straight part")
         elif size < WORTH:
             notes.append(
-                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of what acts there: as much as anything that the model leaves out might"
+                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of what acts there: "
+                "as much as anything that the model leaves out might"
             )
         elif not straight.off(p.value, beside, shared_by_all.get(p.name, (0.0, 0.0)), _limit(p)):
             absorbed.append(p.name)
             notes.append(
-                f"{p.name} is {value:.4g} {unit} without the small deviations that were found, and {beside:.4g} with them: within its tolerance"
+                f"{p.name} is {value:.4g} {unit} without the small deviations that were found, "
+                f"and {beside:.4g} with them: within its tolerance"
             )
         else:
             causes.append(_cause(p, value, sd, shared, confidence))

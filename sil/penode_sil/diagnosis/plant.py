@@ -107,7 +107,7 @@ def _trained(model: Model, e: Element, set_name: str) -> list[tuple[str, str, fl
         if not fold.foldable(network) or len(kinks := fold.kinks(network)) < 3:
             return []
         low, high = ([x] for x in np.quantile(kinks, (0.1, 0.9)))
-    ranges = zip(e.network_inputs, low, high)
+    ranges = zip(e.network_inputs, low, high, strict=True)
     return [(e.name, "s" if what == "deflection" else "v", float(low), float(high), stated) for what, low, high in ranges]
 
 
@@ -122,7 +122,7 @@ def extend(model: Model, elements: Sequence[Element], parameters: Mapping[str, t
     a place then measures theirs as well."""
     elements = [_told_apart(model, e) for e in elements]
     sensors, outputs = model.sensors, model.outputs
-    for e, place in zip(elements, where):
+    for e, place in zip(elements, where, strict=False):  # `where` may be left out
         sensors, outputs = (tuple(_share(s, e.name, place) for s in signals) for signals in (sensors, outputs))
     states = tuple(
         State(e.state(name), mechanics.unit(model, e.ends, state.unit))
@@ -245,10 +245,10 @@ def linearise(model: Model, found: Sequence[Place], x: Array, u: Array) -> Linea
         return np.concatenate([system.rates(*parts), system.sensors(*parts)])
 
     slopes = []
-    for state, drive in zip(x, u):
+    for state, drive in zip(x, u, strict=True):
         centre = np.concatenate([state, drive, np.zeros(len(found) + n_w)])
         moves = np.diag(step)
-        slopes.append(np.stack([(value(centre + m) - value(centre - m)) / (2.0 * h) for m, h in zip(moves, step)], axis=1))
+        slopes.append(np.stack([(value(centre + m) - value(centre - m)) / (2.0 * h) for m, h in zip(moves, step, strict=True)], axis=1))
     mean = np.mean(slopes, axis=0)
     top, low = mean[:n_x], mean[n_x:]
     return Linear(

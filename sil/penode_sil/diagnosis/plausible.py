@@ -41,7 +41,7 @@ def misfits(model: Model, experiments: Sequence[Experiment], set_name: str) -> l
     for k, e in enumerate(experiments):
         z = problem.simulate(k, (), np.zeros((1, 0)))[0][0]
         ratios = [off_by(e.y[:, j], z[:, j], e.good[:, j]) for j in range(len(model.sensors))]
-        pairs = [(s, r) for s, r in zip(model.sensors, ratios) if r is not None]
+        pairs = [(s, r) for s, r in zip(model.sensors, ratios, strict=True) if r is not None]
         lines = [_line(e.name, s.name, known) for s, r in pairs if (known := mixed(r, s.unit))]
         alike = len(pairs) > 1 and all(r / pairs[0][1] > 0.0 and abs(np.log(r / pairs[0][1])) < NEAR for _, r in pairs)
         if lines and alike and len(model.inputs) == 1 and (known := mixed(1.0 / pairs[0][1], model.inputs[0].unit)):
@@ -82,7 +82,7 @@ def missed(study: Study) -> dict[str, float]:
     found = {}
     for j, sensor in enumerate(study.model.sensors):
         left = whole = 0.0
-        for e, z, levels in zip(study.experiments, study.null.simulated, study.levels):
+        for e, z, levels in zip(study.experiments, study.null.simulated, study.levels, strict=True):
             y, good = e.y[:, j], e.good[:, j]
             left += float(np.sum((y - z[:, j])[good] ** 2 - np.mean(levels[:, j])))
             whole += float(np.sum((y[good] - np.mean(y[good])) ** 2)) if good.any() else 0.0

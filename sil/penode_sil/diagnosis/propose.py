@@ -53,7 +53,7 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     moved = motions(probe)
     n_u = bench.records[0].u.shape[1]
     forms: list[Form] = []
-    for k, (place, motion) in enumerate(zip(bench.places, moved)):
+    for k, (place, motion) in enumerate(zip(bench.places, moved, strict=True)):
         if motion.s_rms > 0.0 and motion.v_rms > 0.0 and motion.force > 0.0:
             for file in catalogue.FILES:
                 forms += file.forms(bench.model, k, place, motion)
@@ -68,7 +68,7 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     chosen = _chosen(ranked)
     wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
-    trials = [_fitted(bench, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen)]
+    trials = [_fitted(bench, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen, strict=True)]
     trials += [_fitted(bench, wide, moved, terms, t, np.ones(1)) for t in _holds(bench, trials, terms)]
     return sorted(trials, key=lambda t: -t.gain), wide
 
@@ -112,7 +112,7 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
             hypotheses.append(np.stack([next(columns) for _ in f.parts], axis=-1))
         else:
             hypotheses.append(_slope(bench, f)[:, :, None])
-    return sorted(zip(scores(bench.fit, hypotheses), forms), key=lambda pair: -pair[0].gain)
+    return sorted(zip(scores(bench.fit, hypotheses), forms, strict=True), key=lambda pair: -pair[0].gain)
 
 
 def _holds(bench: Bench, trials: Sequence[Trial], terms: Sequence[Term]) -> list[Term]:
@@ -136,9 +136,9 @@ def _slope(bench: Bench, form: Form) -> Array:
 
 
 def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], term: Term, sizes: Array) -> Trial:
-    """Fits a term beside those accepted, from the best fit so far with the sizes that its score promises. Where parameters are hardly known,
-    and for a limit, which may have bent them, it also starts from the nominal values, and from a free run of these: the motion of a wrong plant
-    promises little."""
+    """Fits a term beside those accepted, from the best fit so far with the sizes that its score promises. Where parameters are hardly
+    known, and for a limit, which may have bent them, it also starts from the nominal values, and from a free run of these: the motion of a
+    wrong plant promises little."""
     problem = bench.problem(wide)
     n_x = len(wide.states)
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))

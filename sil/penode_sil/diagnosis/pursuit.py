@@ -118,10 +118,10 @@ def terms_of(r: Regression, chosen: Sequence[int]) -> list[Term]:
     keeps a part of what it has alone; none if that is nothing."""
     _, gains = r.gain(chosen)
     alone = [c for c in chosen if not r.candidates[c].companion][:1]
-    if all(g == 0.0 or r.candidates[c].companion for c, g in zip(chosen, gains)):
+    if all(g == 0.0 or r.candidates[c].companion for c, g in zip(chosen, gains, strict=True)):
         small = PART * r.gain(alone)[1] if alone else np.zeros(1)
         gains = np.where([c in alone for c in chosen], small, gains) if small[0] else np.zeros(len(chosen))
-    return [Term(r.candidates[c], float(g)) for c, g in zip(chosen, gains) if g != 0.0]
+    return [Term(r.candidates[c], float(g)) for c, g in zip(chosen, gains, strict=True) if g != 0.0]
 
 
 def group_of(r: Regression, chosen: Sequence[int]) -> Group:

@@ -33,7 +33,8 @@ from .terms import Term, Trial
 from .worth import SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, undetermined
 
 Array = NDArray[np.float64]
-RIGHT = 0.93  # share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
+# share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
+RIGHT = 0.93
 RIVAL = (
     1.0 - RIGHT
 ) / RIGHT  # posterior, RIGHT of which is as much as what is not in the catalogue has: from there on an explanation is listed
@@ -41,9 +42,9 @@ RIVAL = (
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Causes; notes on what is small; the sets of explanations that held-out blocks cannot tell apart, with their posterior; where the search
-    ended; the free `run` that fits best, and sensors whose `offsets` it has; and the share `taken` of what the file's own model leaves: by the
-    free run, or of the power of the innovations, whichever is more, for a free run that drifts shows little else."""
+    """Causes; notes on what is small; the sets of explanations that held-out blocks cannot tell apart, with their posterior; where the
+    search ended; the free `run` that fits best, and sensors whose `offsets` it has; and the share `taken` of what the file's own model
+    leaves: by the free run, or of the power of the innovations, whichever is more, for a free run that drifts shows little else."""
 
     causes: tuple[Cause, ...]
     notes: tuple[str, ...]
@@ -71,7 +72,7 @@ def answer(
     named = terms_of(found.named)
     names = {name_of(a.trial) for a in found.named}
     chances = {a.trial: _weighed([t for t in a.trials if name_of(t) not in names - {name_of(a.trial)}]) for a in found.named}
-    for a, term in ((a, term) for a in found.named for term in a.terms):
+    for a, term in [(accepted, term) for accepted in found.named for term in accepted.terms]:
         enough, chance, first = least(after.level.size, a.trial.whole), chances[a.trial], term is a.terms[0]
         size = share(plain, [t for t in named if name_of(t) == name_of(term)], plain.fit, moved)
         rivals = _rivals(chance, term) if first else _loads(model, bench.places[term.form.index])
@@ -102,8 +103,8 @@ def answer(
 
 
 def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[Found, list[Motion], parameters.Judged]:
-    """What the search finds, the motion with it, and its parameters. Where one of these only makes up for a form that is small beside it, small
-    forms of at least WORTH of what acts are named too: they took little of the misfit because the parameter had taken the rest."""
+    """What the search finds, the motion with it, and its parameters. Where one of these only makes up for a form that is small beside it,
+    small forms of at least WORTH of what acts are named too: they took little of the misfit because the parameter had taken the rest."""
 
     def judged(found: Found) -> tuple[Found, list[Motion], parameters.Judged]:
         moved = motions(Probe.of(found.plain))
@@ -115,7 +116,8 @@ def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[F
         return first
     wider = judged(first[0].naming(large))
     log(
-        f"{', '.join(first[2].absorbed)} may have made up for {', '.join(' at '.join(name_of(a.trial)) for a in large)}; still does {wider[2].absorbed}"
+        f"{', '.join(first[2].absorbed)} may have made up for {', '.join(' at '.join(name_of(a.trial)) for a in large)}; "
+        f"still does {wider[2].absorbed}"
     )
     return wider if set(wider[2].absorbed) < set(first[2].absorbed) else first
 
@@ -140,7 +142,7 @@ def _weighed(trials: Sequence[Trial]) -> list[tuple[Form, float]]:
     chance = posterior([t.blocks for t in trials])
     total: dict[tuple[str, str], float] = {}
     forms: dict[tuple[str, str], Form] = {}
-    for t, p in zip(trials, chance):
+    for t, p in zip(trials, chance, strict=True):
         name = name_of(t)
         total[name] = total.get(name, 0.0) + float(p)
         forms.setdefault(name, t.form)
@@ -159,7 +161,8 @@ def _sure(names: Sequence[tuple[Form, float]], form: Form) -> float:
 
 
 def _explanations(named: Sequence[tuple[Term, Sequence[tuple[Form, float]]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
-    """Sets of causes with their posterior: the one found, and it with one cause exchanged for a rival; what is not in the catalogue has the rest."""
+    """Sets of causes with their posterior: the one found, and it with one cause exchanged for a rival; what is not in the catalogue has the
+    rest."""
     own = tuple(dict.fromkeys(Named(*name_of(t)) for t, _ in named))
     if not own:
         return ()
@@ -186,7 +189,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
             unit = units.si((model.inputs if form.how.startswith("input_") else model.sensors)[form.index].unit)
             return drives.sizes(form, Sizes({}, {}, 0.0, True, values[term.free[0].target]), unit)
         parts = {}
-        for k, (name, part) in enumerate(zip(term.elements, form.parts)):
+        for k, (name, part) in enumerate(zip(term.elements, form.parts, strict=True)):
             for key in (part.gain[0], *part.shapes):
                 parts[k, key] = values.get(f"{name}_{key}", bench.model.parameters[f"{name}_{key}"].value)
         linear: dict[str, float] = {}
@@ -238,17 +241,18 @@ def _values_of(bench: Bench, term: Term) -> list[Free]:
 
 
 def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[list[Cause], list[str]]:
-    """Sensor offsets that the recordings show. An offset is a cause if it is surely above 7 % of the signal's rms and below 100 %. Smaller ones,
-    larger ones and those near 1 g become notes, as do all if a named cause also shifts the rest position (`loaded`). Nothing where start
-    states have the same effect: a plant without a spring to ground has no zero, and its sensors are off against each other at most."""
+    """Sensor offsets that the recordings show. An offset is a cause if it is surely above 7 % of the signal's rms and below 100 %. Smaller
+    ones, larger ones and those near 1 g become notes, as do all if a named cause also shifts the rest position (`loaded`). Nothing where
+    start states have the same effect: a plant without a spring to ground has no zero, and its sensors are off against each other at
+    most."""
     causes, notes = [], []
     biases = [bias(s.name) for s in model.sensors]
     shares, mixed = own_of_sensors(bench.model, bench.fit, biases), confounded(bench.model, bench.fit, biases)
     rms = [max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300) for j in range(len(biases))]
-    if any(abs(mixed.get(b, 0.0)) > WORTH * shown for b, shown in zip(biases, rms)):
+    if any(abs(mixed.get(b, 0.0)) > WORTH * shown for b, shown in zip(biases, rms, strict=True)):
         off = ", ".join(s.name for s in model.sensors if bias(s.name) in mixed)
         notes.append(f"the offsets of {off} differ; the recordings do not tell which is wrong")
-    for s, alone, shown in zip(model.sensors, shares, rms):
+    for s, alone, shown in zip(model.sensors, shares, rms, strict=True):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         if alone * abs(value) <= 3.0 * sd or bias(s.name) in mixed:
             continue
@@ -268,8 +272,8 @@ def _constant(kind: str, where: str, name: str, value: float, sd: float, unit: s
 
 
 def _load(model: Model, bench: Bench, probe: Probe, sensor: str, offset: float, deviation: float) -> Cause | None:
-    """The constant force on a body, if any, with the same effect on all sensors as this `offset` (+- `deviation`) of one: the simpler cause, and
-    what an input or the sensor itself may be off by as well."""
+    """The constant force on a body, if any, with the same effect on all sensors as this `offset` (+- `deviation`) of one: the simpler
+    cause, and what an input or the sensor itself may be off by as well."""
     i = [f.target for f in bench.fit.free].index(bias(sensor))
     f = bench.fit.free[i]
     used, white = bench.fit.used, 1.0 / np.sqrt(bench.fit.variance)

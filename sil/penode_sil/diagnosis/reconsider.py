@@ -14,8 +14,8 @@ from .worth import mostly
 
 
 def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
-    """Returns the end of a search, or a better one (floating search; Pudil, Novovicova and Kittler 1994). For each form of two laws, such as a
-    friction with a constant, it also tries the best single law instead, and searches on from there."""
+    """Returns the end of a search, or a better one (floating search; Pudil, Novovicova and Kittler 1994). For each form of two laws, such
+    as a friction with a constant, it also tries the best single law instead, and searches on from there."""
     best = _exchanged(rounds, grown)
     for k, a in enumerate(best.accepted):
         single = [t for t in a.trials if len(t.form.kinds) == 1]
@@ -31,13 +31,13 @@ def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
 
 
 def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
-    """Drops each doubtful form that the others make unnecessary, or exchanges it for one that is simpler or predicts better beside them; then
-    resumes the search, and keeps the new end if that loses no more than what was dropped or simplified may. Doubtful are large forms
+    """Drops each doubtful form that the others make unnecessary, or exchanges it for one that is simpler or predicts better beside them;
+    then resumes the search, and keeps the new end if that loses no more than what was dropped or simplified may. Doubtful are large forms
     other than the last: all of them if a trial that was not accepted would take most of what is still missed, else those preferred to a
     simpler form of the same curve. After an exchange the last form is checked too."""
     found, whole, loss = list(grown.accepted), _total(grown), 0.0
     missed = any(mostly(t.whole) for t in grown.rest)
-    doubted = [a for a, big in zip(found[:-1], grown.large) if big and (missed or _has_simpler(a))]
+    doubted = [a for a, big in zip(found[:-1], grown.large[:-1], strict=True) if big and (missed or _has_simpler(a))]
     last = found[-1:] if found and grown.large[-1] else []
     while doubted:
         a = doubted.pop(0)

@@ -75,8 +75,8 @@ def mended(study: Study, e: Explanation, log) -> tuple[Explanation, Explanation]
 
 
 def formed(study: Study, e: Explanation, r: Regression | None, log) -> tuple[Study, Explanation, Regression | None]:
-    """The explanation with more laws as they are in a regression about it, if it is known already, one where fits are `heavy`; with the study
-    that has the noise it leaves, and the regression about it. Laws may have any sign if they may in the regression."""
+    """The explanation with more laws as they are in a regression about it, if it is known already, one where fits are `heavy`; with the
+    study that has the noise it leaves, and the regression about it. Laws may have any sign if they may in the regression."""
     parameters = [f.target for f in study.null.free if isinstance(f.target, str)]
     spare = [g for g in e.groups if g[0] not in ("wrong_parameter", "constant_force", "sensor_delay", CLOCK)]
     anyway = r is not None
@@ -113,5 +113,5 @@ def called(e: Explanation, known: Explanation) -> Explanation:
     """The explanation with its curves called what they are in a known one."""
     names = {curve(t.candidate): t.group for t in known.terms}
     groups = [names.get(curve(t.candidate), t.group) for t in e.terms]
-    candidates = [replace(t.candidate, kind=kind, where=where) for t, (kind, where) in zip(e.terms, groups)]
-    return replace(e, terms=tuple(replace(t, candidate=c) for t, c in zip(e.terms, candidates)))
+    candidates = [replace(t.candidate, kind=kind, where=where) for t, (kind, where) in zip(e.terms, groups, strict=True)]
+    return replace(e, terms=tuple(replace(t, candidate=c) for t, c in zip(e.terms, candidates, strict=True)))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""How often causes named with the same confidence were right: the table that test/diagnosis/reliability.py --take-over keeps in templates/."""
+"""How often causes named with the same confidence were right: the table that test/diagnosis/reliability.py --take-over keeps in
+templates/."""
 
 from __future__ import annotations
 

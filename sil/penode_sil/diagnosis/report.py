@@ -3,13 +3,12 @@
 """report.html: one page that needs nothing else and tells what is wrong, why, how sure that is, and what knowing it
 gains.
 
-From the top: the answer in a sentence, how sure it is, what it costs, what to do next; per sensor and recording the residual over time, its spectrum above the noise
-floor, its coherence with the input and a test for whiteness; the causes with parameters, intervals, confidence and
-rivals; the restoring force of each element over deflection and rate, measured, nominal and extended; the gain on
-held-out data with the generated C, samples outside of the trained range marked; the change of the model file and what
-it costs on a Cortex-M4F; findings in the data; the error of the deployed step; the terms. Figures zoom, move and read
-out where scripts run; all of the page can be read without, on paper, on a phone, in light and in dark. Figures are data
-(report_figure.py), the page is templates/report.html.
+From the top: the answer in a sentence, how sure it is, what it costs, what to do next; per sensor and recording the residual over time, its
+spectrum above the noise floor, its coherence with the input and a test for whiteness; the causes with parameters, intervals, confidence and
+rivals; the restoring force of each element over deflection and rate, measured, nominal and extended; the gain on held-out data with the
+generated C, samples outside of the trained range marked; the change of the model file and what it costs on a Cortex-M4F; findings in the
+data; the error of the deployed step; the terms. Figures zoom, move and read out where scripts run; all of the page can be read without, on
+paper, on a phone, in light and in dark. Figures are data (report_figure.py), the page is templates/report.html.
 """
 
 from __future__ import annotations
@@ -33,7 +32,8 @@ from .reliability import line
 from .report_figure import Axis, Figure, pretty, readable
 from .report_price import difference, price
 from .report_words import LIKE_NOISE, gains, headline, key_figures, lead, percent, relative, sentence, sure, value, where
-from .residual import LEAST, Channel, Residual, Shown, Surface, averages, cells, rms
+from .residual import Channel, Residual, Shown
+from .restoring import LEAST, Surface, averages, cells, rms
 from .result import VERDICTS, Diagnosis, place, plain
 
 Array = NDArray[np.float64]

@@ -126,9 +126,9 @@ def _grid(x: Array, y: Array, ax: Axis, ay: Axis) -> tuple[NDArray[np.int64], ND
 def _runs(x: Array, y: Array, ax: Axis, ay: Axis) -> Iterator[str]:
     sound = np.isfinite(y)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], sound.astype(np.int8), [0]])))
-    for a, b in zip(edges[::2], edges[1::2]):
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
         px, py = _grid(x[a:b], y[a:b], ax, ay)
-        steps = "".join(f"{dx}{dy if dy < 0 else f' {dy}'} " for dx, dy in zip(np.diff(px).tolist(), np.diff(py).tolist()))
+        steps = "".join(f"{dx}{dy if dy < 0 else f' {dy}'} " for dx, dy in zip(np.diff(px).tolist(), np.diff(py).tolist(), strict=True))
         yield f"M{px[0]} {py[0]}" + (f"l{steps.rstrip()}" if b - a > 1 else "h0")
 
 
@@ -136,7 +136,7 @@ def dots(look: str, x: Array, y: Array, ax: Axis, ay: Axis, name: str = "") -> M
     """Round points: lines of no length with round ends."""
     sound = np.isfinite(y)
     px, py = _grid(x[sound], y[sound], ax, ay)
-    return Mark("dots", look, "".join(f"M{a} {b}h0" for a, b in zip(px.tolist(), py.tolist())), name)
+    return Mark("dots", look, "".join(f"M{a} {b}h0" for a, b in zip(px.tolist(), py.tolist(), strict=True)), name)
 
 
 def band(look: str, low: float, high: float, ay: Axis, name: str = "") -> Mark:
@@ -148,7 +148,7 @@ def band(look: str, low: float, high: float, ay: Axis, name: str = "") -> Mark:
 def spans(look: str, x: Array, inside: NDArray[np.bool_], ax: Axis, name: str = "") -> Mark:
     """All of the plot where samples are inside."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(np.int8), [0]])))
-    ends = [(ax.share(x[a]), ax.share(x[b - 1])) for a, b in zip(edges[::2], edges[1::2])]
+    ends = [(ax.share(x[a]), ax.share(x[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     path = "".join(f"M{WIDE * a:.0f} 0H{max(WIDE * b, WIDE * a + 10):.0f}V{HIGH}H{WIDE * a:.0f}z" for a, b in ends)
     return Mark("area", look, path, name)
 
@@ -158,7 +158,7 @@ def tiles(values: Array, x: Array, y: Array, ax: Axis, ay: Axis, full: float, sa
     `says` is a format with the places x, y and v."""
     found = []
     px, py = _grid(x, np.full(len(x), ay.low), ax, ay)[0], _grid(np.full(len(y), ax.low), y, ax, ay)[1]
-    for i, j in zip(*np.nonzero(np.isfinite(values))):
+    for i, j in zip(*np.nonzero(np.isfinite(values)), strict=True):
         v = float(values[i, j])
         path = f"M{px[i]} {py[j + 1]}H{px[i + 1]}V{py[j]}H{px[i]}z"
         more = says.format(

@@ -132,6 +132,25 @@ def coherence(r: Array, u: Array, step: float, length: int) -> tuple[Array, floa
     return found, limit, min(u.shape[1] / number, 1.0)
 
 
+def _segments(e: Experiment) -> tuple[int, int]:
+    """Samples of the segments of a density and, shorter, of a coherence."""
+    n = len(e.time)
+    return segment(n, e.step, 6), max(segment(n, e.step, 12) // 2, 8)
+
+
+def _residual(e: Experiment, j: int, simulated: Array, variance: Array, kept: NDArray[np.bool_]) -> Residual:
+    """What a simulation [n, n_z] leaves of a sensor: `variance` of its noise per sample [bins], frequencies of its density that are
+    `kept`."""
+    length, short_length = _segments(e)
+    good = e.good[:, j]
+    r = np.where(good, e.y[:, j] - simulated[:, j], 0.0)
+    f, power = density(r, e.step, length, good)
+    linear = np.interp(f[kept], rfftfreq(short_length, e.step), coherence(r, e.u, e.step, short_length)[0])
+    ratio = np.abs(rfft(r)[1 : e.band]) ** 2 / (len(e.time) * float(np.mean(good)) * variance)
+    white, running = whiteness(ratio)
+    return Residual(r, power[kept], linear, white, running)
+
+
 def whiteness(ratio: Array) -> tuple[Whiteness, Array]:
     """The test on periodogram ordinates over the noise spectrum [m], and their running sum [m], which ends at 1."""
     m = len(ratio)
@@ -174,25 +193,16 @@ def channels(
 ) -> list[Channel]:
     """All sensors of a recording that were measured, from what was simulated [n, n_z]; `floor`: frequencies and noise
     variance per sample [f, n_z]."""
-    n, step, found = len(e.time), e.step, []
-    length, short_length = segment(n, step, 6), max(segment(n, step, 12) // 2, 8)
+    step, found = e.step, []
+    length, short_length = _segments(e)
     top = e.frequencies[e.band - 1]
     for j, sensor in enumerate(model.sensors):
         good = e.good[:, j]
         if not good.any():
             continue
-        share = float(np.mean(good))
         variance = np.interp(e.frequencies[1 : e.band], floor[0], floor[1][:, j])
         f, power = density(np.where(good, e.y[:, j] - np.mean(e.y[good, j]), 0.0), step, length, good)
         kept = (f > 0.0) & (f <= top)
-
-        def residual(simulated: Array) -> Residual:
-            r = np.where(good, e.y[:, j] - simulated[:, j], 0.0)
-            linear = np.interp(f[kept], rfftfreq(short_length, step), coherence(r, e.u, step, short_length)[0])
-            ratio = np.abs(rfft(r)[1 : e.band]) ** 2 / (n * share * variance)
-            white, running = whiteness(ratio)
-            return Residual(r, density(r, step, length, good)[1][kept], linear, white, running)
-
         _, limit, chance = coherence(e.y[:, j], e.u, step, short_length)
         found.append(
             Channel(
@@ -209,8 +219,8 @@ def channels(
                 limit,
                 chance,
                 e.frequencies[1 : e.band],
-                residual(before),
-                None if after is None else residual(after),
+                _residual(e, j, before, variance, kept),
+                None if after is None else _residual(e, j, after, variance, kept),
                 beyond,
             )
         )
@@ -244,17 +254,17 @@ def channel_numbers(c: Channel) -> dict[str, Any]:
     """Where in time and frequency a sensor's residual is, and by how much of the signal."""
     both = [c.before, *([c.after] if c.after else [])]
     names = ["before", "after"][: len(both)]
-    values = {name: c.level(r) for name, r in zip(names, both)}
+    values = {name: c.level(r) for name, r in zip(names, both, strict=True)}
     edges = third_octaves(c.f[0], c.f[-1])
-    in_bands = {name: band_rms(c.f, r.density, edges) for name, r in zip(names, both)}
+    in_bands = {name: band_rms(c.f, r.density, edges) for name, r in zip(names, both, strict=True)}
     noise, whole = band_rms(c.f, c.floor, edges), band_rms(c.f, c.signal, edges)
     found_in = {name: map(short, values) for name, values in (*in_bands.items(), ("noise", noise), ("signal", whole))}
     frequency = [
-        {"from": short(a), "to": short(b), **dict(zip(found_in, levels)), "coherence": short(_mean(c, a, b))}
-        for a, b, *levels in zip(edges, edges[1:], *found_in.values())
+        {"from": short(a), "to": short(b), **dict(zip(found_in, levels, strict=True)), "coherence": short(_mean(c, a, b))}
+        for (a, b), *levels in zip(itertools.pairwise(edges), *found_in.values(), strict=True)
     ]
     time = [
-        {"from": short(a), "to": short(b), **dict(zip(names, map(short, found)))}
+        {"from": short(a), "to": short(b), **dict(zip(names, map(short, found), strict=True))}
         for a, b, found in stretches(c.time, c.good, *(r.values for r in both))
     ]
     return {
@@ -267,7 +277,7 @@ def channel_numbers(c: Channel) -> dict[str, Any]:
         "share_of_signal": short(c.share),
         "linear_in_input": short(linear_share(c, c.before)),
         "coherence_limit": short(c.limit),
-        "whiteness": {name: {k: short(x) for k, x in vars(r.white).items()} for name, r in zip(names, both)},
+        "whiteness": {name: {k: short(x) for k, x in vars(r.white).items()} for name, r in zip(names, both, strict=True)},
         "time": time,
         "frequency": frequency,
     }

@@ -19,7 +19,9 @@ from .residual import rms
 from .study import Study
 
 Array = NDArray[np.float64]
-ROUGH = 0.02  # of a sensor's noise: accepted error of the interpolation, for a hold-out may move several times as fast; and of the residual, that of a step
+# of a sensor's noise: accepted error of the interpolation, for a hold-out may move several times as fast; and of the residual, that of a
+# step
+ROUGH = 0.02
 
 
 def resolved(study: Study, text: str) -> tuple[str, Model]:

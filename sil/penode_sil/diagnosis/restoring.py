@@ -97,7 +97,7 @@ def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surf
         return []
     n_z, n_u = len(study.model.sensors), len(study.model.inputs)
     motions, beside, rigs = [], [], []
-    for k, (e, simulated) in enumerate(zip(study.experiments, watch(study, fit or study.null))):
+    for k, (e, simulated) in enumerate(zip(study.experiments, watch(study, fit or study.null), strict=True)):
         nominal, rest = (rfft(np.where(e.good, e.y - z[:, :n_z], 0.0), axis=0)[: e.band] for z in (study.null.simulated[k], simulated))
         h = study.linear.transfer(e.frequencies[: e.band])[:, :, [n_u + p for p in acting] + list(range(n_u))]
         gain = likely(e, study.levels[k], h[:, :n_z], len(acting), nominal / np.sqrt(len(e.time)))
@@ -143,7 +143,7 @@ def surface_numbers(s: Surface) -> dict[str, Any]:
         found["after_rms"] = short(rms(s.measured - s.extended))
     if np.isfinite(gap).any():
         i, j = np.unravel_index(np.nanargmax(s.count() * gap**2), gap.shape)
-        middle = [0.5 * (e[k] + e[k + 1]) for e, k in zip(s.edges, (i, j))]
+        middle = [0.5 * (e[k] + e[k + 1]) for e, k in zip(s.edges, (i, j), strict=True)]
         found["worst"] = {"deflection": short(middle[0]), "rate": short(middle[1]), "missing": short(gap[i, j])}
     forces = {"measured": s.measured, "nominal": s.nominal} | ({} if s.extended is None else {"extended": s.extended})
     grids = {name: short(s.grid(values)) for name, values in forces.items()}

@@ -28,15 +28,16 @@ MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better,
 MIN_FORM = (
     0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
 )
-MIN_TAKEN = 0.25  # of the power of a sensor's innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
+# of the power of a sensor's innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
+MIN_TAKEN = 0.25
 MIN_BLOCKS = 3  # of the blocks in which it does
 LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
 
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """An accepted form: its `trial`; the `number` in its parameter names; its `terms` in the bench, one for each kind of law; and the `trials`
-    it was compared with, best first."""
+    """An accepted form: its `trial`; the `number` in its parameter names; its `terms` in the bench, one for each kind of law; and the
+    `trials` it was compared with, best first."""
 
     trial: Trial
     number: int
@@ -46,8 +47,8 @@ class Accepted:
 
 @dataclass(frozen=True, eq=False)
 class Grown:
-    """The state of a search: the bench with all accepted forms, its `scores` [blocks] on held-out blocks, which forms are `large`, and `rest`,
-    the good trials not accepted."""
+    """The state of a search: the bench with all accepted forms, its `scores` [blocks] on held-out blocks, which forms are `large`, and
+    `rest`, the good trials not accepted."""
 
     bench: Bench
     scores: Array
@@ -66,8 +67,8 @@ class Rounds:
 
     def grow(self, accepted: Sequence[Accepted] = ()) -> Grown:
         """Accepts causes beside those accepted already, one at a time, the best predictor first, until none predicts enough better, or the
-        best is too small for a name and cannot hide a larger one. The search goes on after a small form that takes most of the misfit, because
-        one more cause may explain the rest. If it does, all forms are judged again by the smaller level that remains."""
+        best is too small for a name and cannot hide a larger one. The search goes on after a small form that takes most of the misfit,
+        because one more cause may explain the rest. If it does, all forms are judged again by the smaller level that remains."""
         bench, scores, found = self.beside(accepted)
         large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
         hides = not found or large[-1] or any(_hidden(t, found[-1].trial) for t in found[-1].trials)
@@ -89,8 +90,8 @@ class Rounds:
         return Grown(bench, scores, tuple(found), tuple(large), good)
 
     def beside(self, accepted: Sequence[Accepted]) -> tuple[Bench, Array, list[Accepted]]:
-        """Rebuilds the bench with these forms; returns it, its scores, and the forms with the share of their name in it. What a form took of the
-        misfit stays that of its round."""
+        """Rebuilds the bench with these forms; returns it, its scores, and the forms with the share of their name in it. What a form took
+        of the misfit stays that of its round."""
         bench, found = self.start, []
         for a in accepted:
             bench, terms = adopt(bench, a.trial, a.number)
@@ -98,21 +99,22 @@ class Rounds:
         moved = motions(Probe.of(bench)) if found else []
         same = [[x for o in found if name_of(o.trial) == name_of(a.trial) for x in o.terms] for a in found]
         shares = [share(bench, terms, bench.fit, moved) for terms in same]
-        found = [replace(a, trial=replace(a.trial, share=x)) for a, x in zip(found, shares)]
+        found = [replace(a, trial=replace(a.trial, share=x)) for a, x in zip(found, shares, strict=True)]
         return *_based(bench, self.blocks), found
 
     def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
-        """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the best, to
-        MIN_GAIN, only large ones; otherwise the large form only imitates a smaller one."""
+        """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the
+        best, to MIN_GAIN, only large ones; otherwise the large form only imitates a smaller one."""
         trials, wide = propose(bench, terms_of(accepted), self.log)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
         trials = holding.told_apart(bench, wide, [_scored(bench, bench.problem(wide), self.blocks, t) for t in trials[:SCORED]])
         better = [t.blocks - scores for t in trials]
-        for t, b in zip(trials, better):
+        for t, b in zip(trials, better, strict=True):
             self.log(
-                f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, {t.taken:.1%} of the power, blocks {np.round(b, 1)}"
+                f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, "
+                f"{t.taken:.1%} of the power, blocks {np.round(b, 1)}"
             )
-        good = [t for t, b in zip(trials, better) if _accepted(bench, t, b)]
+        good = [t for t, b in zip(trials, better, strict=True) if _accepted(bench, t, b)]
         good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
         matter = [t for t in good if _matters(t)]
         if matter and max(np.sum(t.blocks) for t in good) - max(np.sum(t.blocks) for t in matter) <= MIN_GAIN:

@@ -110,7 +110,7 @@ def smooth(
     states, free = (None, None) if moving or not len(linear.a) else (linear.states(f), linear.free(f, 1.0 / e.step)[:, :n_z])
     acts = np.zeros((len(e.frequencies), len(acting)), dtype=complex)
     acts[:band] = w[:, : len(acting)] * np.sqrt(n)
-    forces = dict(zip(acting, fft.irfft(acts, n, axis=0).T))
+    forces = dict(zip(acting, fft.irfft(acts, n, axis=0).T, strict=True))
     return Seen(motions, simulated + change[:, :n_z], h[:, :n_z, n_u:], forces, states, free)
 
 
@@ -214,7 +214,7 @@ class Regression:
         x, _ = optimize.nnls(root[:, None] * vectors.T, vectors.T @ slope / root)
         found = np.zeros(len(chosen))
         order = {c: k for k, c in enumerate(chosen)}
-        for c, f, value in zip(index, flips, x):
+        for c, f, value in zip(index, flips, x, strict=True):
             found[order[c]] += f * value / self.scale[c]
         return float(2.0 * x @ slope - x @ gram @ x), found
 

@@ -124,6 +124,6 @@ def grow(
     others = [e for e in done[1:] if unloaded(e) != unloaded(done[0]) and len(e.groups) <= len(done[0].groups)]  # for loads, see ranked
     equal = [e for e in others if e.gain > done[0].gain - COST]  # and may be the plainer one
     first = level([done[0], *equal[:1]])
-    plainer = list(zip(first, level([plain(study, e, parameters, log) for e in first])))
+    plainer = list(zip(first, level([plain(study, e, parameters, log) for e in first]), strict=True))
     best = settled(study, owned(study, max(plainer, key=lambda both: max(e.score for e in both))[1], log))
     return study, ranked(study, best, done[1:], log)

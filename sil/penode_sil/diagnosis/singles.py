@@ -59,7 +59,7 @@ def sufficient(study: Study, e: Explanation) -> list[Term]:
         return []
     variance, index = np.diag(e.fit.covariance()), {f.target: i for i, f in enumerate(e.fit.free)}
     found = []
-    for other, target in zip(e.terms[::-1], gains(e.terms, e.built.names)):
+    for other, target in zip(e.terms[::-1], gains(e.terms, e.built.names), strict=True):
         f = e.fit.free[index[target]]
         nominal = study.model.parameters[target].value if target in study.model.parameters else 0.0
         if ((f.value - nominal) / f.unit) ** 2 < (NEW + COST) * variance[index[target]]:

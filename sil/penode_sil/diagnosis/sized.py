@@ -102,7 +102,7 @@ def values(study: Study, e: Explanation, group: Group) -> dict[str, Value]:
 
 def functions(study: Study, e: Explanation, group: Group, reach: float, speed: float) -> Parameters:
     """The parameters of one cause."""
-    terms, names = zip(*[(t, n) for t, n in zip(e.terms, e.built.names) if t.group == group])
+    terms, names = zip(*[(t, n) for t, n in zip(e.terms, e.built.names, strict=True) if t.group == group], strict=True)
     what = terms[0].candidate.what
     if isinstance(what, str):
         return {what: (study.model.parameters[what].unit, lambda p: p[what])}
@@ -208,7 +208,7 @@ def _bump_stop(c: _Cause) -> Parameters:
 
 def _backlash(c: _Cause) -> Parameters:
     terms, names = c.terms, c.names
-    halves = [n for t, n in zip(terms, names) if t.own and t.candidate.what.law in HALVES]
+    halves = [n for t, n in zip(terms, names, strict=True) if t.own and t.candidate.what.law in HALVES]
     if len(halves) == 2:
         return {"gap": ("m", lambda p: sum(p[f"{n}_gap"] for n in halves))}
     main = max(having(terms, "gap", "presliding"), key=lambda i: terms[i].gain)
@@ -255,7 +255,7 @@ def _damper_fading(c: _Cause) -> Parameters:
 
     def loss(p: Values) -> float:
         total = 0.0
-        for t, n in zip(terms, names):
+        for t, n in zip(terms, names, strict=True):
             if t.candidate.what.law == "fading_damper":
                 kept = np.exp(-(m.t[-1] + left) / p[f"{n}_time"])
                 slow, end = "faded", 1.0 - kept
@@ -275,18 +275,25 @@ def _damper_fading(c: _Cause) -> Parameters:
 
 def _bouc_wen(c: _Cause) -> Parameters:
     terms, names, curve, speed, zero = c.terms, c.names, c.curve, c.speed, c.zero
-    pairs = [(f"{n}_force", f"{n}_presliding") for n, t in zip(names, terms) if "presliding" in t.candidate.what.shapes]
-    stiff = lambda p: sum(p[f] / p[w] for f, w in pairs)
-    force = lambda p: float(curve(zero[:1], np.array([speed]), p)[0])
+    pairs = [(f"{n}_force", f"{n}_presliding") for n, t in zip(names, terms, strict=True) if "presliding" in t.candidate.what.shapes]
+
+    def stiff(p: Values) -> float:
+        return sum(p[f] / p[w] for f, w in pairs)
+
+    def force(p: Values) -> float:
+        return float(curve(zero[:1], np.array([speed]), p)[0])
+
     return {"force": ("N", force), "yield_deflection": ("m", lambda p: force(p) / max(stiff(p), 1e-300))}
 
 
 def _maxwell_bushing(c: _Cause) -> Parameters:
     terms, names, study = c.terms, c.names, c.study
-    times = {n: t.candidate.what.shapes["relaxation"][0] for n, t in zip(names, terms) if t.candidate.what.law == "maxwell_bushing"}
+    times = {
+        n: t.candidate.what.shapes["relaxation"][0] for n, t in zip(names, terms, strict=True) if t.candidate.what.law == "maxwell_bushing"
+    }
     seen = min(study.model.sample_time, max(times.values(), default=0.0))  # what relaxes within a sample is a damper
     springs = [n for n, tau in times.items() if tau >= seen]
-    loose = [(n, t) for n, t in zip(names, terms) if t.candidate.what.law == "loose_damper"]
+    loose = [(n, t) for n, t in zip(names, terms, strict=True) if t.candidate.what.law == "loose_damper"]
     series = [(t.own or f"{n}_damping", f"{n}_relaxation") for n, t in loose]
 
     def bushing(p: Values) -> tuple[float, float]:
@@ -314,8 +321,8 @@ def _tyre_liftoff(c: _Cause) -> Parameters:
 
 def _tyre_damping(c: _Cause) -> Parameters:
     terms, names, study, what = c.terms, c.names, c.study, c.terms[0].candidate.what
-    lagging = [n for t, n in zip(terms, names) if t.candidate.what.law == "maxwell_bushing"]
-    at_once = Curve([t for t, n in zip(terms, names) if n not in lagging], [n for n in names if n not in lagging])
+    lagging = [n for t, n in zip(terms, names, strict=True) if t.candidate.what.law == "maxwell_bushing"]
+    at_once = Curve([t for t, n in zip(terms, names, strict=True) if n not in lagging], [n for n in names if n not in lagging])
     met = [m.motions[what.place] for m in study.seen]
 
     def damping(p: Values) -> float:

@@ -25,14 +25,14 @@ def notes(study: Study, e: Explanation, causes: Sequence[Cause]) -> list[str]:
 
 
 def share(study: Study, e: Explanation, group: tuple[str, str]) -> float:
-    """Rms of a cause's force beside straight lines, over BENT, as a share of that of the linear elements at its place; 0 where there is none, and
-    for laws with memory, which have no curve."""
-    pairs = [(t, n) for t, n in zip(e.terms, e.built.names) if t.group == group and isinstance(t.candidate.what, Basis)]
+    """Rms of a cause's force beside straight lines, over BENT, as a share of that of the linear elements at its place; 0 where there is
+    none, and for laws with memory, which have no curve."""
+    pairs = [(t, n) for t, n in zip(e.terms, e.built.names, strict=True) if t.group == group and isinstance(t.candidate.what, Basis)]
     if not pairs:
         return 0.0
     k, values = pairs[0][0].candidate.what.place, {f.target: f.value for f in e.fit.free}
     s, v = (np.concatenate([getattr(seen.motions[k], q) for seen in study.seen]) for q in "sv")
-    force = Curve(*zip(*pairs))(s, v, values)
+    force = Curve(*zip(*pairs, strict=True))(s, v, values)
     lines = np.stack([s, v], axis=1) / np.maximum([np.linalg.norm(s), np.linalg.norm(v)], 1e-300)
     left = force - lines @ np.linalg.lstsq(lines, force, rcond=None)[0]
     stiffness, damping = (

@@ -56,7 +56,7 @@ def change(study: Study, fit: Fit, seen: Sequence[Seen]) -> Change:
     still = [not swept(e.u, e.step) for e in study.experiments]
     if not acting or not any(still):
         return Change()
-    parts = list(zip(study.experiments, study.metrics, seen, watch(study, fit)))
+    parts = list(zip(study.experiments, study.metrics, seen, watch(study, fit), strict=True))
     sizes = [2 * e.band * n_z for e in study.experiments]
     free = [f for f in fit.free if f.low < f.value < f.high]
     index = {f.target: i for i, f in enumerate(fit.free)}

@@ -63,7 +63,8 @@ def _of(path: Path, model: Model, pairs: dict[str, str], train: Sequence[Measure
         moving = [deviation(m.z[s.name][m.mask[s.name]]) for m in train if s.name in m.z and m.mask[s.name].any()]
         if moving and noise >= min(moving):
             raise UserError(
-                f"{path}: {s.name} varies by {noise:.3g} {units.si(s.unit)}, in a recording of motion by {min(moving):.3g} {units.si(s.unit)}; "
+                f"{path}: {s.name} varies by {noise:.3g} {units.si(s.unit)}, "
+                f"in a recording of motion by {min(moving):.3g} {units.si(s.unit)}; "
                 "--still takes a recording in which nothing moves"
             )
         if noise > 0.0:

@@ -51,17 +51,21 @@ def beside(model: Model, bench: Bench, terms: Sequence[Term], moved: Sequence[Mo
 
 
 def missed(study: Study, e: Explanation, causes: Sequence[Cause]) -> list[Cause]:
-    """Parameters of straight lines that are off beside laws with two sides, as causes of their own; the interval of each is from the least to
-    the greatest slope. Of other laws a curve is put together from several, whose slopes say less."""
+    """Parameters of straight lines that are off beside laws with two sides, as causes of their own; the interval of each is from the least
+    to the greatest slope. Of other laws a curve is put together from several, whose slopes say less."""
     values = {f.target: f.value for f in e.fit.free}
     known = {x for c in causes for x in c.parameters}
     found = []
     for k, place in enumerate(study.places):
-        pairs = [(t, n) for t, n in zip(e.terms, e.built.names) if isinstance(t.candidate.what, Basis) and t.candidate.what.place == k]
+        pairs = [
+            (t, n)
+            for t, n in zip(e.terms, e.built.names, strict=True)
+            if isinstance(t.candidate.what, Basis) and t.candidate.what.place == k
+        ]
         sure = [c.confidence for c in causes if (c.kind, c.where) in {t.group for t, _ in pairs} and c.parameters.keys() & SIDES]
         if len(sure) < len({t.group for t, _ in pairs}) or not sure:
             continue
-        curve, reaches = Curve(*zip(*pairs)), size([s.motions[k] for s in study.seen])
+        curve, reaches = Curve(*zip(*pairs, strict=True)), size([s.motions[k] for s in study.seen])
         for name, quantity in _lines(study.model, place):
             x = _grid(reaches["sv".index(quantity)])
             force = curve(x, 0.0 * x, values) if quantity == "s" else curve(0.0 * x, x, values)

@@ -71,7 +71,7 @@ def nuisances(model: Model, experiments: Sequence[Experiment]) -> tuple[Free, ..
     free = [uncertain(p) for p in model.parameters.values() if p.tolerance > 0.0 and p.value != 0.0]
     skew = SKEW * model.sample_time
     free += [Free(("skew", j), 0.0, skew, sigma=skew, low=-3.0 * skew, high=3.0 * skew) for j in range(len(model.sensors))]
-    for e, experiment in enumerate(experiments):
+    for e in range(len(experiments)):
         for i, start in enumerate(model.start):
             unit = 1e-3 if i < len(model.bodies) else 1e-2 if i < 2 * len(model.bodies) else 1.0
             free.append(Free(("start", e, i), start, unit))
@@ -83,11 +83,8 @@ def watched(model: Model, found: Sequence[Place]) -> Model:
     ends = {b.name: (b.position, b.velocity) for b in model.bodies}
     signals = []
     for k, p in enumerate(found):
-        if p.elements:
-            texts = (f"s_{p.elements[0][0]}", f"v_{p.elements[0][0]}")
-        else:
-            texts = ends[p.ends[0]]
-        signals += [Signal(f"{q}_place{k}", text, p.unit(unit)) for q, text, unit in zip("sv", texts, ("m", "m/s"))]
+        texts = (f"s_{p.elements[0][0]}", f"v_{p.elements[0][0]}") if p.elements else ends[p.ends[0]]
+        signals += [Signal(f"{q}_place{k}", text, p.unit(unit)) for q, text, unit in zip("sv", texts, ("m", "m/s"), strict=True)]
     return replace(model, sensors=(*model.sensors, *signals))
 
 
@@ -116,8 +113,8 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
     declared = np.array([s.noise for s in model.sensors])
     free = nuisances(model, experiments)
     guess = [np.where(declared > 0.0, declared, 1e-2 * np.std(e.y, axis=0) + 1e-12) for e in experiments]
-    levels = [np.tile(sigma**2, (e.band, 1)) for sigma, e in zip(guess, experiments)]
-    metrics = [metric(e, l, np.zeros((e.band, len(declared), len(model.inputs)))) for e, l in zip(experiments, levels)]
+    levels = [np.tile(sigma**2, (e.band, 1)) for sigma, e in zip(guess, experiments, strict=True)]
+    metrics = [metric(e, x, np.zeros((e.band, len(declared), len(model.inputs)))) for e, x in zip(experiments, levels, strict=True)]
     problem = Problem(model, experiments, metrics, set_name, 0.0)
     _z, x = problem.simulate(0, (), np.zeros((1, 0)), model.states)
     pick = np.linspace(0, len(x[0]) - 1, 12).astype(int) if model.networks else [0]
@@ -150,7 +147,7 @@ def noise_of(study: Study, fit: Fit, coloured: bool = True, robust: bool = True)
     """Noise levels and metrics as the residual of a fit shows them, see sensor_levels."""
     declared = np.array([s.noise for s in study.model.sensors])
     levels, metrics = [], []
-    for e, z in zip(study.experiments, fit.simulated):
+    for e, z in zip(study.experiments, fit.simulated, strict=True):
         h = study.linear.transfer(e.frequencies)[:, : len(declared), : len(study.model.inputs)]
         levels.append(sensor_levels(e, np.where(e.good, e.y - z, 0.0), declared, h, coloured, robust))
         metrics.append(metric(e, levels[-1], h))
@@ -161,7 +158,7 @@ def loss(study: Study, fit: Fit) -> float:
     """-2 log likelihood of a fit with the noise that suits it best: what absorbs less into noise is worth more."""
     _, metrics = noise_of(study, fit, robust=False)
     total = sum(f.offset**2 for f in fit.free)
-    for e, m, z in zip(study.experiments, metrics, fit.simulated):
+    for e, m, z in zip(study.experiments, metrics, fit.simulated, strict=True):
         r = m(np.where(e.good, e.y - z, 0.0))
         total += float(r @ r) + m.volume
     return total
@@ -171,7 +168,7 @@ def loss(study: Study, fit: Fit) -> float:
 def with_noise_of(study: Study, fit: Fit, coloured: bool = True) -> Study:
     """The study with noise as a fit's residual shows it; itself if that is no other noise."""
     levels, metrics = noise_of(study, fit, coloured)
-    change = max(float(np.max(np.mean(np.abs(np.log(new / old)), axis=0))) for new, old in zip(levels, study.levels))
+    change = max(float(np.max(np.mean(np.abs(np.log(new / old)), axis=0))) for new, old in zip(levels, study.levels, strict=True))
     if change < 0.05:
         return study
     quiet = replace(study, levels=levels, metrics=metrics)
@@ -199,8 +196,8 @@ def watch(study: Study, fit: Fit) -> list[Array]:
 def look(study: Study, fit: Fit) -> tuple[Seen, ...]:
     """The smoothed motion around a fit."""
     n_z = len(study.model.sensors)
-    parts = zip(study.experiments, study.metrics, study.levels, watch(study, fit))
-    return tuple(smooth(e, m, l, study.linear, study.places, z[:, :n_z], z[:, n_z:], study.moving) for e, m, l, z in parts)
+    parts = zip(study.experiments, study.metrics, study.levels, watch(study, fit), strict=True)
+    return tuple(smooth(e, m, x, study.linear, study.places, z[:, :n_z], z[:, n_z:], study.moving) for e, m, x, z in parts)
 
 
 @lru_cache(maxsize=KEPT)

@@ -87,15 +87,15 @@ def sentences(model: str, rows: Sequence[Row], folder: Path) -> str:
         for k, cause in enumerate(row.causes or [None]):
             named = (cause["kind"], cause["where"], _parameters(cause)) if cause else ("", "", "")
             lines.append((*(head if k == 0 else ("", "")), *named, *((_gain(row), seconds) if k == 0 else ("", ""))))
-    wide = [max(map(len, column)) for column in zip(*lines)]
-    text = ["  ".join(cell.ljust(w) for cell, w in zip(line, wide) if w).rstrip() for line in lines]
+    wide = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    text = ["  ".join(cell.ljust(w) for cell, w in zip(line, wide, strict=True) if w).rstrip() for line in lines]
     return "\n".join([*text, "", f"{model}: {summary(rows)} -> {folder / 'index.html'}"])
 
 
 def summary(rows: Sequence[Row]) -> str:
     """How often what was found."""
     named = [[f"{c['kind']} at {c['where']}".removesuffix(" at ") for c in row.causes] for row in rows]
-    found = Counter(" + ".join(names) or row.verdict for names, row in zip(named, rows))
+    found = Counter(" + ".join(names) or row.verdict for names, row in zip(named, rows, strict=True))
     counts = ", ".join(f"{n} {what.replace('_', ' ')}" for what, n in found.most_common())
     return f"{len(rows)} recording{'s' * (len(rows) != 1)}: {counts}"
 

@@ -37,7 +37,7 @@ class Term:
     def laws(self, values: Mapping[str, float]) -> list[tuple[float, Part]]:
         """Its laws as they are fitted, each with its gain."""
         found = []
-        for name, part in zip(self.elements, self.form.parts):
+        for name, part in zip(self.elements, self.form.parts, strict=True):
             shapes = {k: (values.get(f"{name}_{k}", v), unit) for k, (v, unit) in part.shapes.items()}
             found.append((values.get(f"{name}_{part.gain[0]}", 0.0), replace(part, shapes=shapes)))
         return found
@@ -45,8 +45,8 @@ class Term:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A form beside what was accepted already, fitted: `gain` of the criterion, its `share` of what acts (see `worth`), the share `taken` of
-    the power that the innovations of a sensor have beyond its noise, of that which shows it most, that share over all sensors together
+    """A form beside what was accepted already, fitted: `gain` of the criterion, its `share` of what acts (see `worth`), the share `taken`
+    of the power that the innovations of a sensor have beyond its noise, of that which shows it most, that share over all sensors together
     (`whole`), `blocks` [blocks] of predictive density."""
 
     form: Form

@@ -148,7 +148,7 @@ def weak(e: Explanation) -> list[Term]:
     places = {f.target: i for i, f in enumerate(e.fit.free)}
     variance = np.diag(e.fit.covariance())
     found = []
-    for term, target in zip(e.terms, gains(e.terms, e.built.names)):
+    for term, target in zip(e.terms, gains(e.terms, e.built.names), strict=True):
         several = sum(t.group == term.group for t in e.terms) > 1 and term.group[0] != "sensor_bias"
         if not term.candidate.companion and sum(t.group == term.group and not t.candidate.companion for t in e.terms) == 1:
             continue  # companions alone are no cause
@@ -196,7 +196,7 @@ def softened(study: Study, e: Explanation, log=lambda text: None) -> Explanation
         for laws in ({"sharpness": SHARP}, {"sharpness": 0.0, "scale_bend": BENT}):  # a tanh of what is bent is sharper than one
             sizes = {"rail": 1.0 / top} | laws
             faults = [Fault("sensor_clipping", sensor, what, what != "scale_bend", (), top) for what in sizes]
-            soft = [Term(replace(own[0].candidate, what=fault), x) for fault, x in zip(faults, sizes.values())]
+            soft = [Term(replace(own[0].candidate, what=fault), x) for fault, x in zip(faults, sizes.values(), strict=True)]
             smooth = explain(study, [*(t for t in e.terms if t.group != group), *soft], start=e.fit, formulas=e.formulas)
             log(f"  smooth {group}: {smooth.gain:.0f} for {e.gain:.0f}")
             e = smooth if smooth.score > e.score else e

@@ -47,7 +47,7 @@ def tone(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated
     a tone: it is not noise, but need not come from a machine. Recordings of less than 120 Hz or 3 s have too few bins or seconds.
     """
     found = [Tone()]
-    for e, m, z in zip(experiments, metrics, simulated):
+    for e, m, z in zip(experiments, metrics, simulated, strict=True):
         size = round(1.0 / e.step)  # samples of a second
         top = int(0.4 * size)
         sine = swept(e.u, e.step)

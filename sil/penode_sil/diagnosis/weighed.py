@@ -114,7 +114,8 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
     gained = bench.fit.likelihood - still.likelihood
     better = bench.fit.likelihood - nominal.fit.likelihood
     log(
-        f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats; it follows better than the nominal model by {better:.0f}"
+        f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats; "
+        f"it follows better than the nominal model by {better:.0f}"
     )
     if better < -MIN_GAIN * len(nominal.free):
         return Misfit(np.inf, bench.fit.likelihood, bench.update)
@@ -129,7 +130,7 @@ def _is_noise(study: Study, fit: Fit) -> bool:
 def _within(study: Study, fit: Fit, noise: Array) -> bool:
     """Does an explanation leave of every sensor no more than its noise [n_z]?"""
     for j, most in enumerate(noise):
-        left = np.concatenate([(e.y - z)[e.good[:, j], j] for e, z in zip(study.experiments, fit.simulated)])
+        left = np.concatenate([(e.y - z)[e.good[:, j], j] for e, z in zip(study.experiments, fit.simulated, strict=True)])
         if left.size and rms(left) > UNSEEN * most:
             return False
     return True
@@ -147,9 +148,12 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
     scale = np.array([s.noise or 1.0 for s in model.sensors])
     after = tuple(measuring.started(extended, e, study)[1] for e in study.experiments)
     fit = replace(study.null, simulated=after)
-    left = max(rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after))
+    left = max(
+        rms((e.y - z)[e.good]) / max(rms(e.y[e.good] - np.mean(e.y[e.good])), 1e-300) for e, z in zip(study.experiments, after, strict=True)
+    )
     powers = [
-        sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs)) for zs in (study.null.simulated, after)
+        sum(float(np.sum(((e.y - z) * e.good / scale) ** 2)) for e, z in zip(study.experiments, zs, strict=True))
+        for zs in (study.null.simulated, after)
     ]
     causes, notes = _plausible(model, found.causes)
     known = replace(
@@ -208,8 +212,8 @@ def _explanations(causes: Sequence[Cause], sets: Sequence[tuple[tuple[Named, ...
 
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float, quiet: bool) -> str:
-    """From what is named, the share of the residual that it takes in a free run, and what is left: the residual with all that was found as a
-    share of the signal, or what wanders as a share of what moves. Small deviations that have been found are what any model has; `quiet`:
+    """From what is named, the share of the residual that it takes in a free run, and what is left: the residual with all that was found as
+    a share of the signal, or what wanders as a share of what moves. Small deviations that have been found are what any model has; `quiet`:
     noise is all that is left."""
     if causes:
         return "explained" if share > ENOUGH else "partly_explained"

@@ -92,8 +92,9 @@ def own_of_sensors(model: Model, fit: Fit, targets: Collection[object]) -> Array
 
 
 def confounded(model: Model, fit: Fit, targets: Collection[object]) -> dict[object, float]:
-    """Those of `targets` whose effect others of them share in part, because the other free values reproduce what they do together; with the least
-    values that have the rest of the effect. Without a spring to ground, an equal offset of all angle sensors is only another start."""
+    """Those of `targets` whose effect others of them share in part, because the other free values reproduce what they do together; with the
+    least values that have the rest of the effect. Without a spring to ground, an equal offset of all angle sensors is only another
+    start."""
     columns, others = _columns(model, fit, targets)
     free = [f for f in fit.free if f.target in targets]
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
@@ -106,20 +107,20 @@ def confounded(model: Model, fit: Fit, targets: Collection[object]) -> dict[obje
     values = resolution @ (size * np.array([(f.value - f.origin) / f.unit for f in free])) / size
     return {
         f.target: float(f.origin + f.unit * x)
-        for f, x, sole in zip(free, values, np.diag(resolution))
+        for f, x, sole in zip(free, values, np.diag(resolution), strict=True)
         if SYSTEMATIC < sole < 1.0 - SYSTEMATIC
     }
 
 
 def _columns(model: Model, fit: Fit, targets: Collection[object]) -> tuple[Array, Array]:
-    """Whitened sensitivities [used, .] of the innovations: columns of `targets` per unit (0 for the logarithm of a parameter), and normalised
-    columns of all other free values except masses."""
+    """Whitened sensitivities [used, .] of the innovations: columns of `targets` per unit (0 for the logarithm of a parameter), and
+    normalised columns of all other free values except masses."""
     masses = {b.mass for b in model.bodies} - set(targets)
     rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
-    own = [column * (not f.log) for f, column in zip(fit.free, rows.T) if f.target in targets]
+    own = [column * (not f.log) for f, column in zip(fit.free, rows.T, strict=True) if f.target in targets]
     rest = [
         column / np.linalg.norm(column)
-        for f, column in zip(fit.free, rows.T)
+        for f, column in zip(fit.free, rows.T, strict=True)
         if f.target not in targets and f.target not in masses and column.any()
     ]
     return np.array(own).T.reshape(len(rows), -1), np.array(rest).T.reshape(len(rows), -1)
@@ -132,7 +133,7 @@ def shift(model: Model, bench: Bench, moved: Sequence[Motion], name: str) -> flo
     shares = []
     for e in model.elements:
         if e.law in LINEAR and name in e.arguments.values():
-            _place, motion = next((p, m) for p, m in zip(bench.places, moved) if any(e.name == n for n, _ in p.elements))
+            _place, motion = next((p, m) for p, m in zip(bench.places, moved, strict=True) if any(e.name == n for n, _ in p.elements))
             shares.append(abs(off) * (motion.s_rms if LINEAR[e.law] == "s" else motion.v_rms) / motion.force)
     log = next(f.log for f in bench.fit.free if f.target == name)
     return max(shares, default=abs(off / model.parameters[name].value)) * (1.0 if log else own(bench.model, bench.fit, [name]))
@@ -153,7 +154,7 @@ def _force(term: Term, fit: Fit, motion: Motion) -> list[Array]:
     """Of all parts of a term along every recording."""
     total = [np.zeros(len(m.s)) for m in motion.parts]
     for gain, part in term.laws(fit.values):
-        total = [x + gain * part.along(m) for x, m in zip(total, motion.parts)]
+        total = [x + gain * part.along(m) for x, m in zip(total, motion.parts, strict=True)]
     return total
 
 

@@ -4,7 +4,8 @@
 What each threshold of the diagnosis decides: which of them go, and what each of the others costs or saves.
 
     ablate.py table NOTES [NOTES...]            which thresholds decide something in the cases that probes.py has noted, from NOTES/*.jsonl
-    ablate.py off NAME NOTES [NOTES...] --draw SEED:INDEX... --worlds SEED:INDEX...    those cases again with NAME switched off: won and lost
+    ablate.py off NAME NOTES [NOTES...] --draw SEED:INDEX... --worlds SEED:INDEX...
+                                                those cases again with NAME switched off: won and lost
 
 A threshold is switched off by giving each of its comparisons the outcome that it has most often. Where all of its comparisons come out
 the same in all cases, it decides nothing, and can be removed. Else only the cases in which one of them came out otherwise are run again.

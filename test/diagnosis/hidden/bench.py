@@ -207,8 +207,8 @@ class Bench:
 
 def reach(plant: Plant, motions: Sequence[Motion], drives: Sequence[Drive]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Deflection and rate of every element over all these recordings."""
-    parts = {e: [plant.deflection(e, m, *d.at_signals) for m, d in zip(motions, drives)] for e in plants.ELEMENTS[plant.kind]}
-    return {e: tuple(np.concatenate(x) for x in zip(*own)) for e, own in parts.items()}
+    parts = {e: [plant.deflection(e, m, *d.at_signals) for m, d in zip(motions, drives, strict=True)] for e in plants.ELEMENTS[plant.kind]}
+    return {e: tuple(np.concatenate(x) for x in zip(*own, strict=True)) for e, own in parts.items()}
 
 
 def draw_drives(rng: np.random.Generator, plant: Plant, moving: bool, harsh: bool) -> tuple[Drive, ...]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import faults, plants  # the forms register themselves
+from . import faults, forces, memory, outside, plants  # noqa: F401 - the forms register themselves, in this order
 from .bench import NOTHING, Bench, draw_bench, reach
 from .effects import FORMS, OUTSIDE, Change, Form, places
 from .plants import SIGNALS
@@ -221,7 +221,7 @@ class Case:
     def measured(self) -> list[tuple[np.ndarray, dict[str, np.ndarray]]]:
         """Input and signals as recorded, of every recording."""
         found = []
-        for i, (drive, motion) in enumerate(zip(self.bench.drives, self.motions)):
+        for i, (drive, motion) in enumerate(zip(self.bench.drives, self.motions, strict=True)):
             rng, given = self.bench.rng(i, 99), drive.at_signals[0][:: int(RATE / self.bench.rate)]
             noise = {s: w.draw(rng, len(given)) for s, w in self.bench.noise.items()}
             found.append(
@@ -237,7 +237,7 @@ class Case:
         shaken = {s: np.fft.irfft(error * bench.transfer(len(given))[s], len(given)) for s in seen}
         floor = {bench.plant.names[s]: float(np.sqrt(np.mean((seen[s] - clean[s] - shaken[s]) ** 2))) for s in seen}
         trained, held = reach(bench.plant, self.motions[:-1], bench.training), reach(bench.plant, self.motions[-1:], [drive])
-        inside = all(np.abs(h).max() <= np.abs(t).max() for e in trained for h, t in zip(held[e], trained[e]))
+        inside = all(np.abs(h).max() <= np.abs(t).max() for e in trained for h, t in zip(held[e], trained[e], strict=True))
         return {
             "holdout_inside": bool(inside),
             "noise_floor": floor,
@@ -251,7 +251,7 @@ class Case:
         stated = {s: n.rms * rng.uniform(0.85, 1.2) for s, n in bench.noise.items()}
         (folder / "model.toml").write_text(plants.model_file(bench.plant, bench.rate, stated, bench.input_noise * rng.uniform(0.85, 1.2)))
         names, (role, unit) = bench.plant.names, plants.INPUT[bench.plant.kind]
-        for drive, (given, seen) in zip(bench.drives, self.measured):
+        for drive, (given, seen) in zip(bench.drives, self.measured, strict=True):
             header = ["time [s]", f"{names[role]} [{unit}]", *(f"{names[s]} [{SIGNALS[bench.plant.kind][s][1]}]" for s in seen)]
             table = np.column_stack([np.arange(len(given)) / bench.rate, given, *seen.values()])
             np.savetxt(folder / drive.file, table, fmt="%.9g", delimiter=",", header=",".join(header), comments="")

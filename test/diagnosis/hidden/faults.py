@@ -71,26 +71,33 @@ forms(
     hardening_absorber=lambda r, at: absorber(
         r,
         at,
-        lambda m, w, zeta, bend=r.uniform(0.1, 0.4): [
-            (Kind.LINEAR, (0.0, 2 * zeta * m * w)),
-            (Kind.DEFLECTION_CURVE, (), lambda s: m * w**2 * s * (1 + bend * np.minimum((s / at.s) ** 2, 10))),
-        ],
+        partial(
+            lambda m, w, zeta, bend: [
+                (Kind.LINEAR, (0.0, 2 * zeta * m * w)),
+                (Kind.DEFLECTION_CURVE, (), lambda s: m * w**2 * s * (1 + bend * np.minimum((s / at.s) ** 2, 10))),
+            ],
+            bend=r.uniform(0.1, 0.4),
+        ),
     ),
     rubbing_absorber=lambda r, at: absorber(
         r,
         at,
-        lambda m, w, zeta, part=r.uniform(0.1, 0.3), q=at.s * r.uniform(0.1, 0.5): [
-            (Kind.LINEAR, (m * w**2 * (1 - part), 2 * zeta * m * w)),
-            (Kind.SLIDER, (m * w**2 * part, q)),
-        ],
+        partial(
+            lambda m, w, zeta, part, q: [(Kind.LINEAR, (m * w**2 * (1 - part), 2 * zeta * m * w)), (Kind.SLIDER, (m * w**2 * part, q))],
+            part=r.uniform(0.1, 0.3),
+            q=at.s * r.uniform(0.1, 0.5),
+        ),
     ),
     absorber_of_rubber=lambda r, at: absorber(
         r,
         at,
-        lambda m, w, zeta, part=r.uniform(0.3, 0.8): [
-            (Kind.LINEAR, (m * w**2, zeta * m * w)),
-            (Kind.SERIES, (m * w * part,), lambda s: m * w**2 * part * s),
-        ],
+        partial(
+            lambda m, w, zeta, part: [
+                (Kind.LINEAR, (m * w**2, zeta * m * w)),
+                (Kind.SERIES, (m * w * part,), lambda s: m * w**2 * part * s),
+            ],
+            part=r.uniform(0.3, 0.8),
+        ),
     ),
 )
 forms(
@@ -100,7 +107,7 @@ forms(
     "settled_load",
     settled_load=lambda r, at: load(r, at, np.ones_like, settled=True),
     put_on_at_once=lambda r, at: load(r, at, lambda t: (t > 0).astype(float)),
-    put_on_at_the_start=lambda r, at: load(r, at, lambda t, seconds=r.uniform(0.1, 0.8): rise(t, 0.2, seconds)),
+    put_on_at_the_start=lambda r, at: load(r, at, partial(lambda t, seconds: rise(t, 0.2, seconds), seconds=r.uniform(0.1, 0.8))),
 )
 
 
@@ -134,7 +141,9 @@ def scale(r: Rng, at: Place, shape: Callable[[np.ndarray, np.ndarray], np.ndarra
     up = way(r)
 
     def build(size: float) -> Change:
-        seen = lambda x, _, rate: x * (1 + up * size * shape(x / at.peak, times(x, rate) / at.duration))
+        def seen(x, _, rate):
+            return x * (1 + up * size * shape(x / at.peak, times(x, rate) / at.duration))
+
         return Change({"scale": 1 + up * size}, sensor={at.where: seen})
 
     return build
@@ -191,9 +200,11 @@ forms(
     (0.003, 0.5),
     "offset",
     offset=lambda r, at: bias(r, at, np.ones_like),
-    warming_up=lambda r, at: bias(r, at, lambda t, part=r.uniform(0.1, 0.4), tau=r.uniform(0.2, 1.0): 1 - part * np.exp(-t / tau)),
+    warming_up=lambda r, at: bias(
+        r, at, partial(lambda t, part, tau: 1 - part * np.exp(-t / tau), part=r.uniform(0.1, 0.4), tau=r.uniform(0.2, 1.0))
+    ),
     wandering_zero=lambda r, at: bias(
-        r, at, lambda t, f=r.uniform(0.3, 0.9), phi=r.uniform(0, 6.3): 1 + 0.2 * np.sin(2 * np.pi * f * t + phi)
+        r, at, partial(lambda t, f, phi: 1 + 0.2 * np.sin(2 * np.pi * f * t + phi), f=r.uniform(0.3, 0.9), phi=r.uniform(0, 6.3))
     ),
 )
 forms(
@@ -202,9 +213,9 @@ forms(
     (0.01, 0.4),
     "gain",
     gain=lambda r, at: scale(r, at, lambda x, t: np.ones_like(x)),
-    gain_that_bends=lambda r, at: scale(r, at, lambda x, t, bend=r.uniform(-0.3, 0.3): 1 + bend * np.minimum(np.abs(x), 2)),
-    gain_that_drifts=lambda r, at: scale(r, at, lambda x, t, drift=r.uniform(-0.3, 0.3): 1 + drift * (t - 0.5)),
-    gain_of_each_side=lambda r, at: scale(r, at, lambda x, t, other=r.uniform(0.5, 0.8): np.where(x > 0, 1.0, other)),
+    gain_that_bends=lambda r, at: scale(r, at, partial(lambda x, t, bend: 1 + bend * np.minimum(np.abs(x), 2), bend=r.uniform(-0.3, 0.3))),
+    gain_that_drifts=lambda r, at: scale(r, at, partial(lambda x, t, drift: 1 + drift * (t - 0.5), drift=r.uniform(-0.3, 0.3))),
+    gain_of_each_side=lambda r, at: scale(r, at, partial(lambda x, t, other: np.where(x > 0, 1.0, other), other=r.uniform(0.5, 0.8))),
 )
 forms(
     "sensor_delay",
@@ -222,9 +233,9 @@ forms(
     (0.05, 0.8),
     "both_rails",
     both_rails=lambda r, at: clipped(at, lambda x, top: np.clip(x, -top, top)),
-    soft_rails=lambda r, at: clipped(at, lambda x, top, p=r.uniform(4, 12): x / (1 + np.abs(x / top) ** p) ** (1 / p)),
-    one_rail=lambda r, at: clipped(at, lambda x, top, up=way(r): np.minimum(up * x, top) * up),
-    unequal_rails=lambda r, at: clipped(at, lambda x, top, other=r.uniform(0.6, 0.9): np.clip(x, -top * other, top)),
+    soft_rails=lambda r, at: clipped(at, partial(lambda x, top, p: x / (1 + np.abs(x / top) ** p) ** (1 / p), p=r.uniform(4, 12))),
+    one_rail=lambda r, at: clipped(at, partial(lambda x, top, up: np.minimum(up * x, top) * up, up=way(r))),
+    unequal_rails=lambda r, at: clipped(at, partial(lambda x, top, other: np.clip(x, -top * other, top), other=r.uniform(0.6, 0.9))),
 )
 forms(
     "sensor_dropout",
@@ -234,6 +245,8 @@ forms(
     frozen=lambda r, at: dropouts(r, at, lambda x, i, j, rng: x[i - 1]),
     zeros=lambda r, at: dropouts(r, at, lambda x, i, j, rng: 0.0),
     noise_bursts=lambda r, at: dropouts(r, at, lambda x, i, j, rng: rng.uniform(-1, 1, j - i) * at.peak),
-    rail=lambda r, at: dropouts(r, at, lambda x, i, j, rng, level=way(r) * r.uniform(1.2, 2.5): level * at.peak),
-    fading_to_zero=lambda r, at: dropouts(r, at, lambda x, i, j, rng, k=r.uniform(5, 30): x[i - 1] * np.exp(-np.arange(j - i) / k)),
+    rail=lambda r, at: dropouts(r, at, partial(lambda x, i, j, rng, level: level * at.peak, level=way(r) * r.uniform(1.2, 2.5))),
+    fading_to_zero=lambda r, at: dropouts(
+        r, at, partial(lambda x, i, j, rng, k: x[i - 1] * np.exp(-np.arange(j - i) / k), k=r.uniform(5, 30))
+    ),
 )

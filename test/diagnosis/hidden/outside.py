@@ -16,7 +16,10 @@ def driven(at: Place, of_time: Curve) -> Build:
 
 def engine(r: Rng, at: Place) -> Build:
     f, swing, slow = r.uniform(11, 40), r.uniform(0, 0.15), r.uniform(0.02, 0.1)
-    phase = lambda t: 2 * np.pi * f * t - f * swing / slow * np.cos(2 * np.pi * slow * t)
+
+    def phase(t):
+        return 2 * np.pi * f * t - f * swing / slow * np.cos(2 * np.pi * slow * t)
+
     return driven(at, lambda t: np.sin(phase(t)) + 0.3 * np.sin(2 * phase(t)))
 
 
@@ -34,7 +37,10 @@ def gusts(r: Rng, at: Place) -> Build:
 
 def uneven_tyre(r: Rng, at: Place) -> Build:
     f, phase = r.uniform(3, 14), r.uniform(0, 2 * np.pi, 3)
-    turn = lambda t, u: sum(np.sin(2 * np.pi * f * k * t + phase[k - 1]) / k**2 for k in (1, 2, 3))
+
+    def turn(t, u):
+        return sum(np.sin(2 * np.pi * f * k * t + phase[k - 1]) / k**2 for k in (1, 2, 3))
+
     return lambda size: Change({"amplitude": size * at.force}, {"hidden": Law(Kind.TRACK, 1, GROUND, (size * at.force,))}, auxiliary=turn)
 
 
@@ -55,7 +61,10 @@ def pitch(r: Rng, at: Place) -> Build:
             "rear": Law(Kind.LINEAR, 2, 3, (rear * p["c"], rear * p["d"])),
             "rear tyre": Law(Kind.LINEAR, 3, AUXILIARY, (p["c_t"], 0.0)),
         }
-        delayed = lambda t, u: np.interp(t - later, t, u)
+
+        def delayed(t, u):
+            return np.interp(t - later, t, u)
+
         return Change({"coupling": 0.35 * size}, laws, (rear * p["m_b"], p["m_w"]), auxiliary=delayed, inverse=np.linalg.inv(mass))
 
     return build
@@ -78,13 +87,19 @@ def levelling_spring(r: Rng, at: Place) -> Build:
 
 def mains_hum(r: Rng, at: Place) -> Build:
     f, phase = r.choice([50.0, 60.0]) + r.uniform(-0.2, 0.2), r.uniform(0, 2 * np.pi)
-    hum = lambda x, rate: np.sin(2 * np.pi * f * times(x, rate) + phase)
+
+    def hum(x, rate):
+        return np.sin(2 * np.pi * f * times(x, rate) + phase)
+
     return lambda size: Change({"amplitude": size * at.peak}, sensor={at.where: lambda x, _, rate: x + size * at.peak * hum(x, rate)})
 
 
 def clock_drift(r: Rng, at: Place) -> Build:
     up = way(r)
-    seen = lambda x, rate, drift: np.interp(times(x, rate) * (1 + drift), times(x, rate), x)
+
+    def seen(x, rate, drift):
+        return np.interp(times(x, rate) * (1 + drift), times(x, rate), x)
+
     return lambda size: Change({"drift": up * size * 4e-3}, sensor={"*": lambda x, _, rate: seen(x, rate, up * size * 4e-3)})
 
 

@@ -128,7 +128,7 @@ def simulate(world: World, motion: np.ndarray, start: np.ndarray | None = None, 
     count = int((len(motion) - 6) / KNOT_RATE * RATE + 0.5)
     time = (np.arange(len(motion)) - 2) / KNOT_RATE
     keep, table = [], (_Law * len(laws))()
-    for slot, law in zip(table, laws):
+    for slot, law in zip(table, laws, strict=True):
         slot.kind, slot.a, slot.b, slot.scale = law.kind, law.a, law.b, law.scale
         slot.p[: len(law.p)] = law.p
         if law.curve is not None:
@@ -146,4 +146,4 @@ def simulate(world: World, motion: np.ndarray, start: np.ndarray | None = None, 
     if _library().simulate(plant, x.ctypes.data, RATE, count, steps, out.ctypes.data):
         raise ArithmeticError("the hidden plant is unstable")
     z, v, a = (out[:, i * n : (i + 1) * n] for i in range(3))
-    return Motion(z, v, a, out[:, -1], dict(zip(world.laws, x[2 * n :])))
+    return Motion(z, v, a, out[:, -1], dict(zip(world.laws, x[2 * n :], strict=True)))

@@ -62,7 +62,7 @@ def noises(t: Array, low: float, high: float, fall: float, rng: np.random.Genera
     f = np.arange(low, high, 0.125)
     size = f**-fall * rng.uniform(0.5, 1.0, len(f))
     phase = rng.uniform(0.0, 2.0 * np.pi, len(f))
-    wave = sum(a * np.sin(2.0 * np.pi * x * t + p) for a, x, p in zip(size, f, phase))
+    wave = sum(a * np.sin(2.0 * np.pi * x * t + p) for a, x, p in zip(size, f, phase, strict=True))
     begin = np.clip(t / 0.5, 0.0, 1.0)
     return wave * begin**3 * (10.0 - 15.0 * begin + 6.0 * begin**2) / (2.0 * np.sqrt(np.sum(size**2) / 2.0))
 
@@ -78,12 +78,12 @@ def halfcar(kinds: list[str], seeds: list[int], seconds: float) -> list[Case]:
     rngs = [np.random.default_rng([seed, 1]) for seed in seeds]
     stated = {"m": 600.0, "J": 900.0, "mf": 40.0, "mr": 45.0, "cf": 18e3, "cr": 21e3, "df": 1300.0, "dr": 1500.0, "tf": 19e4, "tr": 20e4}
     each = [drawn(rng, **stated) for rng in rngs]
-    for one, kind, rng in zip(each, kinds, rngs):
+    for one, kind, rng in zip(each, kinds, rngs, strict=True):
         one["J"] *= 1.0 + (rng.choice([-1.0, 1.0]) * rng.uniform(0.12, 0.25) if kind == "inertia" else 0.0)
     p = {k: np.array([one[k] for one in each]) for k in stated}
-    level = np.array([rng.uniform(90.0, 180.0) if k == "friction" else 0.0 for k, rng in zip(kinds, rngs)])
+    level = np.array([rng.uniform(90.0, 180.0) if k == "friction" else 0.0 for k, rng in zip(kinds, rngs, strict=True)])
     width = np.array([rng.uniform(0.01, 0.03) for rng in rngs])
-    stiff = np.array([rng.uniform(4e4, 9e4) if k == "stop" else 0.0 for k, rng in zip(kinds, rngs)])
+    stiff = np.array([rng.uniform(4e4, 9e4) if k == "stop" else 0.0 for k, rng in zip(kinds, rngs, strict=True)])
     gap = np.array([rng.uniform(0.008, 0.014) for rng in rngs])
     heights = []
     for rng in rngs:
@@ -108,12 +108,12 @@ def halfcar(kinds: list[str], seeds: list[int], seconds: float) -> list[Case]:
 
     x = integrate(rates, u, 8)
     road = u[::HALVES]
-    acc = np.array([rates(xk, uk)[4:] for xk, uk in zip(x, road)])
+    acc = np.array([rates(xk, uk)[4:] for xk, uk in zip(x, road, strict=True)])
     sf, _, sr, _, stop, rub = parts(x.transpose(1, 0, 2))
     clean = np.stack([acc[:, 0] - a * acc[:, 1], acc[:, 0] + b * acc[:, 1], acc[:, 2], acc[:, 3], sf, sr], axis=1)
     noise = np.array([0.01, 0.01, 0.03, 0.03, 2e-5, 2e-5])
     cases = []
-    for i, (kind, seed, rng) in enumerate(zip(kinds, seeds, rngs)):
+    for i, (kind, seed, rng) in enumerate(zip(kinds, seeds, rngs, strict=True)):
         hidden = {"friction": rub[:, i], "stop": stop[:, i], "inertia": (p["J"][i] - 900.0) * acc[:, 1, i]}.get(kind, np.zeros(len(x)))
         y = clean[:, :, i] + noise * rng.standard_normal(clean.shape[:2])
         cases.append(Case("halfcar", kind, seed, t[::HALVES], road[:, :, i], y, hidden))
@@ -127,9 +127,9 @@ def drive(kinds: list[str], seeds: list[int], seconds: float) -> list[Case]:
     stated = {"jm": 0.02, "jl": 0.8, "k": 900.0, "d": 3.0, "dl": 0.5, "dm": 0.03}
     each = [drawn(rng, **stated) for rng in rngs]
     p = {k: np.array([one[k] for one in each]) for k in stated}
-    gap = np.array([rng.uniform(1e-3, 2.5e-3) if k == "backlash" else 0.0 for k, rng in zip(kinds, rngs)])
-    cubic = np.array([rng.uniform(4e6, 1e7) if k == "cubic" else 0.0 for k, rng in zip(kinds, rngs)])
-    level = np.array([rng.uniform(0.4, 1.2) if k == "friction" else 0.0 for k, rng in zip(kinds, rngs)])
+    gap = np.array([rng.uniform(1e-3, 2.5e-3) if k == "backlash" else 0.0 for k, rng in zip(kinds, rngs, strict=True)])
+    cubic = np.array([rng.uniform(4e6, 1e7) if k == "cubic" else 0.0 for k, rng in zip(kinds, rngs, strict=True)])
+    level = np.array([rng.uniform(0.4, 1.2) if k == "friction" else 0.0 for k, rng in zip(kinds, rngs, strict=True)])
     width = np.array([rng.uniform(0.05, 0.15) for rng in rngs])
     u = np.stack([2.5 * noises(t, 0.5, 10.0, 0.7, rng) for rng in rngs], axis=-1)[:, None, :]
 
@@ -145,7 +145,7 @@ def drive(kinds: list[str], seeds: list[int], seconds: float) -> list[Case]:
     x = integrate(rates, u, 4)
     _, _, shaft, rub = parts(x.transpose(1, 0, 2))
     cases = []
-    for i, (kind, seed, rng) in enumerate(zip(kinds, seeds, rngs)):
+    for i, (kind, seed, rng) in enumerate(zip(kinds, seeds, rngs, strict=True)):
         hidden = {"backlash": shaft[:, i], "cubic": shaft[:, i], "friction": rub[:, i]}.get(kind, np.zeros(len(x)))
         y = x[:, :2, i] + 1e-6 * rng.standard_normal((len(x), 2))
         cases.append(Case("drive", kind, seed, t[::HALVES], u[::HALVES, :, i], y, hidden))

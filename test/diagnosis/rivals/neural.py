@@ -2,8 +2,9 @@
 # Copyright (c) 2026 the penode authors
 """Rival of the diagnosis: an additional force without a name, a tanh network of 25 weights, fitted by output error.
 
-The network sits beside the first spring and sees deflection and rate. Parameters are first fitted within their tolerance. Two thirds of every
-training recording train it, the rest decides whether it is kept. Levenberg-Marquardt; derivatives by finite differences, all in one simulation.
+The network sits beside the first spring and sees deflection and rate. Parameters are first fitted within their tolerance. Two thirds of
+every training recording train it, the rest decides whether it is kept. Levenberg-Marquardt; derivatives by finite differences, all in one
+simulation.
 """
 
 import numpy as np
@@ -67,8 +68,8 @@ def cut(r: Recording) -> Recording:
 def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:
     lin = rig.linear(rig.fitted(data))
     starts, train, places = [rig.start(r, lin=lin) for r in data], [cut(r) for r in data], len(rig.places)
-    plain = [rig.simulate(r, x0, lin=lin) for r, x0 in zip(data, starts)]
-    moved = np.vstack([x[:, :, 0] @ lin.s.T + r.given @ lin.su.T for r, (x, _, _) in zip(data, plain)])
+    plain = [rig.simulate(r, x0, lin=lin) for r, x0 in zip(data, starts, strict=True)]
+    moved = np.vstack([x[:, :, 0] @ lin.s.T + r.given @ lin.su.T for r, (x, _, _) in zip(data, plain, strict=True)])
     s, v = moved[:, 0], moved[:, places]
     both = [rig.parameters[p] * m for m, law in ((s, "linear_spring"), (v, "linear_damper")) if (p := rig.coefficient(0, law))]
     scale = np.array([s.std(), v.std(), 0.1 * np.sum(both, axis=0).std()])
@@ -76,7 +77,7 @@ def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:
     def off(w: np.ndarray) -> np.ndarray:
         """Residuals (all samples, lanes) of the training part, with the prior's."""
         force, parts = Network(w, scale, places), []
-        for r, x0 in zip(train, starts):
+        for r, x0 in zip(train, starts, strict=True):
             said = rig.simulate(r, np.repeat(x0, w.shape[1], axis=1), force, lin)[2]
             parts.append(rig.residual(r, said).reshape(-1, w.shape[1]))
         return np.vstack([*parts, w / PRIOR])
@@ -104,7 +105,7 @@ def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:
         lanes = off(w[:, None] + change * np.eye(WEIGHTS, WEIGHTS + 1))
 
     force, won = Network(w[:, None], scale, places), []
-    for r, x0, (_, _, linear) in zip(data, starts, plain):
+    for r, x0, (_, _, linear) in zip(data, starts, plain, strict=True):
         n, second = 2 * len(r.given) // 3, round(1 / r.step)
         less = rig.residual(r, linear) ** 2 - rig.residual(r, rig.simulate(r, x0, force, lin)[2]) ** 2
         less = less.sum(axis=(1, 2))[n:]

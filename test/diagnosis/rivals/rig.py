@@ -55,7 +55,7 @@ def modal(a: np.ndarray, inputs: np.ndarray, start: np.ndarray) -> np.ndarray:
     """States (samples, n, lanes) of x[k + 1] = a x[k] + inputs[k] from `start` (n, lanes), each mode by itself."""
     poles, shapes = np.linalg.eig(a)
     driven = np.vstack([np.zeros(len(a)), np.linalg.solve(shapes, inputs.T).T])[:-1]
-    moved = np.stack([lfilter([1.0], [1.0, -pole], w) for pole, w in zip(poles, driven.T)])
+    moved = np.stack([lfilter([1.0], [1.0, -pole], w) for pole, w in zip(poles, driven.T, strict=True)])
     faded = poles[:, None] ** np.arange(len(inputs))
     free = np.einsum("ij,jk,jl->kil", shapes, faded, np.linalg.solve(shapes, start.astype(complex)), optimize=True)
     return ((shapes @ moved).T[:, :, None] + free).real
@@ -144,7 +144,10 @@ class Rig:
         n, p = 2 * len(self.bodies), len(self.places)
         points = np.eye(n + 2 + p)
         rate, moved, seen = self._evaluate(values, points[:n], points[n : n + 2], points[n + 2 :])
-        cut = lambda m: (m[:, :n], m[:, n : n + 2], m[:, n + 2 :])
+
+        def cut(m):
+            return (m[:, :n], m[:, n : n + 2], m[:, n + 2 :])
+
         (a, b, g), (s, su, _), (c, e, h) = cut(rate), cut(moved), cut(seen)
         return Linear(a, b, g, s, su, c, e, h)
 
@@ -214,7 +217,8 @@ class Rig:
         return whole[:n, :n], whole[:n, n + 4 :], given.given @ whole[:n, n : n + 2].T + slope @ whole[:n, n + 2 : n + 4].T
 
     def start(self, given: Recording, seconds: float = 3.0, lin: Linear | None = None) -> np.ndarray:
-        """State (n, 1) at the first sample, by linear least squares over the first seconds; rest has a prior, so that noise moves little."""
+        """State (n, 1) at the first sample, by linear least squares over the first seconds; rest has a prior, so that noise moves
+        little."""
         n = 2 * len(self.bodies)
         if n == 0:  # prescribed motion has no state
             return np.zeros((0, 1))
@@ -231,12 +235,12 @@ class Rig:
         names, recordings = list(self.parameters), list(recordings)
 
         def off(q: np.ndarray) -> np.ndarray:
-            lin = self.linear({k: self.parameters[k] * (1 + 0.4 * self.tolerance[k] * z) for k, z in zip(names, q)})
+            lin = self.linear({k: self.parameters[k] * (1 + 0.4 * self.tolerance[k] * z) for k, z in zip(names, q, strict=True)})
             parts = [self.residual(r, self.simulate(r, self.start(r, lin=lin), lin=lin)[2]).ravel() for r in recordings]
             return np.concatenate([*parts, q])
 
         best = least_squares(off, np.zeros(len(names)), diff_step=1e-3, max_nfev=4).x
-        return {k: self.parameters[k] * (1 + 0.4 * self.tolerance[k] * z) for k, z in zip(names, best)}
+        return {k: self.parameters[k] * (1 + 0.4 * self.tolerance[k] * z) for k, z in zip(names, best, strict=True)}
 
     def gain(self, holdout: Recording, force: Force | None, lin: Linear | None = None) -> dict[str, dict[str, float]]:
         """RMSE of every sensor on the hold-out: the file as it is, and with other parameters and the additional forces."""

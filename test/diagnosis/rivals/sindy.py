@@ -2,8 +2,9 @@
 # Copyright (c) 2026 the penode authors
 """Rival of the diagnosis: sparse regression with PySINDy on the force that the model lacks, as its users do.
 
-Deflections, rates and accelerations come from the sensors by Savitzky-Golay filters, and from the nominal simulation where there is no sensor.
-The missing force of each place is balanced from the accelerations; terms that survive thresholded least squares are read as kinds of the list.
+Deflections, rates and accelerations come from the sensors by Savitzky-Golay filters, and from the nominal simulation where there is no
+sensor. The missing force of each place is balanced from the accelerations; terms that survive thresholded least squares are read as kinds
+of the list.
 """
 
 from collections.abc import Callable
@@ -137,7 +138,7 @@ def power(term: str) -> tuple[int, int]:
 
 def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:
     parts = [states(rig, r) for r in data]
-    s, v, lacks = (np.vstack(p) for p in zip(*parts))
+    s, v, lacks = (np.vstack(p) for p in zip(*parts, strict=True))
     places, kept, causes = len(rig.places), [], []
     places_seen = balanced(rig, data)
     for place in range(places):
@@ -147,7 +148,7 @@ def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:
         scale = own(rig, place, s[:, place], v[:, place]).std()
         x = np.column_stack([s[:, place] / wide, v[:, place] / fast])
         library = ps.CustomLibrary(list(TERMS.values()))
-        np.random.seed(0)  # the ensemble draws from it
+        np.random.seed(0)  # noqa: NPY002 - the ensemble of pysindy draws from this generator
         optimizer = ps.EnsembleOptimizer(ps.STLSQ(threshold=THRESHOLD, alpha=1e-6), bagging=True, n_models=MODELS)
         sparse = ps.SINDy(optimizer=optimizer, feature_library=library)
         sparse.fit(x, t=data[0].step, x_dot=np.column_stack([lacks[:, place], lacks[:, place]]) / scale)
@@ -169,7 +170,7 @@ def answer(rig: Rig, data: list[Recording], holdout: Recording) -> dict:
     def force(s: np.ndarray, v: np.ndarray) -> np.ndarray:
         f = np.zeros_like(s)
         for i, wide, fast, scale, best in kept:
-            for k, term in zip(best, TERMS.values()):
+            for k, term in zip(best, TERMS.values(), strict=True):
                 f[i] += k * scale * term(s[i] / wide, v[i] / fast) if k else 0.0
         return f
 

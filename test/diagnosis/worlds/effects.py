@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What may hide: forces as laws of world.c, and changes of inputs and sensors. Sizes grow with x from 1, where a force is some 0.3 of that at its place."""
+"""What may hide: forces as laws of world.c, and changes of inputs and sensors. Sizes grow with x from 1, where a force is some 0.3 of that
+at its place."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class At:
-    """A place as it moves: RMS of deflection, rate and force; its stiffness and damping; seconds of the training; a sign and two shape numbers in 0..1."""
+    """A place as it moves: RMS of deflection, rate and force; its stiffness and damping; seconds of the training; a sign and two shape
+    numbers in 0..1."""
 
     s: float
     v: float

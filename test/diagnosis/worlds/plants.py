@@ -204,7 +204,8 @@ def model_text(kind: Kind, tolerance: float | None, noise: Mapping[str, float], 
             lines.append(f"{rest.pop(0)} = {{ {between}, {body} }}")
         if site.damper:
             lines.append(
-                f'{rest[0]} = {{ between = ["{kind.ends[name][0]}", "{kind.ends[name][1]}"], law = "linear_damper", damping = "{site.damper}" }}'
+                f'{rest[0]} = {{ between = ["{kind.ends[name][0]}", "{kind.ends[name][1]}"], '
+                f'law = "linear_damper", damping = "{site.damper}" }}'
             )
     if (k := kind.drive()) >= 0:
         lines.append(f'actuator = {{ between = ["{kind.masses[0][0]}", "ground"], law = "expression", force = "-{list(kind.inputs)[k]}" }}')

@@ -33,7 +33,7 @@ def waves(rng: np.random.Generator, seconds: float, low: float, high: float, fal
     f = np.sort(np.exp(rng.uniform(np.log(low), np.log(high), 60)))
     size = f ** (0.5 - fall)
     wave = np.zeros(len(t))
-    for a, x, p in zip(size, f, rng.uniform(0, 2 * np.pi, len(f))):
+    for a, x, p in zip(size, f, rng.uniform(0, 2 * np.pi, len(f)), strict=True):
         wave += a * np.sin(2 * np.pi * x * t + p)
     return wave / rms(wave) * (0.5 - 0.5 * np.cos(np.pi * np.clip((t - LEAD) / 0.4, 0, 1)))
 

@@ -113,7 +113,7 @@ class World:
         elif kind in effects.SENSOR:
             site = str(pick.choice(list(self.kind.sensors)))
         elif kind in effects.INPUT:
-            site = list(self.kind.inputs)[0]
+            site = next(iter(self.kind.inputs))
         elif kind in ("hidden_resonance", "constant_force"):
             site = bodies[0]
         else:
@@ -242,7 +242,7 @@ class World:
         return beside(f, *self.columns(name))
 
     def columns(self, name: str) -> list[Array]:
-        """What free parameters of a site may take: deflection (or its sine) where it has a spring, rate where it has a damper, else acceleration."""
+        """What free parameters of a site may take: deflection (or its sine) beside a spring, rate beside a damper, else acceleration."""
         site, r = self.kind.sites[name][0], self.runs["train_1"]
         spring = np.sin(r.s[name]) if name == self.kind.sine else r.s[name]
         both = [spring] * bool(site.spring) + [r.v[name]] * bool(site.damper)

@@ -2,10 +2,11 @@
 # Copyright (c) 2026 the penode authors
 """Plain Adam on whole trajectories, in JAX: what training the two networks of a quarter vehicle costs without penode.
 
-`adam.py WORK.npz OUT.npz` reads road, accelerations and their noise (campaign_adam.py writes them) and trains two ReLU networks 1-16-16-16-1 through
-Runge-Kutta steps of the recording's 1 ms, start state too, by the gradient over the whole recording. Physical parameters are known. The
-loop is compiled (lax.scan) and the same in diffrax is timed beside it; the faster one is run to its end. The rate of learning is that of three that
-came furthest on the first ten seconds; it falls to 0 as half a cosine. What is reached is kept every 50 epochs, and a call goes on there.
+`adam.py WORK.npz OUT.npz` reads road, accelerations and their noise (campaign_adam.py writes them) and trains two ReLU networks
+1-16-16-16-1 through Runge-Kutta steps of the recording's 1 ms, start state too, by the gradient over the whole recording. Physical
+parameters are known. The loop is compiled (lax.scan) and the same in diffrax is timed beside it; the faster one is run to its end. The rate
+of learning is that of three that came furthest on the first ten seconds; it falls to 0 as half a cosine. What is reached is kept every 50
+epochs, and a call goes on there.
 """
 
 from __future__ import annotations
@@ -151,7 +152,10 @@ def keep(out: Path, p: Tree, state: tuple[Tree, Tree], facts: dict[str, Any]) ->
     """All that a later call goes on from."""
     leaves = {f"leaf{n}": np.asarray(v) for n, v in enumerate(jax.tree.leaves((p, state)))}
     nets = {
-        f"{name}_{kind}{n}": np.asarray(v) for name in ("spring", "damper") for n, pair in enumerate(p[name]) for kind, v in zip("wb", pair)
+        f"{name}_{kind}{n}": np.asarray(v)
+        for name in ("spring", "damper")
+        for n, pair in enumerate(p[name])
+        for kind, v in zip("wb", pair, strict=True)
     }
     part = out.with_suffix(".part.npz")
     np.savez(part, **leaves, **nets, facts=json.dumps(facts))

@@ -64,9 +64,9 @@ class Motion:
 class Part:
     """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies
     it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values.
-    `force(motion, **shapes)` returns the force [n] for gain 1; given where that is faster than a simulation. A shape stays within a factor of
-    `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump, and may become
-    as small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another cause."""
+    `force(motion, **shapes)` returns the force [n] for gain 1; given where that is faster than a simulation. A shape stays within a factor
+    of `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump, and may become as
+    small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another cause."""
 
     law: str
     gain: tuple[str, str]
@@ -102,7 +102,8 @@ class Series:
 @dataclass(frozen=True, eq=False)
 class Form:
     """A form of a kind at a place of the model (its index), an input or a sensor (its index): `how` is "force", or what is wrong with the
-    input ("input_gain", ..., "input_added": a `series`) or sensor ("scale", "late", "clip": beyond a `limit`). Of one family, forms stand for the same name."""
+    input ("input_gain", ..., "input_added": a `series`) or sensor ("scale", "late", "clip": beyond a `limit`). Of one family, forms stand
+    for the same name."""
 
     kind: str
     where: str
@@ -138,9 +139,9 @@ class Sizes:
 
 
 class Kind(Protocol):
-    """A file of the catalogue, for kinds of one curve. `forms` that may be at a place, given the motion of it; `MEANING` of each in a sentence;
-    `sizes`: what a report gives of a form, name to unit and value (SI); `ONE`: only one of them is at a place, another one is but a form
-    of it; `STRAIGHT`: kinds with a straight part, which a place shares with its linear elements."""
+    """A file of the catalogue, for kinds of one curve. `forms` that may be at a place, given the motion of it; `MEANING` of each in a
+    sentence; `sizes`: what a report gives of a form, name to unit and value (SI); `ONE`: only one of them is at a place, another one is but
+    a form of it; `STRAIGHT`: kinds with a straight part, which a place shares with its linear elements."""
 
     KINDS: tuple[str, ...]
     MEANING: dict[str, str]

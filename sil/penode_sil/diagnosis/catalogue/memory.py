@@ -19,7 +19,8 @@ from penode_gen import laws
 from ...batch import Batch
 
 Array = NDArray[np.float64]
-PERIOD = 256  # least steps in a period of the motion: gas in a pocket of a tenth of it is 75 times as fast, and Runge-Kutta is stable up to 2.78 a step
+# least steps in a period of the motion: gas in a pocket of a tenth of it is 75 times as fast, and Runge-Kutta is stable up to 2.78 a step
+PERIOD = 256
 MODEL = """[model]
 name = "memory"
 sample_time = "{step!r} s"

@@ -111,7 +111,7 @@ def build(
             for j in range(len(noise))
         ]
     )
-    for s, span, mean in zip(model.sensors, spans, means):
+    for s, span, mean in zip(model.sensors, spans, means, strict=True):
         free.append(Free(bias(s.name), 0.0, span, sigma=span + mean))
     plain = Fit((), Filter.none(0, 0), *(np.zeros(0),) * 2, np.zeros(0, bool), np.zeros(0), 0.0, 0.0)
     longest = sum(map(len, records)) * records[0].step
@@ -207,7 +207,7 @@ def fit_level(bench: Bench, problem: Problem, fit: Fit, level: Level) -> tuple[L
     gains = bench.gains(fit, problem.predictor.model)
     period = gains.period
     tried = [level] + [Level(size, CORRELATION * period) for size in SIZES]
-    filters = [gains.at(l) for l in tried]
+    filters = [gains.at(some) for some in tried]
     nu = problem.nu(fit.free, np.zeros((len(tried), len(fit.free))), Filter.many(filters))
     worth = [likelihood(n, np.isfinite(n), problem.floor)[1] for n in nu]
     best = int(np.argmax(worth))

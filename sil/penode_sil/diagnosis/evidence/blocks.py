@@ -44,11 +44,11 @@ class Blocks:
         """Log predictive density [blocks] of each block by the fit of the others."""
         lefts = [self.number == b for b in range(BLOCKS)]
         parts = problem.without(fit, lefts, REFIT)
-        return np.array([predictive(part, left, problem.floor) for part, left in zip(parts, lefts)])
+        return np.array([predictive(part, left, problem.floor) for part, left in zip(parts, lefts, strict=True)])
 
     def fit_level(self, bench: Bench, problem: Problem, fit: Fit, level: Level, sizes: Sequence[float]) -> tuple[Level, Fit, Array]:
-        """The level with which left-out blocks are predicted best, that of a fit or one of other `sizes`, the fit with it, and its scores. The
-        likeliest level in training is too small where few updates meet many free values: they then follow what should wander."""
+        """The level with which left-out blocks are predicted best, that of a fit or one of other `sizes`, the fit with it, and its scores.
+        The likeliest level in training is too small where few updates meet many free values: they then follow what should wander."""
         best = level, fit, self.scores(problem, fit)
         gains = bench.gains(fit, problem.predictor.model)
         for size in sizes:
@@ -76,7 +76,8 @@ def predictive(part: Fit, left: NDArray[np.bool_], floor: Array) -> float:
 
 
 def spread(x: Array, floor: float) -> float:
-    """Square of the width of a Student's t with FREEDOM degrees that fits x best (Lange, Little and Taylor, JASA 84, 1989), at least floor."""
+    """Square of the width of a Student's t with FREEDOM degrees that fits x best (Lange, Little and Taylor, JASA 84, 1989), at least
+    floor."""
     width, before = max(float(np.mean(x**2)), floor), 0.0
     while abs(width - before) > 1e-5 * width:
         weight = (FREEDOM + 1.0) / (FREEDOM + x**2 / width)

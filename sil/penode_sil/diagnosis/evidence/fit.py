@@ -60,8 +60,8 @@ class Fit:
         return float(np.sqrt(self.covariance(known)[i, i])) * (abs(f.value) if f.log else f.unit)
 
     def taken(self, after: Fit, floor: Array) -> Array:
-        """Share [n_z] of the power of each sensor's innovations beyond that of its noise, `floor` [n_z], that another fit takes away; what is
-        within three deviations of an estimate of power from so many updates is noise."""
+        """Share [n_z] of the power of each sensor's innovations beyond that of its noise, `floor` [n_z], that another fit takes away; what
+        is within three deviations of an estimate of power from so many updates is noise."""
         count = np.maximum(np.sum(self.used, axis=0), 1)
         beyond = np.maximum(self.variance - floor, 3.0 * np.sqrt(2.0 / count) * self.variance)
         return np.clip((self.variance - after.variance) / beyond, 0.0, 1.0)
@@ -147,11 +147,11 @@ class Problem:
         parts = [self._at(fit, fit.nu, left, fit.free) for left in lefts]
         shifts = np.zeros((len(lefts), len(fit.free)))
         for _ in range(iterations):
-            steps = np.array([shift + self._steps(part) for shift, part in zip(shifts, parts)])  # [lefts, dampings, free]
+            steps = np.array([shift + self._steps(part) for shift, part in zip(shifts, parts, strict=True)])  # [lefts, dampings, free]
             nu = self.nu(fit.free, steps.reshape(-1, len(fit.free)), fit.by).reshape(*steps.shape[:2], *fit.nu.shape)
             gained = 0.0
             for b, left in enumerate(lefts):
-                tried = [self._at(fit, n, left, put(fit.free, s)) for n, s in zip(nu[b], steps[b])]
+                tried = [self._at(fit, n, left, put(fit.free, s)) for n, s in zip(nu[b], steps[b], strict=True)]
                 best = int(np.argmax([t.cost if np.isfinite(t.cost) else -np.inf for t in tried]))
                 if tried[best].cost > parts[b].cost + 1e-9:
                     gained = max(gained, tried[best].cost - parts[b].cost)
@@ -171,7 +171,7 @@ class Problem:
         rest = (fit.nu / np.sqrt(fit.variance))[fit.used]
         curvature = rows.T @ rows + np.diag(precisions(fit.free) ** 2)
         slope = -rows.T @ rest - prior_slopes(fit.free)
-        stuck = [(f.value <= f.low and s <= 0.0) or (f.value >= f.high and s >= 0.0) for f, s in zip(fit.free, slope)]
+        stuck = [(f.value <= f.low and s <= 0.0) or (f.value >= f.high and s >= 0.0) for f, s in zip(fit.free, slope, strict=True)]
         slope[stuck] = 0.0
         curvature[stuck], curvature[:, stuck] = 0.0, 0.0
         size = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
@@ -181,4 +181,4 @@ class Problem:
 
 
 def put(free: Sequence[Free], shift: Array) -> tuple[Free, ...]:
-    return tuple(replace(f, value=float(f.at(s))) for f, s in zip(free, shift))
+    return tuple(replace(f, value=float(f.at(s))) for f, s in zip(free, shift, strict=True))

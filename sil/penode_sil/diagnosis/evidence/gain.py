@@ -57,7 +57,7 @@ class Gains:
             return Filter.none(len(self.into), n_z)
         a = self.plant.a.copy()
         drive = np.zeros((n_x, n_x))
-        for i, force in zip(self._wanders, self.forces):
+        for i, force in zip(self._wanders, self.forces, strict=True):
             if is_force(self.names[i]):
                 a[i, i] = -1.0 / level.tau
                 drive[i, i] = 2.0 * (level.size * force) ** 2 / level.tau

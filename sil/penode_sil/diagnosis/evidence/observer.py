@@ -81,8 +81,8 @@ def augmented(model: Model, places: Sequence[Place]) -> Model:
     units = [rotational_unit(model, e, "m/s^2" if model.bodies else "N") for e in ends]
     names = [f"{WANDER}{k}" for k in range(len(ends))]
     masses = [f"{b.mass}*" for b in model.bodies] or [""] * len(ends)
-    forces = [Element(name, e, "expression", expression=f"{mass}{name}_f") for name, e, mass in zip(names, ends, masses)]
-    states = [State(f"{name}_f", u) for name, u in zip(names, units)]
+    forces = [Element(name, e, "expression", expression=f"{mass}{name}_f") for name, e, mass in zip(names, ends, masses, strict=True)]
+    states = [State(f"{name}_f", u) for name, u in zip(names, units, strict=True)]
     laws = [Equation(name, f"der({name}_f)*{WANDER}_tau = -{name}_f") for name in names]
     wide = replace(
         model, parameters={**model.parameters, **free}, extra_states=(*model.extra_states, *states), equations=(*model.equations, *laws)
@@ -204,7 +204,8 @@ class Predictor:
         return found
 
     def _scales(self, parameters: Mapping[str, Array]) -> Array:
-        """Scales of sensors, [1, n_z] or [runs, 1, n_z]. Filters are for sensors of scale 1: without this a fitted scale would tune them."""
+        """Scales of sensors, [1, n_z] or [runs, 1, n_z]. Filters are for sensors of scale 1: without this a fitted scale would tune
+        them."""
         known = [parameters.get(scale(s.name), np.ones(1)) for s in self.model.sensors[: self.n_z]]
         return np.stack(np.broadcast_arrays(*known), axis=-1)[:, None, :] if any(len(k) > 1 for k in known) else np.array(known).T
 
@@ -256,7 +257,7 @@ class Predictor:
         start = np.tile(np.array(self.model.start, dtype=float), (runs, 1))
         parameters: dict[str, Array] = {}
         u, y = record.u, record.y
-        for f, shift in zip(free, shifts.T):
+        for f, shift in zip(free, shifts.T, strict=True):
             values = f.at(shift)
             if isinstance(f.target, str):
                 parameters[f.target] = values
@@ -299,5 +300,5 @@ def driven(how: str, u: Array, values: Array, step: float) -> Array:
         case "input_delay":
             return moved(u[0], values / step)
         case "input_lag":
-            return np.array([x[0] + lag(x - x[0], max(tau, 1e-3 * step), step) for x, tau in zip(u, values)])
+            return np.array([x[0] + lag(x - x[0], max(tau, 1e-3 * step), step) for x, tau in zip(u, values, strict=True)])
     raise ValueError(how)

@@ -27,7 +27,8 @@ def shown(series: Sequence[Array]) -> float:
 
 
 def bent(series: Sequence[Array]) -> float:
-    """The same from second differences, whose variance is six times that of the noise, and which are also bent by motion; 0 if there are none."""
+    """The same from second differences, whose variance is six times that of the noise, and which are also bent by motion; 0 if there are
+    none."""
     bends = np.concatenate([np.diff(x, 2) for x in series])
     bends = bends[np.isfinite(bends)]
     return float(np.sqrt(np.mean(bends**2) / 6.0)) if bends.size else 0.0
@@ -43,5 +44,5 @@ def _spectra(x: Array) -> list[Array]:
 def noise(series: Sequence[Sequence[Array]], stated: Array) -> Array:
     """Noise of a sample [n_z], in the sensors' SI units: what the file states, but not more than second differences show; of a sensor for
     which it states nothing (0), what the spectrum shows."""
-    own = [min(bent(s) or most, most) if most > 0.0 else shown(s) for s, most in zip(series, stated)]
+    own = [min(bent(s) or most, most) if most > 0.0 else shown(s) for s, most in zip(series, stated, strict=True)]
     return np.maximum(own, 1e-12)
