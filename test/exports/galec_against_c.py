@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from galec import Block
 
-from penode_gen.exports import efmu_code
+from penode_gen.exports.efmu import code as efmu_code
 from penode_sil.targets import Sil
 
 

@@ -21,7 +21,7 @@ from galec_types import GalecError
 
 import penode_gen
 from penode_gen import exports
-from penode_gen.exports import efmu_code, efmu_manifest, efmu_schemas
+from penode_gen.exports.efmu import code as efmu_code, manifest as efmu_manifest, schemas as efmu_schemas
 from penode_sil.cli import cli
 
 sys.path.append(str(ROOT / "test" / "gen"))

@@ -350,7 +350,7 @@ def test_models_without_inputs_states_sensors_or_sets(tmp_path: Path) -> None:
 
 def test_all_functions_of_the_standard_are_there(unpacked: Unpacked) -> None:
     """Importers that look for each of them find it."""
-    from penode_gen.exports.fmi_functions import functions
+    from penode_gen.exports.fmi.functions import functions
 
     library = ctypes.CDLL(str(next(unpacked.folder.rglob("*.so"))))
     assert (

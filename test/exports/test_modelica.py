@@ -85,7 +85,7 @@ def test_a_foreign_compiler_reads_the_values_of_the_record(nqvm: Any, tmp_path: 
         f"{''.join(lines)}  der(x) = 1.0;\nend Probe;\n"
     )
     result = rumoca.Session().load(str(tmp_path / "Probe.mo"), model="Probe").simulate(0.01, dt=0.01)
-    from penode_gen.exports.modelica_model import arrays
+    from penode_gen.exports.modelica.model import arrays
 
     for name, values in arrays(nqvm.sets["default"].networks["damper_net"]):
         for index in np.ndindex(values.shape):

@@ -16,8 +16,8 @@ import pytest
 from conftest import ROOT, chirp
 from master import Unpacked
 
-from penode_gen.exports import fmu_files
-from penode_gen.exports.fmi_functions import functions
+from penode_gen.exports.fmi import files as fmu_files
+from penode_gen.exports.fmi.functions import functions
 from penode_sil.schedule import Call
 from penode_sil.targets import Sil
 

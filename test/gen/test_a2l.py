@@ -19,7 +19,7 @@ from models import RICH, network_file
 
 import penode_gen
 from penode_gen import exports
-from penode_gen.exports import a2l, elf_types
+from penode_gen.exports.a2l import a2l, elf_types
 from penode_gen.sets import layout
 from penode_sil.calibration import a2l_read, virtual
 

@@ -16,7 +16,7 @@ from models import RICH, network_file
 
 import penode_gen
 from penode_gen import exports
-from penode_gen.exports import a2l, a2l_lists, elf_types
+from penode_gen.exports.a2l import a2l, elf_types, lists as a2l_lists
 from penode_sil.calibration import a2l_read, measure, virtual
 from penode_sil.errors import UserError
 

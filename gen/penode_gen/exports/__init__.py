@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Exports of a model into the formats of other tools: one file a format, one line of FORMATS for each."""
+"""Exports of a model into the formats of other tools: a package for each family of formats, a line of FORMATS for each format."""
 
 from __future__ import annotations
 
@@ -14,7 +14,14 @@ from .interface import Exporter, ExportError, Option, Options, run
 __all__ = ["FORMATS", "ExportError", "Exporter", "Option", "Options", "export", "exporter"]
 
 # Name on the command line -> module of this package, whose EXPORTER it is. A new format is a new line.
-FORMATS: dict[str, str] = {"fmu3": "fmu3", "fmu2": "fmu2", "modelica": "modelica", "ssp": "ssp", "a2l": "a2l", "efmu": "efmu"}
+FORMATS: dict[str, str] = {
+    "fmu3": "fmi.fmu3",
+    "fmu2": "fmi.fmu2",
+    "modelica": "modelica.modelica",
+    "ssp": "ssp.ssp",
+    "a2l": "a2l.a2l",
+    "efmu": "efmu.efmu",
+}
 
 
 @cache

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What an export is. A format is a file of this package that ends in `EXPORTER = Exporter(...)`, and a line of FORMATS in `__init__.py`."""
+"""What an export is. A format is a module below this package that ends in `EXPORTER = Exporter(...)`, and a line of FORMATS."""
 
 from __future__ import annotations
 

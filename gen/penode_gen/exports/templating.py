@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The templates of the exports, in templates/ beside this file. Filters: `xml` and `c` escape a text, `number` prints all digits of a double."""
+"""
+The templates of the exports: "ssp/system.xml.j2" is ssp/templates/system.xml.j2.
+
+Filters: `xml` and `c` escape a text, `number` prints all digits of a double.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +31,9 @@ def c_string(text: object) -> str:
     return "".join(chr(b) if b < 128 and b not in _C else _C.get(b, f"\\{b:03o}") for b in str(text).encode())
 
 
+_FOLDERS = sorted(Path(__file__).parent.glob("*/templates"))
 _ENVIRONMENT = jinja2.Environment(
-    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    loader=jinja2.PrefixLoader({folder.parent.name: jinja2.FileSystemLoader(folder) for folder in _FOLDERS}),
     bytecode_cache=compiled_templates(),
     undefined=jinja2.StrictUndefined,
     trim_blocks=True,

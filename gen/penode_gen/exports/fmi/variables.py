@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The variables of an FMU: names, places and start values, for FMI 2 and FMI 3 alike."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product, repeat
+from math import prod
+
+import numpy as np
+
+from ... import units
+from ...model import Model
+from ...sets import layout, packing
+from ..interface import ExportError
+
+BETWEEN = ("held", "linear")  # choices of input_between_samples
+
+
+@dataclass(frozen=True)
+class Variable:
+    """
+    A variable; its elements, row by row, have the places [first, first + count) of templates/fmu_core.h.j2.
+
+    `kind` is "real", "whole" or "choice" (of `choices`, from 1); `start` is None where the FMU computes the value.
+    """
+
+    key: str  # its group
+    name: str
+    first: int
+    causality: str
+    variability: str
+    description: str
+    unit: str = ""
+    shape: tuple[int, ...] = ()
+    start: tuple[float, ...] | None = None
+    kind: str = "real"
+    choices: tuple[str, ...] = ()
+    minimum: float | None = None
+    maximum: float | None = None
+
+    @property
+    def count(self) -> int:
+        return prod(self.shape)
+
+    @property
+    def initial(self) -> str:
+        """As in the standard; empty for the independent variable and for inputs, whose start is always exact."""
+        return "" if self.causality in ("independent", "input") else "calculated" if self.start is None else "exact"
+
+    @property
+    def letter(self) -> str:
+        return {"real": "r", "whole": "u", "choice": "e"}[self.kind]
+
+    @property
+    def start_text(self) -> str:
+        """The start values with a blank between."""
+        return " ".join(number(v, self.kind) for v in self.start or ())
+
+    def elements(self) -> Iterator[tuple[str, int, float | None]]:
+        """Name, place and start of each element: W[1,2] as FMI 2 and Modelica write it."""
+        starts = repeat(None) if self.start is None else self.start
+        indices = product(*([str(k + 1) for k in range(n)] for n in self.shape))
+        names = (f"{self.name}[{','.join(index)}]" for index in indices) if self.shape else (self.name,)
+        yield from zip(names, range(self.first, self.first + self.count), starts)
+
+    def scalars(self, head: str, body: str) -> str:
+        """The lines of all elements in FMI 2, with what they share: attributes, and the element inside. 200 000 of them are too many for a template's loop."""
+        before, between = '    <ScalarVariable name="', f" {head}><{body}"
+        if self.start is None:
+            return "".join(f'{before}{name}" valueReference="{place}"{between}/></ScalarVariable>\n' for name, place, _ in self.elements())
+        kind = "choice" if self.kind == "choice" else "real"
+        return "".join(
+            f'{before}{name}" valueReference="{place}"{between} start="{number(start, kind)}"/></ScalarVariable>\n'
+            for (name, place, _), start in zip(self.elements(), self.start)
+        )
+
+
+def number(value: float, kind: str = "real") -> str:
+    """The shortest text that is read as the same double."""
+    return repr(float(value)) if kind == "real" else str(int(value))
+
+
+class _Table:
+    def __init__(self) -> None:
+        self.variables: list[Variable] = []
+        self.end = 0
+
+    def add(self, key: str, name: str, causality: str, variability: str, description: str, **more: object) -> None:
+        self.variables.append(Variable(key, name, self.end, causality, variability, description, **more))  # type: ignore[arg-type]
+        self.end += self.variables[-1].count
+
+
+def variables(model: Model, dtype: type = np.float32) -> list[Variable]:
+    """All variables by place. Raises ExportError where two have one name."""
+    table = _Table()
+    table.add("time", "time", "independent", "continuous", "simulation time", unit="s")
+    table.add(
+        "parameter_set",
+        "parameter_set",
+        "parameter",
+        "tunable",
+        "named parameter set, selected without copying",
+        kind="choice",
+        choices=tuple(model.sets),
+        start=(1.0,),
+    )
+    table.add(
+        "between",
+        "input_between_samples",
+        "parameter",
+        "fixed",
+        "held: inputs keep their value over a step; linear: they reach their early.* at its end",
+        kind="choice",
+        choices=BETWEEN,
+        start=(2.0 if model.sampled else 1.0,),
+    )
+    table.add("set_id", "set_id", "output", "discrete", "id of the set in force; 1000 and more: written by the master", kind="whole")
+    table.add("status", "status", "output", "discrete", "flags of penode/pen_status.h of the last communication step", kind="whole")
+    table.add("checksum", "set_checksum", "output", "discrete", "CRC-32 of the set in force", kind="whole")
+    _signals(table, model)
+    n_x, n_u = len(model.states), len(model.inputs)
+    if n_x:
+        table.add(
+            "state_state",
+            "jacobian.state_state",
+            "local",
+            "continuous",
+            "state at the end of the last communication step by the state at its start",
+            shape=(n_x, n_x),
+        )
+    if n_x and n_u:
+        table.add(
+            "state_input",
+            "jacobian.state_input",
+            "local",
+            "continuous",
+            "state at the end of the last communication step by the inputs",
+            shape=(n_x, n_u),
+        )
+    values = packing.set_values(model, "default", dtype)
+    described = {p.name: p.description for p in model.tunable} | {n: p.description for n, p in model.networks.items()}
+    for array in layout.arrays(model):
+        start = tuple(map(float, np.ravel(layout.gather(array, values))))
+        owner, _, part = array.name.partition(".")
+        words = f"{part.replace('_', ' ')}: {described.get(owner, '')}" if part else described.get(owner, "")
+        table.add(
+            "tunable",
+            array.name,
+            "parameter",
+            "tunable",
+            words.strip(": "),
+            unit=units.si(array.unit) if array.unit else "",
+            shape=array.shape,
+            start=start,
+        )
+    _check_names(table.variables)
+    return table.variables
+
+
+def _signals(table: _Table, model: Model) -> None:
+    """Inputs, outputs, sensors, states and constants."""
+    for i in model.inputs:
+        limits = {"minimum": i.minimum, "maximum": i.maximum}
+        start = min(max(0.0, i.minimum if i.minimum is not None else 0.0), i.maximum if i.maximum is not None else np.inf)
+        table.add("input", i.name, "input", "continuous", i.description, unit=units.si(i.unit), start=(float(start),), **limits)
+    for i in model.inputs:
+        start = table.variables[-len(model.inputs)].start
+        words = f"{i.name} at the end of the next communication step; read where input_between_samples is linear"
+        table.add("early", f"early.{i.name}", "input", "continuous", words, unit=units.si(i.unit), start=start)
+    for key, signals in (("output", model.outputs), ("sensor", model.sensors)):
+        for o in signals:
+            table.add(key, o.name, "output", "continuous", o.description, unit=units.si(o.unit))
+    of = _state_units(model)
+    for name, start in zip(model.states, model.start):
+        table.add("state", f"state.{name}", "local", "continuous", f"state {name}", unit=of[name], start=(float(start),))
+    for p in model.parameters.values():
+        if not p.tunable:
+            table.add("constant", p.name, "local", "constant", p.description, unit=units.si(p.unit), start=(float(p.value),))
+
+
+def _state_units(model: Model) -> dict[str, str]:
+    from ...algebra.mechanics import state_unit
+
+    return {name: units.si(state_unit(model, name)) for name in model.states}
+
+
+def _check_names(found: list[Variable]) -> None:
+    seen: dict[str, Variable] = {}
+    problems = []
+    for v in found:
+        if v.name in seen:
+            problems.append(
+                f"'{v.name}' would be two variables of the FMU, {v.causality} and {seen[v.name].causality}; rename one of them in the model file"
+            )
+        seen[v.name] = v
+    if problems:
+        raise ExportError(*problems)
+
+
+def groups(found: list[Variable]) -> list[dict[str, object]]:
+    """First place of each group, in the order in which fmu_sets.c.j2 tells places apart."""
+    keys = (
+        "time",
+        "parameter_set",
+        "between",
+        "set_id",
+        "status",
+        "checksum",
+        "input",
+        "early",
+        "output",
+        "sensor",
+        "state",
+        "constant",
+        "state_state",
+        "state_input",
+        "tunable",
+    )
+    first: dict[str, int] = {}
+    at = found[-1].first + found[-1].count
+    for key in reversed(keys):
+        at = first[key] = next((v.first for v in found if v.key == key), at)
+    return [{"key": key, "first": first[key]} for key in keys]
+
+
+_BASE = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[current]": "A", "[temperature]": "K", "[substance]": "mol", "[luminosity]": "cd"}
+
+
+def unit_definitions(found: list[Variable]) -> list[dict[str, object]]:
+    """Each unit once, with its exponents of SI base units; None where one is no whole number."""
+    definitions = []
+    for text in sorted({v.unit for v in found if v.unit}):
+        powers = {_BASE[k]: float(p) for k, p in units.dimension(text).items() if k in _BASE and p}
+        whole = all(p.is_integer() for p in powers.values())
+        base = {k: int(p) for k, p in powers.items()} if whole else None
+        definitions.append({"name": text, "base": base, "type": f"in {text}"})
+    return definitions
+
+
+def identifier(model: Model) -> str:
+    """The model identifier: the model's name, which is one already."""
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", model.name):
+        raise ExportError(f"the name '{model.name}' is no C identifier; rename the model")
+    return model.name
