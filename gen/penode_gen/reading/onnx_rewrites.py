@@ -22,6 +22,7 @@ from onnx import ModelProto, NodeProto, helper, numpy_helper, shape_inference
 from onnx.reference import ReferenceEvaluator
 
 from ..networks import Affine, Dense, Layer, Network, NetworkError
+from .onnx_graph import attribute
 
 Values = NDArray[Any]
 PIECEWISE = ("LeakyRelu", "PRelu", "Clip", "Max", "Min")  # rewritten, unless reader or rule finds a plainer form
@@ -147,20 +148,20 @@ class _Graph:
         if (
             len(node.input) < 5
             or any(n not in self.constants for n in node.input[1:5])
-            or _attribute(node, "training_mode", 0)
+            or attribute(node, "training_mode", 0)
             or self.ranks.get(node.input[0]) != 2
         ):
             return None
         scale, bias, mean, variance = (self.constants[n].astype(np.float64) for n in node.input[1:5])
-        factor = scale / np.sqrt(variance + _attribute(node, "epsilon", 1e-5))
+        factor = scale / np.sqrt(variance + attribute(node, "epsilon", 1e-5))
         shift, kind = bias - mean * factor, self.constants[node.input[1]].dtype
         before = next((n for n in self.nodes if node.input[0] in n.output), None)
         if before is not None and self.folds(before):
             weights = self.constants[before.input[1]].astype(np.float64)
-            turned = _attribute(before, "transB", 0)
-            weights = _attribute(before, "alpha", 1.0) * (weights * factor[:, None] if turned else weights * factor)
+            turned = attribute(before, "transB", 0)
+            weights = attribute(before, "alpha", 1.0) * (weights * factor[:, None] if turned else weights * factor)
             if len(before.input) > 2 and before.input[2]:
-                shift = shift + _attribute(before, "beta", 1.0) * self.constants[before.input[2]].astype(np.float64) * factor
+                shift = shift + attribute(before, "beta", 1.0) * self.constants[before.input[2]].astype(np.float64) * factor
             self.nodes.remove(before)
             names = [before.input[0], self.constant(weights.astype(kind)), self.constant(np.atleast_1d(shift).astype(kind))]
             return [helper.make_node("Gemm", names, [node.output[0]], node.name, transB=turned)]
@@ -172,7 +173,7 @@ class _Graph:
 
     def folds(self, before: NodeProto) -> bool:
         """Can a Gemm take what scales its result? A transposed signal is left to the reader, which refuses it."""
-        plain = before.op_type == "Gemm" and not before.domain and not _attribute(before, "transA", 0)
+        plain = before.op_type == "Gemm" and not before.domain and not attribute(before, "transA", 0)
         return plain and self.users(before.output[0]) == 1 and all(n in self.constants for n in before.input[1:])
 
     def along(self, value: Values, source: str) -> Values | None:
@@ -184,14 +185,12 @@ class _Graph:
 
     def users(self, name: str) -> int:
         """How many nodes of the file take a tensor."""
-        return sum(list(n.input).count(name) for n in self.model.graph.node) + sum(o.name == name for o in self.model.graph.output)
+        taken = [t for n in self.model.graph.node for t in n.input] + [o.name for o in self.model.graph.output]
+        return taken.count(name)
 
     def leaky(self, node: NodeProto) -> list[NodeProto] | None:
         """relu(x) - a relu(-x)."""
-        if node.op_type == "PRelu":
-            slope = self.constants.get(node.input[1])
-        else:
-            slope = np.array(_attribute(node, "alpha", 0.01))
+        slope = self.constants.get(node.input[1]) if node.op_type == "PRelu" else np.array(attribute(node, "alpha", 0.01))
         by = None if slope is None else self.along(slope, node.input[0])
         if by is None:
             return None
@@ -205,9 +204,8 @@ class _Graph:
             given = node.input[position] if len(node.input) > position else ""
             if given and (given not in self.constants or self.constants[given].size != 1):
                 return None
-            value = self.constants[given].item() if given else _attribute(node, name, None)
-            none = value is None or (value <= -FAR if name == "min" else value >= FAR)
-            limits.append(None if none else float(value))
+            value: float | None = self.constants[given].item() if given else attribute(node, name, None)
+            limits.append(None if value is None or (value <= -FAR if name == "min" else value >= FAR) else float(value))
         low, high = limits
         if high is None and low is not None:
             return self.above(node, node.input[0], np.array([low]))
@@ -278,10 +276,6 @@ class _Graph:
         return (first, second) if first in fed and second in fed and first != second else None
 
 
-def _attribute(node: NodeProto, name: str, default: Any) -> Any:
-    return next((helper.get_attribute_value(a) for a in node.attribute if a.name == name), default)
-
-
 def _dense(layers: tuple[Layer, ...]) -> tuple[Layer, ...]:
     """Scalings as dense layers too."""
     found: list[Layer] = []
@@ -308,7 +302,7 @@ def _fused(layers: tuple[Layer, ...]) -> tuple[Layer, ...]:
 def _beside(first: tuple[Layer, ...], second: tuple[Layer, ...]) -> tuple[Layer, ...]:
     """Two chains as one whose output is their difference; units stand in pairs, so that equal ones cancel exactly in any sum."""
     found: list[Layer] = []
-    for n, (a, b) in enumerate(zip(first, second)):
+    for n, (a, b) in enumerate(zip(first, second, strict=True)):
         assert isinstance(a, Dense) and isinstance(b, Dense)
         start, end = n == 0, n == len(first) - 1
         rows = np.zeros((2 * a.n_out, a.n_in if start else 2 * a.n_in))
