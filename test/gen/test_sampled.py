@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_gen.emission.model_c import _Emitter
+from penode_gen.emission.model_c import Emitter
 from penode_gen.twins.evaluate import Evaluator
 from penode_sil import mil, scenario
 from penode_sil.batch import Batch
@@ -108,7 +108,7 @@ def test_c_batch_and_evaluator_agree_to_the_bit(load, tmp_path, method, input, s
     assert np.array_equal(run.y, wanted[:, [1, 0]]) and np.array_equal(run.z[:, :2], wanted[:, 2:])
     assert all(np.array_equal(a, b[0]) for a, b in ((run.x, batch.x), (run.y, batch.y), (run.z, batch.z)))
     assert np.array_equal(batch.x[1], Sil(model, dtype).run(u[::-1]).x)
-    machine = Evaluator(_Emitter(model).context(), dtype)
+    machine = Evaluator(Emitter(model).context(), dtype)
     for sample, x, y in zip(u, run.x, run.y, strict=True):
         assert machine.step(sample.astype(dtype)) and np.array_equal(machine.x, x) and np.array_equal(machine.y, y)
     penode_gen.generate(model, tmp_path)

@@ -20,7 +20,7 @@ import pytest
 
 import penode_gen
 from penode_gen.emission import selftest
-from penode_gen.emission.model_c import _Emitter
+from penode_gen.emission.model_c import Emitter
 from penode_gen.twins import translate
 from penode_gen.twins.evaluate import Evaluator
 from penode_sil.targets import MACHINES, Sil
@@ -83,7 +83,7 @@ def found(library: ctypes.CDLL, name: str = "nqvm", real: type = np.float32) -> 
 
 def first_difference(model: penode_gen.Model, real: type) -> str:
     """Where evaluator and C part: sample, states, outputs."""
-    machine, instance = Evaluator(_Emitter(model).context(), real), Sil(model, real).instance()
+    machine, instance = Evaluator(Emitter(model).context(), real), Sil(model, real).instance()
     draw = np.random.default_rng(1)
     for k in range(200):
         u = draw.uniform(-0.3, 0.3, len(model.inputs)).astype(real)
@@ -168,7 +168,7 @@ def test_input_stays_in_its_range_and_reaches_the_envelope(monkeypatch):
     """Of the committed model: at least three quarters of the evaluations inside, and the damper sees most of its envelope."""
     monkeypatch.setattr(selftest, "LEVELS", 25)
     model = penode_gen.load(ROOT / "gen" / "nqvm" / "nqvm.toml")
-    context = _Emitter(model).context()
+    context = Emitter(model).context()
     chosen = selftest.model_context(context)["levels"]
     low, step = (float(chosen[0][k].removesuffix("F")) for k in ("low", "step"))
     assert low >= -0.3 and low + 255 * step <= 0.3

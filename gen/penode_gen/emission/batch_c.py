@@ -15,7 +15,8 @@ from ..model import Model
 from ..networks import Affine, Dense, Layer
 from ..sets import packing
 from .c_text import Printer, fold, real
-from .model_c import _RUNGE_KUTTA, _TEMPLATES, VERSION, _Emitter
+from .equations_c import RUNGE_KUTTA, Equations
+from .model_c import TEMPLATES, VERSION
 from .networks_c import NetworkCode
 
 # Names of batch.c.j2 that no name of a model may take.
@@ -34,7 +35,7 @@ def render_batch(model: Model, causal: Causal | None = None) -> BatchCode:
     """The batch C of a model: to be compiled with sil/firmware/pen_lanes.h beside the runtime. `causal`: its equations in
     order, where they are known already."""
     emitter = _LaneEmitter(model, causal)
-    text = fold(_TEMPLATES.get_template("batch.c.j2").render(emitter.context()))
+    text = fold(TEMPLATES.get_template("batch.c.j2").render(emitter.context()))
     return BatchCode(text, tuple(emitter.taken))
 
 
@@ -55,7 +56,7 @@ class _LanePrinter(Printer):
         return super().inner(expr)
 
 
-class _LaneEmitter(_Emitter):
+class _LaneEmitter(Equations):
     def __init__(self, model: Model, causal: Causal | None = None):
         super().__init__(model, causal)
         self.weights_at = self.at
@@ -66,7 +67,7 @@ class _LaneEmitter(_Emitter):
     def context(self) -> dict[str, object]:
         model, causal = self.model, self.causal
         rosenbrock = model.method.startswith("ros")
-        nodes, weights, divisor = _RUNGE_KUTTA.get(model.method, ((), (), 1.0))
+        nodes, weights, divisor = RUNGE_KUTTA.get(model.method, ((), (), 1.0))
         return {
             **sampled.context(self.given),
             "model": model,

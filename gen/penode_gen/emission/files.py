@@ -1,3 +1,5 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
 """Write generated files: all of them, or none."""
 
 from __future__ import annotations
