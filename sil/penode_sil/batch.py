@@ -220,7 +220,7 @@ class Batch:
         """[n_p, padded]: value or reciprocal of each parameter the code takes; reciprocals of doubles, as in the C."""
         tunable = [p.name for p in self.model.tunable]
         found = np.empty((len(self._code.parameters), padded), dtype=self.dtype)
-        for row, (name, inverse) in zip(found, self._code.parameters):
+        for row, (name, inverse) in zip(found, self._code.parameters, strict=True):
             if name in given:
                 value = given[name]
             elif name in tunable:

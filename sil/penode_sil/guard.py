@@ -53,7 +53,8 @@ def crash_file(exc: Exception) -> tuple[str, Path | None]:
     """What happened, in one line, and the file with the traceback that was written for it; None if none could be."""
     what = " ".join(f"{type(exc).__name__}: {exc}".split())
     call = shlex.join(["penode", *sys.argv[1:]])
-    text = f"penode {penode_gen.VERSION}, Python {sys.version.split()[0]}, {sys.platform}\n{call}\n\n{''.join(traceback.format_exception(exc))}"
+    about = f"penode {penode_gen.VERSION}, Python {sys.version.split()[0]}, {sys.platform}"
+    text = f"{about}\n{call}\n\n{''.join(traceback.format_exception(exc))}"
     for folder in (Path.cwd(), Path(tempfile.gettempdir())):
         path = folder / f"penode-crash-{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}.txt"
         try:

@@ -33,7 +33,8 @@ from .output import check_writable, whole
 )
 @click.option("--model", help="Which Modelica model, if the file has several; for a .toml only.")
 def import_(file: Path, output: Path, network: str | None, activation: str, model: str | None) -> None:
-    """Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits; or a Modelica model of masses, springs and dampers, as a model file."""
+    """Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits; or a Modelica model of masses,
+    springs and dampers, as a model file."""
     whole_model = output.suffix.lower() == ".toml"
     foreign = [f"--{name}" for name in (("network", "activation") if whole_model else ("model",)) if _given(name)]
     if foreign:

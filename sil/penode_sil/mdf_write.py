@@ -12,7 +12,8 @@ from .output import Column, whole
 
 
 def write_mf4(path: Path, columns: list[Column], comment: str = "penode simulate") -> None:
-    """Write columns, the first of which is the time [s], with their units; doubles, and whole numbers as they are. `comment`: who wrote it."""
+    """Write columns, the first of which is the time [s], with their units; doubles, and whole numbers as they are. `comment`: who wrote
+    it."""
     from asammdf import MDF, Signal  # slow to load
 
     time, *others = columns

@@ -132,7 +132,7 @@ def solve(
     for piece in _pieces(instance, duration, set_length, model.sample_time, knots):
         system, source = equations[piece.set], _Inputs(signals, piece.begin, piece.end)
 
-        def keep(row: int, state: Array) -> None:
+        def keep(row: int, state: Array, system: penode_gen.Numeric = system, source: _Inputs = source) -> None:
             u, udot = source(float(times[row]))
             rows_x[row], rows_y[row], rows_z[row] = (state, system.outputs(state, u, udot), system.sensors(state, u, udot))
 

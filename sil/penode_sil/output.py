@@ -61,5 +61,5 @@ def write_csv(path: Path, columns: list[Column]) -> None:
     line = ",".join(column.format for column in columns) + "\n"
     with whole(path) as part, open(part, "w", encoding="utf-8", newline="") as file:
         file.write(",".join(f"{column.name} [{column.unit}]" for column in columns) + "\n")
-        rows = zip(*(column.values.tolist() for column in columns))
+        rows = zip(*(column.values.tolist() for column in columns), strict=True)
         file.writelines(line % row for row in rows)

@@ -61,7 +61,7 @@ def load(path: Path, model: Any, set_name: str | None, channels: Iterable[str], 
     for remark in remarks:
         note(f"{path}: {remark}")
     times = np.arange(raster.size) * model.sample_time
-    inputs = {s.name: Samples(times, column) for s, column in zip(model.inputs, u.T)}
+    inputs = {s.name: Samples(times, column) for s, column in zip(model.inputs, u.T, strict=True)}
     instance = scenarios.Instance(model.name, set_name or next(iter(model.sets)))
     plan = scenarios.Scenario(path.stem, float(times[-1]), inputs, {}, (instance,), path)
     return Replay(plan, times, float(raster[0]), u, sensed)
@@ -118,10 +118,10 @@ def _between(tables: Sequence[Any], wanted: dict[str, str], raster: Array, step:
         if worst > 0.01:  # an error of pi * 1 % at half of the highest frequency
             what = f"rows are off an even clock by {worst:.2g} of their interval"
             raise UserError(f"{table.path}: channel {name}: its {what}; replay it with --replay linear or held")
-        if np.max(np.abs((raster - time[0]) / usual - np.rint((raster - time[0]) / usual))) < 1e-3 and usual <= 1.001 * step:
-            if usual >= 0.999 * step:
-                columns.append(values[np.rint((raster - time[0]) / usual).astype(int)])
-                continue
+        rows = (raster - time[0]) / usual
+        if np.max(np.abs(rows - np.rint(rows))) < 1e-3 and 0.999 * step <= usual <= 1.001 * step:
+            columns.append(values[np.rint(rows).astype(int)])
+            continue
         kernel = recordings.Kernel(raster, float(time[0]), float(grid[1] - grid[0]), time.size, step)
         columns.append(kernel.apply(values[:, None])[:, 0])
         remarks.append(f"{name} is replayed band-limited from rows {usual * 1e3:.6g} ms apart")

@@ -37,9 +37,9 @@ def _signals(model: Any, result: Result) -> Iterator[tuple[str, str, NDArray[Any
     seen = set()
     state_units = scenarios.state_units(model)
     for name, unit, values in (
-        *((s.name, s.unit, v) for s, v in zip(model.outputs, result.y.T)),
-        *((s.name, s.unit, v) for s, v in zip(model.sensors, result.z.T)),
-        *((name, state_units[name], v) for name, v in zip(model.states, result.x.T)),
+        *((s.name, s.unit, v) for s, v in zip(model.outputs, result.y.T, strict=True)),
+        *((s.name, s.unit, v) for s, v in zip(model.sensors, result.z.T, strict=True)),
+        *((name, state_units[name], v) for name, v in zip(model.states, result.x.T, strict=True)),
     ):
         if name not in seen:
             seen.add(name)
@@ -51,7 +51,7 @@ def table(
 ) -> list[Column]:
     """Time, inputs, and per instance its signals; `full` adds states and status."""
     columns = [Column("time", "s", times, "%.12g")]
-    columns += [Column(s.name, s.unit, v / units.factor(s.unit), "%.12g") for s, v in zip(model.inputs, u.T)]
+    columns += [Column(s.name, s.unit, v / units.factor(s.unit), "%.12g") for s, v in zip(model.inputs, u.T, strict=True)]
     measured = {s.name for s in (*model.outputs, *model.sensors)}
     for result in results:
         head = f"{result.instance.name}." if prefix else ""

@@ -55,6 +55,6 @@ def instance_calls(model: Any, instance: Instance, initial: dict[str, float], dt
     """All calls of an instance in the order in which they are made."""
     calls = []
     if initial:
-        start = dict(zip(model.states, model.start)) | initial
+        start = dict(zip(model.states, model.start, strict=True)) | initial
         calls.append(Call(0, "state", values=np.array([start[name] for name in model.states], dtype=dtype)))
     return calls + [call for exchange in instance.exchanges for call in exchange_calls(model, exchange, dtype)]

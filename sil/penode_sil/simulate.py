@@ -78,7 +78,7 @@ def simulate(model: Path | None, ssp: Path | None, target: str, as_json: bool, *
         _warn_range(loaded, job.u)
     compiled = None if place == "mil" else Sil(loaded) if place == "sil" else Pil(loaded, machine)
     summaries = []
-    for job, output in zip(jobs, outputs):
+    for job, output in zip(jobs, outputs, strict=True):
         found = _run(loaded, job, place, compiled)
         _tell_refused(found)
         columns = results.table(loaded, job.times + job.offset, job.u, found, prefix=len(found) > 1, full=job.replay is None)
@@ -231,7 +231,7 @@ def _tell_refused(found: list[Result]) -> None:
 
 def _warn_range(model: Any, u: NDArray[np.float64]) -> None:
     """Say where an input leaves the range that the model file states."""
-    for signal, column in zip(model.inputs, u.T):
+    for signal, column in zip(model.inputs, u.T, strict=True):
         scale = units.factor(signal.unit)
         for bound, worst, outside in ((signal.minimum, column.min(), "below"), (signal.maximum, column.max(), "above")):
             if bound is not None and (worst < bound if outside == "below" else worst > bound):

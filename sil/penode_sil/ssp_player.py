@@ -43,7 +43,10 @@ def play(path: Path, record: Path | None, tell: Any = lambda line: None) -> list
         rows = _run(path, system, fmu, table, steps)
     times = np.arange(steps + 1) * fmu.step_size
     names = [*system.inputs, *system.outputs]
-    return [Column("time", "s", times), *(Column(name, fmu.unit(system.wires[name]), values) for name, values in zip(names, rows.T))]
+    return [
+        Column("time", "s", times),
+        *(Column(name, fmu.unit(system.wires[name]), values) for name, values in zip(names, rows.T, strict=True)),
+    ]
 
 
 def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array], steps: int) -> Array:
@@ -56,7 +59,7 @@ def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array]
     ).reshape(-1, steps + 1)
     outputs = np.empty((steps + 1, len(system.outputs)))
     waiting = list(system.schedule)
-    fmu.initialise({**system.start, **{system.wires[n]: (u[0],) for n, u in zip(system.inputs, inputs)}}, f"{path}: start")
+    fmu.initialise({**system.start, **{system.wires[n]: (u[0],) for n, u in zip(system.inputs, inputs, strict=True)}}, f"{path}: start")
     for k in range(steps + 1):
         outputs[k] = [fmu.get(system.wires[name]) for name in system.outputs]
         if k == steps:
@@ -64,7 +67,7 @@ def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array]
         while waiting and waiting[0].time <= times[k] + half * 1e-3:
             exchange = waiting.pop(0)
             fmu.set(exchange.values, f"{path}: {exchange.source} at {exchange.time:g} s")
-        fmu.set({system.wires[n]: (u[k],) for n, u in zip(system.inputs, inputs)}, f"{path}: inputs")
+        fmu.set({system.wires[n]: (u[k],) for n, u in zip(system.inputs, inputs, strict=True)}, f"{path}: inputs")
         fmu.step(k)
     for exchange in waiting:
         fmu.tell(f"{exchange.source} at {exchange.time:g} s is never in force: the run ends at {times[-1]:g} s")

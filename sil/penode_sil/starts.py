@@ -106,7 +106,7 @@ def fit(model: Any, set_name: str, replay: Replay, start: Start) -> tuple[dict[s
     """The start states (SI), and a line that says from what. Least squares over all measured sensors, each in units of its
     noise, by Gauss and Newton with halved steps through the C in double. Raises UserError."""
     states = scenarios.state_units(model)
-    x = np.array([start.given.get(name, value) for name, value in zip(model.states, model.start)], dtype=float)
+    x = np.array([start.given.get(name, value) for name, value in zip(model.states, model.start, strict=True)], dtype=float)
     if not replay.sensed:
         names = ", ".join(s.name for s in (*model.sensors, *model.outputs))
         raise UserError(f"{replay.plan.path}: --start measured needs a sensor of the model; record one of: {names}")
@@ -119,7 +119,8 @@ def fit(model: Any, set_name: str, replay: Replay, start: Start) -> tuple[dict[s
     free = [i for i, name in enumerate(model.states) if name not in start.given]
     if sum(values.size for _, _, _, values, _ in residual.rows) < len(free):
         raise UserError(
-            f"{replay.plan.path}: its first {count} samples measure too little to fit {len(free)} states; give --start measured:K with a larger K"
+            f"{replay.plan.path}: its first {count} samples measure too little to fit {len(free)} states; "
+            "give --start measured:K with a larger K"
         )
     x, unseen = _solve(residual, x, free)
     if not np.isfinite(x).all():
@@ -130,7 +131,7 @@ def fit(model: Any, set_name: str, replay: Replay, start: Start) -> tuple[dict[s
     text = f"start fitted to the first {count} samples ({count * model.sample_time:.4g} s): {', '.join(parts)}"
     if unseen:
         text += "; the sensors do not show " + ", ".join(model.states[i] for i in unseen) + ", which start as in the model file"
-    return dict(zip(model.states, x.tolist())), text
+    return dict(zip(model.states, x.tolist(), strict=True)), text
 
 
 def _solve(residual: _Fit, x: Array, free: list[int], rounds: int = 20, seen: float = 1e-6) -> tuple[Array, list[int]]:
