@@ -14,9 +14,10 @@ from ..algebra.causalise import Causal, Step
 from ..model import Model
 from ..networks import Affine, Dense, Layer
 from ..sets import packing
+from ..version import VERSION
 from .c_text import Printer, fold, real
 from .equations_c import RUNGE_KUTTA, Equations
-from .model_c import TEMPLATES, VERSION
+from .model_c import TEMPLATES
 from .networks_c import NetworkCode
 
 # Names of batch.c.j2 that no name of a model may take.

@@ -16,13 +16,12 @@ from ..algebra.mechanics import state_unit
 from ..model import Model
 from ..networks import Dense
 from ..sets import layout, packing, promises
+from ..version import VERSION
 from . import selftest
 from .c_text import fold, literal, literals, real
 from .equations_c import RUNGE_KUTTA, Body, Equations
 from .files import write_all
 from .networks_c import NetworkCode, by_value, hidden16, network_lines, second_lines, slope_lines
-
-VERSION = "0.1.0"
 
 
 def compiled_templates() -> jinja2.BytecodeCache | None:

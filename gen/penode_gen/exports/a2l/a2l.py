@@ -8,8 +8,8 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from ...emission.model_c import VERSION
 from ...model import Model
+from ...version import VERSION
 from ..interface import Exporter, ExportError, Option, Options
 from ..templating import render
 from .elf_types import Place, Program, read_program

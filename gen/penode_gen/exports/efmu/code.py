@@ -11,8 +11,8 @@ import sympy as sp
 
 from ...algebra import expressions as ex
 from ...algebra.causalise import Causal, Step, causalise
-from ...emission.model_c import VERSION
 from ...model import Model
+from ...version import VERSION
 from ..interface import ExportError
 from ..templating import render
 from . import galec_text as text, variables as ev

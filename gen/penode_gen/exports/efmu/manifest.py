@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from ...emission.model_c import VERSION
 from ...model import Model
+from ...version import VERSION
 from ..interface import ExportError
 from ..templating import render
 from .schemas import DIALECTS

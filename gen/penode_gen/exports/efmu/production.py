@@ -7,8 +7,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from ...emission.model_c import VERSION
 from ...model import Model
+from ...version import VERSION
 from ..fmi.files import flat, runtime
 from ..templating import render
 from . import manifest as manifests

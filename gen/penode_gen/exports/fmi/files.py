@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ...emission.model_c import VERSION, render
+from ...emission.model_c import render
 from ...model import Model
+from ...version import VERSION
 from ..interface import ExportError, Option, Options
 from ..templating import render as template
 from . import variables as fv

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...emission.model_c import VERSION
 from ...model import Model
 from ...networks import Affine, Dense, Network
+from ...version import VERSION
 from ..interface import ExportError
 from ..templating import render
 from .model import arrays

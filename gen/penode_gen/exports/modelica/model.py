@@ -11,9 +11,9 @@ from sympy.core.function import AppliedUndef
 from ...algebra import expressions as ex
 from ...algebra.causalise import aliases
 from ...algebra.mechanics import Relation, balances, forces, kinematics, meanings, state_unit
-from ...emission.model_c import VERSION
 from ...model import Model
 from ...networks import Affine, Network
+from ...version import VERSION
 from ..interface import ExportError
 from ..templating import render
 from .text import array, expression, identifier, quoted, real, unit

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...emission.model_c import VERSION
 from ...model import Model
 from ...networks import Affine
 from ...sets import layout, packing
+from ...version import VERSION
 from ..archive import zipped
 from ..fmi import files as fmu_files, fmu2, fmu3, variables as fv
 from ..interface import Exporter, ExportError, Option, Options
