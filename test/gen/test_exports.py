@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import sys
 import types
@@ -33,7 +34,8 @@ def formats(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         options=(exports.Option("times", "how often", "number", default=1), exports.Option("as_is", "not read", "flag")),
     )
     absent = exports.Exporter("needs what is nowhere", (".txt",), lambda model, options: b"", needs=("no_such_package",))
-    for name, exporter in (("shout", shout), ("absent", absent)):
+    extra = dataclasses.replace(absent, extra="nowhere")
+    for name, exporter in (("shout", shout), ("absent", absent), ("extra", extra)):
         module = types.ModuleType(f"penode_gen.exports.{name}")
         module.EXPORTER = exporter  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, module.__name__, module)
@@ -70,6 +72,10 @@ def test_a_format_is_a_module_and_a_line(tmp_path: Path) -> None:
         (
             ["--format", "absent", "-o", "n.txt"],
             "--format absent: it needs the Python package no_such_package, which is not installed; pip install no_such_package",
+        ),
+        (
+            ["--format", "extra", "-o", "n.txt"],
+            "--format extra: it needs the Python package no_such_package, which is not installed; pip install penode[nowhere]",
         ),
         (["--format", "shout", "-o", "n.bin"], 'n.bin: a file of the format shout does not end in ".bin"; end its name in .txt'),
         (["--format", "shout", "-o", "no/n.txt"], "no/n.txt: there is no directory no; create it or name another file"),

@@ -51,6 +51,7 @@ class Exporter:
     build: Callable[[Model, Options], bytes]
     options: tuple[Option, ...] = ()
     needs: tuple[str, ...] = ()
+    extra: str = ""  # that of penode which installs `needs`
     notes: Callable[[Options], list[str]] = lambda options: []  # what the file lacks because something is not installed here, a line each
 
     def missing(self) -> list[str]:
@@ -63,7 +64,8 @@ def run(exporter: Exporter, name: str, model: Model, path: Path, options: Option
     missing = exporter.missing()
     if missing:
         packages = " ".join(missing)
-        raise ExportError(f"--format {name}: it needs the Python package {packages}, which is not installed; pip install {packages}")
+        remedy = f"penode[{exporter.extra}]" if exporter.extra else packages
+        raise ExportError(f"--format {name}: it needs the Python package {packages}, which is not installed; pip install {remedy}")
     if path.suffix.lower() not in exporter.suffixes:
         raise ExportError(
             f'{path}: a file of the format {name} does not end in "{path.suffix}"; end its name in {_either(exporter.suffixes)}'

@@ -182,4 +182,5 @@ EXPORTER = Exporter(
         Option("epk", "Variable with the text that identifies the program; penode_epk if not given and there."),
     ),
     ("elftools",),
+    "xcp",
 )
