@@ -16,6 +16,7 @@ WATCHED   := $(PYTHON) test/diagnosis/ablation/probes.py
 CASES     := 192 # eight rounds of the 24 cases of a draw
 # and of each kind seven in a common form and four in a foreign one, so that one wrong answer is not below 85 or 70 %
 LEAST     := single_common=161 single_foreign=88 pair=48 triple=16 null=100 null_hard=100 outside=60
+export PENODE_BUILD ?= $(CURDIR)/build/sil
 unexport PYTHONDONTWRITEBYTECODE # else every command translates all of its modules anew, for half a second
 
 help: ## Show this text

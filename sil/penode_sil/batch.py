@@ -25,8 +25,9 @@ from penode_gen.algebra.causalise import Causal
 from penode_gen.algebra.placeholder import columns
 from penode_gen.algebra.sampled import beside
 from penode_gen.emission.batch_c import BatchCode, render_batch
+from penode_gen.resources import native
 
-from .building import FLAGS, ROOT, build_directory, build_once, compile_program, digest_of, sources_in
+from .building import FLAGS, build_directory, build_once, compile_program, digest_of, include, missing_tool, sources_in
 from .errors import UserError
 from .output import whole
 
@@ -252,7 +253,7 @@ def _processor(compiler: str) -> bytes:
     try:
         return subprocess.run([compiler, *OPTIMISE, "-dM", "-E", "-x", "c", "/dev/null"], capture_output=True).stdout
     except FileNotFoundError as exc:
-        raise UserError(f"{compiler}: this compiler is not installed; install it (make test does)") from exc
+        raise missing_tool(compiler) from exc
 
 
 def _compiler(model: penode_gen.Model) -> str:
@@ -272,13 +273,13 @@ def _build(model: penode_gen.Model, code: BatchCode, dtype: type, per_run: bool,
         "-fPIC",
         *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []),
         *(["-DWEIGHTS_PER_RUN"] if per_run else []),
-        *(f"-I{ROOT}/{folder}" for folder in ("sil/firmware", "src", "inc", "port/gnu")),
+        *include("sil/firmware", "src", "inc", "port/gnu"),
     ]
     functions = (("src", f"pen_{name}.c") for name in ("math", "trig", "atan", "log", "root"))
     parts = sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes*.h"), *functions)
     folding = []
     if "LANES_PIECES" in code.text:
-        own = [ROOT / "src" / name for name in ("pen_fold.c", "pen_net.c")]
+        own = [native("src", name) for name in ("pen_fold.c", "pen_net.c")]
         folding = [
             build_once("folding", ".o", [*command, "-r", "-nostdlib", *map(str, own)], [_processor(compiler), *parts, *own])
         ]  # for every model

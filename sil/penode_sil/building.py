@@ -17,19 +17,18 @@ from typing import Any
 import numpy as np
 
 import penode_gen
+from penode_gen.resources import native, resource
+from penode_gen.tools import not_installed
 
 from .errors import UserError
 
-ROOT = Path(__file__).resolve().parents[2]
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
 
 
 def build_directory() -> Path:
-    """Where compiled things are kept: PENODE_BUILD, else build/sil of the checkout, else the user's cache."""
+    """Where compiled things are kept: PENODE_BUILD, else penode/ in the user's cache."""
     if os.environ.get("PENODE_BUILD"):
         return Path(os.environ["PENODE_BUILD"]).absolute()
-    if os.access(ROOT, os.W_OK):
-        return ROOT / "build" / "sil"
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute() / "penode"
 
 
@@ -43,13 +42,18 @@ def digest_of(parts: Iterable[str | bytes | Path]) -> str:
 
 
 def sources_in(*places: tuple[str, str]) -> list[Path]:
-    """Files of the checkout by folder and pattern, sorted."""
-    return sorted(path for folder, pattern in places for path in (ROOT / folder).rglob(pattern))
+    """Files of native/ by folder and pattern, sorted."""
+    return sorted(path for folder, pattern in places for path in native(folder).rglob(pattern))
+
+
+def include(*folders: str) -> list[str]:
+    """Options of compilers: folders of native/ to look for headers in."""
+    return [f"-I{native(folder)}" for folder in folders]
 
 
 def generated(model: Any) -> Path:
     """The folder with the model's C, generated unless an earlier call did; keyed by model and generator."""
-    sources = [path for path in sources_in(("gen/penode_gen", "*")) if path.is_file() and path.suffix != ".pyc"]
+    sources = sorted(path for pattern in ("*.py", "templates/*") for path in resource("penode_gen").rglob(pattern))
     folder = build_directory() / f"{model.name}-{digest_of([model.digest, *sources])}"
     if not (folder / f"{model.name}.c").exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -79,6 +83,11 @@ def model_options(model: Any) -> list[str]:
     ]
 
 
+def missing_tool(name: str) -> UserError:
+    """What to raise where a compiler or an emulator is not installed."""
+    return UserError(not_installed(name))
+
+
 def compile_program(command: Sequence[str], output: Path) -> None:
     """Run a compiler that writes `output`, all or nothing. UserError if it is missing or refuses."""
     with tempfile.TemporaryDirectory(dir=output.parent) as scratch:
@@ -86,10 +95,10 @@ def compile_program(command: Sequence[str], output: Path) -> None:
         try:
             result = subprocess.run([*command, "-o", str(part)], capture_output=True, text=True, stdin=subprocess.DEVNULL)
         except FileNotFoundError as exc:
-            raise UserError(f"{command[0]}: this compiler is not installed; install it (make test does)") from exc
+            raise missing_tool(command[0]) from exc
         if result.returncode != 0:
             lines = [line for line in result.stderr.splitlines() if "error" in line] or result.stderr.splitlines() or ["?"]
-            raise UserError(f"{output.name}: {command[0]} refused it: {lines[0]}; report this with the model file")
+            raise UserError(f"{output.name}: the compiler refused it: {lines[0]}; report this with the model file")
         _move(part, output)
 
 
@@ -112,8 +121,8 @@ def build_library(model: Any, dtype: type = np.float32, compiler: Sequence[str] 
     """The shared library of a model; `source` is a folder with its C if it is not to be generated."""
     source = source or generated(model)
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
-    shim = ROOT / "sil" / "firmware" / "sil.c"
-    options = [*compiler, *FLAGS, "-fPIC", *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []), f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu"]
+    shim = native("sil", "firmware", "sil.c")
+    options = [*compiler, *FLAGS, "-fPIC", *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []), *include("inc", "port/gnu")]
     read = [compiler_version(compiler[0]), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
     same = build_once("runtime", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     own = ["-shared", *model_options(model), f"-I{source}", *map(str, [shim, *code, same])]

@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
+from penode_gen.resources import native
 
-from .building import FLAGS, ROOT, build_library, build_once, compiler_version, generated, model_options, sources_in
+from .building import FLAGS, build_library, build_once, compiler_version, generated, include, missing_tool, model_options, sources_in
 from .errors import UserError
 from .instance import Instance, Set
 from .schedule import Call
@@ -153,7 +154,8 @@ MACHINES = {"m4f": "mps2-an386", "m3": "mps2-an385", "m7": "mps2-an500", "m33": 
 TAPE_MAGIC = 0x314C4950
 OPERATION = {"end": 0, "step": 1, "begin": 2, "write": 3, "commit": 4, "abort": 5, "select": 6, "rollback": 7, "hold": 8, "state": 9}
 COST_KINDS = ("normal", "adopting", "holding")
-PORT = ROOT / "port" / "cortex-m"
+PORT = native("port", "cortex-m")
+SHELL = "sh"  # its scripts are called by it: not all that unpacks a wheel keeps that they are executable
 TROUBLE = {
     1: "it could not open, read or write its files",
     2: "it was given a tape for another model",
@@ -167,14 +169,11 @@ def build_firmware(model: Any, machine: str, source: Path | None = None, optimis
     """The PiL program of a model for one of MACHINES."""
     source = source or generated(model)
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
-    program, board = ROOT / "sil" / "firmware" / "pil.c", MACHINES[machine]
-    port = ROOT / "port" / "host" / "board.c"
+    program, board = native("sil", "firmware", "pil.c"), MACHINES[machine]
+    port = native("port", "host", "board.c")
     sets = ",".join(f"&{model.name}_set_{name}" for name in model.sets)
     compiler = "arm-none-eabi-gcc" if board else "gcc"
-    if shutil.which(compiler) is None:
-        raise UserError(f"{compiler}: this compiler is not installed; install it (make test does)")
-    own = ["gcc", f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/sil/firmware"]
-    options = [*([str(PORT / "cc"), board] if board else own), *FLAGS, optimise]
+    options = [*(cross(board) if board else ["gcc", *include("inc", "port/gnu", "sil/firmware")]), *FLAGS, optimise]
     read = [compiler_version(compiler), *runtime, *_included()]
     same = build_once(f"runtime-{machine}", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], read)  # for every model
     files = [program, *code, same, *([] if board else [port])]
@@ -182,10 +181,17 @@ def build_firmware(model: Any, machine: str, source: Path | None = None, optimis
     return build_once(f"{model.name}-{machine}", ".elf", command, [*read, program, *code, source / f"{model.name}.h", same])
 
 
+def cross(board: str) -> list[str]:
+    """The compiler for an emulated board, port/cortex-m/cc. Raises UserError where that calls one that is not installed."""
+    if shutil.which("arm-none-eabi-gcc") is None:
+        raise missing_tool("arm-none-eabi-gcc")
+    return [SHELL, str(PORT / "cc"), board]
+
+
 def build_object(model: Any, machine: str, name: str) -> Path:
     """One file of a model's C as it is for an emulated one of MACHINES, by itself."""
     source = generated(model)
-    command = [str(PORT / "cc"), MACHINES[machine], *FLAGS, "-O2", f"-I{source}", f"-I{ROOT}/src", "-c", str(source / name)]
+    command = [*cross(MACHINES[machine]), *FLAGS, "-O2", f"-I{source}", *include("src"), "-c", str(source / name)]
     read = [compiler_version("arm-none-eabi-gcc"), source / name, source / f"{model.name}.h", *sources_in(("src", "*.h")), *_included()]
     return build_once(f"{Path(name).stem}-{machine}", ".o", command, read)
 
@@ -212,20 +218,18 @@ class Pil:
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "tape").write_bytes(self._tape(u, calls, set_name))
             board = MACHINES[self.machine]
-            command = [str(PORT / "run"), board, str(self.program)] if board else [str(self.program)]
-            environment = os.environ | {"LIMIT": str(self.limit)}
-            try:
-                process = subprocess.Popen(
-                    [*command, "tape", "record"],
-                    cwd=folder,
-                    env=environment,
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.STDOUT,
-                    text=True,
-                )
-            except FileNotFoundError as exc:
-                raise UserError(f"{command[0]}: it cannot be run: {exc.strerror}; restore the checkout") from exc
+            if board and shutil.which("qemu-system-arm") is None:
+                raise missing_tool("qemu-system-arm")
+            command = [SHELL, str(PORT / "run"), board, str(self.program)] if board else [str(self.program)]
+            process = subprocess.Popen(
+                [*command, "tape", "record"],
+                cwd=folder,
+                env=os.environ | {"LIMIT": str(self.limit)},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+            )
             record = Path(folder, "record")
             while process.poll() is None:
                 try:

@@ -18,10 +18,11 @@ import cycles
 import peers
 
 import penode_gen
-from penode_sil.building import FLAGS, ROOT, generated, model_options
+from penode_sil.building import FLAGS, generated, model_options
 from penode_sil.targets import MACHINES, PORT
 
 HERE = Path(__file__).parent
+ROOT = HERE.resolve().parents[1]
 PLACE = ROOT / "build" / "bench"
 
 

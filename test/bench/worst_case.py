@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 import penode_gen
 from penode_gen.sets import fold
-from penode_sil.building import ROOT
 from penode_sil.status import BIT
 from penode_sil.targets import MACHINES
 
+ROOT = Path(__file__).resolve().parents[2]
 ROUND = 100  # steps, see worst_case.c
 METHODS, POLICIES = ("rk4", "ros1"), ("clamp", "fade")  # of a model of everything: values, and slopes, of all there is
 FPU = ("m4f", "m7", "m33", "m55")

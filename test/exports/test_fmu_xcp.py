@@ -193,5 +193,5 @@ def test_one_instance_at_a_time(opened: Unpacked) -> None:
 
 def test_without_a_compiler_it_is_one_line(nqvm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.which", lambda name: None)
-    with pytest.raises(exports.ExportError, match="--xcp: the A2L needs gcc, which is not installed"):
+    with pytest.raises(exports.ExportError, match="gcc is not installed; install it, on Debian: apt-get install gcc"):
         exports.export(nqvm, "fmu3", tmp_path / "x.fmu", {"xcp": True, "source_only": True})

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_sil.building import ROOT
 from penode_sil.status import BIT, names
 from penode_sil.targets import Sil
 
+ROOT = Path(__file__).resolve().parents[2]
 NQVM = ROOT / "gen" / "nqvm"
 HISTORY = {"held": 0, "linear": 1, "parabola": 2, "cubic": 3}  # inputs before this one that rates depend on
 N_X, N_U, N_Y, N_Z = 3, 2, 2, 2

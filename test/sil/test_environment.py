@@ -49,8 +49,11 @@ def test_a_build_directory_that_is_empty_or_relative(name: str, tmp_path: Path, 
     """A library is loaded by its path only where that is absolute; an empty name is none."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PENODE_BUILD", name)
-    found = build_directory()
-    assert found.is_absolute() and (found == tmp_path / name) == bool(name)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert build_directory() == tmp_path / (name or "cache/penode")
+    monkeypatch.setenv("XDG_CACHE_HOME", "")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    assert build_directory() == tmp_path / (name or "home/.cache/penode")
 
 
 def test_variables_that_libraries_read_do_no_harm() -> None:

@@ -28,6 +28,7 @@ def use(core, monkeypatch, folder):
     """Let Pil() make and run programs for one of CORES."""
     need("gcc", *CORES[core])
     monkeypatch.setattr(targets, "PORT", ROOT / "test" / "builds" / "user")
+    monkeypatch.setattr(targets, "SHELL", "bash")
     monkeypatch.setitem(targets.MACHINES, core, core)
     monkeypatch.setenv("PENODE_BUILD", str(folder))
     monkeypatch.setenv("SHIFT", "none")
@@ -74,6 +75,6 @@ def test_a_checksum_over_bytes_as_they_lie_is_found(nqvm, monkeypatch, tmp_path)
     assert found == 1
     file.write_text(text)
     for module in (building, targets):
-        monkeypatch.setattr(module, "ROOT", tmp_path / "copy")
+        monkeypatch.setattr(module, "native", (tmp_path / "copy").joinpath)
     with pytest.raises(UserError, match="it refused the first parameter set"):
         targets.Pil(nqvm, "s390x").run(chirp(1))

@@ -128,7 +128,7 @@ def test_flags_are_those_of_the_header():
 
 def test_missing_compiler_is_said(nqvm, tmp_path, monkeypatch):
     monkeypatch.setenv("PENODE_BUILD", str(tmp_path))
-    with pytest.raises(UserError, match="no-such-compiler: this compiler is not installed"):
+    with pytest.raises(UserError, match="no-such-compiler is not installed; install it"):
         Sil(nqvm, compiler=("no-such-compiler", "-O2"))
     assert not list(tmp_path.glob("*.so"))
 

@@ -66,6 +66,7 @@ def sources(root: Path) -> list[Path]:
     """All files that count, in a fixed order."""
     generated = re.compile(r"gen/[^/]+/c/")
     files = [p for folder in FOLDERS for p in sorted((root / folder).rglob("*")) if p.suffix in KINDS and p.is_file()]
+    files = [p for p in files if p.resolve() == root.resolve() / p.relative_to(root)]  # not by way of a link as well
     files += [p for p in (root / "Makefile",) if p.is_file()]
     return [p for p in files if not generated.match(p.relative_to(root).as_posix()) and "build" not in p.relative_to(root).parts]
 

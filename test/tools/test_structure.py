@@ -123,6 +123,14 @@ def test_budget_may_be_left_unused(tree: Path) -> None:
     assert structure.main(["--root", str(tree)]) == 0
 
 
+def test_what_is_linked_counts_once(tree: Path) -> None:
+    counts = structure.look(tree)[0]
+    (tree / "gen/penode_gen/native").mkdir()
+    (tree / "gen/penode_gen/native/src").symlink_to(tree / "src")
+    (tree / "gen/penode_gen/native/long.c").symlink_to(tree / "src/long.c")
+    assert structure.look(tree)[0] == counts
+
+
 @pytest.mark.parametrize(
     ("text", "lengths"),
     [

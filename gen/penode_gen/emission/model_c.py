@@ -15,6 +15,7 @@ from ..algebra.functions import CALLS
 from ..algebra.mechanics import state_unit
 from ..model import Model
 from ..networks import Dense
+from ..resources import resource
 from ..sets import layout, packing, promises
 from ..version import VERSION
 from . import selftest
@@ -36,7 +37,7 @@ def compiled_templates() -> jinja2.BytecodeCache | None:
 
 
 TEMPLATES = jinja2.Environment(
-    loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+    loader=jinja2.FileSystemLoader(resource("penode_gen.emission", "templates")),
     bytecode_cache=compiled_templates(),
     undefined=jinja2.StrictUndefined,
     trim_blocks=True,

@@ -8,13 +8,13 @@ Filters: `xml` and `c` escape a text, `number` prints all digits of a double.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
 import jinja2
 
 from ..emission.model_c import compiled_templates
+from ..resources import resource
 
 # C strings: what C99 can write, byte by byte; octal, since a hexadecimal escape has no end
 _C = {i: f"\\{i:03o}" for i in (*range(32), 34, 63, 92, 127)}
@@ -31,7 +31,7 @@ def c_string(text: object) -> str:
     return "".join(chr(b) if b < 128 and b not in _C else _C.get(b, f"\\{b:03o}") for b in str(text).encode())
 
 
-_FOLDERS = sorted(Path(__file__).parent.glob("*/templates"))
+_FOLDERS = sorted(resource("penode_gen.exports").glob("*/templates"))
 _ENVIRONMENT = jinja2.Environment(
     loader=jinja2.PrefixLoader({folder.parent.name: jinja2.FileSystemLoader(folder) for folder in _FOLDERS}),
     bytecode_cache=compiled_templates(),

@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..building import FLAGS, ROOT, build_once, compiler_version, generated, model_options, sources_in
+from penode_gen.resources import native
+
+from ..building import FLAGS, build_once, compiler_version, generated, include, missing_tool, model_options, sources_in
 from ..errors import UserError, hint
-from ..targets import MACHINES, PORT, _included
+from ..targets import MACHINES, PORT, _included, cross
 from .codes import Slave
 from .virtual import Served, describe, free_port, identity, period
 
@@ -35,16 +37,15 @@ def build(model: Any, machine: str) -> Path:
         raise UserError(
             f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; use --on sil"
         )
-    source, firmware = generated(model), ROOT / "sil" / "firmware"
+    source, firmware = generated(model), native("sil", "firmware")
     code = [source / f"{model.name}.c", source / f"{model.owner}_params.c", *sources_in(("src", "*.c"))]
-    own = [firmware / "serve_uart.c", firmware / "controller.c", PORT / "uart.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
+    own = [firmware / "serve_uart.c", firmware / "controller.c", PORT / "uart.c", native("port", "xcp", "xcp_frame.c")]
     command = [
-        str(PORT / "cc"),
-        MACHINES[machine],
+        *cross(MACHINES[machine]),
         *FLAGS,
         "-O2",
         "-g",
-        f"-I{ROOT}/port/xcp",
+        *include("port/xcp"),
         f"-I{PORT}",
         f"-I{source}",
         *model_options(model),
@@ -65,7 +66,7 @@ def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[n
     machine. Raises UserError.
     """
     if shutil.which(_EMULATOR) is None:
-        raise UserError(f"{_EMULATOR}: the emulator is not installed; install it (make test does)")
+        raise missing_tool(_EMULATOR)
     inputs = u.astype(np.float32).tobytes()
     if len(inputs) > Slave.STIMULUS:
         most = Slave.STIMULUS // (len(inputs) // len(u)) * model.sample_time

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 import penode_gen
 from penode_gen import exports
 from penode_gen.algebra import placeholder
+from penode_gen.resources import native
 
 from .. import scenario as scenarios
-from ..building import FLAGS, ROOT, build_once, compiler_version, generated, model_options, sources_in
+from ..building import FLAGS, build_once, compiler_version, generated, include, model_options, sources_in
 from ..console import note
 from ..errors import UserError
 from .codes import Slave
@@ -51,11 +52,11 @@ def period(model: Any) -> int:
 
 def build(model: Any) -> Path:
     """The virtual controller of a model. Raises UserError."""
-    source, firmware = generated(model), ROOT / "sil" / "firmware"
+    source, firmware = generated(model), native("sil", "firmware")
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
-    own = [ROOT / "port" / "host" / "serve.c", firmware / "controller.c", ROOT / "port" / "xcp" / "xcp_frame.c"]
-    include = [f"-I{ROOT}/inc", f"-I{ROOT}/port/gnu", f"-I{ROOT}/port/xcp", f"-I{firmware}", f"-I{source}"]
-    options = ["gcc", "-O2", "-g", *FLAGS, "-fno-pie", *include]
+    own = [native("port", "host", "serve.c"), firmware / "controller.c", native("port", "xcp", "xcp_frame.c")]
+    folders = [*include("inc", "port/gnu", "port/xcp", "sil/firmware"), f"-I{source}"]
+    options = ["gcc", "-O2", "-g", *FLAGS, "-fno-pie", *folders]
     read = [compiler_version("gcc"), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("sil/firmware", "*.h"))]
     same = build_once("runtime-serve", ".o", [*options[:-1], "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     told = [f'-DCONTROLLER_EPK="{identity(model)}"', f"-DCONTROLLER_PERIOD={period(model)}ULL"]

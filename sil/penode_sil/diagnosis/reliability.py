@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from penode_gen.resources import resource
+
 from .result import OUTSIDE, Cause
 
-TABLE = Path(__file__).with_name("templates") / "reliability.json"  # beside the page that states it
+TABLE = resource("penode_sil.diagnosis", "templates", "reliability.json")  # beside the page that states it
 
 
 def reliability(causes: Sequence[Cause], table: Path | None = None) -> dict[str, Any] | None:

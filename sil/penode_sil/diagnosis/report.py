@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 import penode_gen
 from penode_gen.emission.model_c import compiled_templates
 from penode_gen.model import Model
+from penode_gen.resources import resource
 
 from ..output import whole
 from . import catalogue, report_figure as fig
@@ -51,7 +52,7 @@ def write(path: Path, model: Model, d: Diagnosis, extended: Path) -> None:
 
 def render(model: Model, d: Diagnosis, extended: Path) -> str:
     """The same as text."""
-    folder = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
+    folder = jinja2.FileSystemLoader(resource("penode_sil.diagnosis", "templates"))
     environment = jinja2.Environment(
         loader=folder,
         bytecode_cache=compiled_templates(),

@@ -14,6 +14,8 @@ from typing import Any
 
 import jinja2
 
+from penode_gen.resources import resource
+
 from ..output import whole
 
 JSON = "diagnoses.json"
@@ -131,7 +133,7 @@ def _cells(rows: Sequence[Row]) -> Iterator[list[Any]]:
 
 def _page(folder: Path, model: str, rows: Sequence[Row]) -> str:
     """index.html: the same with links."""
-    text = (Path(__file__).parent / "templates" / "diagnoses.html").read_text(encoding="utf-8")
+    text = resource("penode_sil.diagnosis", "templates", "diagnoses.html").read_text(encoding="utf-8")
     template = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True).from_string(text)
     links = {row.folder: (folder / row.folder / "report.html").exists() for row in rows}
     context = {"summary": summary(rows), "links": links, "parameters": _parameters, "gain": _gain}

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from penode_gen.model import Model
+from penode_gen.resources import resource
 
 from ..building import build_directory, build_once, compiler_version
 from ..output import whole
@@ -75,7 +76,9 @@ class Engine:
         self.calls = found.calls
         self.networks = tuple(dict.fromkeys(name for name, _ in found.calls))
         self.signals = tuple(s.name for s in (*model.sensors, *model.outputs))
-        source = "".join((Path(__file__).parent / "templates" / f"{part}.c").read_text(encoding="utf-8") for part in ("networks", "engine"))
+        source = "".join(
+            resource("penode_sil.training", "templates", f"{part}.c").read_text(encoding="utf-8") for part in ("networks", "engine")
+        )
         head = "#include <math.h>\n#include <stddef.h>\nstatic inline double t_sigmoid(double x);\nstatic inline double t_softplus(double x);\n"
         head += "static inline double t_sign(double x) { return (double)((x > 0.0) - (x < 0.0)); }\nstatic inline double t_step(double x) { return (x > 0.0) ? 1.0 : 0.0; }\n"
         self._library = ctypes.CDLL(str(_compiled(head + found.text + source)))

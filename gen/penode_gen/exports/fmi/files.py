@@ -17,13 +17,14 @@ import numpy as np
 
 from ...emission.model_c import render
 from ...model import Model
+from ...resources import native, resource
+from ...tools import not_installed
 from ...version import VERSION
 from ..interface import ExportError, Option, Options
 from ..templating import render as template
 from . import variables as fv
 from .functions import functions
 
-ROOT = Path(__file__).resolve().parents[4]
 OPTIONS = (
     Option("real", "number type inside, float (default) or double", choices=("float", "double"), default="float"),
     Option("source_only", "leave the binaries out", "flag", default=False),
@@ -107,22 +108,20 @@ def context(model: Model, options: Options, fmi: int) -> dict[str, Any]:
 
 def _provided(fmi: int) -> set[str]:
     """The functions that the template of the interface writes out; it makes stubs of the others."""
-    text = Path(__file__).with_name("templates").joinpath(f"fmi{fmi}.c.j2").read_text(encoding="utf-8")
+    text = resource("penode_gen.exports.fmi", "templates", f"fmi{fmi}.c.j2").read_text(encoding="utf-8")
     return set(re.findall(rf"^(?:[\w ]+[ *])(fmi{fmi}\w+)\(", text, re.M))
 
 
 def runtime(model: Model) -> dict[str, str]:
-    """Name -> text of the model's C and of the runtime that it needs, as they stand in the repository. Raises ExportError."""
+    """Name -> text of the model's C and of the runtime that it needs, as they stand in the repository."""
     texts = {name: text for name, text in render(model, self_test=False).items() if name.endswith((".c", ".h"))}
     for folder, pattern in (("src", "*.c"), ("src", "*.h"), ("inc/penode", "*.h"), ("port/gnu", "*.h")):
-        for path in sorted((ROOT / folder).glob(pattern)):
+        for path in sorted(native(folder).glob(pattern)):
             if not path.name.startswith(_LEFT_OUT):
                 texts[path.name] = path.read_text(encoding="utf-8")
-    if "pen_set.c" not in texts:
-        raise ExportError(f"the C of the runtime is not in {ROOT}; run the command from a checkout of penode")
     for kept in ("pen_selftest.h", "pen_xcp.h", "pen_xcp_daq.h", "pen_xcp_parts.h"):
         if any(f"penode/{kept}" in text for text in texts.values()):
-            texts[kept] = (ROOT / "inc/penode" / kept).read_text(encoding="utf-8")
+            texts[kept] = native("inc", "penode", kept).read_text(encoding="utf-8")
     return texts
 
 
@@ -180,7 +179,7 @@ def notes(options: Options) -> list[str]:
     if options.get("source_only"):
         return []
     return [
-        f"no binary for {target} inside: {compiler} is not installed"
+        f"no binary for {target} inside: {not_installed(compiler)}"
         for target, (compiler, _, _) in _COMPILERS.items()
         if shutil.which(compiler) is None
     ]
@@ -191,7 +190,7 @@ def documentation(context: dict[str, Any], platforms: list[str]) -> dict[str, st
     return {
         "documentation/index.html": template("fmi/fmu_page.html.j2", **context, platforms=platforms),
         "documentation/licenses/license.txt": "The C runtime in this FMU, and the code that penode generates:\n\n"
-        + (ROOT / "LICENSE").read_text(encoding="utf-8"),
+        + native("LICENSE").read_text(encoding="utf-8"),
     }
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from ...model import Model
+from ...tools import not_installed
 from ..a2l.a2l import describe, epk, transport
 from ..a2l.elf_types import Program, read_program
 from ..a2l.entries import Measurements
@@ -37,11 +38,11 @@ def described(
     The binaries without their debug information, and the files of the layered standard by path in the FMU. `made`: platform of FMI 3 ->
     binary, compiled with debug information where it is an ELF file; `folders`: its folder in binaries/. Raises ExportError.
     """
-    missing = [name for name in ("elftools",) if importlib.util.find_spec(name) is None] + [
-        name for name in ("gcc", "objcopy") if shutil.which(name) is None
-    ]
-    if missing:
-        raise ExportError(f"--xcp: the A2L needs {missing[0]}, which is not installed; pip install penode[xcp], and install gcc")
+    if importlib.util.find_spec("elftools") is None:
+        raise ExportError("--xcp: the A2L needs the Python package pyelftools, which is not installed; pip install penode[xcp]")
+    for program in ("gcc", "objcopy"):
+        if shutil.which(program) is None:
+            raise ExportError(f"--xcp: the A2L needs a compiler, and {not_installed(program)}")
     stripped, files = dict(made), {}
     name = f"{model.name}.a2l"
     with tempfile.TemporaryDirectory() as folder:
