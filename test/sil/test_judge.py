@@ -153,7 +153,7 @@ def test_laws_that_are_sure_make_up_for_a_size_that_is_not(values, gains, togeth
     spring behind a damper, a size that may be nothing is none."""
     values["maxwell_bushing"] = {"stiffness": (1e6, -1e5, 2e6)}
     e = found(*[("maxwell_bushing", "spring")] * len(gains))
-    e.groups, e.built.names = (("maxwell_bushing", "spring"),), ["x1", "x2"]
+    e.groups, e.built.names = (("maxwell_bushing", "spring"),), ["x1", "x2"][: len(gains)]
     e.fit.free = [SimpleNamespace(target=f"x{i}_damping", value=g, unit=50.0) for i, g in enumerate(gains, 1)]
     e.fit.covariance = lambda: 4.0 * np.array([[1.0, together], [together, 1.0]])[: len(gains), : len(gains)]
     for law, expected in (("loose_damper", out), ("maxwell_bushing", True)):

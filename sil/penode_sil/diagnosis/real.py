@@ -252,7 +252,7 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
     if any(abs(mixed.get(b, 0.0)) > WORTH * shown for b, shown in zip(biases, rms, strict=True)):
         off = ", ".join(s.name for s in model.sensors if bias(s.name) in mixed)
         notes.append(f"the offsets of {off} differ; the recordings do not tell which is wrong")
-    for s, alone, shown in zip(model.sensors, shares, rms, strict=True):
+    for s, alone, shown in zip(model.sensors, shares[:-1], rms, strict=True):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         if alone * abs(value) <= 3.0 * sd or bias(s.name) in mixed:
             continue
