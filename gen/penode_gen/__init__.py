@@ -1,12 +1,24 @@
-"""penode_gen: from a model file and its networks to C."""
+"""
+penode_gen: from a model file and its networks to C.
 
-from .emission.model_c import generate, render
-from .model import Model, ModelError
-from .reading.model_file import load
-from .sets.packing import set_head, set_values
-from .sets.serial_form import SerialSet, read_serial, serial
-from .twins.numeric import Numeric, numeric
+What stands in `__all__` is imported when it is asked for: sympy and onnx take a second, and `penode --help` needs neither.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from .version import VERSION
+
+if TYPE_CHECKING:
+    from .emission.model_c import generate, render
+    from .errors import ModelError
+    from .model import Model
+    from .reading.model_file import load
+    from .sets.packing import set_head, set_values
+    from .sets.serial_form import SerialSet, read_serial, serial
+    from .twins.numeric import Numeric, numeric
 
 __all__ = [
     "VERSION",
@@ -23,3 +35,31 @@ __all__ = [
     "set_head",
     "set_values",
 ]
+
+_FROM = {  # name -> module that has it
+    "Model": "model",
+    "ModelError": "errors",
+    "Numeric": "twins.numeric",
+    "SerialSet": "sets.serial_form",
+    "generate": "emission.model_c",
+    "load": "reading.model_file",
+    "numeric": "twins.numeric",
+    "read_serial": "sets.serial_form",
+    "render": "emission.model_c",
+    "serial": "sets.serial_form",
+    "set_head": "sets.packing",
+    "set_values": "sets.packing",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """A name of `__all__`, from its module (PEP 562)."""
+    if name not in _FROM:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(import_module(f".{_FROM[name]}", __name__), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .errors import ModelError as ModelError
 from .networks import Network
 
 METHODS = ("euler", "heun", "rk4", "ros1", "ros2")
@@ -14,14 +15,6 @@ MORE_PIECES = ("refuse", "layers")
 OUT_OF_RANGE = ("report", "clamp", "hold")
 ON_DAMAGE = ("report", "hold", "rollback")
 GROUND = "ground"
-
-
-class ModelError(Exception):
-    """A model that cannot be used; `problems` lists all of them, one line each, with place and remedy."""
-
-    def __init__(self, problems: list[str]):
-        self.problems = list(problems)
-        super().__init__("\n".join(problems))
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import expit
 
+from .choices import ACTIVATIONS as ACTIVATIONS
+from .errors import NetworkError as NetworkError
+
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-ACTIVATIONS = ("relu", "identity", "tanh", "sigmoid", "softplus", "step")
 FORMS = ("centre", "rescale")
-
-
-class NetworkError(Exception):
-    """A network that cannot be used. The message is one line: file, node or layer, what is wrong, remedy."""
 
 
 @dataclass(frozen=True, eq=False)

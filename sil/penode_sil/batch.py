@@ -28,7 +28,7 @@ from penode_gen.emission.batch_c import BatchCode, render_batch
 from penode_gen.resources import native
 
 from .building import FLAGS, build_directory, build_once, compile_program, digest_of, include, missing_tool, sources_in
-from .errors import UserError
+from .errors import WrongUse
 from .output import whole
 
 Array = NDArray[Any]
@@ -127,7 +127,7 @@ class Batch:
         """
         model, dtype = self.model, self.dtype
         if set_name not in model.sets:
-            raise UserError(f"{model.path}: no set '{set_name}'; it has {', '.join(model.sets)}")
+            raise WrongUse(f"{model.path}: no set '{set_name}'; it has {', '.join(model.sets)}")
         default = penode_gen.set_values(model, set_name, dtype)
         values = np.ascontiguousarray(default if sets is None else sets, dtype=dtype)
         given = {name: np.atleast_1d(np.asarray(value, dtype=float)) for name, value in (parameters or {}).items()}
@@ -159,7 +159,7 @@ class Batch:
         job.which, job.kept = (tuple(a.ctypes.data for a in arrays) for arrays in (wanted, kept))
         kept.append(self._observed(observer, job, -(-n // every), padded))  # arrays that the job points to
         if not self._step(self._library(per_run), job, vectors, threads):
-            raise UserError(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
+            raise WrongUse(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
         x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept[:3])
         return BatchRun(x, y, z, *first[:, :runs].astype(np.int64))
 
@@ -185,7 +185,7 @@ class Batch:
         for name, value in given.items():
             if name not in self.model.parameters:
                 known = ", ".join(self.model.parameters)
-                raise UserError(f"{self.model.path}: no parameter '{name}'; it has {known}")
+                raise WrongUse(f"{self.model.path}: no parameter '{name}'; it has {known}")
             if value.ndim != 1:
                 raise ValueError(f"parameter {name} has the shape {value.shape}; it must be one value or [runs]")
         if u.ndim not in (2, 3) or u.shape[-1] != n_u:
@@ -235,7 +235,7 @@ class Batch:
     def _columns(self, kind: str, wanted: Sequence[str] | None, known: Sequence[str]) -> Array:
         for name in wanted or ():
             if name not in known:
-                raise UserError(f"{self.model.path}: no {kind} '{name}'; it has {', '.join(known) or 'none'}")
+                raise WrongUse(f"{self.model.path}: no {kind} '{name}'; it has {', '.join(known) or 'none'}")
         return np.array([known.index(name) for name in (known if wanted is None else wanted)], dtype=np.uintp)
 
     def _library(self, per_run: bool) -> ctypes.CDLL:

@@ -20,7 +20,7 @@ import penode_gen
 from penode_gen.resources import native, resource
 from penode_gen.tools import not_installed
 
-from .errors import UserError
+from .errors import TargetError, ToolMissing
 
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
 
@@ -83,9 +83,9 @@ def model_options(model: Any) -> list[str]:
     ]
 
 
-def missing_tool(name: str) -> UserError:
+def missing_tool(name: str) -> ToolMissing:
     """What to raise where a compiler or an emulator is not installed."""
-    return UserError(not_installed(name))
+    return ToolMissing(not_installed(name))
 
 
 def compile_program(command: Sequence[str], output: Path) -> None:
@@ -98,7 +98,7 @@ def compile_program(command: Sequence[str], output: Path) -> None:
             raise missing_tool(command[0]) from exc
         if result.returncode != 0:
             lines = [line for line in result.stderr.splitlines() if "error" in line] or result.stderr.splitlines() or ["?"]
-            raise UserError(f"{output.name}: the compiler refused it: {lines[0]}; report this with the model file")
+            raise TargetError(f"{output.name}: the compiler refused it: {lines[0]}; report this with the model file")
         _move(part, output)
 
 

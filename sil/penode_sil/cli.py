@@ -4,115 +4,60 @@
 
 from __future__ import annotations
 
-import gc
-import json
-import os
-from pathlib import Path
+from importlib import import_module
 
 import click
 
-import penode_gen
+from penode_gen.version import VERSION
 
 from . import environment  # noqa: F401 isort: split
-from .calibration.measure import measure
-from .calibration.serve import serve
-from .calibration.stage import compare, stage
-from .console import FILE, Several, counted, staged
-from .errors import UserError
-from .export import export
 from .guard import guarded
-from .importing import import_
-from .inspection import inspect
-from .simulate import simulate
-from .training.command import train
+
+# name -> its module of commands/ and the command there, and the first line of its help
+COMMANDS: dict[str, tuple[str, str]] = {
+    "compare": (
+        "compare:compare",
+        "Which of the sets of the model file MODEL a controller runs, and what differs from its reference page.",
+    ),
+    "diagnose": ("diagnose:diagnose", "Show what the model file MODEL gets wrong, name the cause, extend the model, measure the gain."),
+    "export": ("export:export", "Write the model file MODEL in the format of another tool."),
+    "generate": ("generate:generate", "Check the model file MODEL and write its C."),
+    "import": ("import_:import_", "Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits;"),
+    "inspect": (
+        "inspect:inspect",
+        "List the channels of the recording FILE with units, clock and quality; and which signals of MODEL they are.",
+    ),
+    "measure": ("measure:measure", "Record signals of a controller that runs, a sample a step, with units and its own time stamps."),
+    "serve": ("serve:serve", "Run the compiled model file MODEL in real time, for calibration tools to connect to by XCP."),
+    "simulate": ("simulate:simulate", "Run the model file MODEL on a scenario or on recorded inputs, or play an SSP."),
+    "stage": ("stage:stage", "Write a parameter set into a controller that runs: written, proven by its checksum, switched, read back."),
+    "train": ("train:train", "Fit the networks of the model file MODEL, and its parameters within their tolerances, to recordings."),
+}
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(penode_gen.VERSION, prog_name="penode")
+class Commands(click.Group):
+    """A group whose commands are imported when they are called; their first lines are listed without that."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module, _, name = COMMANDS[cmd_name][0].partition(":")
+        found: click.Command = getattr(import_module(f".commands.{module}", __package__), name)
+        return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        width = formatter.width - 6 - max(map(len, COMMANDS))
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, click.utils.make_default_short_help(COMMANDS[name][1], width)) for name in self.list_commands(ctx)])
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(VERSION, prog_name="penode")
 def cli() -> None:
     """Physics-enhanced neural ODEs: from a model file to checked C, in the loop on host and Cortex-M."""
-
-
-cli.add_command(export)
-cli.add_command(compare)
-cli.add_command(import_)
-cli.add_command(inspect)
-cli.add_command(measure)
-cli.add_command(serve)
-cli.add_command(simulate)
-cli.add_command(stage)
-cli.add_command(train)
-
-
-@cli.command()
-@click.argument("model", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help="Directory for the C files; created if need be.")
-def generate(model: Path, output: Path) -> None:
-    """Check the model file MODEL and write its C."""
-    loaded = penode_gen.load(model)
-    if output.exists() and not output.is_dir():
-        raise UserError(f"{output}: this is a file; name a directory")
-    if not output.exists() and not output.absolute().parent.is_dir():
-        raise UserError(f"{output}: there is no directory {output.parent}; create it")
-    for path in penode_gen.generate(loaded, output):
-        click.echo(str(path))
-
-
-@cli.command(cls=Several)
-@click.argument("model", type=FILE)
-@click.option("--data", type=FILE, multiple=True, required=True, help="Recordings (CSV or MDF4), or folders of them.")
-@click.option("--each", is_flag=True, help="Diagnose each recording by itself, as in a folder.")
-@click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on; not learnt from.")
-@click.option("--still", type=FILE, multiple=True, help="Recordings at standstill: the noise of each channel, instead of the model file's.")
-@click.option("-o", "--output", type=FILE, required=True, help="Directory for what is found; created if need be.")
-@click.option("--set", "set_name", default="default", show_default=True, help="Parameter set to start from.")
-@click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
-@click.option("--jobs", type=click.IntRange(1), help="Processes for a folder; as many as cores if not given.")
-@click.option("--scheduler", help="Address of a Dask scheduler for a folder, like tcp://host:8786.")
-@click.option("--resume", is_flag=True, help="Keep what DIR has of the same model, recordings and options.")
-@click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json, or diagnoses.json for a table.")
-def diagnose(
-    model: Path,
-    data: tuple[Path, ...],
-    each: bool,
-    holdout: tuple[Path, ...],
-    still: tuple[Path, ...],
-    output: Path,
-    set_name: str,
-    channel: tuple[str, ...],
-    jobs: int | None,
-    scheduler: str | None,
-    resume: bool,
-    as_json: bool,
-) -> None:
-    """Show what the model file MODEL gets wrong, name the cause, extend the model, measure the gain.
-
-    Several files are one study: the same plant with the same cause, one answer. A folder, or files with --each, are as
-    many studies: an answer for each recording in a directory of its own below DIR, and one table over all of them in
-    diagnoses.csv, diagnoses.json and index.html.
-    """
-    from .diagnosis import files, folder, sentences, table  # SciPy's parts are slow to load
-
-    gc.freeze()  # what has been loaded stays to the end: not to be looked through for garbage again and again
-    files.check_folder(output)
-    job = files.Job(model, data, holdout, output, set_name, channel, still)
-    if not each and not any(path.is_dir() for path in data):
-        for given, name in ((jobs, "--jobs"), (scheduler, "--scheduler"), (resume, "--resume")):
-            if given:
-                raise UserError(f"{name}: these recordings are one study; give a folder, or --each for one by one")
-        with staged() as tell:
-            loaded, found = files.run(job, tell=tell)
-        click.echo(json.dumps(found.as_json(), indent=2) if as_json else sentences(loaded, found, output))
-        return
-    if jobs and scheduler:
-        raise UserError("--jobs: the cluster of --scheduler has its own number of processes; leave one of them out")
-    with counted("recordings") as tell:
-        rows = folder.diagnose(job, jobs or len(os.sched_getaffinity(0)), scheduler or "", resume, tell)
-    name = penode_gen.load(model).name
-    click.echo(table.as_json(name, rows) if as_json else table.sentences(name, rows, output))
-    failed = [row.error for row in rows if row.error]
-    if failed:
-        raise UserError(*failed)
 
 
 def main() -> None:

@@ -4,16 +4,19 @@
 The environment variables that the command and its libraries read, checked before any of them is loaded.
 
 `cli.py` imports this module before all others: numpy reads SOURCE_DATE_EPOCH, and matplotlib MPLBACKEND, when they are imported,
-and end in a traceback where the value is none. Only the standard library is used here.
+and end in a traceback where the value is none. Only the standard library, and errors, which need no more, are used here.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Mapping
 from datetime import MAXYEAR, UTC, datetime
 from pathlib import Path
+
+from .errors import WrongUse
 
 LAST = int(datetime(MAXYEAR, 12, 31, 23, 59, 59, tzinfo=UTC).timestamp())  # [s] the last that a date can be written for
 
@@ -31,12 +34,14 @@ def problems(environment: Mapping[str, str]) -> list[str]:
 
 
 def refuse(environment: Mapping[str, str]) -> None:
-    """Ends the process with code 2 where there are problems."""
+    """Ends the process with code 2 where there are problems, which --json gets too (guard.py)."""
     found = problems(environment)
     for problem in found:
         print(f"penode: {problem}", file=sys.stderr)
+    if found and "--json" in sys.argv:
+        print(json.dumps(WrongUse(*found).as_json(), indent=2))
     if found:
-        raise SystemExit(2)
+        raise SystemExit(WrongUse.exit)
 
 
 refuse(os.environ)

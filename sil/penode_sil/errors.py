@@ -1,19 +1,58 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Errors that a user can mend: one line each, what, where and the remedy. The command prints them and ends with 2."""
+"""Errors of the rooms of penode_sil; the tree of all of them stands in penode_gen.errors."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
 
+from penode_gen.errors import InternalError, ModelError, NetworkError, PenodeError, Problem, UserError
 
-class UserError(Exception):
-    """Something the user can mend; `problems` has one line for each thing that is wrong."""
+__all__ = [
+    "InternalError",
+    "ModelError",
+    "NetworkError",
+    "PenodeError",
+    "Problem",
+    "RecordingError",
+    "ScenarioError",
+    "TargetError",
+    "ToolMissing",
+    "UserError",
+    "WrongUse",
+    "hint",
+]
 
-    def __init__(self, *problems: str):
-        self.problems = list(problems)
-        super().__init__("\n".join(problems))
+
+class RecordingError(UserError):
+    """A recording that cannot be read, or does not fit the model."""
+
+    code = "recording"
+
+
+class ScenarioError(UserError):
+    """A scenario file that cannot be read, or does not fit the model."""
+
+    code = "scenario"
+
+
+class ToolMissing(UserError):
+    """A compiler, an emulator or a Python package that is not installed."""
+
+    code = "tool-missing"
+
+
+class TargetError(UserError):
+    """A board, an emulator or a controller, or the line to it, that does not do what it should."""
+
+    code = "target"
+
+
+class WrongUse(UserError):
+    """Options, paths or variables of the environment that the command cannot work with."""
+
+    code = "usage"
 
 
 def hint(name: str, known: Iterable[str]) -> str:

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a command ends with: 0 done, 2 wrong use or bad input with a line for each problem, 3 a fault of ours with one line."""
+"""
+What a command ends with: 0 done, 2 wrong use or bad input with a line for each problem, 3 a fault of ours with one line.
+
+The lines go to stderr; where the command line has --json, the same go to stdout, as one JSON object (sil/ERRORS.md).
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
 import sys
@@ -13,12 +18,13 @@ import warnings
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
+from typing import NoReturn
 
 import click
 
-import penode_gen
+from penode_gen.version import VERSION
 
-from .errors import UserError
+from .errors import InternalError, PenodeError, Problem, WrongUse
 
 
 def guarded(command: Callable[[], object]) -> None:
@@ -28,32 +34,44 @@ def guarded(command: Callable[[], object]) -> None:
         os.environ.setdefault("PYTHONWARNINGS", "ignore")
     try:
         command()
-    except (UserError, penode_gen.ModelError) as exc:
-        for problem in exc.problems:
-            click.echo(f"penode: {problem}", err=True)
-        sys.exit(2)
+    except PenodeError as exc:
+        _end(exc)
     except click.exceptions.Abort:
         sys.exit(130)
     except click.UsageError as exc:
-        where = exc.ctx.command_path if exc.ctx else "penode"
-        click.echo(f"penode: {exc.format_message()} See {where} --help", err=True)
-        sys.exit(2)
+        where = f"See {exc.ctx.command_path if exc.ctx else 'penode'} --help"
+        what = exc.format_message()
+        _end(WrongUse(Problem.shown(f"{what} {where}", what, place=_option(exc), remedy=where)))
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(0)
     except OSError as exc:
-        click.echo(f"penode: {exc.filename or 'a file'}: {exc.strerror or exc}; check the path and its permissions", err=True)
-        sys.exit(2)
+        _end(WrongUse(f"{exc.filename or 'a file'}: {exc.strerror or exc}; check the path and its permissions"))
     except Exception as exc:  # a fault of ours, whatever it is
-        click.echo(_crashed(exc), err=True)
-        sys.exit(3)
+        _end(_crashed(exc))
+
+
+def _option(exc: click.UsageError) -> str:
+    """The option or argument that is wrong, as far as click says."""
+    if isinstance(exc, click.BadParameter) and exc.param is not None:
+        return max(exc.param.opts, key=len) if isinstance(exc.param, click.Option) else exc.param.human_readable_name
+    return getattr(exc, "option_name", "")
+
+
+def _end(exc: PenodeError) -> NoReturn:
+    """Say what is wrong, and end."""
+    if "--json" in sys.argv and not exc.told:
+        click.echo(json.dumps(exc.as_json(), indent=2))
+    for problem in exc.problems:
+        click.echo(f"penode: {problem}", err=True)
+    sys.exit(exc.exit)
 
 
 def crash_file(exc: Exception) -> tuple[str, Path | None]:
     """What happened, in one line, and the file with the traceback that was written for it; None if none could be."""
     what = " ".join(f"{type(exc).__name__}: {exc}".split())
     call = shlex.join(["penode", *sys.argv[1:]])
-    about = f"penode {penode_gen.VERSION}, Python {sys.version.split()[0]}, {sys.platform}"
+    about = f"penode {VERSION}, Python {sys.version.split()[0]}, {sys.platform}"
     text = f"{about}\n{call}\n\n{''.join(traceback.format_exception(exc))}"
     for folder in (Path.cwd(), Path(tempfile.gettempdir())):
         path = folder / f"penode-crash-{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}.txt"
@@ -65,8 +83,8 @@ def crash_file(exc: Exception) -> tuple[str, Path | None]:
     return what, None
 
 
-def _crashed(exc: Exception) -> str:
+def _crashed(exc: Exception) -> InternalError:
     """The line that says what to send."""
     what, path = crash_file(exc)
     send = f"{path} and the files that the command names" if path else "this line, the command and the files that it names"
-    return f"penode: a fault of penode, not of yours ({what}); send us {send}"
+    return InternalError(f"a fault of penode, not of yours ({what}); send us {send}", None if path is None else str(path))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""`penode import`: weights from the file of another tool, as a network file for a parameter set; or a Modelica model, as a model file."""
+"""What `penode import` does: weights from the file of another tool, as a network file for a parameter set; or a Modelica model, as a model file."""
 
 from __future__ import annotations
 
@@ -11,47 +11,30 @@ import click
 import penode_gen
 from penode_gen import imports
 from penode_gen.emission.network_json import to_json
-from penode_gen.networks import ACTIVATIONS
 
-from .console import FILE
-from .errors import UserError, hint
+from .errors import ModelError, WrongUse, hint
 from .output import check_writable, whole
 
 
-@click.command("import")
-@click.argument("file", type=FILE)
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    required=True,
-    help="Network file to write (.json), to be named in a set of a model file; or model file (.toml), from a Modelica model.",
-)
-@click.option("--network", help="Which one, if the file has several.")
-@click.option(
-    "--activation", type=click.Choice(ACTIVATIONS), default="relu", show_default=True, help="Of hidden layers, where the file does not say."
-)
-@click.option("--model", help="Which Modelica model, if the file has several; for a .toml only.")
 def import_(file: Path, output: Path, network: str | None, activation: str, model: str | None) -> None:
-    """Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits; or a Modelica model of masses,
-    springs and dampers, as a model file."""
+    """Write what the options name (commands/import_.py), and print the file. Raises UserError."""
     whole_model = output.suffix.lower() == ".toml"
     foreign = [f"--{name}" for name in (("network", "activation") if whole_model else ("model",)) if _given(name)]
     if foreign:
         kind = "a model, which it writes as .toml" if not whole_model else "a network, which it writes as .json"
-        raise UserError(*(f"{name}: it is for {kind}; leave it out" for name in foreign))
+        raise WrongUse(*(f"{name}: it is for {kind}; leave it out" for name in foreign))
     if whole_model:
         _model(file, output, model)
         return
     if output.suffix.lower() != ".json":
-        raise UserError(f'{output}: a network cannot be written as "{output.suffix}"; end its name in .json, or in .toml for a model')
+        raise WrongUse(f'{output}: a network cannot be written as "{output.suffix}"; end its name in .json, or in .toml for a model')
     check_writable(output)
     found = imports.read(file, imports.Options(activation))
     if network is None and len(found) > 1:
-        raise UserError(f"{file}: it has {len(found)} networks: {', '.join(found)}; choose one with --network")
+        raise WrongUse(f"{file}: it has {len(found)} networks: {', '.join(found)}; choose one with --network")
     chosen = network or next(iter(found))
     if chosen not in found:
-        raise UserError(f'--network: {file} has no network "{chosen}"; {hint(chosen, found)}')
+        raise WrongUse(f'--network: {file} has no network "{chosen}"; {hint(chosen, found)}')
     text = to_json(found[chosen])
     with whole(output) as part:
         part.write_text(text, encoding="utf-8")
@@ -74,5 +57,5 @@ def _model(file: Path, output: Path, model: str | None) -> None:
         try:
             penode_gen.load(part)
         except penode_gen.ModelError as error:
-            raise UserError(f"{file}: no model file can be made of it: {error.problems[0].replace(str(part), output.name)}") from None
+            raise ModelError([f"{file}: no model file can be made of it: {error.problems[0].replace(str(part), output.name)}"]) from None
     click.echo(str(output))

@@ -1,34 +1,14 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""`penode inspect`: what is in a recording, how good it is, and how it maps to a model."""
+"""What `penode inspect` prints: what is in a recording, how good it is, and how it maps to a model."""
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
-import click
-
-import penode_gen
-
-from .console import FILE, Several
-from .recordings import look, named
-
-
-@click.command(cls=Several)
-@click.argument("file", type=FILE)
-@click.argument("model", type=FILE, required=False)
-@click.option("--channel", multiple=True, help="What the file calls a signal: x=pos_mm, or x=Weg [mm], or x=pos@10ms.")
-@click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
-def inspect(file: Path, model: Path | None, channel: tuple[str, ...], as_json: bool) -> None:
-    """List the channels of the recording FILE with units, clock and quality; and which signals of MODEL they are."""
-    loaded = None if model is None else penode_gen.load(model)
-    known = [s.name for s in (*loaded.inputs, *loaded.sensors, *loaded.outputs)] if loaded is not None else []
-    found = look.look(file, loaded, named.aliases(channel, known))
-    click.echo(json.dumps(machine(found), indent=2) if as_json else "\n".join(people(found)))
+from .recordings import look
 
 
 def machine(found: look.Look) -> dict[str, Any]:

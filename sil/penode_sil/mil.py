@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 import penode_gen
 
-from .errors import UserError
+from .errors import ModelError
 from .late import Held, driving
 from .scenario import Instance, Scenario, staging_samples
 from .signals import Signal
@@ -106,7 +106,7 @@ def _step(solver: Any, what: str) -> None:
     message = solver.step()
     if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
         why = message or "a state is not finite"
-        raise UserError(f"{what} cannot be continued after {solver.t:.6g} s ({why}); the model is unstable there")
+        raise ModelError([f"{what} cannot be continued after {solver.t:.6g} s ({why}); the model is unstable there"])
 
 
 def solve(

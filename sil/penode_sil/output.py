@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import UserError
+from .errors import WrongUse
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +31,11 @@ def check_writable(path: Path) -> None:
     """UserError now rather than after long work, if `path` cannot be written."""
     folder = path.parent
     if not folder.is_dir():
-        raise UserError(f"{path}: there is no directory {folder}; create it or name another file")
+        raise WrongUse(f"{path}: there is no directory {folder}; create it or name another file")
     if path.is_dir():
-        raise UserError(f"{path}: this is a directory; name a file in it")
+        raise WrongUse(f"{path}: this is a directory; name a file in it")
     if not os.access(folder, os.W_OK):
-        raise UserError(f"{path}: the directory {folder} is not writable; name another one")
+        raise WrongUse(f"{path}: the directory {folder} is not writable; name another one")
 
 
 @contextmanager
@@ -51,7 +51,7 @@ def whole(path: Path) -> Iterator[Path]:
         os.chmod(name, 0o666 & ~umask)
         os.replace(name, path)
     except OSError as exc:
-        raise UserError(f"{path}: cannot be written: {exc.strerror or exc}; free space or name another file") from exc
+        raise WrongUse(f"{path}: cannot be written: {exc.strerror or exc}; free space or name another file") from exc
     finally:
         Path(name).unlink(missing_ok=True)
 

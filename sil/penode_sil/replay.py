@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import recordings, scenario as scenarios
-from .errors import UserError
+from .errors import RecordingError, UserError
 from .signals import Samples
 
 Array = NDArray[np.float64]
-HOW = ("linear", "held", "bandlimited")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +47,7 @@ def load(path: Path, model: Any, set_name: str | None, channels: Iterable[str], 
     tables = recordings.read(path, [*wanted, *signals, "time"], pairs)
     sensed, broken = _sensed(tables, signals, path)
     if broken and not wanted and not sensed:
-        raise UserError(next(iter(broken.values())))
+        raise RecordingError(next(iter(broken.values())))
     for name, problem in broken.items():
         note(f"{problem}; {name} is not compared")
     if wanted:
@@ -93,13 +92,15 @@ def _clock(path: Path, sensed: dict[str, Sensed], model: Any) -> Array:
     if not sensed:
         first = next(s.name for s in (*model.sensors, *model.outputs))
         look = f'"penode inspect {path.name} {model.path.name}" lists its columns'
-        raise UserError(f"{path}: it holds no sensor of the model; {look}, then name them, such as --channel {first}=COLUMN")
+        raise RecordingError(
+            f"{path}: it holds no sensor of the model; {look}, then name them, such as --channel {first}=COLUMN", channel=first
+        )
     first, last = max(s.time[0] for s in sensed.values()), min(s.time[-1] for s in sensed.values())
     count = int((last - first) / step + 1e-3) + 1
     if last <= first or count < 2:
-        raise UserError(f"{path}: its sensors share less than two samples of {step * 1e3:g} ms; record them together")
+        raise RecordingError(f"{path}: its sensors share less than two samples of {step * 1e3:g} ms; record them together")
     if count > 1000 * max(s.time.size for s in sensed.values()):
-        raise UserError(f"{path}: it has far longer gaps than samples; split the recording there")
+        raise RecordingError(f"{path}: it has far longer gaps than samples; split the recording there")
     return first + np.arange(count) * step
 
 
@@ -117,7 +118,7 @@ def _between(tables: Sequence[Any], wanted: dict[str, str], raster: Array, step:
         worst = float(np.max(np.abs(time - grid))) / usual
         if worst > 0.01:  # an error of pi * 1 % at half of the highest frequency
             what = f"rows are off an even clock by {worst:.2g} of their interval"
-            raise UserError(f"{table.path}: channel {name}: its {what}; replay it with --replay linear or held")
+            raise RecordingError(f"{table.path}: channel {name}: its {what}; replay it with --replay linear or held", channel=name)
         rows = (raster - time[0]) / usual
         if np.max(np.abs(rows - np.rint(rows))) < 1e-3 and 0.999 * step <= usual <= 1.001 * step:
             columns.append(values[np.rint(rows).astype(int)])

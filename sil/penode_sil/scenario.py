@@ -8,6 +8,7 @@ The file is checked as a whole: UserError has one line for each problem, with fi
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import UserError, hint
+from .errors import Problem, ScenarioError, UserError, hint
 from .recordings import pick, read
 from .recordings.units import UnitError, quantity
 from .signals import ROAD_CLASSES, Bump, Chirp, Constant, Ramp, Road, Samples, Signal, Sum, VelocityChirp
@@ -75,7 +76,7 @@ class _Table:
 
     def complain(self, key: str, what: str, remedy: str) -> None:
         place = ".".join(part for part in (self.key, key) if part)
-        self.problems.append(f"{self.path}: {place}: {what}; {remedy}" if place else f"{self.path}: {what}; {remedy}")
+        self.problems.append(Problem(what, str(self.path), None, place, remedy))
 
     def has(self, key: str) -> bool:
         self.asked.add(key)
@@ -301,9 +302,10 @@ def load(path: Path, model: Any, set_length: int) -> Scenario:
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as exc:
-        raise UserError(f"{path}: {exc.strerror or exc}; name a scenario file that can be read") from exc
+        raise ScenarioError(f"{path}: {exc.strerror or exc}; name a scenario file that can be read") from exc
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as exc:
-        raise UserError(f"{path}: it is no TOML text: {exc}; correct it there") from exc
+        found = re.search(r"at line (\d+)", str(exc))
+        raise ScenarioError(f"{path}: it is no TOML text: {exc}; correct it there", line=int(found[1]) if found else None) from exc
     problems: list[str] = []
     table = _Table(data, "", path, problems)
     title = table.text("title", path.stem)
@@ -331,7 +333,7 @@ def load(path: Path, model: Any, set_length: int) -> Scenario:
         table.complain("instance", f'two are called "{name}"', "give each its own name")
     table.finish()
     if problems:
-        raise UserError(*problems)
+        raise ScenarioError(*problems)
     return Scenario(title, duration, inputs, initial, instances, path)
 
 

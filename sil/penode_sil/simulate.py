@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""`penode simulate`: a model on a scenario or on recordings, exact, as C on the host, or as C on an emulated core."""
+"""What `penode simulate` does: a model on a scenario or on recordings, exact, as C on the host, or as C on an emulated core."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 import penode_gen
 
 from . import mil, replay, results, scenario as scenarios, starts, status
-from .console import FILE, Several, note, progress
-from .errors import UserError, hint
+from .console import note, progress
+from .errors import UserError, WrongUse, hint
 from .mdf_write import write_mf4
 from .output import write_csv
 from .recordings import units
@@ -31,42 +31,13 @@ ENDINGS = (".csv", ".mf4")
 PICTURES = (".png", ".svg", ".pdf")
 
 
-@click.command(cls=Several)
-@click.argument("model", type=FILE, required=False)
-@click.option("--ssp", type=FILE, help="SSP to play with its schedule of sets, instead of MODEL (gen/SCHEDULE.md); inputs by --input.")
-@click.option("--scenario", type=FILE, help="Scenario file (TOML) to run.")
-@click.option("--input", "records", type=FILE, multiple=True, help="Recordings (CSV with units, or MDF) that drive the model.")
-@click.option(
-    "--on",
-    "target",
-    default="sil",
-    show_default=True,
-    metavar="mil|sil|pil[:machine]",
-    help=f"Exact reference, C on this machine, or C on an emulated one of {', '.join(MACHINES)}.",
-)
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    required=True,
-    help="File to write (.csv, .mf4); for several recordings a folder, or a name with {name}. Folders are made.",
-)
-@click.option("--plot", type=FILE, help="Picture to write as well (.png, .svg, .pdf).")
-@click.option("--signal", help="Signal to plot; the first output if not given.")
-@click.option("--set", "set_name", help="Parameter set for --input.")
-@click.option("--channel", multiple=True, help="What the recording calls a signal: x=pos_mm, or x=Weg [mm].")
-@click.option("--start", multiple=True, help='Start: "state=0.01 m", or measured[:K], fitted to the first K samples of the sensors.')
-@click.option(
-    "--replay", "how", type=click.Choice(replay.HOW), default="linear", show_default=True, help="What an input does between rows."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def simulate(model: Path | None, ssp: Path | None, target: str, as_json: bool, **given: Any) -> None:
-    """Run the model file MODEL on a scenario or on recorded inputs, or play an SSP."""
+    """Run a model on what the options name (commands/simulate.py), write the tables, print a summary. Raises UserError."""
     if ssp is not None:
         play(model, ssp, as_json or target != "sil", given)
         return
     if model is None:
-        raise UserError("simulate needs a model file, or --ssp FILE; name one")
+        raise WrongUse("simulate needs a model file, or --ssp FILE; name one")
     asked = _Asked(model, target, **given)
     place, machine = asked.place()
     outputs = asked.outputs()
@@ -129,45 +100,45 @@ class _Asked:
     def place(self) -> tuple[str, str]:
         """mil, sil or pil, and the machine of pil."""
         if (self.scenario is None) == (not self.records):
-            raise UserError("simulate needs exactly one of --scenario and --input; name a scenario file or recordings")
+            raise WrongUse("simulate needs exactly one of --scenario and --input; name a scenario file or recordings")
         place, _, machine = self.target.partition(":")
         if place not in ("mil", "sil", "pil") or (machine and place != "pil"):
-            raise UserError(f'--on: "{self.target}" is not known; use mil, sil, pil or pil:MACHINE')
+            raise WrongUse(f'--on: "{self.target}" is not known; use mil, sil, pil or pil:MACHINE')
         if machine and machine not in MACHINES:
-            raise UserError(f'--on: there is no machine "{machine}"; {hint(machine, MACHINES)}')
+            raise WrongUse(f'--on: there is no machine "{machine}"; {hint(machine, MACHINES)}')
         return place, machine or next(iter(MACHINES))
 
     def outputs(self) -> list[Path]:
         """A file for each recording, or one for the scenario; none of them, nor the picture, has a wrong name."""
         if self.plot is not None:
             if self.plot.suffix not in PICTURES:
-                raise UserError(f'{self.plot}: a picture cannot be written as "{self.plot.suffix}"; end its name in .png, .svg or .pdf')
+                raise WrongUse(f'{self.plot}: a picture cannot be written as "{self.plot.suffix}"; end its name in .png, .svg or .pdf')
             if len(self.records) > 1:
-                raise UserError("--plot: it draws one recording, and there are several; leave it out or give one --input")
+                raise WrongUse("--plot: it draws one recording, and there are several; leave it out or give one --input")
             check_makeable(self.plot)
         pattern = str(self.output)
         if len(self.records) > 1 and "{name}" not in pattern:
             if self.output.suffix in ENDINGS:
-                raise UserError(f"{self.output}: several recordings need several files; name a folder, or a file with {{name}} in it")
+                raise WrongUse(f"{self.output}: several recordings need several files; name a folder, or a file with {{name}} in it")
             pattern = str(self.output / "{name}.csv")
         outputs = [Path(pattern.replace("{name}", path.stem)) for path in self.records] or [self.output]
         for path in outputs:
             check_makeable(path)
             if path.suffix not in ENDINGS:
-                raise UserError(f'{path}: a table cannot be written as "{path.suffix}"; end its name in .csv or .mf4')
+                raise WrongUse(f'{path}: a table cannot be written as "{path.suffix}"; end its name in .csv or .mf4')
         twice = sorted({str(p) for p in outputs if outputs.count(p) > 1})
         if twice:
-            raise UserError(f"{twice[0]}: two recordings would be written to it; rename one of the recordings")
+            raise WrongUse(f"{twice[0]}: two recordings would be written to it; rename one of the recordings")
         for record, path in ((r, p) for r in self.records for p in outputs):
             if path.exists() and record.exists() and path.samefile(record):
-                raise UserError(f"{path}: this is the recording itself; name another file")
+                raise WrongUse(f"{path}: this is the recording itself; name another file")
         return outputs
 
     def check(self, model: Any) -> None:
         """What the model must know."""
         names = _names(model)
         if self.signal is not None and self.signal not in names:
-            raise UserError(f'--signal: the model has no signal "{self.signal}"; {hint(self.signal, names)}')
+            raise WrongUse(f'--signal: the model has no signal "{self.signal}"; {hint(self.signal, names)}')
         if self.scenario is not None:
             for option, given, why in (
                 ("--channel", self.channel, "it names what a recording holds, and a scenario has none"),
@@ -176,9 +147,9 @@ class _Asked:
                 ("--set", self.set_name, "scenarios name their sets themselves"),
             ):
                 if given:
-                    raise UserError(f"{option}: {why}; remove it")
+                    raise WrongUse(f"{option}: {why}; remove it")
         if self.set_name is not None and self.set_name not in model.sets:
-            raise UserError(f'--set: the model has no set "{self.set_name}"; {hint(self.set_name, model.sets)}')
+            raise WrongUse(f'--set: the model has no set "{self.set_name}"; {hint(self.set_name, model.sets)}')
 
     def jobs(self, model: Any, start: starts.Start) -> list[_Job]:
         """All that is to be run, read and checked."""
@@ -187,14 +158,16 @@ class _Asked:
             plan = scenarios.load(self.scenario, model, length)
             times = scenarios.sample_times(plan, model.sample_time)
             return [_Job(plan, times, 0.0, scenarios.sampled(plan, model, times))]
-        found, problems = [], []
+        found: list[replay.Replay] = []
+        refused: list[UserError] = []
         for path in self.records:
             try:
                 found.append(replay.load(path, model, self.set_name, self.channel, self.how, note))
             except UserError as exc:
-                problems += exc.problems
-        if problems:
-            raise UserError(*dict.fromkeys(problems))
+                refused.append(exc)
+        if refused:
+            refused[0].problems = list(dict.fromkeys(problem for exc in refused for problem in exc.problems))
+            raise refused[0]
         return [self._started(model, start, one) for one in found]
 
     def _started(self, model: Any, start: starts.Start, one: replay.Replay) -> _Job:
@@ -207,14 +180,14 @@ class _Asked:
 def check_makeable(path: Path) -> None:
     """UserError now rather than after long work, if `path` cannot be written, its folders made if need be."""
     if path.is_dir():
-        raise UserError(f"{path}: this is a directory; name a file in it")
+        raise WrongUse(f"{path}: this is a directory; name a file in it")
     folder = path.absolute().parent
     while not folder.exists():
         folder = folder.parent
     if not folder.is_dir():
-        raise UserError(f"{path}: {folder} is a file and no directory; name another one")
+        raise WrongUse(f"{path}: {folder} is a file and no directory; name another one")
     if not os.access(folder, os.W_OK):
-        raise UserError(f"{path}: the directory {folder} is not writable; name another one")
+        raise WrongUse(f"{path}: the directory {folder} is not writable; name another one")
 
 
 def _names(model: Any) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from .console import note
-from .errors import UserError
+from .errors import WrongUse
 from .output import check_writable, write_csv
 
 
@@ -21,7 +21,7 @@ def play(model: Path | None, ssp: Path, other: bool, given: dict[str, Any]) -> N
     records, output = given["records"], given["output"]
     foreign = other or any(given[key] for key in ("scenario", "plot", "signal", "set_name", "channel", "start")) or given["how"] != "linear"
     if model is not None or foreign or len(records) > 1 or output.suffix != ".csv":
-        raise UserError("--ssp: it goes with one --input and -o FILE.csv only, and without a model file; leave the others out")
+        raise WrongUse("--ssp: it goes with one --input and -o FILE.csv only, and without a model file; leave the others out")
     check_writable(output)
     columns = ssp_player.play(ssp, records[0] if records else None, note)
     write_csv(output, columns)

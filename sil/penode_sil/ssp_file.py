@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-from .errors import UserError
+from .errors import ModelError
 
 SSP = "http://ssp-standard.org/SSP1/SystemStructure"
 SCHEDULE = "extra/penode/schedule.xml"
@@ -55,10 +55,10 @@ def read(path: Path) -> System:
         with zipfile.ZipFile(path) as archive:
             return _Reader(path, archive).system()
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror or error}; name a file that can be read") from None
+        raise ModelError([f"{path}: {error.strerror or error}; name a file that can be read"]) from None
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
-        raise UserError(
-            f"{path}: no SSP that can be read: {' '.join(str(error).split()) or type(error).__name__}; export it again"
+        raise ModelError(
+            [f"{path}: no SSP that can be read: {' '.join(str(error).split()) or type(error).__name__}; export it again"]
         ) from None
 
 
@@ -66,8 +66,8 @@ class _Reader:
     def __init__(self, path: Path, archive: zipfile.ZipFile):
         self.path, self.archive = path, archive
 
-    def error(self, where: str, what: str, remedy: str) -> UserError:
-        return UserError(f"{self.path}: {where}: {' '.join(what.split())}; {remedy}")
+    def error(self, where: str, what: str, remedy: str) -> ModelError:
+        return ModelError([f"{self.path}: {where}: {' '.join(what.split())}; {remedy}"])
 
     def data(self, name: str, named_by: str, limit: int = 200_000_000) -> bytes:
         """A file of the archive, of up to `limit` bytes."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import ssp_file
-from .errors import UserError
+from .errors import ModelError, RecordingError, ToolMissing
 from .output import Column
 
 Array = NDArray[np.float64]
@@ -32,12 +32,12 @@ def play(path: Path, record: Path | None, tell: Any = lambda line: None) -> list
     scheduled too late.
     """
     if importlib.util.find_spec("fmpy") is None:
-        raise UserError("--ssp: it needs the Python package FMPy, which is not installed; pip install penode[ssp]")
+        raise ToolMissing("--ssp: it needs the Python package FMPy, which is not installed; pip install penode[ssp]")
     system = ssp_file.read(path)
     table = _record(record, system.inputs) if record else {}
     stop = float(table["time"][-1]) if table else system.stop
     if stop is None:
-        raise UserError(f"{path}: it has no stop time; give inputs with --input")
+        raise ModelError([f"{path}: it has no stop time; give inputs with --input"])
     with _component(path, system, tell) as fmu:
         steps = round(stop / fmu.step_size)
         rows = _run(path, system, fmu, table, steps)
@@ -86,18 +86,20 @@ def _record(path: Path, known: tuple[str, ...]) -> dict[str, Array]:
         with open(path, encoding="utf-8", newline="") as file:
             rows = [row for row in csv.reader(file) if row]
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}; name a file that can be read") from None
+        raise RecordingError(f"{path}: {error.strerror}; name a file that can be read") from None
     except (UnicodeDecodeError, csv.Error) as error:
-        raise UserError(f"{path}: no table that can be read: {error}; save it as CSV in UTF-8") from None
+        raise RecordingError(f"{path}: no table that can be read: {error}; save it as CSV in UTF-8") from None
     names = [re.sub(r"\s*\[.*?\]\s*$", "", word).strip() for word in rows[0]] if rows else []
     if "time" not in names or len(rows) < 2:
-        raise UserError(f"{path}: it has no column time, or no rows; write time [s] and the inputs: {', '.join(known)}")
+        raise RecordingError(f"{path}: it has no column time, or no rows; write time [s] and the inputs: {', '.join(known)}")
     try:
         values = np.array(rows[1:], float)
     except ValueError as error:
-        raise UserError(f"{path}: {' '.join(str(error).split())[:200]}; give every row as many numbers as the header has names") from None
+        raise RecordingError(
+            f"{path}: {' '.join(str(error).split())[:200]}; give every row as many numbers as the header has names"
+        ) from None
     if values.shape[1] != len(names) or not np.isfinite(values).all() or (np.diff(values[:, names.index("time")]) <= 0).any():
-        raise UserError(
+        raise RecordingError(
             f"{path}: a row that does not fit the header, a number that is not finite, or times that do not ascend; mend the table"
         )
     return {name: values[:, i] for i, name in enumerate(names) if name == "time" or name in known}
@@ -138,7 +140,7 @@ class _Fmu:
         try:
             yield
         except FMICallException as error:
-            raise UserError(f"{doing}: the FMU refuses it: {self.lines[-1] or error}; mend the SSP") from None
+            raise ModelError([f"{doing}: the FMU refuses it: {self.lines[-1] or error}; mend the SSP"]) from None
 
     def unit(self, name: str) -> str:
         variable = self.variables[name]
@@ -146,7 +148,7 @@ class _Fmu:
 
     def known(self, name: str, where: str) -> Any:
         if name not in self.variables:
-            raise UserError(f"{where}: the FMU has no variable {name!r}; mend the SSP")
+            raise ModelError([f"{where}: the FMU has no variable {name!r}; mend the SSP"])
         return self.variables[name]
 
     def set(self, values: ssp_file.Values, where: str) -> None:
@@ -154,7 +156,7 @@ class _Fmu:
             variable = self.known(name, where)
             size = int(np.prod(variable.shape or (1,))) if self.new else 1
             if len(given) != size:
-                raise UserError(f"{where}: {name} has {size} elements, and {len(given)} values are given; mend the SSP")
+                raise ModelError([f"{where}: {name} has {size} elements, and {len(given)} values are given; mend the SSP"])
             with self.guarded(f"{where}: {name}"):
                 if variable.type == "Enumeration":
                     (self.fmu.setInt64 if self.new else self.fmu.setInteger)([variable.valueReference], [int(v) for v in given])
@@ -192,12 +194,12 @@ def _component(path: Path, system: ssp_file.System, tell: Any) -> Iterator[_Fmu]
             fmpy.extract(str(file), str(Path(folder) / "fmu"))
             fmu = _Fmu(path, str(Path(folder) / "fmu"), description, system.component, tell)
         except Exception as error:  # FMPy raises many kinds
-            raise UserError(
-                f"{path}: its FMU cannot be used: {' '.join(str(error).split())[:300]}; export it again, with a binary for this machine"
+            raise ModelError(
+                [f"{path}: its FMU cannot be used: {' '.join(str(error).split())[:300]}; export it again, with a binary for this machine"]
             ) from None
         missing = [name for name in system.wires.values() if name not in fmu.variables]
         if missing:
-            raise UserError(f"{path}: the FMU has no variable {missing[0]!r}; mend the SSP")
+            raise ModelError([f"{path}: the FMU has no variable {missing[0]!r}; mend the SSP"])
         try:
             yield fmu
         finally:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import penode_gen
 
 from . import scenario as scenarios
-from .errors import UserError, hint
+from .errors import RecordingError, WrongUse, hint
 from .recordings.units import UnitError, quantity
 from .replay import Replay
 from .schedule import Call
@@ -45,19 +45,19 @@ def parse(texts: Iterable[str], model: Any) -> Start:
         if match := MEASURED.fullmatch(text):
             fitted, samples = True, int(match[1] or 0)
             if match[1] is not None and samples < 2:
-                raise UserError(f'--start: "{text}" fits too few samples; give measured:K with K from 2 on')
+                raise WrongUse(f'--start: "{text}" fits too few samples; give measured:K with K from 2 on')
             continue
         match = GIVEN.fullmatch(text)
         if match is None:
-            raise UserError(f'--start: "{text}" is not understood; write measured, measured:K or "state=0.01 m"')
+            raise WrongUse(f'--start: "{text}" is not understood; write measured, measured:K or "state=0.01 m"')
         if match[1] not in units:
-            raise UserError(f'--start: the model has no state "{match[1]}"; {hint(match[1], units)}')
+            raise WrongUse(f'--start: the model has no state "{match[1]}"; {hint(match[1], units)}')
         try:
             given[match[1]] = quantity(match[2], units[match[1]])
         except UnitError as exc:
-            raise UserError(f"--start: {match[1]}: {exc}") from exc
+            raise WrongUse(f"--start: {match[1]}: {exc}") from exc
     if fitted and set(given) == set(units):
-        raise UserError("--start: all states are given, so that none is left to be fitted; leave measured out")
+        raise WrongUse("--start: all states are given, so that none is left to be fitted; leave measured out")
     return Start(given, fitted, samples)
 
 
@@ -109,7 +109,7 @@ def fit(model: Any, set_name: str, replay: Replay, start: Start) -> tuple[dict[s
     x = np.array([start.given.get(name, value) for name, value in zip(model.states, model.start, strict=True)], dtype=float)
     if not replay.sensed:
         names = ", ".join(s.name for s in (*model.sensors, *model.outputs))
-        raise UserError(f"{replay.plan.path}: --start measured needs a sensor of the model; record one of: {names}")
+        raise RecordingError(f"{replay.plan.path}: --start measured needs a sensor of the model; record one of: {names}")
     count = start.samples or min(window(model, set_name, x, replay.u[0]), max(20, replay.times.size // 4))
     count = min(count, replay.times.size)
     residual = _Fit(model, set_name, replay, count)
@@ -118,13 +118,13 @@ def fit(model: Any, set_name: str, replay: Replay, start: Start) -> tuple[dict[s
             x[model.states.index(signal.expression)] = replay.sensed[signal.name].values[0]
     free = [i for i, name in enumerate(model.states) if name not in start.given]
     if sum(values.size for _, _, _, values, _ in residual.rows) < len(free):
-        raise UserError(
+        raise RecordingError(
             f"{replay.plan.path}: its first {count} samples measure too little to fit {len(free)} states; "
             "give --start measured:K with a larger K"
         )
     x, unseen = _solve(residual, x, free)
     if not np.isfinite(x).all():
-        raise UserError(
+        raise RecordingError(
             f"{replay.plan.path}: no start fits its first samples; give the states with --start, or another window with measured:K"
         )
     parts = [f"{model.states[i]} = {x[i]:.6g} {states[model.states[i]]}".rstrip() for i in free]

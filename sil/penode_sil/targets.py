@@ -22,10 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
+from penode_gen.algebra import placeholder
 from penode_gen.resources import native
 
 from .building import FLAGS, build_library, build_once, compiler_version, generated, include, missing_tool, model_options, sources_in
-from .errors import UserError
+from .choices import MACHINES as MACHINES
+from .errors import TargetError
 from .instance import Instance, Set
 from .schedule import Call
 
@@ -119,7 +121,7 @@ class SilInstance(Instance):
 
     def run(self, u: NDArray[Any], calls: Sequence[Call] = (), progress: Progress = lambda n: None) -> Run:
         """Step through u [n, n_u], making each call before its sample."""
-        u = np.ascontiguousarray(penode_gen.algebra.placeholder.columns(self.sil.model, u).reshape(-1, self.sil.n_u), dtype=self.dtype)
+        u = np.ascontiguousarray(placeholder.columns(self.sil.model, u).reshape(-1, self.sil.n_u), dtype=self.dtype)
         total = len(u)
         samples = np.zeros((total, self.sil.n_x + self.sil.n_y + self.sil.n_z), dtype=self.dtype)
         status, made, done = np.zeros(total, dtype=np.uint32), [], 0
@@ -150,7 +152,6 @@ class SilInstance(Instance):
 
 # -- PiL --------------------------------------------------------------------------------------------------------------
 
-MACHINES = {"m4f": "mps2-an386", "m3": "mps2-an385", "m7": "mps2-an500", "m33": "mps2-an505", "m55": "mps3-an547", "host": ""}
 TAPE_MAGIC = 0x314C4950
 OPERATION = {"end": 0, "step": 1, "begin": 2, "write": 3, "commit": 4, "abort": 5, "select": 6, "rollback": 7, "hold": 8, "state": 9}
 COST_KINDS = ("normal", "adopting", "holding")
@@ -212,9 +213,7 @@ class Pil:
 
     def run(self, u: NDArray[Any], calls: Sequence[Call] = (), set_name: str = "default", progress: Progress = lambda n: None) -> Run:
         """Initialise an instance with a set and step through u [n, n_u], making each call before its sample."""
-        u = np.ascontiguousarray(
-            penode_gen.algebra.placeholder.columns(self.model, u).reshape(-1, max(len(self.model.inputs), 1)), dtype=self.dtype
-        )
+        u = np.ascontiguousarray(placeholder.columns(self.model, u).reshape(-1, max(len(self.model.inputs), 1)), dtype=self.dtype)
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "tape").write_bytes(self._tape(u, calls, set_name))
             board = MACHINES[self.machine]
@@ -239,7 +238,7 @@ class Pil:
             text = (process.stdout.read() if process.stdout else "").strip().replace("\n", " | ")
             if process.returncode != 0:
                 what = TROUBLE.get(process.returncode, f"it ended with {process.returncode}")
-                raise UserError(f"pil:{self.machine}: {what}{': ' + text if text else ''}; run make test to check the installation")
+                raise TargetError(f"pil:{self.machine}: {what}{': ' + text if text else ''}; run make test to check the installation")
             progress(len(u))
             return self._read(np.fromfile(record, dtype="<u4"), len(u), calls)
 

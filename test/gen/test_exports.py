@@ -19,6 +19,8 @@ from penode_gen import exports
 from penode_gen.exports import archive, templating
 from penode_gen.model import ModelError
 from penode_sil.cli import cli
+from penode_sil.commands import export
+from penode_sil.commands.formats import OPTIONS, SUMMARIES
 from penode_sil.errors import UserError
 
 NQVM = Path(__file__).resolve().parents[2] / "gen" / "nqvm" / "nqvm.toml"
@@ -60,7 +62,12 @@ def test_a_format_is_a_module_and_a_line(tmp_path: Path) -> None:
     assert output.read_text() == "NQVM"
     run(str(NQVM), "--format", "shout", "--times", "2", "-o", str(output))
     assert output.read_text() == "NQVMNQVM"
-    assert "the name of the model, loud" in run("--help") and "--as-is" in run("--help")
+
+
+def test_help_shows_what_the_formats_declare() -> None:
+    """The help is written down, for it is not to load them all."""
+    assert {name: exports.exporter(name).summary for name in exports.FORMATS} == SUMMARIES
+    assert export.declared() == OPTIONS
 
 
 @pytest.mark.usefixtures("formats")

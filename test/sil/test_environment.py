@@ -26,7 +26,8 @@ def test_a_time_that_is_none_is_a_line_of_every_command() -> None:
     done = called(SOURCE_DATE_EPOCH="")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "penode: SOURCE_DATE_EPOCH: '' is no time in seconds; remove it or give a whole number\n"
-    code = "import sys, types; sys.modules['penode_sil.environment'] = types.ModuleType('penode_sil.environment'); import penode_sil.cli"
+    module = "sys.modules['penode_sil.environment'] = types.ModuleType('penode_sil.environment')"
+    code = f"import sys, types; {module}; import penode_sil.simulate"
     unguarded = subprocess.run([sys.executable, "-c", code], env=os.environ | {"SOURCE_DATE_EPOCH": ""}, capture_output=True, text=True)
     assert unguarded.returncode == 1 and "Traceback" in unguarded.stderr
 

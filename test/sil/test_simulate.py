@@ -13,6 +13,7 @@ from test_cli import table
 
 import penode_gen
 from penode_sil import replay, starts
+from penode_sil.choices import REPLAYS
 from penode_sil.recordings import mdf
 
 SWING = """
@@ -147,7 +148,7 @@ def test_replays_differ_between_rows_only(folder):
         return np.sin(2 * np.pi * 8 * t)
 
     (folder / "r.csv").write_text("time [s],push [rad/s^2]\n" + "".join(f"{a:.2f},{sine(a):.12g}\n" for a in t))
-    seen = {how: replay.load(folder / "r.csv", model, None, (), how, lambda text: None) for how in replay.HOW}
+    seen = {how: replay.load(folder / "r.csv", model, None, (), how, lambda text: None) for how in REPLAYS}
     for one in seen.values():
         assert np.allclose(one.u[120:-120:4, 0], sine(one.times[120:-120:4]), atol=1e-3)
     inner = slice(120, -120)

@@ -20,6 +20,8 @@ class ExportError(ModelError):
 
     def __init__(self, *problems: str):
         super().__init__(list(problems))
+        if all(problem.place.startswith("--") for problem in self.problems):
+            self.code = "usage"
 
 
 @dataclass(frozen=True)

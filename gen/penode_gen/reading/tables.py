@@ -14,6 +14,7 @@ from typing import Any
 
 from .. import model as m, units
 from ..algebra import expressions as ex
+from ..errors import Problem
 from ..sets import promises
 from .places import Lines, merge, one_line, parse, show
 
@@ -109,7 +110,7 @@ class Tables:
     def problem(self, where: Iterable[str], what: str, remedy: str) -> None:
         where = tuple(where)
         path, lines = self.place(where)
-        self.problems.append(one_line(f"{path}:{lines.of(where)}: {'.'.join(where)}{': ' * bool(where)}{what}; {remedy}"))
+        self.problems.append(Problem(one_line(what), one_line(str(path)), lines.of(where), one_line(".".join(where)), one_line(remedy)))
 
     # -- tables ---------------------------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import UserError
+from ..errors import TargetError
 
 _TOKEN = re.compile(r'/\*.*?\*/|//[^\n]*|"((?:[^"\\]|\\.|"")*)"|([^\s"]+)', re.S)
 _TYPES = {
@@ -184,4 +184,4 @@ def parse(text: str, origin: str) -> A2l:
             (epk[0][0], int(epk[1][0], 0)) if all(epk) else None,
         )
     except (ValueError, IndexError, KeyError) as exc:
-        raise UserError(f"{origin}: it cannot be read as A2L ({exc}); export it again with penode export --format a2l") from exc
+        raise TargetError(f"{origin}: it cannot be read as A2L ({exc}); export it again with penode export --format a2l") from exc

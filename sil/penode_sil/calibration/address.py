@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import UserError
+from ..errors import WrongUse
 
 FORMS = "tcp:HOST:PORT, udp:HOST:PORT or serial:DEVICE[:BAUD]"
 
@@ -31,4 +31,4 @@ def parse(text: str, baud: int = 115200) -> Address:
         device, rate = (place, int(number)) if place and number.isdecimal() else (rest, baud)
         settings = {"port": device, "bitrate": rate, "header_format": "HEADER_LEN_CTR_WORD", "tail_format": "NO_CHECKSUM"}
         return Address(text, "sxi", {"SxI": settings})
-    raise UserError(f'--to: "{text}" is no address; use {FORMS}')
+    raise WrongUse(f'--to: "{text}" is no address; use {FORMS}')

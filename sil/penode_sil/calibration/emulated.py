@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from penode_gen.resources import native
 
 from ..building import FLAGS, build_once, compiler_version, generated, include, missing_tool, model_options, sources_in
-from ..errors import UserError, hint
+from ..errors import ModelError, ScenarioError, TargetError, WrongUse, hint
 from ..targets import MACHINES, PORT, _included, cross
 from .codes import Slave
 from .virtual import Served, describe, free_port, identity, period
@@ -31,11 +31,13 @@ _EMULATOR = "qemu-system-arm"
 def build(model: Any, machine: str) -> Path:
     """The program for one of WITH_UART, with debug information. Raises UserError."""
     if machine not in WITH_UART:
-        raise UserError(f'--on: there is no controller for "{machine}"; {hint(machine, WITH_UART)}')
+        raise WrongUse(f'--on: there is no controller for "{machine}"; {hint(machine, WITH_UART)}')
     between = period(model)
     if 10**9 % between:  # ns
-        raise UserError(
-            f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; use --on sil"
+        raise ModelError(
+            [
+                f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; use --on sil"
+            ]
         )
     source, firmware = generated(model), native("sil", "firmware")
     code = [source / f"{model.name}.c", source / f"{model.owner}_params.c", *sources_in(("src", "*.c"))]
@@ -70,7 +72,7 @@ def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[n
     inputs = u.astype(np.float32).tobytes()
     if len(inputs) > Slave.STIMULUS:
         most = Slave.STIMULUS // (len(inputs) // len(u)) * model.sample_time
-        raise UserError(
+        raise ScenarioError(
             f"--scenario: the emulated controller holds the inputs of {most:g} s, not of {len(u) * model.sample_time:g} s; shorten it, or use --on sil"
         )
     program = build(model, machine)
@@ -102,7 +104,7 @@ def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[n
             device = process.stdout.readline().partition("redirected to ")[2].split()[:1] if port is None else []
             time.sleep(0.5)
             if process.poll() is not None:
-                raise UserError(
+                raise TargetError(
                     f"{line}: the emulator has ended ({process.stdout.read().strip() or process.returncode}); choose another port"
                 )
             try:

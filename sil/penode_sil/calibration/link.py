@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import status
-from ..errors import UserError
+from ..errors import TargetError, ToolMissing, UserError
 from .a2l_read import A2l, Entry, parse
 from .address import Address
 from .codes import Page, Text, Who
@@ -25,11 +25,11 @@ from .codes import Page, Text, Who
 _CRC_32 = "XCP_CRC_32"
 
 
-class Refused(UserError):
-    """A negative answer of the slave; `flags` is what its tuning call reported, 0 if nothing."""
+class Refused(TargetError):
+    """A negative answer of the slave; `answer` is its code, `flags` what its tuning call reported, 0 if nothing."""
 
     def __init__(self, what: str, code: str, flags: int):
-        self.code, self.flags = code, flags
+        self.answer, self.flags = code, flags
         reasons = f": {', '.join(status.names(flags))}" if flags else ""
         super().__init__(f"{what}: the controller refused it ({code}{reasons}); {_REMEDIES.get(code, 'the running set stays in force')}")
 
@@ -99,7 +99,7 @@ class Link:
             kept = np.frombuffer(error[3:7], self.order + "u4") if len(error) >= 7 else []
             raise Refused(what, str(exc.get_error_code()), int(kept[0]) if len(kept) else 0) from None
         except (types.XcpTimeoutError, OSError, SystemExit) as exc:
-            raise UserError(f"{self.address.text}: no answer to {what}; is the controller running, and no other tool connected?") from exc
+            raise TargetError(f"{self.address.text}: no answer to {what}; is the controller running, and no other tool connected?") from exc
 
     def give_up(self) -> None:
         """No answer is expected any more: what is still asked for waits 0.1 s."""
@@ -128,7 +128,7 @@ class Link:
         self.ask("SET_MTA", self.master.setMta, address)
         answer = self.ask("BUILD_CHECKSUM", self.master.buildChecksum, n)
         if str(answer.checksumType) != _CRC_32:
-            raise UserError(f"{self.address.text}: its checksum is {answer.checksumType}; a slave of penode has {_CRC_32}")
+            raise TargetError(f"{self.address.text}: its checksum is {answer.checksumType}; a slave of penode has {_CRC_32}")
         return int(answer.checksum)
 
     def set_page(self, who: Who, page: Page) -> None:
@@ -147,11 +147,11 @@ class Link:
         """The A2L of a file, or the one that the slave offers, once it is known to be that of the program. Raises UserError."""
         text = path.read_text(encoding="utf-8", errors="replace") if path is not None else self.text(Text.A2L)
         if not text:
-            raise UserError(f"{self.address.text}: the controller offers no A2L; name it by --a2l (penode export --format a2l writes it)")
+            raise TargetError(f"{self.address.text}: the controller offers no A2L; name it by --a2l (penode export --format a2l writes it)")
         found = parse(text, str(path or self.address.text))
         epk = self.text(Text.EPK) if found.epk is not None else ""
         if found.epk is not None and epk and epk != found.epk[0]:
-            raise UserError(
+            raise TargetError(
                 f'{path or self.address.text}: the A2L is that of "{found.epk[0]}", the controller is "{epk}"; export the A2L of its program'
             )
         return found
@@ -161,7 +161,7 @@ class Link:
 def connected(address: Address, policy: Any = None, patience: float = 10.0) -> Iterator[Link]:
     """A link, disconnected at the end. `patience` [s] for an answer: more than any command takes, on a serial line too. Raises UserError."""
     if importlib.util.find_spec("pyxcp") is None:
-        raise UserError("XCP needs the Python package pyxcp, which is not installed; pip install penode[xcp]")
+        raise ToolMissing("XCP needs the Python package pyxcp, which is not installed; pip install penode[xcp]")
     from pyxcp.config import create_application_from_config, set_application
     from pyxcp.master import Master
 
@@ -176,7 +176,7 @@ def connected(address: Address, policy: Any = None, patience: float = 10.0) -> I
         master = Master(address.layer, config=application, policy=spy)
         _without_noise(application)
     except (OSError, SystemExit) as exc:
-        raise UserError(f"{address.text}: it cannot be opened; name a device, or a host, that is there") from exc
+        raise TargetError(f"{address.text}: it cannot be opened; name a device, or a host, that is there") from exc
     finally:
         sys.argv = arguments
     master.transport.timeout = round(patience * 1e9)  # pyxcp takes it from no configuration
@@ -184,7 +184,7 @@ def connected(address: Address, policy: Any = None, patience: float = 10.0) -> I
     try:
         master.transport.connect()
     except OSError as exc:
-        raise UserError(f"{address.text}: nothing answers there; start the controller (penode serve), or correct --to") from exc
+        raise TargetError(f"{address.text}: nothing answers there; start the controller (penode serve), or correct --to") from exc
     try:
         link.connect()
         yield link

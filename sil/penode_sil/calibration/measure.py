@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""`penode measure`: signals of a controller, a sample a step, by DAQ lists into an MDF4 file."""
+"""What `penode measure` does: signals of a controller, a sample a step, by DAQ lists into an MDF4 file."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from ..console import FILE, note, progress
-from ..errors import UserError, hint
+from ..console import note, progress
+from ..errors import TargetError, UserError, WrongUse, hint
 from ..mdf_write import write_mf4
 from ..output import Column, check_writable
 from ..recordings.units import UnitError, quantity
@@ -87,18 +87,18 @@ def _policy(entries: list[Entry], every: int) -> tuple[Any, Samples]:
 def choose(a2l: A2l, names: list[str]) -> list[Entry]:
     """The measurements of that name. Raises UserError."""
     if not names:
-        raise UserError(f"--signals names none; name some of {a2l.name}, with commas between")
+        raise WrongUse(f"--signals names none; name some of {a2l.name}, with commas between")
     problems = [f'--signals: {a2l.name} has no "{name}"; {hint(name, a2l.measurements)}' for name in names if name not in a2l.measurements]
     if problems:
-        raise UserError(*problems)
+        raise WrongUse(*problems)
     entries = [a2l.measurements[name] for name in dict.fromkeys(names)]
     several = [entry.name for entry in entries if entry.count != 1]
     if several:
-        raise UserError(f"--signals: {several[0]} is an array; name single numbers")
+        raise WrongUse(f"--signals: {several[0]} is an array; name single numbers")
     places = sorted({(entry.address, entry.type.str): entry for entry in entries}.values(), key=lambda entry: entry.address)
     for before, after in itertools.pairwise(places):
         if after.address < before.address + before.size:  # pyxcp would leave out one of them
-            raise UserError(f"--signals: {after.name} lies in the bytes of {before.name}; measure one after the other")
+            raise WrongUse(f"--signals: {after.name} lies in the bytes of {before.name}; measure one after the other")
     return entries
 
 
@@ -179,30 +179,19 @@ def _seconds(option: str, text: str) -> float:
     try:
         found = quantity(text, "s")
     except UnitError as exc:
-        raise UserError(f"{option}: {exc}") from exc
+        raise WrongUse(f"{option}: {exc}") from exc
     if not 0.0 < found < 1e6:
-        raise UserError(f'{option}: "{text}" is no such time; give one like "10 s"')
+        raise WrongUse(f'{option}: "{text}" is no such time; give one like "10 s"')
     return found
 
 
-@click.command()
-@click.option("--signals", required=True, help="Names of the A2L, with commas between; units and types come from there.")
-@click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
-@click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
-@click.option("--duration", help='How long, like "10 s"; until Ctrl-C if not given.')
-@click.option(
-    "--stage", "staged", metavar="SET", help="Write this set meanwhile, as penode stage does: MODEL.toml:NAME, or a file in serial form."
-)
-@click.option("--after", default="1 s", show_default=True, help="When to begin with that.")
-@click.option("--every", type=click.IntRange(1, 255), default=1, show_default=True, help="Every so many steps a sample.")
-@click.option("-o", "--output", type=FILE, required=True, help="File to write (.mf4).")
 def measure(
     signals: str, to: str, a2l: Path | None, duration: str | None, staged: str | None, after: str, every: int, output: Path
 ) -> None:
-    """Record signals of a controller that runs, a sample a step, with units and its own time stamps."""
+    """Write what the options name (commands/measure.py), and print a summary. Raises UserError."""
     seconds, wait = None if duration is None else _seconds("--duration", duration), _seconds("--after", after)
     if output.suffix.lower() != ".mf4":
-        raise UserError(f'{output}: a log cannot be written as "{output.suffix}"; end its name in .mf4')
+        raise WrongUse(f'{output}: a log cannot be written as "{output.suffix}"; end its name in .mf4')
     check_writable(output)
     address = addresses.parse(to)
     with connected(address) as link:
@@ -220,7 +209,7 @@ def measure(
     for one in done:
         click.echo(one.sentence())
     if not log.time.size:
-        raise UserError(f"{to}: no sample has come; is the controller stepping?")
+        raise TargetError(f"{to}: no sample has come; is the controller stepping?")
     write_mf4(output, columns(log, described), "penode measure")
     lost = "lost ones not counted" if log.lost is None else f"{log.lost} lost"
     click.echo(f"{to}: {log.time.size} samples in {log.time[-1]:.3f} s, {lost} -> {output}")
@@ -229,7 +218,7 @@ def measure(
             "XCP has no code for the controller's period (1 to 255 times 1 ns, 10 ns, ... 1 s): measure a counter, such as sample, to see gaps"
         )
     if log.broken:
-        raise UserError(f"{to}: the controller has fallen silent, or the line is broken; what came until then is in {output}")
+        raise TargetError(f"{to}: the controller has fallen silent, or the line is broken; what came until then is in {output}")
     if log.lost:
         note("the line was too slow for some samples: measure fewer signals, or --every 2")
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import penode_gen
 
-from ..errors import UserError, hint
+from ..errors import TargetError, WrongUse, hint
 from .a2l_read import A2l, Entry
 from .codes import Page, Who
 from .link import Link
@@ -42,7 +42,7 @@ def segment(a2l: A2l) -> tuple[int, int, np.dtype[Any]]:
     """Address, bytes and type of the values of a set. Raises UserError."""
     kinds = {entry.type for entry in a2l.characteristics.values()}
     if a2l.segment is None or len(kinds) != 1:
-        raise UserError(
+        raise TargetError(
             f"the A2L of {a2l.name} has not one memory segment of one kind of numbers; export it with penode export --format a2l"
         )
     return *a2l.segment, kinds.pop()
@@ -63,19 +63,19 @@ def choose(text: str, kind: np.dtype[Any]) -> ChosenSet:
     if path.endswith(".toml") and Path(path).is_file():
         model = penode_gen.load(path)
         if name not in model.sets:
-            raise UserError(f'{path}: it has no set "{name}"; {hint(name, model.sets)}')
+            raise WrongUse(f'{path}: it has no set "{name}"; {hint(name, model.sets)}')
         layout = penode_gen.set_head(model, name, kind.type)[0]
         return ChosenSet(f"{name} (set {model.sets[name].id})", int(layout), np.asarray(penode_gen.set_values(model, name, kind.type)))
     if text.endswith(".toml") and Path(text).is_file():
-        raise UserError(f"{text}: which of its sets? Name it as {text}:NAME, one of: {', '.join(penode_gen.load(text).sets)}")
+        raise WrongUse(f"{text}: which of its sets? Name it as {text}:NAME, one of: {', '.join(penode_gen.load(text).sets)}")
     if not Path(text).is_file():
-        raise UserError(f"{text}: there is no such file; name a set as MODEL.toml:NAME, or a file in serial form")
+        raise WrongUse(f"{text}: there is no such file; name a set as MODEL.toml:NAME, or a file in serial form")
     try:
         found = penode_gen.read_serial(Path(text).read_bytes())
     except ValueError as exc:
-        raise UserError(f"{text}: {exc}; name a set as MODEL.toml:NAME, or a file in serial form") from exc
+        raise WrongUse(f"{text}: {exc}; name a set as MODEL.toml:NAME, or a file in serial form") from exc
     if found.values.dtype != kind:
-        raise UserError(
+        raise WrongUse(
             f"{text}: its values have {found.values.dtype.itemsize} bytes, those of the controller {kind.itemsize}; write the set in that form"
         )
     return ChosenSet(f"{Path(text).name} (set {found.id})", found.layout, found.values)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""`penode serve`: the compiled model in real time, as a controller that a calibration tool connects to."""
+"""What `penode serve` does: the compiled model in real time, as a controller that a calibration tool connects to."""
 
 from __future__ import annotations
 
@@ -12,31 +12,12 @@ import click
 
 import penode_gen
 
-from ..console import FILE, note
-from ..errors import UserError
+from ..console import note
+from ..errors import WrongUse
 from .emulated import WITH_UART, emulated
 from .virtual import Served, inputs, served
 
 
-@click.command()
-@click.argument("model", type=FILE)
-@click.option("--tcp", type=click.IntRange(0, 65535), help="Port to listen at; 0: any that is free.")
-@click.option("--udp", type=click.IntRange(0, 65535), help="The same over UDP.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0: every one of this machine.")
-@click.option("--scenario", type=FILE, help="Scenario file whose inputs drive it, again and again; zeros if not given.")
-@click.option(
-    "--on", "target", default="sil", show_default=True, metavar="sil|pil[:machine]", help="On this machine, or on an emulated Cortex-M."
-)
-@click.option(
-    "--quiet",
-    type=click.IntRange(0, 60000),
-    default=0,
-    show_default=True,
-    help="Milliseconds after the last edit until it is in force, while the working page runs; 0: by page switch only.",
-)
-@click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), help="Seconds; until Ctrl-C if not given.")
-@click.option("--a2l", type=FILE, help="File to write its A2L to, for tools that do not ask the controller.")
-@click.option("--json", "as_json", is_flag=True, help="Print the address and the end as JSON.")
 def serve(
     model: Path,
     tcp: int | None,
@@ -49,14 +30,14 @@ def serve(
     a2l: Path | None,
     as_json: bool,
 ) -> None:
-    """Run the compiled model file MODEL in real time, for calibration tools to connect to by XCP."""
+    """Serve as the options say (commands/serve.py). Raises UserError."""
     if (tcp is None) == (udp is None):
-        raise UserError("serve needs one of --tcp PORT and --udp PORT; use --tcp 5555")
+        raise WrongUse("serve needs one of --tcp PORT and --udp PORT; use --tcp 5555")
     place, _, machine = target.partition(":")
     if place not in ("sil", "pil") or (machine and place == "sil"):
-        raise UserError(f'--on: "{target}" is not known; use sil, pil or pil:MACHINE')
+        raise WrongUse(f'--on: "{target}" is not known; use sil, pil or pil:MACHINE')
     if place == "pil" and (tcp is None or quiet):
-        raise UserError(
+        raise WrongUse(
             "--on pil: its serial line is a TCP port, and edits are in force by page switch only; use --tcp PORT, without --quiet"
         )
     loaded = penode_gen.load(model)

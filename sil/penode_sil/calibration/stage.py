@@ -1,25 +1,18 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""`penode stage` and `penode compare`: a set into a controller that runs, and what runs there."""
+"""What `penode stage` and `penode compare` do: a set into a controller that runs, and what runs there."""
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import click
-
-import penode_gen
-
-from ..console import FILE, note
-from ..errors import UserError
-from . import address as addresses, pages
+from ..errors import TargetError, WrongUse
+from . import pages
 from .a2l_read import A2l
 from .codes import Page, Who
-from .link import Link, connected
+from .link import Link
 from .pages import ChosenSet, Pages
 
 
@@ -53,7 +46,7 @@ def _await(link: Link, a2l: A2l, before: int | None, patience: float = 5.0) -> i
     end = time.monotonic() + patience
     while (now := _running_id(link, a2l)) is not None and now == before:
         if time.monotonic() > end:
-            raise UserError(f"{link.address.text}: the set is committed, but no step adopts it; is the controller stepping?")
+            raise TargetError(f"{link.address.text}: the set is committed, but no step adopts it; is the controller stepping?")
         time.sleep(0.002)
     return now
 
@@ -64,7 +57,7 @@ def write(link: Link, a2l: A2l, chosen: ChosenSet) -> tuple[int, float]:
     expected = a2l.measurements.get("set.layout")
     layout = int(link.number(expected)) if expected else chosen.layout
     if chosen.values.nbytes != size or layout != chosen.layout:
-        raise UserError(
+        raise WrongUse(
             f"{chosen.name}: it is a set of another model (layout 0x{chosen.layout:08x}, the controller has 0x{layout:08x}); choose one of {a2l.name}"
         )
     begin = time.perf_counter()
@@ -72,7 +65,7 @@ def write(link: Link, a2l: A2l, chosen: ChosenSet) -> tuple[int, float]:
     seconds = time.perf_counter() - begin
     found = link.checksum(address, size)
     if found != chosen.checksum:
-        raise UserError(
+        raise TargetError(
             f"{chosen.name}: what has arrived is something else (CRC-32 0x{found:08x}, not 0x{chosen.checksum:08x}); the running set stays, stage it again"
         )
     return found, seconds
@@ -86,68 +79,12 @@ def stage_set(link: Link, a2l: A2l, chosen: ChosenSet) -> Staged:
     link.set_page(Who.ECU, Page.WORKING)
     identity = _await(link, a2l, before)
     if link.read(address, size) != chosen.values.astype(kind.newbyteorder(link.order)).tobytes():
-        raise UserError(f"{chosen.name}: it does not read back as it was written; compare the pages (penode compare)")
+        raise TargetError(f"{chosen.name}: it does not read back as it was written; compare the pages (penode compare)")
     return Staged(chosen.name, size, seconds, checksum, identity)
 
 
-def _names(model: Any, kind: Any, found: Pages) -> tuple[str, str]:
+def what_runs(model: Any, kind: Any, found: Pages) -> tuple[str, str]:
     """What runs, and the reference, by name."""
     known = pages.known_sets(model, kind) if model is not None else {}
     name = {checksum: known.get(checksum, f"no known set (CRC-32 0x{checksum:08x})") for checksum, _ in (found.running, found.reference)}
     return name[found.running[0]], name[found.reference[0]]
-
-
-@click.command()
-@click.argument("chosen", metavar="[SET]", required=False)
-@click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
-@click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
-@click.option("--back", is_flag=True, help="Instead of a set: back to the reference page, the set in flash.")
-@click.option("--json", "as_json", is_flag=True, help="Print what was done as JSON.")
-def stage(chosen: str | None, to: str, a2l: Path | None, back: bool, as_json: bool) -> None:
-    """Write a parameter set into a controller that runs: written, proven by its checksum, switched, read back.
-
-    SET is MODEL.toml:NAME, or a file in serial form. The controller adopts it between two steps, all or none.
-    """
-    if (chosen is None) != back:
-        raise UserError("stage needs a SET, or --back, and not both; name a set as MODEL.toml:NAME, or a file in serial form")
-    with connected(addresses.parse(to)) as link:
-        found = link.a2l(a2l)
-        if back:
-            link.set_page(Who.ECU, Page.REFERENCE)
-            click.echo(json.dumps({"page": "reference"}) if as_json else f"{to}: {found.name} runs the reference page")
-            return
-        staged = stage_set(link, found, pages.choose(str(chosen), pages.segment(found)[2]))
-    if as_json:
-        click.echo(json.dumps(vars(staged)))
-        return
-    click.echo(staged.sentence())
-    if staged.id is None:
-        note("the A2L does not say where the id of the running set lies; measure it yourself")
-
-
-@click.command()
-@click.argument("model", type=FILE)
-@click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
-@click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
-@click.option("--list", "listed", type=click.IntRange(min=0), default=20, show_default=True, help="How many differing values to print.")
-@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
-def compare(model: Path, to: str, a2l: Path | None, listed: int, as_json: bool) -> None:
-    """Which of the sets of the model file MODEL a controller runs, and what differs from its reference page."""
-    loaded = penode_gen.load(model)
-    with connected(addresses.parse(to)) as link:
-        described = link.a2l(a2l)
-        address, _, kind = pages.segment(described)
-        found = pages.look(link, described)
-    running, reference = _names(loaded, kind, found)
-    differing = found.differing(described, address)
-    if as_json:
-        keys = ("name", "unit", "running", "reference")
-        click.echo(
-            json.dumps({"running": running, "reference": reference, "differing": [dict(zip(keys, row)) for row in differing]}, indent=1)
-        )
-        return
-    click.echo(f"running: {running}, reference: {reference}")
-    for name, unit, now, then in differing[:listed]:
-        click.echo(f"  {name:<32} {now:14.7g} {then:14.7g} {unit}".rstrip())
-    if len(differing) > listed:
-        click.echo(f"  and {len(differing) - listed} more values of {found.running[1].size} (--list, --json)")

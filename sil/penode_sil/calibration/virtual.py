@@ -25,7 +25,7 @@ from penode_gen.resources import native
 from .. import scenario as scenarios
 from ..building import FLAGS, build_once, compiler_version, generated, include, model_options, sources_in
 from ..console import note
-from ..errors import UserError
+from ..errors import ModelError, TargetError, WrongUse
 from .codes import Slave
 
 MEASURED = "shown"  # the variable of it with what may be measured besides the instance
@@ -43,9 +43,11 @@ def period(model: Any) -> int:
     found = round(exact)
     if found < 1000 or abs(found - exact) > 1e-12 * exact:  # 1e-12: a few roundings of float64, from "0.3 ms" to seconds
         near = max(round(exact / 1000.0), 1)
-        raise UserError(
-            f"{model.path.name}: sample_time: {model.sample_time!r} s is no whole number of nanoseconds from 1000 on, which a controller needs; "
-            f'choose another, such as "{near} us"'
+        raise ModelError(
+            [
+                f"{model.path.name}: sample_time: {model.sample_time!r} s is no whole number of nanoseconds from 1000 on, which a controller needs; "
+                f'choose another, such as "{near} us"'
+            ]
         )
     return int(found)
 
@@ -106,7 +108,7 @@ def served(
     try:
         port = port or free_port(host, kind != "tcp")
     except OSError as exc:
-        raise UserError(f"--host: {host} is no address of this machine; use 127.0.0.1, or 0.0.0.0 for all") from exc
+        raise WrongUse(f"--host: {host} is no address of this machine; use 127.0.0.1, or 0.0.0.0 for all") from exc
     a2l = (
         describe(model, program, f"{kind}:{host}:{port}" if kind != "frames" else "can:0x100:0x101")
         if importlib.util.find_spec("elftools")
@@ -128,7 +130,7 @@ def served(
             assert process.stdin and process.stdout and process.stderr
             if not process.stdout.readline():
                 process.wait()
-                raise UserError(f"{kind}:{host}:{port}: {TROUBLE.get(process.returncode, 'it did not start')}; choose another port")
+                raise TargetError(f"{kind}:{host}:{port}: {TROUBLE.get(process.returncode, 'it did not start')}; choose another port")
             found = Served(f"{kind}:{host}:{port}", a2l)
             try:
                 yield found

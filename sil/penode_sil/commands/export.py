@@ -9,46 +9,48 @@ from typing import Any
 
 import click
 
-import penode_gen
-from penode_gen import exports
-
-from .console import FILE, note
-from .errors import UserError, hint
-from .output import check_writable, whole
+from ..console import FILE, note
+from ..errors import WrongUse, hint
+from .formats import OPTIONS, SUMMARIES, Shown
 
 _KINDS = {"text": str, "file": click.Path(path_type=Path, exists=True, dir_okay=False), "number": float}
 
 
 class _Export(click.Command):
-    """A command with the options of all formats, which are looked up when they are needed."""
+    """A command with the options of all formats; for help, those of formats.py, which is quick to load."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        ctx.meta["help"] = not set(ctx.help_option_names).isdisjoint(args)
+        return super().parse_args(ctx, args)
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        return [*super().get_params(ctx), *_options()]
+        return [*super().get_params(ctx), *map(_made, OPTIONS if ctx.meta.get("help") else declared())]
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Formats"):
-            formatter.write_dl([(name, exports.exporter(name).summary) for name in exports.FORMATS])
+            formatter.write_dl(list(SUMMARIES.items()))
 
 
 def _flag(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _options() -> list[click.Parameter]:
+def declared() -> tuple[Shown, ...]:
     """The options of all formats, each once, with the formats that have it."""
+    from penode_gen import exports
+
     found: dict[str, tuple[exports.Option, list[str]]] = {}
     for name in exports.FORMATS:
         for option in exports.exporter(name).options:
             found.setdefault(option.name, (option, []))[1].append(name)
-    made: list[click.Parameter] = []
-    for option, formats in found.values():
-        shape: dict[str, Any] = (
-            {"is_flag": True}
-            if option.kind == "flag"
-            else {"type": click.Choice(option.choices) if option.choices else _KINDS[option.kind]}
-        )
-        made.append(click.Option([_flag(option.name), option.name], default=None, help=f"{', '.join(formats)}: {option.help}", **shape))
-    return made
+    return tuple(Shown(o.name, f"{', '.join(formats)}: {o.help}", o.kind, o.choices) for o, formats in found.values())
+
+
+def _made(option: Shown) -> click.Option:
+    shape: dict[str, Any] = (
+        {"is_flag": True} if option.kind == "flag" else {"type": click.Choice(option.choices) if option.choices else _KINDS[option.kind]}
+    )
+    return click.Option([_flag(option.name), option.name], default=None, help=option.help, **shape)
 
 
 @click.command(cls=_Export)
@@ -57,13 +59,18 @@ def _options() -> list[click.Parameter]:
 @click.option("-o", "--output", type=FILE, required=True, help="File to write.")
 def export(model: Path, name: str, output: Path, **given: Any) -> None:
     """Write the model file MODEL in the format of another tool."""
+    import penode_gen
+    from penode_gen import exports
+
+    from ..output import check_writable, whole
+
     if name not in exports.FORMATS:
-        raise UserError(f'--format: "{name}" is not known; {hint(name, exports.FORMATS)}')
+        raise WrongUse(f'--format: "{name}" is not known; {hint(name, exports.FORMATS)}')
     chosen = exports.exporter(name)
     options = {key: value for key, value in given.items() if value is not None}
     foreign = sorted(set(options) - {option.name for option in chosen.options})
     if foreign:
-        raise UserError(*(f"{_flag(option)}: the format {name} has no such option; leave it out" for option in foreign))
+        raise WrongUse(*(f"{_flag(option)}: the format {name} has no such option; leave it out" for option in foreign))
     check_writable(output)
     data = exports.export(penode_gen.load(model), name, output, options)
     with whole(output) as part:

@@ -39,11 +39,11 @@ def train(
 ) -> None:
     """Fit the networks of the model file MODEL, and its parameters within their tolerances, to recordings.
 
-    DIR gets an ONNX file for each network, model_trained.toml with a set `default` of them (and `before`), the set's serial form for a running
-    controller, training.json, and report.html, which also says what the recordings cannot tell.
+    DIR gets an ONNX file for each network, model_trained.toml with a set `default` of them (and `before`), the set's serial form for a
+    running controller, training.json, and report.html, which also says what the recordings cannot tell.
     """
     from ..diagnosis.files import check_folder
-    from . import files, result  # SciPy's parts are slow to load
+    from ..training import files, result
 
     check_folder(output)
     with staged() as tell:

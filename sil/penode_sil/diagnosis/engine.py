@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
-from ..errors import UserError
+from ..errors import RecordingError
 from ..recordings.measured import Measured, with_shared_rails
 from . import dropouts, plausible, search, weighed
 from .advice import advised
@@ -55,7 +55,7 @@ def diagnose(
     widened = with_tolerances(model)
     experiments, unused, remarks = settled(widened, train, holdout, set_name)
     if problems := plausible.misfits(widened, [*experiments, *unused], set_name):
-        raise UserError(*problems)
+        raise RecordingError(*problems)
     case = Case(model, train, holdout, unused, [*noisy, *remarks], output, log, tell)
     answer = _answer(case, *unburst(widened, experiments, set_name))
     return advised(replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started), model)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import penode_gen
 
-from ..errors import UserError, hint
+from ..errors import WrongUse, hint
 from ..recordings.measured import load
 from . import report
 from .engine import diagnose
@@ -38,7 +38,7 @@ def load_model(job: Job) -> penode_gen.Model:
     """The model of a job, which has the set that is asked for; UserError or ModelError if not."""
     model = penode_gen.load(job.model)
     if job.set_name not in model.sets and model.networks:
-        raise UserError(f'--set: the model has no set "{job.set_name}"; {hint(job.set_name, model.sets)}')
+        raise WrongUse(f'--set: the model has no set "{job.set_name}"; {hint(job.set_name, model.sets)}')
     return model
 
 
@@ -67,9 +67,9 @@ def compilers() -> float:
 def check_folder(folder: Path) -> None:
     """UserError now rather than after long work, if results cannot go into `folder`."""
     if folder.exists() and not folder.is_dir():
-        raise UserError(f"{folder}: this is a file; name a directory")
+        raise WrongUse(f"{folder}: this is a file; name a directory")
     if not folder.exists() and not folder.absolute().parent.is_dir():
-        raise UserError(f"{folder}: there is no directory {folder.parent}; create it")
+        raise WrongUse(f"{folder}: there is no directory {folder.parent}; create it")
 
 
 @contextmanager

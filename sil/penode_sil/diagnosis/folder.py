@@ -25,7 +25,7 @@ from typing import Any
 
 import penode_gen
 
-from ..errors import UserError
+from ..errors import TargetError, ToolMissing, UserError, WrongUse
 from ..guard import crash_file
 from . import files, table
 from .files import Job
@@ -76,7 +76,7 @@ def plan(job: Job) -> list[Job]:
     """A job for each recording: files as named, folders by what lies directly in them, in the order of names. UserError
     for an empty folder, and if the results would lie among the recordings."""
     if job.output.resolve() in {place.resolve() for place in job.data}:
-        raise UserError(f"{job.output}: the results would lie among the recordings; name another directory")
+        raise WrongUse(f"{job.output}: the results would lie among the recordings; name another directory")
     paths: list[Path] = []
     for place in job.data:
         inside = [place]
@@ -84,7 +84,7 @@ def plan(job: Job) -> list[Job]:
             files_in = (p for p in place.iterdir() if p.is_file() and p.name[0] != ".")
             inside = sorted(p for p in files_in if p.suffix.lower() in KINDS)
             if not inside:
-                raise UserError(f"{place}: there is no recording in this folder; put {', '.join(KINDS)} files into it")
+                raise WrongUse(f"{place}: there is no recording in this folder; put {', '.join(KINDS)} files into it")
         paths += inside
     paths = list(dict.fromkeys(paths))
     names = [path.stem for path in paths]
@@ -117,7 +117,7 @@ def attempt(job: Job) -> Answer:
     try:
         found = files.run(job)[1].as_json()
         return json.loads(json.dumps({key: found[key] for key in table.KEPT})), ""
-    except (UserError, penode_gen.ModelError) as exc:
+    except UserError as exc:
         more = len(exc.problems) - 1
         return None, exc.problems[0] + (f" (and {more} more)" if more else "")
     except Exception as exc:  # a defect in one diagnosis must not take the others along
@@ -169,7 +169,7 @@ def _on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[int, Answer
         from distributed import Client, Security, wait
         from distributed.comm import connect
     except ImportError:
-        raise UserError(f"--scheduler {address}: Dask is not installed here; pip install penode[cluster]") from None
+        raise ToolMissing(f"--scheduler {address}: Dask is not installed here; pip install penode[cluster]") from None
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what matters is reported here
 
@@ -181,14 +181,14 @@ def _on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[int, Answer
         asyncio.run(greet())
     except (OSError, ValueError) as exc:
         what = "no Dask scheduler answers there; start one (dask scheduler), or correct the address"
-        raise UserError(f"--scheduler {address}: {what}") from exc
+        raise TargetError(f"--scheduler {address}: {what}") from exc
     with Client(address, set_as_default=False) as client, client.as_current():
         _staffed(client, address)
         for worker, version in client.run(metadata.version, "penode", on_error="return").items():
             if version != penode_gen.VERSION:
                 has = "no penode" if isinstance(version, Exception) else f"penode {version}"
                 what = f"{worker} has {has}; install {penode_gen.VERSION} there as here"
-                raise UserError(f"--scheduler {address}: {what}")
+                raise TargetError(f"--scheduler {address}: {what}")
         numbers = {future: k for k, future in enumerate(client.map(attempt, jobs, pure=False))}
         while numbers:
             try:
@@ -198,7 +198,7 @@ def _on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[int, Answer
                 continue
             except CancelledError:
                 what = "its connection was lost; start it again, then --resume keeps what is done"
-                raise UserError(f"--scheduler {address}: {what}") from None
+                raise TargetError(f"--scheduler {address}: {what}") from None
             for future in finished:
                 k = numbers.pop(future)
                 try:
@@ -213,4 +213,4 @@ def _staffed(client: Any, address: str) -> None:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError:
         what = f"the cluster has no workers; start some (dask worker {address})"
-        raise UserError(f"--scheduler {address}: {what}") from None
+        raise TargetError(f"--scheduler {address}: {what}") from None

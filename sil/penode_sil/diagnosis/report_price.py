@@ -54,7 +54,7 @@ def price(model: Model, extended: Path) -> list[tuple[str, int, int]]:
         return []
     try:
         sizes = [_sizes(m) for m in (model, penode_gen.load(extended))]
-    except (UserError, penode_gen.ModelError, OSError, subprocess.CalledProcessError):
+    except (UserError, OSError, subprocess.CalledProcessError):
         return []
     return [(what, sizes[0][k], sizes[1][k]) for k, what in enumerate(("code and constants", "parameter sets"))]
 

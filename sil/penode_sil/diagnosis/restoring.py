@@ -14,7 +14,7 @@ from scipy.fft import irfft, rfft
 
 from penode_gen.algebra.causalise import CausaliseError
 from penode_gen.laws import for_angles
-from penode_gen.model import GROUND, Input, Model, ModelError, Signal
+from penode_gen.model import GROUND, Input, Model, Signal
 
 from ..errors import UserError
 from .fit import Fit, Problem
@@ -115,7 +115,7 @@ def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surf
     known = tuple(f for f in study.null.free if isinstance(f.target, str))  # nominal is what the tolerance allows
     try:
         laws = [(Problem(rig(m, places), rigs, (), study.set_name), free) for m, free in ((study.model, known), (extended, ())) if m]
-    except (ModelError, CausaliseError, UserError):
+    except (CausaliseError, UserError):
         return []
     both = [[np.array(p.simulate(k, free, np.zeros((1, len(free))))[0][0]) for k in range(len(rigs))] for p, free in laws]
     found = []

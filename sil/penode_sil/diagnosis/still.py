@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from penode_gen import units
 from penode_gen.model import Input, Model, Signal
 
-from ..errors import UserError
+from ..errors import RecordingError, UserError
 from ..recordings import aliases, pick, read
 from ..recordings.measured import Measured
 from ..recordings.raster import SHORTEST
@@ -39,7 +39,7 @@ def with_noise_at_rest(model: Model, paths: Iterable[Path], channels: Iterable[s
         except UserError as exc:
             problems += exc.problems
     if problems:
-        raise UserError(*problems)
+        raise RecordingError(*problems)
 
     def quiet(s: Channel) -> Channel:
         return replace(s, noise=float(np.sqrt(np.mean(np.square(found[s.name]))))) if s.name in found else s
@@ -53,16 +53,18 @@ def _of(path: Path, model: Model, pairs: dict[str, str], train: Sequence[Measure
     tables = read(path, [*signals, "time"], pairs)
     held = [s for s in signals.values() if any(t.find(s.name, s.unit) for t in tables)]
     if not held:
-        raise UserError(f"{path}: it holds no sensor or input of the model; record at least one of: {', '.join(signals)}")
+        raise RecordingError(f"{path}: it holds no sensor or input of the model; record at least one of: {', '.join(signals)}")
     found = {}
     for s in held:
         x = pick(tables, s.name, s.unit).channel(s.name, s.unit)
         if len(x) < SHORTEST:
-            raise UserError(f"{path}: channel {s.name} has {len(x)} samples; a noise needs at least {SHORTEST}, record longer")
+            raise RecordingError(
+                f"{path}: channel {s.name} has {len(x)} samples; a noise needs at least {SHORTEST}, record longer", channel=s.name
+            )
         noise = deviation(x)
         moving = [deviation(m.z[s.name][m.mask[s.name]]) for m in train if s.name in m.z and m.mask[s.name].any()]
         if moving and noise >= min(moving):
-            raise UserError(
+            raise RecordingError(
                 f"{path}: {s.name} varies by {noise:.3g} {units.si(s.unit)}, "
                 f"in a recording of motion by {min(moving):.3g} {units.si(s.unit)}; "
                 "--still takes a recording in which nothing moves"

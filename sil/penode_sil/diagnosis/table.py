@@ -7,7 +7,7 @@ from __future__ import annotations
 import csv
 import json
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -75,9 +75,9 @@ def write(folder: Path, model: str, rows: Sequence[Row]) -> None:
         part.write_text(_page(folder, model, rows), encoding="utf-8")
 
 
-def as_json(model: str, rows: Sequence[Row]) -> str:
-    """What diagnoses.json holds."""
-    return json.dumps({"model": model, "recordings": [asdict(row) for row in rows]}, indent=2)
+def as_json(model: str, rows: Sequence[Row], more: Mapping[str, Any] | None = None) -> str:
+    """What diagnoses.json holds, and `more`."""
+    return json.dumps({"model": model, "recordings": [asdict(row) for row in rows], **(more or {})}, indent=2)
 
 
 def sentences(model: str, rows: Sequence[Row], folder: Path) -> str:

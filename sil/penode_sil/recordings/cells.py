@@ -11,7 +11,7 @@ from datetime import date
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UserError
+from ..errors import RecordingError
 
 Array = NDArray[np.float64]
 MISSING = frozenset(
@@ -170,7 +170,7 @@ class Columns(Mapping[str, Array]):
                 self._ready[key] = stamps(texts) if key in self._stamped else numbers(texts, self._decimal)
             except ValueError as exc:
                 row, text = exc.args
-                raise UserError(f"{self._place(row)}: {self._what(key, row, text)}") from None
+                raise RecordingError(f"{self._place(row)}: {self._what(key, row, text)}") from None
         return self._ready[key]
 
     def _what(self, key: str, row: int, text: str | None) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UserError
+from ..errors import RecordingError
 from . import cells, header, layout
 from .decode import read_text
 from .table import Recording
@@ -28,7 +28,7 @@ def read_csv(path: Path) -> Recording:
     try:
         found = layout.find(lines)
         if found is None:
-            raise UserError(f'{path}: it is empty; the first row must be a header like "time [s],z_road [m]"')
+            raise RecordingError(f'{path}: it is empty; the first row must be a header like "time [s],z_road [m]"')
         form = f"{encoding}, columns between {layout.NAMED.get(found.separator, found.separator)}, decimal {'commas' if found.decimal == ',' else 'points'}"
         named = _named(found)
         values = _fast(lines[found.body :], found, len(named))
@@ -37,7 +37,7 @@ def read_csv(path: Path) -> Recording:
             return _table(path, found, named, np.arange(found.body, found.body + len(values)) + 1, columns, form)
         return _slow(path, lines, found, named, form)
     except csv.Error as exc:
-        raise UserError(f"{path}: it is no CSV text ({exc}); give a comma-separated file") from exc
+        raise RecordingError(f"{path}: it is no CSV text ({exc}); give a comma-separated file") from exc
 
 
 def _joined(text: str) -> str:
@@ -105,8 +105,8 @@ def _slow(path: Path, lines: Sequence[str], found: layout.Layout, named: Sequenc
         if len(row) > width and any(cell.strip() for cell in row[width:]) and cells.is_number(row[width - 1]):  # no text with commas
             what = f"{path}:{line}: {len(row)} values for {width} channels"
             if found.separator == "," and found.width > width and layout.looks_unseparated(named, row):
-                raise UserError(f"{what}: commas part columns and decimals; export with semicolons or decimal points")
-            raise UserError(f"{what}; give one value a channel, separated by {layout.NAMED.get(found.separator, found.separator)}")
+                raise RecordingError(f"{what}: commas part columns and decimals; export with semicolons or decimal points")
+            raise RecordingError(f"{what}; give one value a channel, separated by {layout.NAMED.get(found.separator, found.separator)}")
         rows.append(row)
         where.append(line)
     numbers = np.array(where, dtype=np.int64)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import codecs
 from pathlib import Path
 
-from ..errors import UserError
+from ..errors import RecordingError
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -35,19 +35,19 @@ def read_text(path: Path) -> tuple[str, str]:
     try:
         data = path.read_bytes()
     except OSError as exc:
-        raise UserError(f"{path}: {exc.strerror or exc}; name a CSV file that can be read") from exc
+        raise RecordingError(f"{path}: {exc.strerror or exc}; name a CSV file that can be read") from exc
     for start, what, remedy in OTHERS:
         if data.startswith(start):
-            raise UserError(f"{path}: it is no CSV text but {what}; {remedy}")
+            raise RecordingError(f"{path}: it is no CSV text but {what}; {remedy}")
     try:
         text, encoding = _decoded(data)
     except UnicodeDecodeError as exc:
-        raise UserError(f"{path}: it is no CSV text ({exc}); give a comma-separated file") from exc
+        raise RecordingError(f"{path}: it is no CSV text ({exc}); give a comma-separated file") from exc
     text = text.rstrip("\0")
     head = text[:4096]
     strange = sum(1 for c in head if c < " " and c not in "\t\n\r\f\v")
     if strange > 2 + len(head) // 50:
-        raise UserError(f"{path}: it is no CSV text ({strange} control characters at its start); give a comma-separated file")
+        raise RecordingError(f"{path}: it is no CSV text ({strange} control characters at its start); give a comma-separated file")
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     return text, encoding

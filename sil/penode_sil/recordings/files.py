@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import UserError, hint
+from ..errors import RecordingError, UserError, hint
 from . import mdf, named, similar
 from .csv_text import read_csv
 from .table import Recording
@@ -28,7 +28,7 @@ def read(path: Path, names: Iterable[str] | None = None, pairs: Mapping[str, str
         with open(path, "rb") as file:
             start = file.read(8)
     except OSError as exc:
-        raise UserError(f"{path}: {exc.strerror or exc}; name a CSV file that can be read") from exc
+        raise RecordingError(f"{path}: {exc.strerror or exc}; name a CSV file that can be read") from exc
     rate = named.clock(pairs["time"]) if "time" in pairs else None
     if rate is not None:
         del pairs["time"]
@@ -41,7 +41,7 @@ def read(path: Path, names: Iterable[str] | None = None, pairs: Mapping[str, str
     named.check(pairs, tables, path, asked, known)
     if not tables:
         what = f"none of the channels {', '.join(sorted({*asked} - {'time'}))}" if asked else "no channel with numbers"
-        raise UserError(f"{path}: it holds {what}; {hint(min({*asked} - {'time'}, default='') if asked else '', known)}")
+        raise RecordingError(f"{path}: it holds {what}; {hint(min({*asked} - {'time'}, default='') if asked else '', known)}")
     return [replace(table, aliases=pairs) for table in tables]
 
 
@@ -77,7 +77,9 @@ def pick(tables: list[Recording], name: str, unit: str) -> Recording:
     holding = [table for table in tables if table.find(name, unit) is not None]
     if not holding:
         known = {c: table.units[c] for table in tables for c in sorted(table.columns) if c != "time"}
-        raise UserError(f"{tables[0].path}: there is no channel {name}; {hint(name, known)}, or {similar.remedy(name, unit, known)}")
+        raise RecordingError(
+            f"{tables[0].path}: there is no channel {name}; {hint(name, known)}, or {similar.remedy(name, unit, known)}", channel=name
+        )
     if len(holding) == 1:
         return holding[0]
     called = None
@@ -91,12 +93,16 @@ def pick(tables: list[Recording], name: str, unit: str) -> Recording:
     if called is not None and called.raster is not None:
         near = [t for t, raster in zip(holding, rasters) if abs(raster - called.raster) <= 0.1 * called.raster]
         if not near:
-            raise UserError(f"{tables[0].path}: channel {name} has no raster of {called.raster * 1e3:g} ms; say {' or '.join(says)}")
+            raise RecordingError(
+                f"{tables[0].path}: channel {name} has no raster of {called.raster * 1e3:g} ms; say {' or '.join(says)}", channel=name
+            )
         holding, rasters = near, [interval(table) for table in near]
     finest = [t for t, raster in zip(holding, rasters) if raster <= 1.01 * min(rasters)]
     if len(finest) > 1 and not all(_same(finest[0], table, name, unit) for table in finest[1:]):
         says = [named.option(name, f"{column}#{tables_of(tables, name, unit).index(t) + 1}") for t in finest]
-        raise UserError(f"{tables[0].path}: channel {name} is there {len(finest)} times in one raster; say {' or '.join(says)}")
+        raise RecordingError(
+            f"{tables[0].path}: channel {name} is there {len(finest)} times in one raster; say {' or '.join(says)}", channel=name
+        )
     return finest[0]
 
 

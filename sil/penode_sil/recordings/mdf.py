@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UserError
+from ..errors import RecordingError
 from .named import plain
 
 # units, columns and (name, text) by key; one is time [s]
@@ -29,11 +29,11 @@ def read(path: Path, names: frozenset[str] | None) -> tuple[list[Group], list[st
     asked = json.dumps(None if names is None else sorted(names))
     code, out = apart(path, asked)
     if code != 0:
-        raise UserError(f"{path}: it is no sound MDF file (its reader gave up); write it anew")
+        raise RecordingError(f"{path}: it is no sound MDF file (its reader gave up); write it anew")
     with np.load(io.BytesIO(out)) as file:
         said = json.loads(str(file["said"]))
         if "problem" in said:
-            raise UserError(f"{path}: {said['problem']}")
+            raise RecordingError(f"{path}: {said['problem']}")
         groups: list[Group] = []
         for g, (units, called) in enumerate(said["groups"]):
             columns = {key: file[f"{g},{c}"] for c, key in enumerate(units)}
@@ -47,7 +47,7 @@ def apart(path: Path, asked: str) -> tuple[int, bytes]:
     try:
         run = subprocess.run([sys.executable, "-m", __name__, str(path), asked], capture_output=True, check=False, timeout=limit)
     except subprocess.TimeoutExpired as error:
-        raise UserError(f"{path}: it is no sound MDF file (its reader came to no end in {limit:.0f} s); write it anew") from error
+        raise RecordingError(f"{path}: it is no sound MDF file (its reader came to no end in {limit:.0f} s); write it anew") from error
     return run.returncode, run.stdout
 
 

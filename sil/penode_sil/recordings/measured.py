@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UserError
+from ..errors import RecordingError, UserError
 from . import noise, quality
 from .files import pick, read
 from .named import aliases
@@ -123,7 +123,7 @@ def load(paths: Iterable[Path], model: Any, channels: Iterable[str] = ()) -> lis
         except UserError as exc:
             problems += exc.problems
     if problems:
-        raise UserError(*problems)
+        raise RecordingError(*problems)
     return found
 
 
@@ -157,7 +157,7 @@ def _load(path: Path, model: Any, pairs: dict[str, str]) -> list[Measured]:
         except UserError as exc:
             errors += exc.problems
     if errors:
-        raise UserError(*errors)
+        raise RecordingError(*errors)
     own = {name: own_of(signals[name], table, bases[id(table)], name in inputs) for name, table in where.items()}
     for table in {id(t): t for t in where.values()}.values():
         steady(own, [name for name, t in where.items() if t is table], bases[id(table)], path, notes)
@@ -170,7 +170,7 @@ def _load(path: Path, model: Any, pairs: dict[str, str]) -> list[Measured]:
         except UserError as exc:
             errors += exc.problems
     if errors:
-        raise UserError(*errors)
+        raise RecordingError(*errors)
     return _parts(path, model.sample_time, raster, inputs, taken, notes)
 
 
@@ -194,9 +194,9 @@ def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
     first, last = float(max(c.time[0] for c in clocks)), float(min(c.time[-1] for c in clocks))
     count = max(0, int(min((last - first) / step + 1e-3, 1e12)) + 1)
     if count < SHORTEST:
-        raise UserError(f"{path}: its {count} samples of {step * 1e3:g} ms are too few; record at least {SHORTEST}")
+        raise RecordingError(f"{path}: its {count} samples of {step * 1e3:g} ms are too few; record at least {SHORTEST}")
     if count > 20 * sum(c.time.size * max(1.0, c.interval / step) for c in clocks):
-        raise UserError(f"{path}: it has far longer gaps than samples; split the recording there")
+        raise RecordingError(f"{path}: it has far longer gaps than samples; split the recording there")
     return first + np.arange(count) * step
 
 
@@ -209,7 +209,7 @@ def _take(raster: Array, step: float, signal: Any, table: Recording, own: Own, d
         what = "does not change" if faults.constant else "has hardly a sound sample"
         place = f"{table.place(clock.rows[0])}: channel {signal.name} {what}"
         if driving:
-            raise UserError(f"{place}, but it drives the model; record it anew")
+            raise RecordingError(f"{place}, but it drives the model; record it anew", channel=signal.name)
         notes.append(f"{place}; it is left out")
         return None
     notes += [origin(table, signal.name, own, driving)] if own.how else []
@@ -235,9 +235,9 @@ def _parts(path: Path, step: float, raster: Array, inputs: list[str], taken: dic
     sound = np.logical_and.reduce([np.ones(raster.size, dtype=bool), *(taken[name].usable for name in inputs)])
     parts = [(a, b) for a, b in stretches(sound) if b - a >= SHORTEST]
     if not parts:
-        raise UserError(f"{path}: the inputs are nowhere measured {SHORTEST} samples in a row; record them without gaps", *notes)
+        raise RecordingError(f"{path}: the inputs are nowhere measured {SHORTEST} samples in a row; record them without gaps", *notes)
     if not any(np.sum(taken[name].usable & sound) >= SHORTEST for name in sensors):
-        raise UserError(f"{path}: no sensor has {SHORTEST} sound samples beside those of the inputs; record at least so many", *notes)
+        raise RecordingError(f"{path}: no sensor has {SHORTEST} sound samples beside those of the inputs; record at least so many", *notes)
     _tell_resampling(path, step, {id(t.clock): t.clock for t in taken.values() if not t.how}, notes)
     lost = raster.size - sum(b - a for a, b in parts)
     if lost:
@@ -333,7 +333,7 @@ def _check_range(path: Path, signal: Any, values: Array, notes: list[str]) -> No
         text = f"{path}: channel {signal.name} reaches {worst / per:.6g} {unit}, the model's range ends at {bound / per:.6g} {unit}"
         if abs(worst) > WILD * widest:
             what = " its numbers look like thousandths (mm for m);" if abs(worst) < 2000.0 * widest else ""
-            raise UserError(f"{text};{what} correct the unit in the recording, or the range in the model file")
+            raise RecordingError(f"{text};{what} correct the unit in the recording, or the range in the model file", channel=signal.name)
         notes.append(f"{text}; the model is not made for that")
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import UserError, hint
+from ..errors import RecordingError, WrongUse, hint
 
 PAIR = re.compile(r"^\s*(\w+)\s*=\s*(.*\S)\s*$", re.DOTALL)
 UNIT = re.compile(r"^(.*?)\s*\[([^\[\]]*)\]$", re.DOTALL)
@@ -38,10 +38,10 @@ def aliases(texts: Iterable[str], known: Iterable[str]) -> dict[str, str]:
     for text in texts:
         match = PAIR.match(text)
         if match is None:
-            raise UserError(f"channel \"{text}\" is not understood; write the model's name = the file's name [unit]")
+            raise WrongUse(f"channel \"{text}\" is not understood; write the model's name = the file's name [unit]")
         if match[1] not in (*known, "time"):
             what = f'channel {match[1]}: the model has no input or sensor "{match[1]}"'
-            raise UserError(f"{what}; {hint(match[1], known)}")
+            raise WrongUse(f"{what}; {hint(match[1], known)}")
         pairs[match[1]] = match[2]
     return pairs
 
@@ -118,4 +118,4 @@ def check(pairs: Mapping[str, str], tables: Sequence[Any], path: Path, names: It
             wanted = next((one.name for one in readings(text)[1:2]), text)
             problems.append(f'{path}: there is no column "{wanted}" for {option(name, text)}; {hint(wanted, every)}')
     if problems:
-        raise UserError(*problems)
+        raise RecordingError(*problems)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UserError
+from ..errors import RecordingError
 from .resampling import Kernel
 from .stamps import evened, sampled_evenly
 from .table import GAP, Recording, more
@@ -45,7 +45,7 @@ def clock_of(table: Recording, notes: list[str]) -> Clock:
         order = np.argsort(time[rows], kind="stable")
         place = f"{table.place(rows[back[0] + 1])}: channel time goes back there{more(back.size)}"
         if np.any(np.diff(time[rows][order]) == 0.0):
-            raise UserError(f"{place}, and times repeat; split the recording where its clock starts anew")
+            raise RecordingError(f"{place}, and times repeat; split the recording where its clock starts anew")
         rows = rows[order]
         notes.append(f"{place}; rows are sorted by time")
     if (even := evened(time[rows])) is not None:
@@ -60,7 +60,7 @@ def clock_of(table: Recording, notes: list[str]) -> Clock:
         )
         rows = np.delete(rows, again + 1)
     if rows.size < 2:
-        raise UserError(f"{table.path}: it has {rows.size} rows with a time of their own; record at least {SHORTEST}")
+        raise RecordingError(f"{table.path}: it has {rows.size} rows with a time of their own; record at least {SHORTEST}")
     steps = np.diff(time[rows])
     interval = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP * interval)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UserError
+from ..errors import RecordingError, UserError
 from .clocks import Samples, own_samples
 from .files import pick
 from .table import Recording
@@ -51,10 +51,10 @@ def on_raster(tables: list[Recording], wanted: Mapping[str, str], sample_time: f
                 except UserError as exc:
                     problems += exc.problems
     if problems:
-        raise UserError(*problems)
+        raise RecordingError(*problems)
     first, last = max(t[0] for t in clocks.values()), min(t[-1] for t in clocks.values())
     if last <= first:
-        raise UserError(f"{tables[0].path}: its channels share no time; record them together")
+        raise RecordingError(f"{tables[0].path}: its channels share no time; record them together")
     columns: dict[str, Array] = {}
     for key, (table, names) in found.items():
         for name in names:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UserError, hint
+from ..errors import RecordingError, UserError, hint
 from . import named, unit_text
 from .stamps import evened
 from .units import UnitError
@@ -121,9 +121,11 @@ class Recording:
                 return found[0]
             says = " or ".join(named.option(name, key) for key in found)
             often = "twice" if len(found) == 2 else f"{len(found)} times"
-            raise UserError(f"{self.header}: channel {name} is there {often}; rename or remove one, or say {says}")
+            raise RecordingError(f"{self.header}: channel {name} is there {often}; rename or remove one, or say {says}", channel=name)
         says = " or ".join(named.option(name, self.name_of(key)) for key in found)
-        raise UserError(f"{self.header}: channel {name} may be {' or '.join(found)}; rename or remove one, or say {says}")
+        raise RecordingError(
+            f"{self.header}: channel {name} may be {' or '.join(found)}; rename or remove one, or say {says}", channel=name
+        )
 
     def _spelt(self, column: str, stem: str, unit: str) -> bool:
         """Is the column's name `stem`_UNIT with a unit that measures what `unit` does?"""
@@ -145,22 +147,23 @@ class Recording:
         column = self.find(name, unit)
         if column is None:
             clock = f", or say {named.option('time', '@1ms')} if rows are 1 ms apart" if name == "time" else ""
-            raise UserError(f"{self.path}: there is no channel {name}; {hint(name, self.columns)}{clock}")
+            raise RecordingError(f"{self.path}: there is no channel {name}; {hint(name, self.columns)}{clock}", channel=name)
         given = self.unit_of(name, column, unit)
         called = self.aliases[name] if name in self.aliases else column
         option = named.option(name, named.with_unit(called, unit, self.units, self.texts))
         if given is None or (given.strip() in ("", "-", "?") and not _plain(unit)):
             where = f'"{self.name_of(column)} [{unit or "1"}]" in the header' if self.lines is not None else "it into the file"
-            raise UserError(f"{self.header}: channel {name} has no unit; write {where}, or say {option}")
+            raise RecordingError(f"{self.header}: channel {name} has no unit; write {where}, or say {option}", channel=name)
         try:
             scale = unit_text.scale(given, unit)
         except UnitError as exc:
-            raise UserError(f"{self.header}: channel {name}: {exc}, or say its true unit, like {option}") from exc
+            raise RecordingError(f"{self.header}: channel {name}: {exc}, or say its true unit, like {option}", channel=name) from exc
         values = self.columns[column]
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size and finite:
-            raise UserError(
-                f"{self.place(bad[0])}: channel {name} has no finite value there{more(bad.size)}; cut the recording or fill the value in"
+            raise RecordingError(
+                f"{self.place(bad[0])}: channel {name} has no finite value there{more(bad.size)}; cut the recording or fill the value in",
+                channel=name,
             )
         with np.errstate(over="ignore"):
             return values if scale == 1.0 else values * scale
@@ -174,7 +177,7 @@ class Recording:
             if notes is not None:
                 notes.append(even.note)
         if time.size < 2:
-            raise UserError(f"{self.path}: it has {time.size} rows; at least 2 are needed")
+            raise RecordingError(f"{self.path}: it has {time.size} rows; at least 2 are needed")
         step = np.diff(time)
         usual = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else 0.0
         problems = [
@@ -191,7 +194,7 @@ class Recording:
             if rows.size
         ]
         if problems:
-            raise UserError(*problems)
+            raise RecordingError(*problems)
         return time
 
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 import penode_gen
 from penode_gen.model import Model
-from penode_gen.networks import Affine, Network, NetworkError
+from penode_gen.networks import Affine, Network
 from penode_gen.reading.network_files import read_network
 
-from ..errors import UserError
+from ..errors import NetworkError, WrongUse
 from .curve import Curve
 from .curves import grid
 from .dense import Dense
@@ -46,7 +46,7 @@ def read(paths: Sequence[Path], model: Model) -> Start:
             found = {n: p.value for n, p in other.parameters.items() if n in model.parameters}
             own = {n: v for n, v in other.sets["default"].networks.items() if n in model.networks} if other.sets else {}
             if not found and not own:
-                raise UserError(
+                raise WrongUse(
                     f"--from {given}: {path.name} has no parameter and no network of {model.path}; give a file that was made from it"
                 )
             parameters |= found
@@ -54,25 +54,25 @@ def read(paths: Sequence[Path], model: Model) -> Start:
         elif path.suffix.lower() in (".onnx", ".json"):
             name = path.stem if path.stem in model.networks else next(iter(model.networks)) if len(model.networks) == 1 else ""
             if not name:
-                raise UserError(
+                raise WrongUse(
                     f"--from {given}: {model.path} has no network {path.stem}; name the file after one of {', '.join(model.networks)}"
                 )
             try:
                 networks[name] = read_network(path)
             except NetworkError as exc:
-                raise UserError(f"--from {exc}") from exc
+                raise NetworkError(f"--from {exc}") from exc
         else:
-            raise UserError(
+            raise WrongUse(
                 f"--from {given}: neither a model file (.toml), nor a network (.onnx, .json), nor a diagnosis.json; give one of these"
             )
     for name, network in networks.items():
         inputs = len(model.networks[name].input_units)
         if (network.n_inputs, network.n_outputs) != (inputs, 1):
-            raise UserError(
+            raise NetworkError(
                 f"--from: network {name} has inputs and outputs {network.n_inputs} and {network.n_outputs}, the model's {inputs} and 1; give one of that shape"
             )
         if all(isinstance(layer, Affine) for layer in network.layers):
-            raise UserError(f"--from: network {name} scales its input and has no layer with weights; give one that has, or leave it out")
+            raise NetworkError(f"--from: network {name} scales its input and has no layer with weights; give one that has, or leave it out")
     return Start(parameters, {n: v for n, v in networks.items() if not _silent(v)})
 
 

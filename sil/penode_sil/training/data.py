@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from penode_gen.model import Model
 
-from ..errors import UserError
+from ..errors import RecordingError
 from ..recordings.measured import Measured
 from .drive import Drive, drive
 from .settings import SETTINGS
@@ -55,7 +55,7 @@ def record(model: Model, m: Measured, signals: Sequence[str]) -> Record:
             noise[j] = found.std if found is not None else np.nan
     held = bool(model.inputs) and all(m.quality.channels[i.name].how == "held" for i in model.inputs)
     if model.inputs and not np.any(np.ptp(m.u, axis=0) > 0.0):
-        raise UserError(f"{m.title}: no input moves, so nothing can be learnt from it; record the plant while it is driven")
+        raise RecordingError(f"{m.title}: no input moves, so nothing can be learnt from it; record the plant while it is driven")
     return Record(m.title, drive(model, m.u, held), y, good, noise)
 
 

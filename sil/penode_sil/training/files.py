@@ -17,7 +17,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from ..diagnosis.files import all_or_none
-from ..errors import UserError
+from ..errors import WrongUse
 from ..output import whole
 from ..recordings.measured import load
 from . import begin, onnx_file, report, resume, threads
@@ -79,14 +79,14 @@ def _known(text: str, model: Model) -> tuple[str, float | None]:
     if not equals:
         return name, None
     if name not in model.parameters:
-        raise UserError(f"--known {name}: the model has no such parameter; it has {', '.join(model.parameters)}")
+        raise WrongUse(f"--known {name}: the model has no such parameter; it has {', '.join(model.parameters)}")
     unit = model.parameters[name].unit
     try:
         number, given = units.quantity(value)
     except units.UnitError as exc:
-        raise UserError(f"--known {text}: {exc}; write --known {name}='{model.parameters[name].value:g} {unit}'") from exc
+        raise WrongUse(f"--known {text}: {exc}; write --known {name}='{model.parameters[name].value:g} {unit}'") from exc
     if units.dimension(given) != units.dimension(unit):
-        raise UserError(f"--known {text}: {name} is measured in {unit}; write --known {name}='{model.parameters[name].value:g} {unit}'")
+        raise WrongUse(f"--known {text}: {name} is measured in {unit}; write --known {name}='{model.parameters[name].value:g} {unit}'")
     return name, number
 
 

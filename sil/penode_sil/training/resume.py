@@ -21,9 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen.model import ModelError
-
-from ..errors import UserError
+from ..errors import UserError, WrongUse
 from ..output import whole
 
 Array = NDArray[np.float64]
@@ -42,7 +40,7 @@ class State:
     steps: int
 
 
-class OtherBits(UserError):
+class OtherBits(WrongUse):
     """This computer computes other bits than the one that wrote a checkpoint, which stays."""
 
 
@@ -107,10 +105,10 @@ class Journal:
             rows = zip(file["numbers"], vectors, file["costs"], file["dampings"], file["poor"], file["steps"], strict=True)
             self._states = {int(n): State(v, float(c), float(d), int(p), int(s)) for n, v, c, d, p, s in rows}
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as exc:
-            raise UserError(f"{self.path}: no checkpoint that can be read ({exc}); {ANEW}") from exc
+            raise WrongUse(f"{self.path}: no checkpoint that can be read ({exc}); {ANEW}") from exc
         differs = [name for name in {**identity, **self.identity} if identity.get(name) != self.identity.get(name)]
         if differs:
-            raise UserError(f"{self.path}: a checkpoint of a training with other {', '.join(differs)}; call it as then, or {ANEW}")
+            raise WrongUse(f"{self.path}: a checkpoint of a training with other {', '.join(differs)}; call it as then, or {ANEW}")
 
 
 @contextmanager
@@ -122,10 +120,10 @@ def journal(folder: Path, identity: Mapping[str, str], resume: bool) -> Iterator
     if resume and (folder / NAME).exists():
         found.read()
     elif resume and (folder / "training.json").exists():
-        raise UserError(f"{folder}: this training has ended, there is nothing to resume; {ANEW}")
+        raise WrongUse(f"{folder}: this training has ended, there is nothing to resume; {ANEW}")
     try:
         yield found
-    except (UserError, ModelError) as exc:
+    except UserError as exc:
         if found.written and not isinstance(exc, OtherBits):
             (folder / NAME).unlink(missing_ok=True)
         if new and folder.exists() and not any(folder.iterdir()):

@@ -20,7 +20,7 @@ from penode_gen.model import Model, NetworkPort
 from penode_gen.networks import Network
 from penode_gen.sets import fold, promises
 
-from ..errors import UserError
+from ..errors import ModelError, RecordingError, WrongUse
 from ..recordings.measured import Measured
 from . import apart, bands, begin, curves, data, dense, ends, held_starts, heldout, judge, kinks, promised, unfold, unknown
 from .curve import Curve
@@ -71,8 +71,10 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
         else:
             problem, fit = ends.train(problem, ports, templates, bounds, options.seed, tell, options.start)
     except FloatingPointError as exc:
-        raise UserError(
-            f"{model.path}: {exc}, whatever the networks are; check signs, units and start states of the model against the recording (penode inspect)"
+        raise ModelError(
+            [
+                f"{model.path}: {exc}, whatever the networks are; check signs, units and start states of the model against the recording (penode inspect)"
+            ]
         ) from exc
     problem, fit = coloured(problem, fit, bounds)
     seen = curves.seen_by(problem, fit.point)
@@ -112,7 +114,7 @@ def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], curv
 def check(model: Model) -> None:
     """UserError for a model that has nothing to train, or a network whose shape cannot be."""
     if not model.networks:
-        raise UserError(f"{model.path}: the model has no network to train; add one in [networks] and [sets.default] (gen/README.md)")
+        raise ModelError([f"{model.path}: the model has no network to train; add one in [networks] and [sets.default] (gen/README.md)"])
     problems = []
     for name, network in model.sets["default"].networks.items():
         why = dense.trainable(network)
@@ -122,7 +124,7 @@ def check(model: Model) -> None:
             f'{model.path}: outside = "fade" changes what networks give within their range; train with "extrapolate" or "clamp"'
         )
     if problems:
-        raise UserError(*problems)
+        raise ModelError(problems)
 
 
 def ports_of(model: Model, engine: Engine) -> list[Port]:
@@ -139,12 +141,16 @@ def ports_of(model: Model, engine: Engine) -> list[Port]:
         zero = port.promises.zero_at_zero or bool(elements and len(elements) == len(seen))
         knots = unfold.capacity(template) if zero else 0
         if port.promises.max_force is not None and model.outside != "clamp":
-            raise UserError(
-                f'{model.path}: network {name} promises max_force, which training keeps with outside = "clamp" only; choose that, or promise max_slope'
+            raise ModelError(
+                [
+                    f'{model.path}: network {name} promises max_force, which training keeps with outside = "clamp" only; choose that, or promise max_slope'
+                ]
             )
         if port.promises and not knots:
-            raise UserError(
-                f"{model.path}: network {name} makes promises, which hold for a ReLU network of one input with room for kinks; give it layers = [16, 16]"
+            raise ModelError(
+                [
+                    f"{model.path}: network {name} makes promises, which hold for a ReLU network of one input with room for kinks; give it layers = [16, 16]"
+                ]
             )
         found.append(Port(name, tuple(seen), _is_rate(port), zero, max(knots, 0) if knots >= 3 else 0))
     return found
@@ -159,7 +165,7 @@ def _with_known(model: Model, options: Options) -> tuple[Model, tuple[str, ...]]
     changed = dict(model.parameters)
     for name, value in options.known:
         if name not in changed:
-            raise UserError(f"--known {name}: the model has no such parameter; it has {', '.join(changed)}")
+            raise WrongUse(f"--known {name}: the model has no such parameter; it has {', '.join(changed)}")
         p = changed[name]
         changed[name] = replace(p, tolerance=0.0, value=p.value if value is None else value)
     return replace(model, parameters=changed), tuple(name for name, _ in options.known)
@@ -173,7 +179,7 @@ def _check_excited(model: Model, ports: Sequence[Port], visited: Sequence[Array]
         if np.ptp(x[:, k]) < SETTINGS.story_still
     ]
     if problems:
-        raise UserError(*problems)
+        raise RecordingError(*problems)
 
 
 def written(
@@ -197,8 +203,10 @@ def written(
             bounds = [promised.bound(model.networks[p.name].promises, margin if p is port else SETTINGS.promised_first, 1.0) for p in ports]
             fit = solve(problem, fit.point, 2, 1.0, curves.limits_of(problem, bounds), damping=1e-6)
         else:
-            raise UserError(
-                f"{model.path}: network {port.name} cannot keep its promises by their margin: {promises.broken(given, network, model.outside == 'clamp')[0]}; relax them"
+            raise ModelError(
+                [
+                    f"{model.path}: network {port.name} cannot keep its promises by their margin: {promises.broken(given, network, model.outside == 'clamp')[0]}; relax them"
+                ]
             )
         found.append(network)
     return found, fit

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""
+What can go wrong, by what the caller can do about it. Each class has a `code`, which stays, and the exit code of the command.
+
+    PenodeError              anything below
+      UserError              exit 2: the caller can mend it
+        ModelError           "model-file": mend the model file, or what it names
+          ExportError        the same, or "usage" where options of the export are all that is wrong (penode_gen.exports)
+          ImportProblem      the file that is to become a model or network file (penode_gen.imports)
+        NetworkError         "network": export the network again, or name another file
+        RecordingError       "recording": mend the recording, or say by --channel what it means
+        ScenarioError        "scenario": mend the scenario file
+        ToolMissing          "tool-missing": install the compiler, the emulator, or the Python package
+        TargetError          "target": look after the board, the emulator, the controller, or the line to it
+        WrongUse             "usage": call the command otherwise: its options, its paths, its environment
+      InternalError          exit 3, "internal": a fault of penode; send us the traceback
+
+The classes from RecordingError on are in penode_sil.errors.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass
+from typing import Any
+
+_PLACE = re.compile(r"(?!channel )(--|[^ ]+$|.*/|.*\.\w+$|.*:\d+$)")
+_ADDRESS = re.compile(r"--|(tcp|udp|serial|pil):")  # what ends in a number that is none of a line
+_KEY = re.compile(r"\w+(\[\d+\])?(\.\w+(\[\d+\])?)*")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Problem(str):
+    """
+    One thing that is wrong: the line that is printed, `PLACE:LINE: KEY: MESSAGE; REMEDY`, with its parts. As a string it is that line.
+
+    `place` is a file, an option such as --set, or an address; `line` counts from 1; `key` is a key of that file; `channel` is the one of a
+    recording that `message` is about. What is not known is empty, or None.
+    """
+
+    message: str
+    place: str = ""
+    line: int | None = None
+    key: str = ""
+    remedy: str = ""
+    channel: str = ""
+
+    def __new__(cls, message: str, place: str = "", line: int | None = None, key: str = "", remedy: str = "", channel: str = "") -> Problem:
+        at = place if line is None else f"{place}:{line}"
+        what = ": ".join(part for part in (at, key, message) if part)
+        return super().__new__(cls, f"{what}; {remedy}" if remedy else what)
+
+    @classmethod
+    def split(cls, text: str, line: int | None = None, channel: str = "") -> Problem:
+        """
+        The parts of a line that was written as one text, with a `line` and a `channel` that it does not show in this form.
+
+        The remedy is what follows the last "; ". The place is what stands before the first ": ", if it is an option, ends in a line number,
+        has a / or a suffix, or is one word. A word that follows, such as instance[2].set, is the key.
+        """
+        if isinstance(text, cls):
+            return text
+        what, separator, remedy = text.rpartition("; ")
+        what, remedy = (what, remedy) if separator else (text, "")
+        place, separator, message = what.partition(": ")
+        if not separator or not _PLACE.match(place):
+            place, message = "", what
+        path, _, number = place.rpartition(":")
+        if path and number.isdecimal() and not _ADDRESS.match(place):
+            place, line = path, int(number)
+        key, separator, rest = message.partition(": ")
+        if not place or not rest or not _KEY.fullmatch(key):
+            key, rest = "", message
+        return cls.shown(text, rest, place, line, key, remedy, channel)
+
+    @classmethod
+    def shown(
+        cls, text: str, message: str, place: str = "", line: int | None = None, key: str = "", remedy: str = "", channel: str = ""
+    ) -> Problem:
+        """A problem that is printed as `text`, whatever its parts."""
+        found = super().__new__(cls, text)
+        Problem.__init__(found, message, place, line, key, remedy, channel)
+        return found
+
+    def as_json(self) -> dict[str, Any]:
+        """The parts, None for one that is not known."""
+        return {name: None if value == "" else value for name, value in asdict(self).items()}
+
+
+class PenodeError(Exception):
+    """
+    Something that keeps penode from what it was asked to do; `problems` has one line for each thing that is wrong. `told`: the command has
+    printed it as part of its result.
+    """
+
+    code: str
+    exit: int
+    told = False
+
+    def __init__(self, *problems: str, line: int | None = None, channel: str = ""):
+        self.problems = [Problem.split(problem, line, channel) for problem in problems]
+        super().__init__(*problems)
+
+    def __str__(self) -> str:
+        return "\n".join(self.problems)
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints in place of a result."""
+        parts = [problem.as_json() for problem in self.problems]
+        return {"error": {"code": self.code, "exit": self.exit, "problems": parts}}
+
+
+class UserError(PenodeError):
+    """Something the caller can mend: raised as one of the classes below."""
+
+    code = "usage"
+    exit = 2
+
+
+class NetworkError(UserError):
+    """A network that cannot be used. The message is one line: file, node or layer, what is wrong, remedy."""
+
+    code = "network"
+
+
+class ModelError(UserError):
+    """A model that cannot be used; `problems` lists all of them, one line each, with place and remedy."""
+
+    code = "model-file"
+
+    def __init__(self, problems: list[str]):
+        super().__init__(*problems)
+
+
+class InternalError(PenodeError):
+    """A fault of penode; `traceback` is the file that has it, None if none could be written."""
+
+    code = "internal"
+    exit = 3
+
+    def __init__(self, problem: str, traceback: str | None = None):
+        super().__init__(problem)
+        self.traceback = traceback
+
+    def as_json(self) -> dict[str, Any]:
+        found = super().as_json()
+        found["error"]["traceback"] = self.traceback
+        return found

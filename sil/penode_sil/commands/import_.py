@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""`penode import`: weights from the file of another tool, as a network file; or a Modelica model, as a model file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from penode_gen.choices import ACTIVATIONS
+
+from ..console import FILE
+
+
+@click.command("import")
+@click.argument("file", type=FILE)
+@click.option(
+    "-o",
+    "--output",
+    type=FILE,
+    required=True,
+    help="Network file to write (.json), to be named in a set of a model file; or model file (.toml), from a Modelica model.",
+)
+@click.option("--network", help="Which one, if the file has several.")
+@click.option(
+    "--activation", type=click.Choice(ACTIVATIONS), default="relu", show_default=True, help="Of hidden layers, where the file does not say."
+)
+@click.option("--model", help="Which Modelica model, if the file has several; for a .toml only.")
+def import_(file: Path, output: Path, network: str | None, activation: str, model: str | None) -> None:
+    """Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits;
+    or a Modelica model of masses, springs and dampers, as a model file."""
+    from ..importing import import_ as run
+
+    run(file, output, network, activation, model)

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""`penode measure`: signals of a controller, a sample a step, by DAQ lists into an MDF4 file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..calibration import address as addresses
+from ..console import FILE
+
+
+@click.command()
+@click.option("--signals", required=True, help="Names of the A2L, with commas between; units and types come from there.")
+@click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
+@click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
+@click.option("--duration", help='How long, like "10 s"; until Ctrl-C if not given.')
+@click.option(
+    "--stage", "staged", metavar="SET", help="Write this set meanwhile, as penode stage does: MODEL.toml:NAME, or a file in serial form."
+)
+@click.option("--after", default="1 s", show_default=True, help="When to begin with that.")
+@click.option("--every", type=click.IntRange(1, 255), default=1, show_default=True, help="Every so many steps a sample.")
+@click.option("-o", "--output", type=FILE, required=True, help="File to write (.mf4).")
+def measure(
+    signals: str, to: str, a2l: Path | None, duration: str | None, staged: str | None, after: str, every: int, output: Path
+) -> None:
+    """Record signals of a controller that runs, a sample a step, with units and its own time stamps."""
+    from ..calibration.measure import measure as run
+
+    run(signals, to, a2l, duration, staged, after, every, output)
