@@ -129,9 +129,9 @@ class Batch:
         if set_name not in model.sets:
             raise WrongUse(f"{model.path}: no set '{set_name}'; it has {', '.join(model.sets)}")
         default = penode_gen.set_values(model, set_name, dtype)
-        values = np.ascontiguousarray(default if sets is None else sets, dtype=dtype)
+        values: Array = np.ascontiguousarray(default if sets is None else sets, dtype=dtype)
         given = {name: np.atleast_1d(np.asarray(value, dtype=float)) for name, value in (parameters or {}).items()}
-        start = np.asarray(model.start if x0 is None else x0, dtype=dtype)
+        start: Array = np.asarray(model.start if x0 is None else x0, dtype=dtype)
         u = np.ascontiguousarray(u, dtype=dtype)
         runs = self._runs(u, start, given, values, default.size)
         u = np.ascontiguousarray(beside(model, columns(model, u)), dtype=dtype)
@@ -157,7 +157,7 @@ class Batch:
         job.first_bad, job.first_outside = (a.ctypes.data for a in first)
         job.count = tuple(map(len, wanted))
         job.which, job.kept = (tuple(a.ctypes.data for a in arrays) for arrays in (wanted, kept))
-        kept.append(self._observed(observer, job, -(-n // every), padded))  # arrays that the job points to
+        kept += self._observed(observer, job, -(-n // every), padded)  # arrays that the job points to
         if not self._step(self._library(per_run), job, vectors, threads):
             raise WrongUse(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
         x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept[:3])
@@ -168,7 +168,8 @@ class Batch:
         if observer is None or not self.model.states or not self.model.sensors:
             return ()
         n_x, n_z = len(self.model.states), len(self.model.sensors)
-        measured, gain = (np.asarray(a, dtype=self.dtype) for a in (observer.measured, observer.gain))
+        measured: Array = np.asarray(observer.measured, dtype=self.dtype)
+        gain: Array = np.asarray(observer.gain, dtype=self.dtype)
         if measured.shape[-2:] != (n, n_z) or gain.shape[-2:] != (n_x, n_z):
             raise ValueError(f"measured {measured.shape} must be [kept, n_z] = [{n}, {n_z}], gain {gain.shape} [n_x, n_z] = [{n_x}, {n_z}]")
         if measured.ndim == 3:
@@ -206,7 +207,7 @@ class Batch:
         """All vectors of runs, shared among threads (ctypes releases the interpreter lock). False: set refused."""
         edges = [vectors * i // threads for i in range(threads + 1)]
         if threads == 1:
-            return library.batch_run(ctypes.byref(job), 0, vectors)
+            return bool(library.batch_run(ctypes.byref(job), 0, vectors))
         with ThreadPoolExecutor(threads) as pool:
             return all(pool.map(lambda i: library.batch_run(ctypes.byref(job), edges[i], edges[i + 1]), range(threads)))
 
@@ -220,7 +221,7 @@ class Batch:
     def _parameters(self, given: Mapping[str, Array], values: Array, padded: int) -> Array:
         """[n_p, padded]: value or reciprocal of each parameter the code takes; reciprocals of doubles, as in the C."""
         tunable = [p.name for p in self.model.tunable]
-        found = np.empty((len(self._code.parameters), padded), dtype=self.dtype)
+        found: Array = np.empty((len(self._code.parameters), padded), dtype=self.dtype)
         for row, (name, inverse) in zip(found, self._code.parameters, strict=True):
             if name in given:
                 value = given[name]

@@ -12,16 +12,17 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import penode_gen
+from penode_gen.model import Model
 from penode_gen.resources import native, resource
 from penode_gen.tools import not_installed
 
 from .errors import TargetError, ToolMissing
 
+Part = str | bytes | Path  # of what a compiled thing is made from: a text, or a file by its contents
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
 
 
@@ -32,7 +33,7 @@ def build_directory() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache").absolute() / "penode"
 
 
-def digest_of(parts: Iterable[str | bytes | Path]) -> str:
+def digest_of(parts: Iterable[Part]) -> str:
     """A short name for texts, bytes and the contents of files."""
     sha = hashlib.sha256()
     for part in parts:
@@ -51,7 +52,7 @@ def include(*folders: str) -> list[str]:
     return [f"-I{native(folder)}" for folder in folders]
 
 
-def generated(model: Any) -> Path:
+def generated(model: Model) -> Path:
     """The folder with the model's C, generated unless an earlier call did; keyed by model and generator."""
     sources = sorted(path for pattern in ("*.py", "templates/*") for path in resource("penode_gen").rglob(pattern))
     folder = build_directory() / f"{model.name}-{digest_of([model.digest, *sources])}"
@@ -72,7 +73,7 @@ def _move(source: Path, target: Path) -> None:
             raise
 
 
-def model_options(model: Any) -> list[str]:
+def model_options(model: Model) -> list[str]:
     """Compiler options that tell sil/firmware/sample.h which model it is about."""
     return [
         f'-DMODEL_HEADER="{model.name}.h"',
@@ -102,7 +103,7 @@ def compile_program(command: Sequence[str], output: Path) -> None:
         _move(part, output)
 
 
-def build_once(name: str, suffix: str, command: Sequence[str], read: Iterable[str | bytes | Path]) -> Path:
+def build_once(name: str, suffix: str, command: Sequence[str], read: Iterable[Part]) -> Path:
     """What a compiler makes, in the build directory; made once for a command and the contents of all that it reads."""
     output = build_directory() / f"{name}-{digest_of([*command, *read])}{suffix}"
     if not output.exists():
@@ -117,13 +118,13 @@ def compiler_version(compiler: str) -> bytes:
     return subprocess.run([compiler, "--version"], capture_output=True).stdout if shutil.which(compiler) else b""
 
 
-def build_library(model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None) -> Path:
+def build_library(model: Model, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None) -> Path:
     """The shared library of a model; `source` is a folder with its C if it is not to be generated."""
     source = source or generated(model)
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
     shim = native("sil", "firmware", "sil.c")
     options = [*compiler, *FLAGS, "-fPIC", *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []), *include("inc", "port/gnu")]
-    read = [compiler_version(compiler[0]), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
+    read: list[Part] = [compiler_version(compiler[0]), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
     same = build_once("runtime", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     own = ["-shared", *model_options(model), f"-I{source}", *map(str, [shim, *code, same])]
     return build_once(model.name, ".so", [*options, *own], [*read, shim, *code, source / f"{model.name}.h", same])

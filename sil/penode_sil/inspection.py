@@ -6,23 +6,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from typing import Any
 
 from .recordings import look
 
 
-def machine(found: look.Look) -> dict[str, Any]:
+def machine(found: look.Look) -> dict[str, object]:
     """All that was found, for programs; None where a number is not finite."""
     plain = asdict(found) | {"path": str(found.path), "options": found.options}
+    return {key: _finite(value) for key, value in plain.items()}
 
-    def finite(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: finite(one) for key, one in value.items()}
-        if isinstance(value, (list, tuple)):
-            return [finite(one) for one in value]
-        return None if isinstance(value, float) and not math.isfinite(value) else value
 
-    return finite(plain)
+def _finite(value: object) -> object:
+    """The value, None where a number in it is not finite; tuples as lists."""
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def people(found: look.Look) -> list[str]:

@@ -5,15 +5,17 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from penode_gen.algebra.placeholder import columns
+from penode_gen.flags import FLAGS
+from penode_gen.model import Model
 
-from .status import BIT, FLAGS
+from .status import BIT
 
 
 class Head(ctypes.Structure):
@@ -29,7 +31,7 @@ class Report(ctypes.Structure):
 
     def count(self, flag: str) -> int:
         """How often a flag of status.FLAGS was raised."""
-        return self.times[FLAGS.index(flag)]
+        return int(self.times[FLAGS.index(flag)])
 
 
 class Set(ctypes.Structure):
@@ -38,20 +40,40 @@ class Set(ctypes.Structure):
     _fields_ = [("head", Head), ("value", ctypes.c_void_p)]
 
 
+class Library(Protocol):
+    """What an instance takes of the library that holds its code, see targets.Sil."""
+
+    model: Model
+    dtype: type
+    instance_size: int
+    saved_size: int
+    set_length: int
+    n_x: int
+    n_u: int
+    n_y: int
+    n_z: int
+
+    def function(self, name: str) -> Callable[..., int]: ...
+
+    def loop(self) -> Callable[..., None]: ...
+
+    def flash_set(self, name: str) -> Set: ...
+
+
 class Instance:
     """One instance in memory of its own. Calls are those of the generated header; statuses are returned as they come.
 
     `memory` and `banks` are the instance's bytes and its two staging areas, for tests that poke.
     """
 
-    def __init__(self, sil: Any, set_name: str, banks: bool):
+    def __init__(self, sil: Library, set_name: str, banks: bool):
         self.sil, self.dtype = sil, sil.dtype
         self.memory = np.zeros(sil.instance_size + 8, dtype=np.uint8)
         shift = -self.memory.ctypes.data % 8
         self.memory = self.memory[shift : shift + sil.instance_size]
-        self.banks = np.zeros((2, sil.set_length), dtype=self.dtype)
-        self._kept: list[Any] = []  # what the instance borrows
-        self._y = np.zeros(sil.n_y, dtype=self.dtype)
+        self.banks = self._zeros(2, sil.set_length)
+        self._kept: list[Set] = []  # what the instance borrows
+        self._y = self._zeros(sil.n_y)
         status = sil.function("init")(self._self, ctypes.byref(sil.flash_set(set_name)), self._pointer(self.banks) if banks else None)
         if status:
             raise AssertionError(f"init refused its own set: {status:#x}")
@@ -64,52 +86,55 @@ class Instance:
     def _pointer(array: NDArray[Any]) -> ctypes.c_void_p:
         return ctypes.c_void_p(array.ctypes.data)
 
-    def _vector(self, values: Any) -> NDArray[Any]:
+    def _zeros(self, *shape: int) -> NDArray[Any]:
+        return np.zeros(shape, dtype=self.dtype)
+
+    def _vector(self, values: ArrayLike) -> NDArray[Any]:
         return np.ascontiguousarray(values, dtype=self.dtype)
 
-    def _input(self, u: Any) -> NDArray[Any]:
+    def _input(self, u: ArrayLike) -> NDArray[Any]:
         return self._vector(columns(self.sil.model, u))
 
-    def step(self, u: Any) -> tuple[NDArray[Any], NDArray[Any], int]:
+    def step(self, u: ArrayLike) -> tuple[NDArray[Any], NDArray[Any], int]:
         """One step with u [n_u]: state, outputs (those before if it holds) and status."""
         status = self.sil.function("step")(self._self, self._pointer(self._input(u)), self._pointer(self._y))
         return self.get_state(), self._y.copy(), status
 
-    def step_jacobian(self, u: Any, entries: int) -> tuple[NDArray[Any], NDArray[Any], int]:
+    def step_jacobian(self, u: ArrayLike, entries: int) -> tuple[NDArray[Any], NDArray[Any], int]:
         """One step and its derivatives: outputs, the `entries` reals of the jacobian struct, status."""
-        jacobian = np.zeros(entries, dtype=self.dtype)
+        jacobian = self._zeros(entries)
         status = self.sil.function("step_jacobian")(
             self._self, self._pointer(self._input(u)), self._pointer(self._y), self._pointer(jacobian)
         )
         return self._y.copy(), jacobian, status
 
     def get_state(self) -> NDArray[Any]:
-        x = np.zeros(self.sil.n_x, dtype=self.dtype)
+        x = self._zeros(self.sil.n_x)
         if x.size:
             self.sil.function("get_state")(self._self, self._pointer(x))
         return x
 
-    def set_state(self, x: Any) -> int:
+    def set_state(self, x: ArrayLike) -> int:
         return self.sil.function("set_state")(self._self, self._pointer(self._vector(x)))
 
     def sensors(self) -> NDArray[Any]:
-        z = np.zeros(self.sil.n_z, dtype=self.dtype)
+        z = self._zeros(self.sil.n_z)
         self.sil.function("sensors")(self._self, self._pointer(z))
         return z
 
     def sensors_jacobian(self, entries: int) -> tuple[NDArray[Any], int]:
         """The `entries` reals of the sensors' jacobian struct, status."""
-        jacobian = np.zeros(entries, dtype=self.dtype)
+        jacobian = self._zeros(entries)
         status = self.sil.function("sensors_jacobian")(self._self, self._pointer(jacobian))
         return jacobian, status
 
     def get_input(self) -> NDArray[Any]:
         """The input of the last sample."""
-        u = np.zeros(self.sil.n_u, dtype=self.dtype)
+        u = self._zeros(self.sil.n_u)
         self.sil.function("get_input")(self._self, self._pointer(u))
         return u[: len(self.sil.model.inputs)]
 
-    def set_input(self, u: Any) -> int:
+    def set_input(self, u: ArrayLike) -> int:
         """The input that the next step starts from."""
         return self.sil.function("set_input")(self._self, self._pointer(self._input(u)))
 
@@ -140,9 +165,9 @@ class Instance:
     def begin(self, head: Sequence[int]) -> int:
         return self.sil.function("tune_begin")(self._self, ctypes.byref(Head(*head)))
 
-    def write(self, offset: int, values: Any) -> int:
-        values = self._vector(values)
-        return self.sil.function("tune_write")(self._self, ctypes.c_uint32(offset), self._pointer(values), ctypes.c_uint32(values.size))
+    def write(self, offset: int, values: ArrayLike) -> int:
+        part = self._vector(values)
+        return self.sil.function("tune_write")(self._self, ctypes.c_uint32(offset), self._pointer(part), ctypes.c_uint32(part.size))
 
     def begin_copy(self, identity: int) -> int:
         """Open a set with the values of the running one."""

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from penode_gen.model import Model
 
 from .signals import Signal
 
@@ -53,7 +54,7 @@ class Held:
         return tuple((np.arange(round(self.duration / self.period) + 1) * self.period).tolist())
 
 
-def driving(model: Any, inputs: Mapping[str, Signal], duration: float) -> tuple[Signal, ...]:
+def driving(model: Model, inputs: Mapping[str, Signal], duration: float) -> tuple[Signal, ...]:
     """The inputs of a model and behind them what its actuators make of their samples."""
     known = {signal.name: inputs[signal.name] for signal in model.inputs}
     for s in model.sampled:

@@ -11,7 +11,7 @@ faster, which counts where pieces are short (a recording has a knot at each samp
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
+from penode_gen.model import Model
 
 from .errors import ModelError
 from .late import Held, driving
@@ -78,11 +79,12 @@ class _Inputs:
 
     def __init__(self, signals: tuple[Signal, ...], begin: float, end: float):
         self.signals, self.begin, self.last = signals, begin, float(np.nextafter(end, begin))
-        self.steps = {i: float(signal.value(0.5 * (begin + end))) for i, signal in enumerate(signals) if isinstance(signal, Held)}
+        middle = np.array(0.5 * (begin + end))
+        self.steps = {i: float(signal.value(middle)) for i, signal in enumerate(signals) if isinstance(signal, Held)}
 
     def __call__(self, t: float) -> tuple[Array, Array]:
-        u = np.array([float(signal.value(t)) for signal in self.signals])
-        inside = min(max(t, self.begin), self.last)
+        at, inside = np.array(t), np.array(min(max(t, self.begin), self.last))
+        u = np.array([float(signal.value(at)) for signal in self.signals])
         return u, np.array([float(signal.slope(inside)) for signal in self.signals])
 
     def before(self, t: float) -> tuple[Array, Array]:
@@ -110,9 +112,9 @@ def _step(solver: Any, what: str) -> None:
 
 
 def solve(
-    model: Any,
+    model: Model,
     instance: Instance,
-    inputs: dict[str, Signal],
+    inputs: Mapping[str, Signal],
     duration: float,
     times: Array,
     set_length: int,
@@ -162,7 +164,7 @@ def solve(
 
 
 def run(
-    model: Any, scenario: Scenario, instance: Instance, times: Array, set_length: int, progress: Progress = lambda t: None
+    model: Model, scenario: Scenario, instance: Instance, times: Array, set_length: int, progress: Progress = lambda t: None
 ) -> Trajectory:
     """The exact solution of one instance of a scenario."""
     return solve(model, instance, scenario.inputs, scenario.duration, times, set_length, scenario.initial, progress)

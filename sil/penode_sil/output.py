@@ -23,7 +23,7 @@ class Column:
 
     name: str
     unit: str
-    values: NDArray[np.float64]
+    values: NDArray[np.float64] | NDArray[np.uint32]
     format: str = "%.9g"
 
 

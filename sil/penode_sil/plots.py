@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -17,8 +18,13 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # the backend must be chosen first
 from matplotlib.axes import Axes
 
+if TYPE_CHECKING:
+    from matplotlib.typing import RcKeyType
+
+__all__ = ["COLOURS", "STYLE", "Line", "draw", "plt"]
+
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-STYLE = {
+STYLE: dict[RcKeyType, object] = {
     "figure.dpi": 150,
     "font.size": 10,
     "axes.titlesize": 11,

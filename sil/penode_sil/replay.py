@@ -4,16 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from penode_gen.model import Model
+
 from . import recordings, scenario as scenarios
 from .errors import RecordingError, UserError
+from .recordings import Recording
 from .signals import Samples
 
 Array = NDArray[np.float64]
@@ -39,7 +41,7 @@ class Replay:
     sensed: dict[str, Sensed]
 
 
-def load(path: Path, model: Any, set_name: str | None, channels: Iterable[str], how: str, note: Callable[[str], None]) -> Replay:
+def load(path: Path, model: Model, set_name: str | None, channels: Iterable[str], how: str, note: Callable[[str], None]) -> Replay:
     """Read a recording for a model; `how` says what an input does between two rows of the file. Raises UserError."""
     wanted = {signal.name: signal.unit for signal in model.inputs}
     signals = {s.name: s.unit for s in (*model.sensors, *model.outputs) if s.name not in wanted}
@@ -66,7 +68,7 @@ def load(path: Path, model: Any, set_name: str | None, channels: Iterable[str], 
     return Replay(plan, times, float(raster[0]), u, sensed)
 
 
-def _sensed(tables: Sequence[Any], signals: dict[str, str], path: Path) -> tuple[dict[str, Sensed], dict[str, str]]:
+def _sensed(tables: list[Recording], signals: dict[str, str], path: Path) -> tuple[dict[str, Sensed], dict[str, str]]:
     """The sensors that the file holds, and why those that cannot be read are left out."""
     found, broken = {}, {}
     for name, unit in signals.items():
@@ -86,7 +88,7 @@ def _sensed(tables: Sequence[Any], signals: dict[str, str], path: Path) -> tuple
     return found, broken
 
 
-def _clock(path: Path, sensed: dict[str, Sensed], model: Any) -> Array:
+def _clock(path: Path, sensed: dict[str, Sensed], model: Model) -> Array:
     """The raster of a model without inputs: as long as all its sensors were measured."""
     step = model.sample_time
     if not sensed:
@@ -104,11 +106,11 @@ def _clock(path: Path, sensed: dict[str, Sensed], model: Any) -> Array:
     return first + np.arange(count) * step
 
 
-def _between(tables: Sequence[Any], wanted: dict[str, str], raster: Array, step: float, how: str) -> tuple[Array, list[str]]:
+def _between(tables: list[Recording], wanted: dict[str, str], raster: Array, step: float, how: str) -> tuple[Array, list[str]]:
     """Inputs [n, inputs] on a raster, held or band-limited between the rows of the file; notes."""
     columns, remarks = [], []
     for name, unit in wanted.items():
-        table = recordings.pick(list(tables), name, unit)
+        table = recordings.pick(tables, name, unit)
         time, values = table.time(), table.channel(name, unit)
         usual = float(np.median(np.diff(time)))
         if how == "held":

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from penode_gen.model import Model
+
 from . import scenario as scenarios, status
 from .output import Column
 from .recordings import units
@@ -32,7 +34,7 @@ class Result:
     run: Run | None = None
 
 
-def _signals(model: Any, result: Result) -> Iterator[tuple[str, str, NDArray[Any]]]:
+def _signals(model: Model, result: Result) -> Iterator[tuple[str, str, NDArray[Any]]]:
     """Name, unit as written in the model file, and SI values: outputs, sensors, then the states that are neither."""
     seen = set()
     state_units = scenarios.state_units(model)
@@ -47,7 +49,7 @@ def _signals(model: Any, result: Result) -> Iterator[tuple[str, str, NDArray[Any
 
 
 def table(
-    model: Any, times: NDArray[np.float64], u: NDArray[np.float64], results: list[Result], *, prefix: bool, full: bool
+    model: Model, times: NDArray[np.float64], u: NDArray[np.float64], results: list[Result], *, prefix: bool, full: bool
 ) -> list[Column]:
     """Time, inputs, and per instance its signals; `full` adds states and status."""
     columns = [Column("time", "s", times, "%.12g")]
@@ -67,7 +69,7 @@ def table(
 
 
 def plot(
-    model: Any, plan: scenarios.Scenario, times: NDArray[np.float64], results: list[Result], signal: str, path: Path, target: str
+    model: Model, plan: scenarios.Scenario, times: NDArray[np.float64], results: list[Result], signal: str, path: Path, target: str
 ) -> None:
     from . import plots  # matplotlib is slow to load
 
@@ -80,7 +82,7 @@ def plot(
     plots.draw(path, plan.title, f"{model.name}, {how}, {model.sample_time * 1e3:g} ms", times, signal, unit, lines)
 
 
-def rmse(model: Any, replay: Replay, result: Result) -> dict[str, dict[str, Any]]:
+def rmse(model: Model, replay: Replay, result: Result) -> dict[str, dict[str, Any]]:
     """Root mean square of prediction - measurement at the sensors' own rows, by sensor, in the unit of the model file."""
     raster, found = replay.offset + replay.times, {}
     for name, unit, values in _signals(model, result):
@@ -95,7 +97,7 @@ def rmse(model: Any, replay: Replay, result: Result) -> dict[str, dict[str, Any]
 
 
 def summary(
-    model: Any, plan: scenarios.Scenario, times: NDArray[np.float64], results: list[Result], target: str, output: Path
+    model: Model, plan: scenarios.Scenario, times: NDArray[np.float64], results: list[Result], target: str, output: Path
 ) -> dict[str, Any]:
     """What a machine may want to read."""
     instances = []

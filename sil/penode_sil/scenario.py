@@ -10,13 +10,15 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from penode_gen.model import Model
 
 from .errors import Problem, ScenarioError, UserError, hint
 from .recordings import pick, read
@@ -58,7 +60,7 @@ class Scenario:
 
     title: str
     duration: float
-    inputs: dict[str, Signal]
+    inputs: Mapping[str, Signal]
     initial: dict[str, float]
     instances: tuple[Instance, ...]
     path: Path
@@ -260,7 +262,7 @@ def on_raster(time: float, sample_time: float, table: _Table, key: str) -> float
     return ticks * sample_time
 
 
-def _instance(table: _Table, sets: dict[str, Any], length: int, sample_time: float, duration: float, name: str) -> Instance:
+def _instance(table: _Table, sets: Iterable[str], length: int, sample_time: float, duration: float, name: str) -> Instance:
     name = table.text("name", name)
     start = table.text("set", next(iter(sets)), choices=tuple(sets))
     exchanges: list[Exchange] = []
@@ -291,13 +293,13 @@ def _instance(table: _Table, sets: dict[str, Any], length: int, sample_time: flo
     return Instance(name, start, tuple(exchanges))
 
 
-def state_units(model: Any) -> dict[str, str]:
+def state_units(model: Model) -> dict[str, str]:
     """Name and SI unit of each state, in order."""
     units = {body.position: body.unit for body in model.bodies} | {body.velocity: f"{body.unit}/s" for body in model.bodies}
     return units | {state.name: state.unit for state in model.extra_states}
 
 
-def load(path: Path, model: Any, set_length: int) -> Scenario:
+def load(path: Path, model: Model, set_length: int) -> Scenario:
     """Read and check a scenario for a model whose sets have `set_length` values."""
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -339,9 +341,9 @@ def load(path: Path, model: Any, set_length: int) -> Scenario:
 
 def sample_times(scenario: Scenario, sample_time: float) -> NDArray[np.float64]:
     """The raster 0, h, 2h, ... up to the duration [s]."""
-    return np.arange(round(scenario.duration / sample_time) + 1) * sample_time
+    return np.arange(round(scenario.duration / sample_time) + 1, dtype=float) * sample_time
 
 
-def sampled(scenario: Scenario, model: Any, times: NDArray[np.float64]) -> NDArray[np.float64]:
+def sampled(scenario: Scenario, model: Model, times: NDArray[np.float64]) -> NDArray[np.float64]:
     """All inputs at the given times, [n, n_u]."""
     return np.column_stack([np.zeros((len(times), 0)), *(scenario.inputs[signal.name].value(times) for signal in model.inputs)])

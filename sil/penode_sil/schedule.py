@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
+from penode_gen.model import Model
 
 from .scenario import Exchange, Instance, staging_samples
 
@@ -29,12 +30,12 @@ class Call:
     kind: str
     head: tuple[int, int, int, int] = (0, 0, 0, 0)
     offset: int = 0
-    values: NDArray[Any] | None = None
+    values: NDArray[Any] = field(default_factory=lambda: np.empty(0))
     set: str = ""
     on: bool = False
 
 
-def exchange_calls(model: Any, exchange: Exchange, dtype: type) -> list[Call]:
+def exchange_calls(model: Model, exchange: Exchange, dtype: type) -> list[Call]:
     """The calls of one exchange. The last of them stands between the sample of its time and the next one."""
     last = round(exchange.time / model.sample_time) + 1
     if exchange.how == "rollback":
@@ -44,14 +45,14 @@ def exchange_calls(model: Any, exchange: Exchange, dtype: type) -> list[Call]:
     values = np.asarray(penode_gen.set_values(model, exchange.set, dtype))
     first = last - staging_samples(values.size, exchange.chunk) + 1
     calls = [Call(first, "hold", on=True)] if exchange.hold else []
-    calls.append(Call(first, "begin", head=tuple(penode_gen.set_head(model, exchange.set, dtype))))
+    calls.append(Call(first, "begin", head=penode_gen.set_head(model, exchange.set, dtype)))
     for n, offset in enumerate(range(0, values.size, exchange.chunk)):
         calls.append(Call(first + n, "write", offset=offset, values=values[offset : offset + exchange.chunk]))
     calls.append(Call(last, "commit"))
     return calls + ([Call(last, "hold", on=False)] if exchange.hold else [])
 
 
-def instance_calls(model: Any, instance: Instance, initial: dict[str, float], dtype: type) -> list[Call]:
+def instance_calls(model: Model, instance: Instance, initial: dict[str, float], dtype: type) -> list[Call]:
     """All calls of an instance in the order in which they are made."""
     calls = []
     if initial:

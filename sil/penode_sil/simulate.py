@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
+from penode_gen.model import Model
 
 from . import mil, replay, results, scenario as scenarios, starts, status
 from .console import note, progress
@@ -134,7 +135,7 @@ class _Asked:
                 raise WrongUse(f"{path}: this is the recording itself; name another file")
         return outputs
 
-    def check(self, model: Any) -> None:
+    def check(self, model: Model) -> None:
         """What the model must know."""
         names = _names(model)
         if self.signal is not None and self.signal not in names:
@@ -151,7 +152,7 @@ class _Asked:
         if self.set_name is not None and self.set_name not in model.sets:
             raise WrongUse(f'--set: the model has no set "{self.set_name}"; {hint(self.set_name, model.sets)}')
 
-    def jobs(self, model: Any, start: starts.Start) -> list[_Job]:
+    def jobs(self, model: Model, start: starts.Start) -> list[_Job]:
         """All that is to be run, read and checked."""
         if self.scenario is not None:
             length = int(np.asarray(penode_gen.set_values(model, next(iter(model.sets)))).size)
@@ -170,7 +171,7 @@ class _Asked:
             raise refused[0]
         return [self._started(model, start, one) for one in found]
 
-    def _started(self, model: Any, start: starts.Start, one: replay.Replay) -> _Job:
+    def _started(self, model: Model, start: starts.Start, one: replay.Replay) -> _Job:
         initial, text = dict(start.given), ""
         if start.fitted:
             initial, text = starts.fit(model, one.plan.instances[0].set, one, start)
@@ -190,7 +191,7 @@ def check_makeable(path: Path) -> None:
         raise WrongUse(f"{path}: the directory {folder} is not writable; name another one")
 
 
-def _names(model: Any) -> list[str]:
+def _names(model: Model) -> list[str]:
     return list(dict.fromkeys([*(s.name for s in (*model.outputs, *model.sensors)), *model.states]))
 
 
@@ -202,7 +203,7 @@ def _tell_refused(found: list[Result]) -> None:
                 note(f"{result.instance.name}: {call.kind} before sample {call.sample} was refused: {refused}")
 
 
-def _warn_range(model: Any, u: NDArray[np.float64]) -> None:
+def _warn_range(model: Model, u: NDArray[np.float64]) -> None:
     """Say where an input leaves the range that the model file states."""
     for signal, column in zip(model.inputs, u.T, strict=True):
         scale = units.factor(signal.unit)
@@ -214,7 +215,7 @@ def _warn_range(model: Any, u: NDArray[np.float64]) -> None:
                 )
 
 
-def _run(model: Any, job: _Job, place: str, target: Sil | Pil | None) -> list[Result]:
+def _run(model: Model, job: _Job, place: str, target: Sil | Pil | None) -> list[Result]:
     """All instances of a scenario, one after the other."""
     found = []
     for instance in job.plan.instances:

@@ -176,7 +176,8 @@ class _Reader:
         """The exchanges, in time; none if there is no schedule."""
         if SCHEDULE not in self.archive.namelist():
             return ()
-        root, found = self.xml(SCHEDULE, str(self.path), "ps:ParameterSchedule"), []
+        root = self.xml(SCHEDULE, str(self.path), "ps:ParameterSchedule")
+        found: list[Exchange] = []
         version = self.attribute(root, "version", SCHEDULE)
         if version.partition(".")[0] != "1":
             raise self.error(SCHEDULE, f"version {version}", "this player reads version 1")

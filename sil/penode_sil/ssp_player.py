@@ -41,7 +41,7 @@ def play(path: Path, record: Path | None, tell: Any = lambda line: None) -> list
     with _component(path, system, tell) as fmu:
         steps = round(stop / fmu.step_size)
         rows = _run(path, system, fmu, table, steps)
-    times = np.arange(steps + 1) * fmu.step_size
+    times = np.arange(steps + 1, dtype=float) * fmu.step_size
     names = [*system.inputs, *system.outputs]
     return [
         Column("time", "s", times),
@@ -51,7 +51,7 @@ def play(path: Path, record: Path | None, tell: Any = lambda line: None) -> list
 
 def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array], steps: int) -> Array:
     """Rows of inputs and outputs: an output beside the input at its own sample."""
-    times = np.arange(steps + 1) * fmu.step_size
+    times = np.arange(steps + 1, dtype=float) * fmu.step_size
     half = fmu.step_size / 2
     at = np.maximum(np.searchsorted(table["time"], times + half * 1e-3, side="right") - 1, 0) if table else None
     inputs = np.array(

@@ -8,12 +8,12 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
+from penode_gen.model import Model
 
 from . import scenario as scenarios
 from .errors import RecordingError, WrongUse, hint
@@ -36,7 +36,7 @@ class Start:
     samples: int = 0
 
 
-def parse(texts: Iterable[str], model: Any) -> Start:
+def parse(texts: Iterable[str], model: Model) -> Start:
     """`measured`, `measured:K` and `state=quantity`, as often as need be. Raises UserError."""
     given: dict[str, float] = {}
     fitted, samples = False, 0
@@ -61,7 +61,7 @@ def parse(texts: Iterable[str], model: Any) -> Start:
     return Start(given, fitted, samples)
 
 
-def window(model: Any, set_name: str, x: Array, u: Array, shortest: int = 20, longest: float = 5.0) -> int:
+def window(model: Model, set_name: str, x: Array, u: Array, shortest: int = 20, longest: float = 5.0) -> int:
     """Samples of half a period (or pi time constants) of the model's slowest motion about x: at least `shortest` samples, at most
     `longest` seconds."""
     system, n = penode_gen.numeric(model, set_name), x.size
@@ -78,7 +78,7 @@ def window(model: Any, set_name: str, x: Array, u: Array, shortest: int = 20, lo
 class _Fit:
     """Weighted differences between the model's response and the first samples of the sensors, as a function of the start."""
 
-    def __init__(self, model: Any, set_name: str, replay: Replay, samples: int):
+    def __init__(self, model: Model, set_name: str, replay: Replay, samples: int):
         self.sil, self.set_name = Sil(model, np.float64), set_name
         self.u = replay.u[:samples]
         self.raster = replay.offset + replay.times[:samples]
@@ -102,7 +102,7 @@ class _Fit:
         return np.concatenate(parts)
 
 
-def fit(model: Any, set_name: str, replay: Replay, start: Start) -> tuple[dict[str, float], str]:
+def fit(model: Model, set_name: str, replay: Replay, start: Start) -> tuple[dict[str, float], str]:
     """The start states (SI), and a line that says from what. Least squares over all measured sensors, each in units of its
     noise, by Gauss and Newton with halved steps through the C in double. Raises UserError."""
     states = scenarios.state_units(model)

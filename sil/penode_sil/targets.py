@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 import penode_gen
 from penode_gen.algebra import placeholder
+from penode_gen.model import Model
 from penode_gen.resources import native
 
 from .building import FLAGS, build_library, build_once, compiler_version, generated, include, missing_tool, model_options, sources_in
@@ -67,7 +68,7 @@ class Run:
 class Sil:
     """A model's shared library; instance() gives as many independent copies as wanted."""
 
-    def __init__(self, model: Any, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None):
+    def __init__(self, model: Model, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None):
         self.model, self.dtype = model, dtype
         self._library = ctypes.CDLL(str(build_library(model, dtype, compiler, source)))
         sizes = list((ctypes.c_uint32 * 8).in_dll(self._library, "sil_sizes"))
@@ -77,16 +78,22 @@ class Sil:
         self.n_x, self.n_u, self.n_y, self.n_z = (size // sizes[2] for size in sizes[3:7])
         self.set_length = self.banks_size // (2 * sizes[2])
 
-    def function(self, name: str, result: Any = ctypes.c_uint32) -> Any:
-        """A function of the generated interface, without the model's prefix."""
-        function = getattr(self._library, name if name.startswith("sil_") else f"{self.model.name}_{name}")
-        function.restype = result
-        return function
+    def function(self, name: str) -> Callable[..., int]:
+        """A function of the generated interface, without the model's prefix, that returns a status."""
+        return self.runtime(f"{self.model.name}_{name}")
 
-    def runtime(self, name: str) -> Any:
+    def loop(self) -> Callable[..., None]:
+        """sil_run: many steps in one call."""
+        found = self._library.sil_run
+        found.restype = None
+        run: Callable[..., None] = found
+        return run
+
+    def runtime(self, name: str) -> Callable[..., int]:
         """A function of the runtime, pen_..., that returns a status."""
-        function = getattr(self._library, name)
-        function.restype = ctypes.c_uint32
+        found = getattr(self._library, name)
+        found.restype = ctypes.c_uint32
+        function: Callable[..., int] = found
         return function
 
     def flash_set(self, name: str) -> Set:
@@ -123,9 +130,9 @@ class SilInstance(Instance):
         """Step through u [n, n_u], making each call before its sample."""
         u = np.ascontiguousarray(placeholder.columns(self.sil.model, u).reshape(-1, self.sil.n_u), dtype=self.dtype)
         total = len(u)
-        samples = np.zeros((total, self.sil.n_x + self.sil.n_y + self.sil.n_z), dtype=self.dtype)
+        samples = self._zeros(total, self.sil.n_x + self.sil.n_y + self.sil.n_z)
         status, made, done = np.zeros(total, dtype=np.uint32), [], 0
-        loop = self.sil.function("sil_run", None)
+        loop = self.sil.loop()
 
         def advance(until: int) -> None:
             nonlocal done
@@ -166,7 +173,7 @@ TROUBLE = {
 }
 
 
-def build_firmware(model: Any, machine: str, source: Path | None = None, optimise: str = "-O2") -> Path:
+def build_firmware(model: Model, machine: str, source: Path | None = None, optimise: str = "-O2") -> Path:
     """The PiL program of a model for one of MACHINES."""
     source = source or generated(model)
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
@@ -207,7 +214,7 @@ class Pil:
 
     dtype = np.float32
 
-    def __init__(self, model: Any, machine: str = "m4f", source: Path | None = None, optimise: str = "-O2", limit: int = 900):
+    def __init__(self, model: Model, machine: str = "m4f", source: Path | None = None, optimise: str = "-O2", limit: int = 900):
         self.model, self.machine, self.limit = model, machine, limit
         self.program = build_firmware(model, machine, source, optimise)
 

@@ -11,11 +11,11 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from penode_gen.model import Model
 from penode_gen.resources import native
 
 from ..building import FLAGS, build_once, compiler_version, generated, include, missing_tool, model_options, sources_in
@@ -28,7 +28,7 @@ WITH_UART = ("m4f", "m3", "m7")  # port/cortex-m/uart.c knows their serial line
 _EMULATOR = "qemu-system-arm"
 
 
-def build(model: Any, machine: str) -> Path:
+def build(model: Model, machine: str) -> Path:
     """The program for one of WITH_UART, with debug information. Raises UserError."""
     if machine not in WITH_UART:
         raise WrongUse(f'--on: there is no controller for "{machine}"; {hint(machine, WITH_UART)}')
@@ -62,7 +62,7 @@ def build(model: Any, machine: str) -> Path:
 
 
 @contextmanager
-def emulated(model: Any, machine: str, host: str, port: int | None, u: NDArray[np.float32]) -> Iterator[Served]:
+def emulated(model: Model, machine: str, host: str, port: int | None, u: NDArray[np.float32]) -> Iterator[Served]:
     """
     Run it. Its serial line is a TCP port, which XCP over Ethernet finds there too: the frames are the same; with port None a device of this
     machine. Raises UserError.

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,7 @@ def _spy() -> Any:
     """A policy of pyxcp that keeps the last negative answer: its exceptions leave out what follows the code."""
     from pyxcp.transport.base import FrameCategory, NoOpPolicy
 
-    class Spy(NoOpPolicy):
+    class Spy(NoOpPolicy):  # type: ignore[misc]  # compiled, without types
         """Sees every frame."""
 
         def __init__(self) -> None:
@@ -80,7 +80,7 @@ class Link:
     def __init__(self, master: Any, spy: Any, address: Address):
         self.master, self.address = master, address
         self._spy = spy
-        self.order = "<"
+        self.order: Literal["<", ">"] = "<"
 
     def connect(self) -> None:
         """CONNECT, and what pyxcp has to know. Raises UserError."""
@@ -96,8 +96,8 @@ class Link:
             return call(*arguments)
         except types.XcpResponseError as exc:
             error = getattr(self._spy, "error", b"")
-            kept = np.frombuffer(error[3:7], self.order + "u4") if len(error) >= 7 else []
-            raise Refused(what, str(exc.get_error_code()), int(kept[0]) if len(kept) else 0) from None
+            flags = int(np.frombuffer(error[3:7], self.order + "u4")[0]) if len(error) >= 7 else 0
+            raise Refused(what, str(exc.args[0]), flags) from None
         except (types.XcpTimeoutError, OSError, SystemExit) as exc:
             raise TargetError(f"{self.address.text}: no answer to {what}; is the controller running, and no other tool connected?") from exc
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
+from penode_gen.model import Model
 
 from ..errors import TargetError, WrongUse, hint
 from .a2l_read import A2l, Entry
@@ -48,9 +49,9 @@ def segment(a2l: A2l) -> tuple[int, int, np.dtype[Any]]:
     return *a2l.segment, kinds.pop()
 
 
-def known_sets(model: Any, kind: np.dtype[Any]) -> dict[int, str]:
+def known_sets(model: Model, kind: np.dtype[Any]) -> dict[int, str]:
     """Checksum -> name, with its id, of all sets of a model file."""
-    found = {}
+    found: dict[int, str] = {}
     for name, chosen in model.sets.items():
         head = penode_gen.set_head(model, name, kind.type)
         found.setdefault(int(head[3]), f"{name} (set {chosen.id})")

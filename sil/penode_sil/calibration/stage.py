@@ -8,6 +8,8 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+from penode_gen.model import Model
+
 from ..errors import TargetError, WrongUse
 from . import pages
 from .a2l_read import A2l
@@ -83,7 +85,7 @@ def stage_set(link: Link, a2l: A2l, chosen: ChosenSet) -> Staged:
     return Staged(chosen.name, size, seconds, checksum, identity)
 
 
-def what_runs(model: Any, kind: Any, found: Pages) -> tuple[str, str]:
+def what_runs(model: Model | None, kind: Any, found: Pages) -> tuple[str, str]:
     """What runs, and the reference, by name."""
     known = pages.known_sets(model, kind) if model is not None else {}
     name = {checksum: known.get(checksum, f"no known set (CRC-32 0x{checksum:08x})") for checksum, _ in (found.running, found.reference)}

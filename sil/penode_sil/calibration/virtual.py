@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +19,11 @@ from numpy.typing import NDArray
 import penode_gen
 from penode_gen import exports
 from penode_gen.algebra import placeholder
+from penode_gen.model import Model
 from penode_gen.resources import native
 
 from .. import scenario as scenarios
-from ..building import FLAGS, build_once, compiler_version, generated, include, model_options, sources_in
+from ..building import FLAGS, Part, build_once, compiler_version, generated, include, model_options, sources_in
 from ..console import note
 from ..errors import ModelError, TargetError, WrongUse
 from .codes import Slave
@@ -32,12 +32,12 @@ MEASURED = "shown"  # the variable of it with what may be measured besides the i
 TROUBLE = {2: "it refused the model, or its inputs", 3: "the port is taken, or the address is not one of this machine"}
 
 
-def identity(model: Any) -> str:
+def identity(model: Model) -> str:
     """The EPK of a program of this model."""
     return f"{model.name} {penode_gen.VERSION} {model.digest[:12]}"
 
 
-def period(model: Any) -> int:
+def period(model: Model) -> int:
     """Time between two steps [ns]. Raises UserError where that is no whole number: a controller that rounds it runs at another speed."""
     exact = model.sample_time * 1e9
     found = round(exact)
@@ -52,26 +52,29 @@ def period(model: Any) -> int:
     return int(found)
 
 
-def build(model: Any) -> Path:
+def build(model: Model) -> Path:
     """The virtual controller of a model. Raises UserError."""
     source, firmware = generated(model), native("sil", "firmware")
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
     own = [native("port", "host", "serve.c"), firmware / "controller.c", native("port", "xcp", "xcp_frame.c")]
     folders = [*include("inc", "port/gnu", "port/xcp", "sil/firmware"), f"-I{source}"]
     options = ["gcc", "-O2", "-g", *FLAGS, "-fno-pie", *folders]
-    read = [compiler_version("gcc"), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("sil/firmware", "*.h"))]
+    read: list[Part] = [
+        compiler_version("gcc"),
+        *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("sil/firmware", "*.h")),
+    ]
     same = build_once("runtime-serve", ".o", [*options[:-1], "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     told = [f'-DCONTROLLER_EPK="{identity(model)}"', f"-DCONTROLLER_PERIOD={period(model)}ULL"]
     command = [*options, "-no-pie", "-pthread", *model_options(model), *told, *map(str, [*own, *code, same])]
     return build_once(f"{model.name}-serve", ".elf", command, [*read, *own, *code, source / f"{model.name}.h", same])
 
 
-def describe(model: Any, program: Path, transport: str) -> str:
+def describe(model: Model, program: Path, transport: str) -> str:
     """The A2L of a virtual controller."""
     return exports.export(model, "a2l", Path("served.a2l"), {"elf": program, "measure": MEASURED, "transport": transport}).decode()
 
 
-def inputs(model: Any, scenario: Path | None) -> NDArray[np.float32]:
+def inputs(model: Model, scenario: Path | None) -> NDArray[np.float32]:
     """What drives it, sample by sample, [n, n_u], played again and again; a row of zeros without a scenario."""
     if scenario is None:
         return np.zeros((1, max(len(model.inputs), 1)), np.float32)
@@ -101,7 +104,7 @@ class Served:
 
 @contextmanager
 def served(
-    model: Any, kind: str, host: str, port: int, u: NDArray[np.float32], quiet: int = 0, max_cto: int = Slave.MAX_CTO
+    model: Model, kind: str, host: str, port: int, u: NDArray[np.float32], quiet: int = 0, max_cto: int = Slave.MAX_CTO
 ) -> Iterator[Served]:
     """Run a virtual controller; `kind` is tcp, udp or frames (CAN frames as datagrams). Raises UserError."""
     program = build(model)

@@ -109,7 +109,7 @@ def stamps(texts: Sequence[str | None]) -> Array:
             raise ValueError(k, text)
     seconds = np.array([np.nan if match is None else _of_day(match) for match in found])
     spans = [days + seconds for days in _days(found)]
-    best = min(spans, key=lambda time: np.nanmax(time) - np.nanmin(time) if np.isfinite(time).any() else 0.0)
+    best: Array = min(spans, key=lambda time: float(np.nanmax(time) - np.nanmin(time)) if np.isfinite(time).any() else 0.0)
     if not any(match is not None and (match["y"] or match["c"]) for match in found):  # past midnight
         known = np.flatnonzero(np.isfinite(best))
         best[known] += 86400.0 * np.cumsum(np.diff(best[known], prepend=best[known[:1]]) < -43200.0)

@@ -73,7 +73,7 @@ class Raster:
     def instants(self, first: float, last: float) -> Array:
         """All instants from `first` to `last` [s], with those just outside."""
         low, high = (int(np.floor((t - self.start) / self.interval)) for t in (first, last))
-        return self.start + np.arange(low, high + 2) * self.interval
+        return self.start + np.arange(low, high + 2, dtype=float) * self.interval
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
@@ -192,7 +192,8 @@ class _Marks:
             return []
         left, here, right = (power[peak + k] for k in (-1, 0, 1))
         exact = peak + 0.5 * (left - right) / (left - 2.0 * here + right - 1e-300)
-        return (size / RULES.fine * self.usual / exact[exact > RULES.padded][: RULES.tried]).tolist()
+        found: list[float] = (size / RULES.fine * self.usual / exact[exact > RULES.padded][: RULES.tried]).tolist()
+        return found
 
     def clock(self, interval: float) -> Raster:
         """The clock of about this interval that catches most marks."""
@@ -284,12 +285,14 @@ def grain(values: Array) -> Array:
         if np.all(np.abs(scaled - np.round(scaled)) < 1e-9 + 4e-16 * np.abs(scaled)):
             fine = np.maximum(fine, 10.0**-decimals)
             break
-    return np.maximum(fine, quantisation(values))
+    found: Array = np.maximum(fine, quantisation(values))
+    return found
 
 
 def _unsure(time: Array) -> Array:
     """How far a time may be from that at which a line was taken: a time whose last digits are zeros is exact."""
-    return np.minimum(grain(time), 1e-8 * max(abs(time[0]), abs(time[-1])))
+    found: Array = np.minimum(grain(time), 1e-8 * max(abs(time[0]), abs(time[-1])))
+    return found
 
 
 def _joined(time: Array, values: Array) -> Samples | None:

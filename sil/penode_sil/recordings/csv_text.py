@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -70,13 +70,13 @@ def _table(
     found: layout.Layout,
     named: Sequence[header.Cell],
     lines: Lines,
-    columns: object,
+    columns: Mapping[str, Array],
     form: str,
     stamped: frozenset[str] = frozenset(),
 ) -> Recording:
     units = {cell.key: "s" if cell.key in stamped else cell.unit for cell in named}
     texts = {cell.key: (cell.name, cell.text) for cell in named}
-    return Recording(path, lines, units, columns, {}, found.header + 1, texts, form)  # type: ignore[arg-type]
+    return Recording(path, lines, units, columns, {}, found.header + 1, texts, form)
 
 
 def _fast(body: Sequence[str], found: layout.Layout, width: int) -> Array | None:

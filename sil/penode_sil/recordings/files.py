@@ -49,7 +49,8 @@ def _clocked(table: Recording, rate: float | None) -> Recording:
     """The table with a time of so many seconds a row, if the user gives one."""
     if rate is None or table.lines is None:
         return table
-    columns = ChainMap({"time": np.arange(table.lines.size) * rate}, table.columns)  # type: ignore[arg-type]
+    time = np.arange(table.lines.size, dtype=float) * rate
+    columns = ChainMap({"time": time}, table.columns)  # type: ignore[arg-type]  # the maps behind the first are only read
     return replace(table, columns=columns, units={**table.units, "time": "s"}, texts={**table.texts, "time": ("time", "time")})
 
 

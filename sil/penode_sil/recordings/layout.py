@@ -7,7 +7,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 
 from . import header, named
@@ -165,6 +165,6 @@ def _is_body(line: str, separator: str, width: int, columns: set[int]) -> bool:
     return any(map(is_number, known)) and all(is_number(cell) or not cell.strip() for cell in known)
 
 
-def looks_unseparated(names: Sequence[str], row: Sequence[str]) -> bool:
+def looks_unseparated(names: Sized, row: Sequence[str]) -> bool:
     """Has a row more values than there are names, most of them whole numbers: do commas part both cells and decimals?"""
     return len(names) < len(row) <= 2 * len(names) and all(NUMBER.fullmatch(cell) for cell in row) and "." not in "".join(row)

@@ -7,10 +7,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from penode_gen.model import Model
 
 from ..errors import UserError
 from . import named, quality, similar, unit_text
@@ -85,7 +86,7 @@ class Look:
         return [signal.option for signal in self.signals if signal.option]
 
 
-def look(path: Path, model: Any | None = None, pairs: Mapping[str, str] | None = None) -> Look:
+def look(path: Path, model: Model | None = None, pairs: Mapping[str, str] | None = None) -> Look:
     """Look into a recording; UserError if it cannot be read at all."""
     tables = read(path, None, pairs)
     signals = _signals(tables, model) if model is not None else ()
@@ -123,18 +124,29 @@ def _channel(table: Recording, key: str, clock: Clock | None) -> Channel:
     faults = quality.examine(own.values if own else values if clock is None else values[clock.rows])
     good = values[np.isfinite(values)]
     low, high = (float(good.min()), float(good.max())) if good.size else (float("nan"), float("nan"))
-    counts = [int(np.sum(flags)) for flags in (faults.missing, faults.held, faults.saturated, faults.spikes)]
     return Channel(
-        key, unit, "", values.size, low, high, *counts, faults.quantum, faults.constant, *((own.how, own.interval) if own else ())
+        key,
+        unit,
+        rows=values.size,
+        low=low,
+        high=high,
+        missing=int(np.sum(faults.missing)),
+        held=int(np.sum(faults.held)),
+        clipped=int(np.sum(faults.saturated)),
+        spikes=int(np.sum(faults.spikes)),
+        quantum=faults.quantum,
+        constant=faults.constant,
+        how=own.how if own else "",
+        interval=own.interval if own else float("nan"),
     )
 
 
-def _signals(tables: Sequence[Recording], model: Any) -> tuple[Signal, ...]:
+def _signals(tables: Sequence[Recording], model: Model) -> tuple[Signal, ...]:
     """All signals of the model, found or not."""
-    kinds = {s.name: ("output", s) for s in model.outputs}
-    kinds |= {s.name: ("sensor", s) for s in model.sensors} | {s.name: ("input", s) for s in model.inputs}
+    kinds = {s.name: ("output", s.unit) for s in model.outputs}
+    kinds |= {s.name: ("sensor", s.unit) for s in model.sensors} | {s.name: ("input", s.unit) for s in model.inputs}
     found: dict[str, Signal] = {"time": _found(tables, "time", "time", "s")}
-    found |= {name: _found(tables, kind, name, signal.unit) for name, (kind, signal) in kinds.items()}
+    found |= {name: _found(tables, kind, name, unit) for name, (kind, unit) in kinds.items()}
     missing = {name: signal.unit for name, signal in found.items() if signal.column is None and not signal.problem}
     taken = {signal.column for signal in found.values() if signal.column}
     known = {named.plain(name) for name in found}  # the same in another raster, or from another device

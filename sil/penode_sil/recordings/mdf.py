@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from .named import plain
 
+Array = NDArray[np.float64]
 # units, columns and (name, text) by key; one is time [s]
-Group = tuple[dict[str, str | None], dict[str, NDArray[np.float64]], dict[str, tuple[str, str]]]
+Group = tuple[dict[str, str | None], dict[str, Array], dict[str, tuple[str, str]]]
+Found = tuple[dict[str, str | None], dict[str, Array], dict[str, str]]  # the same with the name alone
 
 
 def read(path: Path, names: frozenset[str] | None) -> tuple[list[Group], list[str]]:
@@ -63,8 +65,8 @@ def _wanted(name: str, names: set[str] | None) -> bool:
     return any(low == plain(one) or low.startswith(plain(one) + "_") for one in names if plain(one))
 
 
-def _groups(file: Any, names: set[str] | None) -> list[Group]:
-    groups: list[Group] = []
+def _groups(file: Any, names: set[str] | None) -> list[Found]:
+    groups: list[Found] = []
     problems: dict[str, str] = {}
     for group, content in enumerate(file.groups):
         master = file.masters_db.get(group)
@@ -72,7 +74,7 @@ def _groups(file: Any, names: set[str] | None) -> list[Group]:
         often = Counter(channel.name for index, channel in enumerate(content.channels) if index != master)
         seen = Counter[str]()
         units: dict[str, str | None] = {"time": "s"}
-        columns: dict[str, NDArray[np.float64]] = {}
+        columns: dict[str, Array] = {}
         called = {"time": "time"}
         for index, channel in enumerate(content.channels):
             name = channel.name
@@ -108,8 +110,8 @@ def _main(path: str, asked: str) -> None:
     out, sys.stdout = sys.stdout.buffer, sys.stderr
     logging.getLogger("asammdf").setLevel(logging.CRITICAL + 1)
     names = json.loads(asked)
-    said: dict[str, Any]
-    arrays: dict[str, NDArray[np.float64]] = {}
+    said: dict[str, object]
+    arrays: dict[str, Array] = {}
     try:
         file = MDF(path)
         groups = _groups(file, None if names is None else set(names))
@@ -123,7 +125,7 @@ def _main(path: str, asked: str) -> None:
     except Exception as exc:  # a broken file makes the reader raise a dozen kinds
         what = next(iter(str(exc).splitlines()), "") or type(exc).__name__
         said = {"problem": f"it is no sound MDF file ({what}); write it anew"}
-    np.savez(out, said=json.dumps(said), **arrays)
+    np.savez(out, allow_pickle=False, said=json.dumps(said), **arrays)
 
 
 if __name__ == "__main__":

@@ -13,10 +13,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from penode_gen.model import Input, Model, Signal
 
 from ..errors import RecordingError, UserError
 from . import noise, quality
@@ -103,18 +104,19 @@ def _railed(m: Measured, rails: dict[tuple[str, str], float]) -> Measured:
             at = mask[name] & (np.abs(m.z[name] - rail) < 1e-9 * abs(rail))
             beyond = (m.z[name] - rail) * (1.0 if side == "high" else -1.0) > 1e-9 * abs(rail)
             if at.any() and not np.any(beyond & mask[name]):
-                channels[name] = replace(channels[name], saturated=channels[name].saturated + int(at.sum()), **{side: rail})
+                channel = replace(channels[name], saturated=channels[name].saturated + int(at.sum()))
+                channels[name] = replace(channel, low=rail) if side == "low" else replace(channel, high=rail)
                 mask[name] = mask[name] & ~at
     return replace(m, mask=mask, quality=replace(m.quality, channels=channels))
 
 
-def load(paths: Iterable[Path], model: Any, channels: Iterable[str] = ()) -> list[Measured]:
+def load(paths: Iterable[Path], model: Model, channels: Iterable[str] = ()) -> list[Measured]:
     """Read recordings for a model; `channels` are texts like `x=pos_mm` that say what a file calls a signal.
 
     Signals are the model's inputs (required), sensors and outputs (at least one), by name. UserError has one line for
     each reason why a recording cannot be used.
     """
-    pairs = aliases(channels, [s.name for s in (*model.inputs, *model.sensors, *model.outputs)])
+    pairs = aliases(channels, [*(s.name for s in model.inputs), *(s.name for s in (*model.sensors, *model.outputs))])
     found: list[Measured] = []
     problems: list[str] = []
     for path in paths:
@@ -127,8 +129,9 @@ def load(paths: Iterable[Path], model: Any, channels: Iterable[str] = ()) -> lis
     return found
 
 
-def _load(path: Path, model: Any, pairs: dict[str, str]) -> list[Measured]:
-    signals = {s.name: s for s in (*model.outputs, *model.sensors, *model.inputs)}
+def _load(path: Path, model: Model, pairs: dict[str, str]) -> list[Measured]:
+    signals: dict[str, Input | Signal] = {s.name: s for s in (*model.outputs, *model.sensors)}
+    signals |= {s.name: s for s in model.inputs}
     inputs = [s.name for s in model.inputs]
     tables = read(path, [*signals, "time"], pairs)
     errors: list[str] = []
@@ -200,7 +203,7 @@ def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
     return first + np.arange(count) * step
 
 
-def _take(raster: Array, step: float, signal: Any, table: Recording, own: Own, driving: bool, notes: list[str]) -> _Taken | None:
+def _take(raster: Array, step: float, signal: Input | Signal, table: Recording, own: Own, driving: bool, notes: list[str]) -> _Taken | None:
     """One channel on the raster; None if it cannot be used, which is noted, or a UserError if it drives the model."""
     clock, rows, scale = own.clock, own.rows, own.scale
     faults = quality.examine(own.raw)
@@ -224,7 +227,7 @@ def _take(raster: Array, step: float, signal: Any, table: Recording, own: Own, d
     shown = usable
     if faults.any.any() and not driving:
         shown = on_raster(raster, step, clock, filled(rows, ~faults.missing), faults.missing, driving)[1]
-    if driving and usable.any():
+    if isinstance(signal, Input) and usable.any():
         _check_range(table.path, signal, values[usable], notes)
     return _Taken(rows, faults, scale, clock, values, usable, shown, own.how, smooth)
 
@@ -271,10 +274,11 @@ def _parts(path: Path, step: float, raster: Array, inputs: list[str], taken: dic
 
 def _channel(name: str, taken: _Taken, law: noise.Noise | None) -> Channel:
     f, scale = taken.faults, taken.scale
-    counts = [int(np.sum(flags)) for flags in (f.missing, f.saturated, f.held, f.spikes)]
+    missing, saturated, held, spikes = (int(np.sum(flags)) for flags in (f.missing, f.saturated, f.held, f.spikes))
     low, high = (None if edge is None else edge * scale for edge in (f.low, f.high))
     quantum = f.quantum * abs(scale)
-    return Channel(name, taken.clock.interval, taken.rows.size, *counts, low, high, quantum, f.constant, law, taken.how)
+    interval, rows = taken.clock.interval, taken.rows.size
+    return Channel(name, interval, rows, missing, saturated, held, spikes, low, high, quantum, f.constant, law, taken.how)
 
 
 def _noise(
@@ -294,7 +298,9 @@ def _noise(
     return noise.estimate(filled(own.values, own.usable), own.usable & sound, step, company, rest, quantum, kept)
 
 
-def _tell(notes: list[str], table: Recording, clock: Clock, signal: Any, faults: quality.Faults, scale: float, driving: bool) -> None:
+def _tell(
+    notes: list[str], table: Recording, clock: Clock, signal: Input | Signal, faults: quality.Faults, scale: float, driving: bool
+) -> None:
     """A line for each kind of trouble in a channel."""
     unit, per = signal.unit or "1", factor(signal.unit)
     edges = " and ".join(f"{e * scale / per:.6g} {unit}" for e in (faults.low, faults.high) if e is not None)
@@ -323,7 +329,7 @@ def _tell_resampling(path: Path, step: float, clocks: dict[int, Clock], notes: l
         notes.append(f"{path}: its rows are {clock.interval * 1e3:.6g} ms apart, the model's samples {step * 1e3:.6g} ms; {how}")
 
 
-def _check_range(path: Path, signal: Any, values: Array, notes: list[str]) -> None:
+def _check_range(path: Path, signal: Input, values: Array, notes: list[str]) -> None:
     """UserError if an input is far outside of the model's range; a note if it is a little outside."""
     per, unit = factor(signal.unit), signal.unit or "1"
     widest = max(abs(signal.minimum or 0.0), abs(signal.maximum or 0.0))
@@ -345,7 +351,7 @@ def _standstill(u: Array, z: Array, usable: Flags, step: float) -> Flags:
     if blocks < 8:
         return rest
     cut = slice(0, blocks * size)
-    whole = usable[cut].reshape(blocks, size).all(axis=1)
+    whole: Flags = np.all(usable[cut].reshape(blocks, size), axis=1)
     quiet = whole.copy()
     for column, often, share in (*((x, 2.0, 0.05) for x in u.T), (z, 1.5, 0.2)):
         level = np.where(whole, np.nan_to_num(column[cut]).reshape(blocks, size).std(axis=1), np.inf)

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 from ..errors import RecordingError, WrongUse, hint
 
@@ -19,6 +19,16 @@ COUNT = re.compile(r"^(.*)#(\d+)$", re.DOTALL)
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 Units = Mapping[str, str | None]
 Texts = Mapping[str, tuple[str, str]]
+
+
+class Columned(Protocol):
+    """A table by what its header says of its columns."""
+
+    @property
+    def units(self) -> Units: ...
+
+    @property
+    def texts(self) -> Texts: ...
 
 
 @dataclass(frozen=True)
@@ -109,7 +119,7 @@ def clock(text: str) -> float | None:
     return float(match[2]) * SECONDS[match[3]] if match and not match[1] else None
 
 
-def check(pairs: Mapping[str, str], tables: Sequence[Any], path: Path, names: Iterable[str] | None, known: Iterable[str]) -> None:
+def check(pairs: Mapping[str, str], tables: Sequence[Columned], path: Path, names: Iterable[str] | None, known: Iterable[str]) -> None:
     """UserError if the file has no column that an alias names; `known` are the file's columns."""
     every = list(known)
     problems = []

@@ -47,7 +47,8 @@ class Noise:
     def density(self, frequency: Array, interval: float) -> Array:
         """One-sided power spectral density [unit^2/Hz] at frequencies [Hz] for samples at an interval [s]."""
         shape = _shape(np.array([self.pole]), frequency * interval)[0]
-        return 2.0 * interval * (self.innovation**2 * shape + self.white**2)
+        found: Array = 2.0 * interval * (self.innovation**2 * shape + self.white**2)
+        return found
 
 
 def estimate(
@@ -179,7 +180,8 @@ def _quiet(power: Array) -> Flags:
     """The stretches [stretches, bins] without a burst: not louder than 99 % are where noise is all there is."""
     loud = np.mean(power / np.maximum(np.median(power, axis=0), 1e-300), axis=1)
     freedom = power.shape[1] / WIDE
-    return loud <= np.quantile(loud, 0.1) * gammaincinv(freedom, 0.99) / gammaincinv(freedom, 0.1)
+    quiet: Flags = loud <= np.quantile(loud, 0.1) * gammaincinv(freedom, 0.99) / gammaincinv(freedom, 0.1)
+    return quiet
 
 
 def _means(values: Array, edges: Index) -> Array:

@@ -131,7 +131,8 @@ def _median(values: Array, places: Index) -> Array:
     count = np.sum(~np.isnan(taken), axis=1)
     taken.sort(axis=1)  # NaN last
     rows = np.arange(len(taken))
-    return np.nan_to_num(0.5 * (taken[rows, np.maximum(count - 1, 0) // 2] + taken[rows, count // 2]))
+    middle: Array = np.nan_to_num(0.5 * (taken[rows, np.maximum(count - 1, 0) // 2] + taken[rows, count // 2]))
+    return middle
 
 
 def _runs(x: Array, quantum: float) -> tuple[Index, Index, Flags, Flags]:

@@ -40,12 +40,12 @@ def on_raster(tables: list[Recording], wanted: Mapping[str, str], sample_time: f
             clocks[key] = table.time(notes)
         except UserError as exc:
             problems += exc.problems
-    samples = {}
+    samples: dict[str, Samples | None] = {}
     for key, (table, names) in found.items():
         for name in names:
             values = table.channel(name, wanted[name], finite=False)
-            samples[name] = own_samples(clocks[key], values, driving=True) if key in clocks else None
-            if samples[name] is None or samples[name].how != "sparse":
+            own = samples[name] = own_samples(clocks[key], values, driving=True) if key in clocks else None
+            if own is None or own.how != "sparse":
                 try:
                     table.channel(name, wanted[name])
                 except UserError as exc:
@@ -73,7 +73,7 @@ def _of_samples(time: Array, values: Array, own: Samples, sample_time: float, fi
     """A channel with a clock of its own on the raster: held where the table holds it, else its samples joined; values [n, 1]."""
     clock = f"{1e3 * own.interval:.6g} ms, every {own.every:.4g} rows"
     if own.how == "held":
-        raster = first + np.arange(int((last - first) / sample_time + 1e-3) + 1) * sample_time
+        raster = first + np.arange(int((last - first) / sample_time + 1e-3) + 1, dtype=float) * sample_time
         at = np.searchsorted(time, raster + 1e-3 * sample_time, side="right") - 1
         return raster, values[at.clip(0), None], f"repeats its last value between samples ({clock}): simulated as held"
     whole = np.interp(time, own.time, own.values)  # beyond its samples, the first and the last one
@@ -91,7 +91,7 @@ def resample(
     """
     first = float(time[0]) if first is None else first
     count = int(((time[-1] if last is None else last) - first) / sample_time + 1e-3) + 1
-    raster = first + np.arange(count) * sample_time
+    raster = first + np.arange(count, dtype=float) * sample_time
     begin = int(np.searchsorted(time, first - 1e-3 * sample_time))
     inside = time[begin : begin + count]
     if inside.size == count and np.all(np.abs(inside - raster) <= 1e-3 * sample_time):
@@ -99,7 +99,7 @@ def resample(
     usual = float(np.median(np.diff(time)))
     how = "by straight lines"
     if usual < 0.999 * sample_time:
-        grid = time[0] + np.arange(round((time[-1] - time[0]) / usual) + 1) * usual
+        grid = time[0] + np.arange(round((time[-1] - time[0]) / usual) + 1, dtype=float) * usual
         even = values
         if grid.size != time.size or np.max(np.abs(grid - time)) > 1e-2 * usual:
             even = np.column_stack([np.interp(grid, time, column) for column in values.T])
@@ -131,7 +131,8 @@ class Kernel:
         offset = np.arange(1 - self.half, self.half + 1) - part[:, None]
         inside = np.sqrt(np.maximum(0.0, 1.0 - (offset / self.half) ** 2))
         weights = np.sinc(self.cut * offset) * np.i0(0.1102 * (STOP_BAND - 8.7) * inside) * (inside > 0.0)
-        return weights / weights.sum(axis=1, keepdims=True)
+        shares: Array = weights / weights.sum(axis=1, keepdims=True)
+        return shares
 
     def apply(self, values: Array, magnitude: bool = False) -> Array:
         """Rows [count, channels] on the raster, turned round at both ends; `magnitude`: by the weights' shares."""

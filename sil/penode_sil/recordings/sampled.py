@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from penode_gen.model import Input, Signal
 
 from . import clocks
 from .raster import Clock, parted, steadied
@@ -30,10 +31,10 @@ class Own:
     every: float = 1.0  # rows per sample
 
 
-def own_of(signal: Any, table: Recording, base: Clock, driving: bool) -> Own:
+def own_of(signal: Input | Signal, table: Recording, base: Clock, driving: bool) -> Own:
     """A channel on its own clock, if its table has another one."""
     si = table.channel(signal.name, signal.unit, finite=False)[base.rows]
-    raw = table.columns[table.find(signal.name, signal.unit)][base.rows]
+    raw = table.columns[str(table.find(signal.name, signal.unit))][base.rows]
     good = np.flatnonzero(np.isfinite(raw) & (raw != 0.0))
     scale = float(si[good[0]] / raw[good[0]]) if good.size else 1.0
     even = steadied(base, "", [], [])

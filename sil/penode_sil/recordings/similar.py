@@ -47,7 +47,7 @@ def proposals(
     like = np.array([[likeness(name, names[key]) for key in columns] for name in wanted])
     score = np.where(fits < 0, -10.0, like + 0.3 * np.maximum(fits, 0))
     found: dict[str, tuple[str, str]] = {}
-    for i, j in zip(*linear_sum_assignment(-score)):
+    for i, j in np.column_stack(linear_sum_assignment(-score)).tolist():
         if fits[i, j] >= 0 and like[i, j] >= least:
             found[wanted[i]] = (columns[j], "by its name")
     used = {column for column, _ in found.values()}

@@ -88,7 +88,7 @@ class Recording:
     def _candidates(self, name: str, unit: str) -> Iterator[list[str]]:
         """Columns that may be a channel, the closest first: its name; with a unit behind it; in other letters."""
         yield [key for key in self.columns if name in (key, self.name_of(key))]
-        stems = TIME if name == "time" else (name,)
+        stems: tuple[str, ...] = TIME if name == "time" else (name,)
         yield [c for c in self.columns if self.name_of(c) in stems or any(self._spelt(c, stem, unit) for stem in stems)]
         stems = OTHER_TIMES if name == "time" else (named.plain(name),)
         yield [c for c in self.columns if named.plain(self.name_of(c)) in stems]
@@ -149,7 +149,7 @@ class Recording:
             clock = f", or say {named.option('time', '@1ms')} if rows are 1 ms apart" if name == "time" else ""
             raise RecordingError(f"{self.path}: there is no channel {name}; {hint(name, self.columns)}{clock}", channel=name)
         given = self.unit_of(name, column, unit)
-        called = self.aliases[name] if name in self.aliases else column
+        called = self.aliases.get(name, column)
         option = named.option(name, named.with_unit(called, unit, self.units, self.texts))
         if given is None or (given.strip() in ("", "-", "?") and not _plain(unit)):
             where = f'"{self.name_of(column)} [{unit or "1"}]" in the header' if self.lines is not None else "it into the file"
@@ -222,7 +222,7 @@ def _suffix(ending: str, unit: str) -> str | None:
         texts = [match[1] or match[2]]
     else:
         return None
-    fitting = {}
+    fitting: dict[float, str] = {}
     for text in texts:
         try:
             fitting.setdefault(unit_text.scale(text, unit), text)

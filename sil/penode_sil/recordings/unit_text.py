@@ -47,7 +47,7 @@ WORDS = {
 }
 # how words look whose case is lost: NM, KN, MM
 CASES = "N kN m mm cm km s ms us kg g rad deg rpm Hz kHz V mV A mA W kW J kJ Pa kPa MPa bar K min h N*m kN*m".split()
-LOST = {}  # lower case -> spellings
+LOST: dict[str, list[str]] = {}  # lower case -> spellings
 for _case in CASES:
     LOST.setdefault(_case.replace("*", "").lower(), []).append(_case)
 GLUED = ("kN", "MN", "mN", "N", "mm", "cm", "km", "m", "kg", "ms", "s", "rad", "deg", "min", "h", "V", "A", "W")

@@ -9,10 +9,12 @@ import math
 from penode_gen import units as _units
 from penode_gen.units import UnitError
 
+__all__ = ["UnitError", "factor", "quantity"]
+
 
 def factor(unit: str, like: str | None = None) -> float:
     """How many SI units one `unit` is; UnitError if it measures something else than `like`."""
-    unit, like = ("1" if text is not None and text.strip() in ("", "-") else text for text in (unit, like))
+    unit, like = _plain(unit), None if like is None else _plain(like)
     try:
         fits = like is None or _units.same_dimension(unit, like)
     except UnitError as exc:
@@ -20,6 +22,10 @@ def factor(unit: str, like: str | None = None) -> float:
     if not fits:
         raise UnitError(f"{'a plain number' if unit == '1' else unit} cannot be turned into {like}; give it in {like}")
     return _units.factor(unit)
+
+
+def _plain(unit: str) -> str:
+    return "1" if unit.strip() in ("", "-") else unit
 
 
 def quantity(value: object, like: str) -> float:

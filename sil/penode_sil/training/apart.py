@@ -63,7 +63,7 @@ def find(model: Model, free: Sequence[str], networks: Sequence[str]) -> tuple[Ap
             value = sp.Symbol(f"N{len(calls)}", real=True)
             calls.append((step.network, value, tuple(a.xreplace(swap) for a in step.arguments)))
             swap[step.target] = value
-        else:
+        elif step.value is not None:
             swap[step.target] = step.value.xreplace(swap)
     rates = [r.xreplace(swap) for r in shown]
     numbers = {ex.symbol(n): p.value for n, p in model.parameters.items()}

@@ -50,7 +50,8 @@ class Band:
             rows = fine.hats(x[:, 0]) if isinstance(fine, Curve) else _slopes(fine, x)
             noise = np.maximum(np.einsum("ij,jk,ik->i", rows, self.spread[own, own], rows), 0.0)
             left = rest(shape, x[:, 0]) if isinstance(shape, Curve) else 0.0
-            return np.sqrt(noise + (rows @ self.away[own]) ** 2 + left**2)
+            deviation: Array = np.sqrt(noise + (rows @ self.away[own]) ** 2 + left**2)
+            return deviation
 
         return found
 

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -70,7 +72,7 @@ class Curve:
             rows[j - 1, j - 1 : j + 2] = t - 1.0, 1.0, -t
         return np.delete(rows, self.zero, axis=1) if self.zero >= 0 else rows
 
-    def fill(self, net: Any) -> list[Any]:
+    def fill(self, net: ctypes.Structure) -> list[NDArray[Any]]:
         """Fill in a net_t; what it points to."""
         knots, values = np.ascontiguousarray(self.knots), np.ascontiguousarray(self.values)
         net.kind, net.count, net.zero, net.layers, net.columns, net.widest, net.inputs = 0, len(knots), self.zero, 0, self.columns, 1, 1
@@ -109,7 +111,7 @@ def bent(knots: Array, values: Array, spread: Array, regular: NDArray[np.bool_])
     away, variance = rows @ values, rows @ spread @ rows.T
     scale = 1.0 / np.sqrt(np.maximum(np.diag(variance), 1e-300))
     chi2 = float((away * scale) @ np.linalg.solve(variance * np.outer(scale, scale) + 1e-9 * np.eye(len(at)), away * scale))
-    return chi2 > len(at) + 3.0 * np.sqrt(2.0 * len(at))
+    return chi2 > len(at) + 3.0 * math.sqrt(2.0 * len(at))
 
 
 def fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArray[np.bool_], zero: int) -> NDArray[np.bool_]:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from . import data, unknown
 from .curve import Curve, bent, fewer, spaced, three
+from .engine import Shape
 from .port import Port, inputs_of
-from .problem import Point, Problem
+from .problem import Point, Problem, replaced
 from .settings import SETTINGS
 from .solve import NONE, Fit, Limits, solve
 
@@ -82,6 +83,13 @@ def seen_by(problem: Problem, point: Point) -> list[Array]:
     return found[1]
 
 
+def _curves(point: Point) -> list[Curve]:
+    """The shapes of a point, all of which are curves."""
+    found = [shape for shape in point.shapes if isinstance(shape, Curve)]
+    assert len(found) == len(point.shapes)
+    return found
+
+
 def train(
     problem: Problem,
     ports: Sequence[Port],
@@ -100,10 +108,8 @@ def train(
         seen = seen_by(problem, point)
         problem = rescaled(problem, point, seen, ports)
         for i, port in enumerate(ports):
-            knots = min(max(count, len(point.shapes[i].knots)), port.knots)
-            point = Point(
-                point.ratios, point.starts, (*point.shapes[:i], curve_on(port, point.shapes[i], seen, knots), *point.shapes[i + 1 :])
-            )
+            before = _curves(point)[i]
+            point = replaced(point, i, curve_on(port, before, seen, min(max(count, len(before.knots)), port.knots)))
         fit = solve(problem, point, iterations, 20.0, limits, patience=1)
         point = fit.point
         problem = renoised(problem, point)
@@ -117,7 +123,7 @@ def train(
     return problem, solve(problem, fit.point, 6, 1.0, limits, damping=1e-6)
 
 
-def lines(problem: Problem, shapes: Sequence[Curve], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
+def lines(problem: Problem, shapes: Sequence[Shape], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
     """Parameters, start states and two slopes of each network from the first seconds: everything later leans on it."""
     samples = max(int(SETTINGS.curves_short / problem.model.sample_time), 100)
     free = np.full(len(problem.scale), 1e6)  # slopes are free, in the units of the model: how large forces are is not known yet
@@ -135,12 +141,12 @@ def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callab
     """Curves on a regular grid of as many knots as there is room for, and on others in the middle between them where data want them there."""
     seen = seen_by(problem, point)
     problem = rescaled(problem, point, seen, ports)
-    grids = [curve_on(p, s, seen, p.knots) for p, s in zip(ports, point.shapes)]
+    grids = [curve_on(p, s, seen, p.knots) for p, s in zip(ports, _curves(point))]
     point = Point(point.ratios, point.starts, tuple(g.middled() for g in grids))
     fit = solve(problem, point, 3, 20.0, limits, damping=1e-6, patience=1)
     spread = covariance(problem, fit)
     at, shapes = len(point.ratios) + point.starts.size, []
-    for port, grid_, shape in zip(ports, grids, fit.point.shapes):
+    for port, grid_, shape in zip(ports, grids, _curves(fit.point)):
         own = spread[at : at + shape.columns, at : at + shape.columns]
         at += shape.columns
         if shape.zero >= 0:

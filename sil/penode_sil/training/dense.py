@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 from dataclasses import dataclass, replace
 from typing import Any
@@ -58,7 +59,7 @@ class Dense:
             h, rest = networks.layer_value(layer, h), networks.layer_value(layer, rest)
         return (h[:, 0] - (rest[0, 0] if self.zero else 0.0)) * self.size
 
-    def fill(self, net: Any) -> list[Any]:
+    def fill(self, net: ctypes.Structure) -> list[NDArray[Any]]:
         """Fill in a net_t; what it points to."""
         width = np.array(self.width, dtype=np.int32)
         kinds = np.array([ACTIVATIONS.index(a) for a in self.activation], dtype=np.int32)
@@ -93,31 +94,26 @@ def trainable(network: Network) -> str:
 
 def network_of(shape: Dense, template: Network, low: Array, high: Array) -> Network:
     """A Network of the template's architecture that computes the same, in float as well as in double: 0 at 0 if it shall."""
-    layers: list[networks.Layer] = []
-    scaled_in, scaled_out = isinstance(template.layers[0], Affine), isinstance(template.layers[-1], Affine)
+    layers: list[networks.Dense] = []
+    first, last = template.layers[0], template.layers[-1]
     parts = [(w.copy(), b.copy()) for w, b in shape.parts()]
-    if not scaled_in:
+    if not isinstance(first, Affine):
         parts[0] = (parts[0][0] / shape.scale, parts[0][1])
-    if not scaled_out:
+    if not isinstance(last, Affine):
         parts[-1] = (parts[-1][0] * shape.size, parts[-1][1] * shape.size)
     for (w, b), activation in zip(parts, shape.activation):
         layers.append(networks.Dense(w.astype(np.float32), b.astype(np.float32), activation))
     if shape.zero:
         layers[-1] = networks.Dense(layers[-1].weights, -_at_zero(layers), layers[-1].activation)
-    if scaled_in:
-        first = template.layers[0]
-        assert isinstance(first, Affine)
-        layers.insert(0, Affine(np.zeros(shape.width[0]), (1.0 / shape.scale).astype(np.float32), first.form))
-    if scaled_out:
-        layers.append(Affine(np.zeros(1), np.float32([shape.size]), template.layers[-1].form))  # type: ignore[union-attr]
-    return Network(tuple(layers), low, high, "trained")
+    before = (Affine(np.zeros(shape.width[0]), (1.0 / shape.scale).astype(np.float32), first.form),) if isinstance(first, Affine) else ()
+    behind = (Affine(np.zeros(1), np.array([shape.size], np.float32), last.form),) if isinstance(last, Affine) else ()
+    return Network((*before, *layers, *behind), low, high, "trained")
 
 
-def _at_zero(layers: list[networks.Layer]) -> Array:
+def _at_zero(layers: list[networks.Dense]) -> Array:
     """What the weights of the last layer make at 0, summed in float in the order of the C, so that the bias takes it away exactly."""
     h = np.zeros(layers[0].n_in, np.float32)
     for layer in layers:
-        assert isinstance(layer, networks.Dense)
         last = layer is layers[-1]
         if not last:
             h = networks.layer_value(layer, h.astype(float)).astype(np.float32)

@@ -47,7 +47,7 @@ def train(
     bounds: Sequence[Callable[[Curve], Limits]],
     seed: int,
     tell: Tell,
-    start: begin.Start = begin.Start(),
+    start: begin.Start,
 ) -> tuple[Problem, Fit]:
     """All networks of a problem; several random starts if one does not come down to the noise. What a `start` knows is tried first."""
     limits = curves.limits_of(problem, bounds)
@@ -59,7 +59,7 @@ def train(
     for k in range(SETTINGS.ends_tries):
         own = _begin(first, lines, seen, ports, shapes, seed + 1000 * k, start if k == 0 else begin.Start())
         try:
-            found = _descend(first, own, limits, lambda share, doing, k=k: tell((k + share) / SETTINGS.ends_tries, f"{doing}, try {k + 1}"))
+            found = _descend(first, own, limits, _of_try(k, tell))
         except FloatingPointError:
             continue
         if best is None or loud(*_of(found)) < loud(*_of(best)):
@@ -69,6 +69,11 @@ def train(
     if best is None:
         raise FloatingPointError("the simulation left all bounds from every start")
     return best
+
+
+def _of_try(k: int, tell: Tell) -> Tell:
+    """Tells the progress of all tries, during one of them."""
+    return lambda share, doing: tell((k + share) / SETTINGS.ends_tries, f"{doing}, try {k + 1}")
 
 
 def _of(found: tuple[Problem, Fit]) -> tuple[Problem, Point]:

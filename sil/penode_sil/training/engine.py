@@ -135,7 +135,7 @@ class Engine:
         return job, [*kept, nets, which, p, x, sensitivity, nodes, shares, scratch]
 
 
-def compiler() -> str:
+def compiler() -> bytes:
     """The version of the compiler that makes the library."""
     return compiler_version("gcc")
 

@@ -8,7 +8,7 @@ the physics only, and is the same for every network that stands in a place.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -27,18 +27,18 @@ class Equations:
     calls: tuple[tuple[str, int], ...]
 
 
-class _Printer(C99CodePrinter):
+class _Printer(C99CodePrinter):  # type: ignore[misc]  # SymPy has no types
     """C of double, also for the functions that the project keeps whole."""
 
     def emptyPrinter(self, expr: sp.Basic) -> str:
         raise ValueError(f"no C for {expr.func.__name__} in {expr}")
 
 
-def _call(name: str) -> object:
+def _call(name: str) -> Callable[[C99CodePrinter, sp.Expr], str]:
     return lambda self, expr: f"{name}({self._print(expr.args[0])})"
 
 
-for _function, _name in {
+for _kind, _name in {
     "Root": "sqrt",
     "Logarithm": "log",
     "Softplus": "t_softplus",
@@ -47,7 +47,7 @@ for _function, _name in {
     "Absolute": "fabs",
     "Heaviside": "t_step",
 }.items():
-    setattr(_Printer, f"_print_{_function}", _call(_name))
+    setattr(_Printer, f"_print_{_kind}", _call(_name))
 
 
 def equations(model: Model, free: Sequence[str]) -> Equations:
@@ -60,7 +60,7 @@ def equations(model: Model, free: Sequence[str]) -> Equations:
         if step.network:
             calls.append((step.network, tuple(a.xreplace(swap) for a in step.arguments)))
             swap[step.target] = _at("N", len(calls) - 1)
-        else:
+        elif step.value is not None:
             swap[step.target] = step.value.xreplace(swap)
     names = {s: _at("x", i) for i, s in enumerate(causal.states)}
     names |= {s: _at("u", i) for i, s in enumerate(causal.inputs)} | {s: _at("ud", i) for i, s in enumerate(causal.input_rates)}

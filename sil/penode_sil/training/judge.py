@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from penode_gen.model import Model
+from penode_gen.networks import Network
 from penode_gen.sets import packing
 
 from ..batch import Batch
@@ -88,11 +89,11 @@ def visited(ports: Sequence[Port], seen: Sequence[Array]) -> list[Array]:
     return [inputs_of(p, seen) for p in ports]
 
 
-def with_networks(model: Model, networks: dict[str, object], parameters: dict[str, float]) -> Model:
+def with_networks(model: Model, networks: Mapping[str, Network], parameters: dict[str, float]) -> Model:
     """The model with trained networks in its set 'default', and with other parameters."""
     default = replace(
         model.sets["default"],
-        networks=model.sets["default"].networks | networks,
+        networks=model.sets["default"].networks | dict(networks),
         parameters=model.sets["default"].parameters | {k: v for k, v in parameters.items() if k in model.sets["default"].parameters},
     )
     changed = {n: replace(p, value=parameters[n]) for n, p in model.parameters.items() if n in parameters}

@@ -29,10 +29,10 @@ def model(network: Network, name: str, text: str, properties: Mapping[str, str])
         constants.append(numpy_helper.from_array(np.asarray(values, dtype=np.float32), f"c{len(constants)}"))
         return constants[-1].name
 
-    def node(kind: str, *given: str, **options: int) -> None:
+    def node(kind: str, *given: str) -> None:
         nonlocal now
         out = f"h{len(nodes)}"
-        nodes.append(helper.make_node(kind, [now, *given], [out], f"{kind.lower()}{len(nodes)}", **options))
+        nodes.append(helper.make_node(kind, [now, *given], [out], f"{kind.lower()}{len(nodes)}"))
         now = out
 
     for layer in network.layers:
@@ -42,7 +42,8 @@ def model(network: Network, name: str, text: str, properties: Mapping[str, str])
             ):
                 node(kind, constant(values))
         else:
-            node("Gemm", constant(layer.weights), constant(layer.bias), transB=1)
+            node("Gemm", constant(layer.weights), constant(layer.bias))
+            nodes[-1].attribute.append(helper.make_attribute("transB", 1))
             if layer.activation != "identity":
                 node(_NODES[layer.activation])
     nodes[-1].output[0] = "y"

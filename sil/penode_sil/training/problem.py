@@ -85,7 +85,7 @@ class Problem:
         given = {
             k: getattr(self, k) for k in ("engine", "records", "noise", "scale", "held", "frozen", "tied", "plain", "apart", "journal")
         }
-        return Problem(**(given | changes))  # type: ignore[arg-type]
+        return Problem(**(given | changes))
 
     @property
     def nominal(self) -> Array:
@@ -223,7 +223,8 @@ class Problem:
         rows = shape.bends() / (SETTINGS.problem_bent * size)
         if self.plain and 0 < shape.zero < len(shape.knots) - 1:  # a constant of one network would move where 0 of another one is
             rows[shape.zero - 1] /= SETTINGS.problem_tied
-        return rows.T @ rows + np.eye(len(shape.theta)) * (SETTINGS.problem_large * size) ** -2.0
+        precision: Array = rows.T @ rows + np.eye(len(shape.theta)) * (SETTINGS.problem_large * size) ** -2.0
+        return precision
 
 
 def replaced(point: Point, index: int, shape: Shape) -> Point:

@@ -32,7 +32,7 @@ from .problem import Point, Problem
 from .result import Error, Force, Trained
 from .resume import Journal
 from .settings import SETTINGS
-from .solve import Fit, solve
+from .solve import Fit, Limits, solve
 
 Array = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin
     return Point(begin.ratios(start, problem.engine.free, problem.model, point.ratios), point.starts, shapes)
 
 
-def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], curves.Limits]]) -> tuple[Problem, Fit]:
+def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], Limits]]) -> tuple[Problem, Fit]:
     """The fit with the colour of what it leaves, for its estimate and its band. What is louder than noise is what the model lacks: there the
     estimate stays that of least errors, and curves bend as held-out parts of the recordings allow."""
     loud = heldout.loud(problem, fit.point)
@@ -238,7 +238,8 @@ def _judged(
     after = judge.with_networks(model, {p.name: n for p, n in zip(ports, networks)}, values)
     ranges = [(x.min(axis=0), x.max(axis=0)) for x in visited]
     training, _, _ = judge.errors(problem, fit.point, train_, model, after, ports, ranges, problem.noise)
-    holdout, outside, masked = (), 0.0, 0.0
+    holdout: tuple[Error, ...] = ()
+    outside = masked = 0.0
     if held:
         records = tuple(data.record(model, m, problem.engine.signals) for m in held)
         there = held_starts.fitted(problem, records, fit.point, ports, curves.seen_by(problem, fit.point))
@@ -323,6 +324,7 @@ def _force(model: Model, port: Port, shape: Curve | Dense, network: Network, x: 
         counts.append(count.astype(float))
     declared = model.networks[port.name]
     broken = promises.broken(declared.promises, network, model.outside == "clamp") if declared.promises else []
+    assert network.input_min is not None and network.input_max is not None  # written() gives it the visited range
     low, high = (tuple(float(v) for v in values) for values in (network.input_min, network.input_max))
     pieces = fold.pieces(network, model.outside == "clamp") if fold.foldable(network) else 0
     way = "curve" if isinstance(shape, Curve) else "network"

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -101,7 +102,8 @@ def _splits(problem: Problem, fit: Fit, ports: Sequence[Port], visited: Sequence
     curvature = fit.normal.curvature + prior
     scale = 1.0 / np.sqrt(np.diag(curvature))
     spread = np.linalg.inv(curvature * np.outer(scale, scale) + 1e-13 * np.eye(len(scale))) * np.outer(scale, scale)
-    at, rows = len(fit.point.ratios) + fit.point.starts.size, {}
+    at = len(fit.point.ratios) + fit.point.starts.size
+    rows: dict[str, tuple[int, Curve, Array]] = {}
     for port, shape, x in zip(ports, fit.point.shapes, visited):
         if isinstance(shape, Curve):
             rows[port.name] = (at, shape, x[:, 0])
@@ -125,4 +127,4 @@ def _constant(at: int, shape: Curve, x: Array, spread: Array) -> float:
     values = np.sort(x)[:: max(1, len(x) // 500)]
     mean = np.zeros(len(spread))
     mean[at : at + shape.columns] = np.mean(shape.hats(values), axis=0)
-    return float(np.sqrt(max(mean @ spread @ mean, 0.0)))
+    return math.sqrt(max(float(mean @ spread @ mean), 0.0))
