@@ -95,7 +95,7 @@ class _Inputs:
         return u, udot
 
 
-def _solver(system: Any, source: _Inputs, piece: _Piece, x: Array) -> Any:
+def _solver(system: penode_gen.Numeric, source: _Inputs, piece: _Piece, x: Array) -> Any:
     """A solver of the equations over a piece, from its first state on."""
     from scipy.integrate import DOP853, LSODA  # here, for other commands need not wait for it
 
@@ -131,24 +131,24 @@ def solve(
     rows_x = np.empty((times.size, x.size))
     rows_y, rows_z = np.empty((times.size, len(model.outputs))), np.empty((times.size, len(model.sensors)))
     done = 0
+
+    def keep(row: int, state: Array, system: penode_gen.Numeric, source: _Inputs) -> None:
+        u, udot = source(float(times[row]))
+        rows_x[row], rows_y[row], rows_z[row] = state, system.outputs(state, u, udot), system.sensors(state, u, udot)
+
     for piece in _pieces(instance, duration, set_length, model.sample_time, knots):
         system, source = equations[piece.set], _Inputs(signals, piece.begin, piece.end)
-
-        def keep(row: int, state: Array, system: penode_gen.Numeric = system, source: _Inputs = source) -> None:
-            u, udot = source(float(times[row]))
-            rows_x[row], rows_y[row], rows_z[row] = (state, system.outputs(state, u, udot), system.sensors(state, u, udot))
-
         # a sample that lies on the end of a piece belongs to it: the set before an exchange
         last = int(np.searchsorted(times, piece.end, side="right"))
         if piece.held:
             for row in range(done, last):
-                keep(row, x)
+                keep(row, x, system, source)
                 rows_y[row] = rows_y[max(row - 1, 0)]  # outputs are held as well, sensors are not
             done = last
             continue
         solver = _solver(system, source, piece, x)
         while done < last and times[done] <= piece.begin:
-            keep(done, x)
+            keep(done, x, system, source)
             done += 1
         while solver.status == "running":
             _step(solver, f"{model.path}: the exact solution of {instance.name}")
@@ -156,7 +156,7 @@ def solve(
             if reached > done:
                 between = solver.dense_output()
                 for row in range(done, reached):
-                    keep(row, solver.y if times[row] == solver.t else between(times[row]))
+                    keep(row, solver.y if times[row] == solver.t else between(times[row]), system, source)
                 done = reached
                 progress(solver.t)
         x = solver.y

@@ -116,7 +116,7 @@ def draw(path: Path, title: str, subtitle: str, time: NDArray[np.float64], signa
         axes[0, -1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(lines), borderaxespad=0.2)
         if several:
             who = lines[1].name if len(lines) == 2 else "each"
-            axes[1, 0].set_ylabel(f"{who} − {lines[0].name}\nin {_small_scale(lines, unit)[1]}")
+            axes[1, 0].set_ylabel(f"{who} \u2212 {lines[0].name}\nin {_small_scale(lines, unit)[1]}")
         figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
         figure.align_ylabels()
         try:

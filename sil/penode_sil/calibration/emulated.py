@@ -36,7 +36,8 @@ def build(model: Model, machine: str) -> Path:
     if 10**9 % between:  # ns
         raise ModelError(
             [
-                f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; use --on sil"
+                f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; "
+                "use --on sil"
             ]
         )
     source, firmware = generated(model), native("sil", "firmware")
@@ -73,7 +74,8 @@ def emulated(model: Model, machine: str, host: str, port: int | None, u: NDArray
     if len(inputs) > Slave.STIMULUS:
         most = Slave.STIMULUS // (len(inputs) // len(u)) * model.sample_time
         raise ScenarioError(
-            f"--scenario: the emulated controller holds the inputs of {most:g} s, not of {len(u) * model.sample_time:g} s; shorten it, or use --on sil"
+            f"--scenario: the emulated controller holds the inputs of {most:g} s, not of {len(u) * model.sample_time:g} s; shorten it, "
+            "or use --on sil"
         )
     program = build(model, machine)
     port = port if port is None else port or free_port(host, False)

@@ -152,14 +152,16 @@ class Link:
         epk = self.text(Text.EPK) if found.epk is not None else ""
         if found.epk is not None and epk and epk != found.epk[0]:
             raise TargetError(
-                f'{path or self.address.text}: the A2L is that of "{found.epk[0]}", the controller is "{epk}"; export the A2L of its program'
+                f'{path or self.address.text}: the A2L is that of "{found.epk[0]}", the controller is "{epk}"; '
+                "export the A2L of its program"
             )
         return found
 
 
 @contextmanager
 def connected(address: Address, policy: Any = None, patience: float = 10.0) -> Iterator[Link]:
-    """A link, disconnected at the end. `patience` [s] for an answer: more than any command takes, on a serial line too. Raises UserError."""
+    """A link, disconnected at the end. `patience` [s] for an answer: more than any command takes, on a serial line too. Raises
+    UserError."""
     if importlib.util.find_spec("pyxcp") is None:
         raise ToolMissing("XCP needs the Python package pyxcp, which is not installed; pip install penode[xcp]")
     from pyxcp.config import create_application_from_config, set_application

@@ -215,7 +215,8 @@ def measure(
     click.echo(f"{to}: {log.time.size} samples in {log.time[-1]:.3f} s, {lost} -> {output}")
     if log.lost is None:
         note(
-            "XCP has no code for the controller's period (1 to 255 times 1 ns, 10 ns, ... 1 s): measure a counter, such as sample, to see gaps"
+            "XCP has no code for the controller's period (1 to 255 times 1 ns, 10 ns, ... 1 s): measure a counter, such as sample, to "
+            "see gaps"
         )
     if log.broken:
         raise TargetError(f"{to}: the controller has fallen silent, or the line is broken; what came until then is in {output}")

@@ -77,7 +77,8 @@ def choose(text: str, kind: np.dtype[Any]) -> ChosenSet:
         raise WrongUse(f"{text}: {exc}; name a set as MODEL.toml:NAME, or a file in serial form") from exc
     if found.values.dtype != kind:
         raise WrongUse(
-            f"{text}: its values have {found.values.dtype.itemsize} bytes, those of the controller {kind.itemsize}; write the set in that form"
+            f"{text}: its values have {found.values.dtype.itemsize} bytes, those of the controller {kind.itemsize}; write the set in "
+            "that form"
         )
     return ChosenSet(f"{Path(text).name} (set {found.id})", found.layout, found.values)
 
@@ -103,7 +104,8 @@ class Pages:
 
 
 def look(link: Link, a2l: A2l) -> Pages:
-    """Both pages of a controller, whose tool page is the working page afterwards. A set that is open is not looked at: none is after CONNECT."""
+    """Both pages of a controller, whose tool page is the working page afterwards. A set that is open is not looked at: none is after
+    CONNECT."""
     address, size, kind = segment(a2l)
     page = link.page(Who.ECU)
     whole = Entry("segment", "", address, kind, (size // kind.itemsize,))

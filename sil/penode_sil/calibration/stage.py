@@ -31,7 +31,10 @@ class Staged:
     def sentence(self) -> str:
         """For people."""
         within = "" if self.id is None else f", as set {self.id} of the controller"
-        return f"{self.bytes} bytes written in {self.seconds:.3f} s, proven (CRC-32 0x{self.checksum:08x}), read back\nin force: {self.set}{within}"
+        return (
+            f"{self.bytes} bytes written in {self.seconds:.3f} s, proven (CRC-32 0x{self.checksum:08x}), read back\n"
+            f"in force: {self.set}{within}"
+        )
 
 
 def _running_id(link: Link, a2l: A2l) -> int | None:
@@ -60,7 +63,8 @@ def write(link: Link, a2l: A2l, chosen: ChosenSet) -> tuple[int, float]:
     layout = int(link.number(expected)) if expected else chosen.layout
     if chosen.values.nbytes != size or layout != chosen.layout:
         raise WrongUse(
-            f"{chosen.name}: it is a set of another model (layout 0x{chosen.layout:08x}, the controller has 0x{layout:08x}); choose one of {a2l.name}"
+            f"{chosen.name}: it is a set of another model (layout 0x{chosen.layout:08x}, the controller has 0x{layout:08x}); choose one "
+            f"of {a2l.name}"
         )
     begin = time.perf_counter()
     link.write(address, chosen.values.astype(chosen.values.dtype.newbyteorder(link.order)).tobytes())
@@ -68,7 +72,8 @@ def write(link: Link, a2l: A2l, chosen: ChosenSet) -> tuple[int, float]:
     found = link.checksum(address, size)
     if found != chosen.checksum:
         raise TargetError(
-            f"{chosen.name}: what has arrived is something else (CRC-32 0x{found:08x}, not 0x{chosen.checksum:08x}); the running set stays, stage it again"
+            f"{chosen.name}: what has arrived is something else (CRC-32 0x{found:08x}, not 0x{chosen.checksum:08x}); the running set "
+            "stays, stage it again"
         )
     return found, seconds
 

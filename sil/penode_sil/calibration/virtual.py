@@ -45,8 +45,8 @@ def period(model: Model) -> int:
         near = max(round(exact / 1000.0), 1)
         raise ModelError(
             [
-                f"{model.path.name}: sample_time: {model.sample_time!r} s is no whole number of nanoseconds from 1000 on, which a controller needs; "
-                f'choose another, such as "{near} us"'
+                f"{model.path.name}: sample_time: {model.sample_time!r} s is no whole number of nanoseconds from 1000 on, "
+                f'which a controller needs; choose another, such as "{near} us"'
             ]
         )
     return int(found)

@@ -104,7 +104,7 @@ def numbers(texts: Sequence[str | None], decimal: str) -> Array:
 def stamps(texts: Sequence[str | None]) -> Array:
     """Dates and times of day in s since the first day's midnight; ValueError as for `numbers`. NaN where a cell is empty."""
     found = [None if not text or not text.strip() else STAMP.fullmatch(text) for text in texts]
-    for k, (match, text) in enumerate(zip(found, texts)):
+    for k, (match, text) in enumerate(zip(found, texts, strict=True)):
         if match is None and text and text.strip():
             raise ValueError(k, text)
     seconds = np.array([np.nan if match is None else _of_day(match) for match in found])

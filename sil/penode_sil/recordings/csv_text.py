@@ -29,11 +29,12 @@ def read_csv(path: Path) -> Recording:
         found = layout.find(lines)
         if found is None:
             raise RecordingError(f'{path}: it is empty; the first row must be a header like "time [s],z_road [m]"')
-        form = f"{encoding}, columns between {layout.NAMED.get(found.separator, found.separator)}, decimal {'commas' if found.decimal == ',' else 'points'}"
+        between, decimals = layout.NAMED.get(found.separator, found.separator), "commas" if found.decimal == "," else "points"
+        form = f"{encoding}, columns between {between}, decimal {decimals}"
         named = _named(found)
         values = _fast(lines[found.body :], found, len(named))
         if values is not None:
-            columns = dict(zip((c.key for c in named), values.T.copy()))
+            columns = dict(zip((c.key for c in named), values.T.copy(), strict=True))
             return _table(path, found, named, np.arange(found.body, found.body + len(values)) + 1, columns, form)
         return _slow(path, lines, found, named, form)
     except csv.Error as exc:

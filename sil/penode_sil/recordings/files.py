@@ -63,7 +63,7 @@ def _by_clock(table: Recording) -> list[Recording]:
     if all(np.array_equal(table.columns[times[0]], table.columns[key], equal_nan=True) for key in times[1:]):
         return [table]
     parts = []
-    for first, last in zip(times, [*times[1:], None]):
+    for first, last in zip(times, [*times[1:], None], strict=True):
         chosen = keys[keys.index(first) : keys.index(last) if last else None]
         some = np.flatnonzero(np.isfinite(table.columns[first]))
         columns = {("time" if key == first else key): table.columns[key][some] for key in chosen}
@@ -92,13 +92,13 @@ def pick(tables: list[Recording], name: str, unit: str) -> Recording:
     column = called.name if called is not None else holding[0].name_of(str(holding[0].find(name, unit)))
     says = [named.option(name, f"{column}@{raster * 1e3:.4g}ms") for raster in rasters]
     if called is not None and called.raster is not None:
-        near = [t for t, raster in zip(holding, rasters) if abs(raster - called.raster) <= 0.1 * called.raster]
+        near = [t for t, raster in zip(holding, rasters, strict=True) if abs(raster - called.raster) <= 0.1 * called.raster]
         if not near:
             raise RecordingError(
                 f"{tables[0].path}: channel {name} has no raster of {called.raster * 1e3:g} ms; say {' or '.join(says)}", channel=name
             )
         holding, rasters = near, [interval(table) for table in near]
-    finest = [t for t, raster in zip(holding, rasters) if raster <= 1.01 * min(rasters)]
+    finest = [t for t, raster in zip(holding, rasters, strict=True) if raster <= 1.01 * min(rasters)]
     if len(finest) > 1 and not all(_same(finest[0], table, name, unit) for table in finest[1:]):
         says = [named.option(name, f"{column}#{tables_of(tables, name, unit).index(t) + 1}") for t in finest]
         raise RecordingError(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence, Sized
@@ -94,7 +95,7 @@ def _placed(lines: Sequence[str], first: int, separator: str, decimal: str, samp
     rows = [split(line, separator) for line in sample] or [[]]
     width = Counter(map(len, rows)).most_common(1)[0][0]
     valued = [values for row in rows if len(row) == width and any(values := [is_number(cell) or not cell.strip() for cell in row])]
-    share = [sum(column) / len(valued) for column in zip(*valued)]
+    share = [sum(column) / len(valued) for column in zip(*valued, strict=True)]
     columns = {k for k, part in enumerate(share) if part >= min(0.9, max(share))}
     upto = min(len(lines), first + HEAD)
     body = next((k for k in range(first, upto) if _is_body(lines[k], separator, width, columns)), None)
@@ -130,7 +131,7 @@ def _names(fitting: list[int], grid: dict[int, list[str]]) -> int:
     for k in reversed(fitting):
         if any(_is_time(cell) for cell in grid[k]) and not header.are_units(grid[k]):
             return k
-    for k, below in zip(reversed(fitting[:-1]), reversed(fitting[1:])):
+    for below, k in itertools.pairwise(reversed(fitting)):
         if header.are_units(grid[below]):
             return k
     return fitting[-1]

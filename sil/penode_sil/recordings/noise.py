@@ -99,7 +99,8 @@ def _bending(cycles: Array, bends: int) -> Array:
 
 
 def _frames(values: Array, usable: Flags, bends: int, size: int, kept: Kept) -> tuple[Spectra, Index]:
-    """Transforms [stretches, bins] of windowed stretches of differences, of those with usable samples only; starts. Not to be written to."""
+    """Transforms [stretches, bins] of windowed stretches of differences, of those with usable samples only; starts. Not to be written
+    to."""
     key = values.tobytes(), usable.tobytes(), bends, size
     if key not in kept:
         kept[key] = _transformed(values, usable, bends, size, size // 2)

@@ -57,7 +57,7 @@ def examine(values: Array) -> Faults:
     for edge in (low, high):
         if edge is not None:
             saturated |= x == edge
-    for i, j in zip(first[jump], last[jump]):
+    for i, j in zip(first[jump], last[jump], strict=True):
         held[i + (x[i] != 0.0) : j + 1] = True  # the first of a held row was measured; zeros were not
     return Faults(missing, saturated, held & ~saturated, spikes, quantum, False, low, high)
 

@@ -197,7 +197,7 @@ def _move(
 def stretches(flags: Flags) -> list[tuple[int, int]]:
     """[first, last) of each run of True."""
     change = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
-    return list(zip(change[::2].tolist(), change[1::2].tolist()))
+    return list(zip(change[::2].tolist(), change[1::2].tolist(), strict=True))
 
 
 def filled(values: Array, usable: Flags) -> Array:

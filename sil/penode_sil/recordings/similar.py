@@ -85,7 +85,7 @@ def likeness(name: str, column: str) -> float:
     mine, theirs = _words(name), _words(column)
     weights = [min(len(word), 4) for word in mine]
     best = [max((_alike(word, other) for other in theirs), default=0.0) for word in mine]
-    repeated = sum(w * b for w, b in zip(weights, best)) / max(1, sum(weights))
+    repeated = sum(w * b for w, b in zip(weights, best, strict=True)) / max(1, sum(weights))
     return repeated - 0.02 * max(0, len(theirs) - len(mine))
 
 

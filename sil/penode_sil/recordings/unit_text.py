@@ -17,7 +17,7 @@ from penode_gen import units as _units
 
 from .units import UnitError, factor
 
-SUPERSCRIPT = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺−–", "0123456789-+--")
+SUPERSCRIPT = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺\u2212–", "0123456789-+--")
 PLAIN = ("", "-", "--", "1", "none", "no unit", "unitless", "dimensionless", "[-]", "n/a", "/", "ohne", "keine", "1/1")
 WORD = re.compile(r"°?[^\W\d_]+(?:_n\b)?|[%°]")
 ANGLE = re.compile(r"rad|deg|°|turn|rev|rpm|rps|grad|gon", re.IGNORECASE)
@@ -165,7 +165,7 @@ def _replaced(text: str, alternatives: Callable[[str], list[str]]) -> Iterator[s
     choices = [alternatives(m[0]) for m in words]
     for chosen in islice(product(*choices), 300):
         out, end = "", 0
-        for match, word in zip(words, chosen):
+        for match, word in zip(words, chosen, strict=True):
             out += text[end : match.start()] + word
             end = match.end()
         yield out + text[end:]

@@ -2,11 +2,10 @@
 # Copyright (c) 2026 the penode authors
 """Networks beside free parameters that act in the same place: the network takes only what the parameters cannot.
 
-Where a network could do all that a parameter does (a damping, and a network of the same rate between the same ends), recordings show
-their sum only. So the network is held orthogonal to the parameter's sensitivity over the visited range: sum of N(x) g(x) = 0 with
-g = (d f / d parameter) / (d f / d N), f all rates and signals. The parameter is then the least-squares one of the whole force, and stays what its name says.
-Parameters that a network cannot stand for (a mass, a stiffness beside a network of the rate) are left to the recordings.
-"""
+Where a network could do all that a parameter does (a damping, and a network of the same rate between the same ends), recordings show their
+sum only. So the network is held orthogonal to the parameter's sensitivity over the visited range: sum of N(x) g(x) = 0 with g = (d f / d
+parameter) / (d f / d N), f all rates and signals. The parameter is then the least-squares one of the whole force, and stays what its name
+says. Parameters that a network cannot stand for (a mass, a stiffness beside a network of the rate) are left to the recordings."""
 
 from __future__ import annotations
 
@@ -85,9 +84,9 @@ def find(model: Model, free: Sequence[str], networks: Sequence[str]) -> tuple[Ap
 
 def _ratio(above: Sequence[sp.Expr], below: Sequence[sp.Expr], values: Sequence[sp.Symbol]) -> sp.Expr | None:
     """The factor between two vectors, where there is one that is the same in all places and knows no network."""
-    if any(b == 0 and a != 0 for a, b in zip(above, below)):
+    if any(b == 0 and a != 0 for a, b in zip(above, below, strict=True)):
         return None
-    pairs = [(a, b) for a, b in zip(above, below) if b != 0]
+    pairs = [(a, b) for a, b in zip(above, below, strict=True) if b != 0]
     if not pairs or any(a == 0 for a, _ in pairs) or not _equal(pairs):
         return None
     ratios = [sp.simplify(a / b) for a, b in pairs]
@@ -97,10 +96,11 @@ def _ratio(above: Sequence[sp.Expr], below: Sequence[sp.Expr], values: Sequence[
 
 
 def _equal(pairs: Sequence[tuple[sp.Expr, sp.Expr]]) -> bool:
-    """May the ratios of all pairs be equal? Most are not: some numbers in place of the symbols show that at a hundredth of the time of algebra."""
+    """May the ratios of all pairs be equal? Most are not: some numbers in place of the symbols show that at a hundredth of the time of
+    algebra."""
     symbols = sorted(set().union(*(v.free_symbols for pair in pairs for v in pair)), key=str)
     numbers = np.random.default_rng(0).uniform(0.5, 1.5, len(symbols))
-    found = [complex(sp.N((a / b).subs(dict(zip(symbols, numbers))))) for a, b in pairs]
+    found = [complex(sp.N((a / b).subs(dict(zip(symbols, numbers, strict=True))))) for a, b in pairs]
     close = 1e-6  # equal ones differ by rounding only, some 1e-15; NaN, where a law has no value there, tells nothing
     return not any(abs(r - found[0]) > close * abs(found[0]) for r in found[1:])
 

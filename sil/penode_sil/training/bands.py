@@ -2,11 +2,10 @@
 # Copyright (c) 2026 the penode authors
 """How far a trained force may be from the true one: what noise does, and what straight pieces between few knots cannot be.
 
-A force is no chain of straight pieces. Between two knots it may sag, by width^2 * curvature / 8 in the middle, and what it sags there moves the
-knots too, and the constant that two curves share. So the band is taken on curves with a knot more in the middle of each piece: its sag has a
-prior deviation as its neighbours bend, and no more. The error of what was trained is then that of the best such curve, and the way to it:
-E (trained - true)^2 = (trained - best)^2 + covariance of the best, whatever was left out.
-"""
+A force is no chain of straight pieces. Between two knots it may sag, by width^2 * curvature / 8 in the middle, and what it sags there moves
+the knots too, and the constant that two curves share. So the band is taken on curves with a knot more in the middle of each piece: its sag
+has a prior deviation as its neighbours bend, and no more. The error of what was trained is then that of the best such curve, and the way to
+it: E (trained - true)^2 = (trained - best)^2 + covariance of the best, whatever was left out."""
 
 from __future__ import annotations
 
@@ -26,8 +25,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Where a fit ended, the same point with a knot more in each piece of its curves, and there `spread` [n, n] and `away` [n]: covariance of
-    the unknowns, and the way to the best."""
+    """Where a fit ended, the same point with a knot more in each piece of its curves, and there `spread` [n, n] and `away` [n]: covariance
+    of the unknowns, and the way to the best."""
 
     point: Point
     fine: Point
@@ -74,7 +73,8 @@ def of(problem: Problem, fit: Fit) -> Band:
 
 
 def sag(curve: Curve) -> Array:
-    """Standard deviation of how far a smooth force is from each straight piece [n - 1] in its middle: it bends there as at the piece's ends."""
+    """Standard deviation of how far a smooth force is from each straight piece [n - 1] in its middle: it bends there as at the piece's
+    ends."""
     wide = np.diff(curve.knots)
     bend = np.abs(np.diff(np.diff(curve.values) / wide)) / (0.5 * (wide[1:] + wide[:-1]))
     ends = np.concatenate([bend[:1], bend, bend[-1:]]) if len(bend) else np.zeros(2)
@@ -96,7 +96,7 @@ def _ways(point: Point, fine: Point) -> tuple[Array, Array]:
     first[:at, :at] = np.eye(at)
     more: list[Array] = []
     deviations: list[Array] = []
-    for shape, middled in zip(point.shapes, fine.shapes):
+    for shape, middled in zip(point.shapes, fine.shapes, strict=True):
         columns, wide = len(shape.theta), len(middled.theta)
         if isinstance(shape, Curve) and isinstance(middled, Curve):
             free = np.delete(middled.knots, middled.zero) if middled.zero >= 0 else middled.knots

@@ -69,7 +69,8 @@ def read(paths: Sequence[Path], model: Model) -> Start:
         inputs = len(model.networks[name].input_units)
         if (network.n_inputs, network.n_outputs) != (inputs, 1):
             raise NetworkError(
-                f"--from: network {name} has inputs and outputs {network.n_inputs} and {network.n_outputs}, the model's {inputs} and 1; give one of that shape"
+                f"--from: network {name} has inputs and outputs {network.n_inputs} and {network.n_outputs}, the model's {inputs} and 1; "
+                "give one of that shape"
             )
         if all(isinstance(layer, Affine) for layer in network.layers):
             raise NetworkError(f"--from: network {name} scales its input and has no layer with weights; give one that has, or leave it out")
@@ -84,7 +85,9 @@ def _silent(network: Network) -> bool:
 
 def ratios(start: Start, free: Sequence[str], model: Model, before: Array) -> Array:
     """Parameters over their nominal values; those of before where the start says nothing."""
-    return np.array([start.parameters[n] / model.parameters[n].value if n in start.parameters else b for n, b in zip(free, before)])
+    return np.array(
+        [start.parameters[n] / model.parameters[n].value if n in start.parameters else b for n, b in zip(free, before, strict=True)]
+    )
 
 
 def curve(port: Port, network: Network, reach: float) -> Curve:

@@ -86,7 +86,8 @@ def three(reach: float, zero: bool) -> Curve:
 
 
 def spaced(low: float, high: float, count: int, power: float) -> Array:
-    """`count` knots from low to high, dense about 0 by a power; one of them is 0 exactly, and those on both sides of it mirror each other."""
+    """`count` knots from low to high, dense about 0 by a power; one of them is 0 exactly, and those on both sides of it mirror each
+    other."""
     low, high = min(low, 0.0), max(high, 0.0)
     wide = high ** (1.0 / power) + (-low) ** (1.0 / power)
     left = round((count - 1) * (-low) ** (1.0 / power) / wide)
@@ -102,8 +103,8 @@ def spaced(low: float, high: float, count: int, power: float) -> Array:
 
 
 def bent(knots: Array, values: Array, spread: Array, regular: NDArray[np.bool_]) -> bool:
-    """Do data say at all that a curve is more than one of its regular knots? Wald's test of all others together, at three deviations: each may
-    look wanted by itself, and for each a regular knot goes, whose loss moves the constant that two curves share."""
+    """Do data say at all that a curve is more than one of its regular knots? Wald's test of all others together, at three deviations: each
+    may look wanted by itself, and for each a regular knot goes, whose loss moves the constant that two curves share."""
     at = np.flatnonzero(~regular)
     t = (knots[at] - knots[at - 1]) / (knots[at + 1] - knots[at - 1])
     rows = np.zeros((len(at), len(knots)))
@@ -117,11 +118,10 @@ def bent(knots: Array, values: Array, spread: Array, regular: NDArray[np.bool_])
 def fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArray[np.bool_], zero: int) -> NDArray[np.bool_]:
     """Which `count` knots to keep: those are dropped, one by one, that cost least; `spread` is the covariance of the values at all knots.
 
-    Of so many candidates noise makes some look wanted, and a curve whose knots noise has chosen is wrong by more than its covariance shows. So
-    another knot than those of the `regular` grid must gain more than that by 2 ln(candidates) (risk inflation criterion; Foster and George,
-    Annals of Statistics 22, 1994). The outermost knots and that at 0 stay. The first knots on both sides of 0 stay or go together: what straight
-    pieces miss of a force that turns there cancels, or else it moves the force on both sides by a constant.
-    """
+    Of so many candidates noise makes some look wanted, and a curve whose knots noise has chosen is wrong by more than its covariance shows.
+    So another knot than those of the `regular` grid must gain more than that by 2 ln(candidates) (risk inflation criterion; Foster and
+    George, Annals of Statistics 22, 1994). The outermost knots and that at 0 stay. The first knots on both sides of 0 stay or go together:
+    what straight pieces miss of a force that turns there cancels, or else it moves the force on both sides by a constant."""
     kept = _fewer(knots, values, spread, count, regular, np.arange(len(knots)) == zero)
     if not 1 < zero < len(knots) - 2 or kept[zero - 1] == kept[zero + 1]:
         return kept

@@ -41,7 +41,7 @@ def limits_of(problem: Problem, bounds: Sequence[Callable[[Curve], Limits]]) -> 
     def found(point: Point) -> Limits:
         n = len(point.vector)
         at, rows, least = len(point.ratios) + point.starts.size, [], []
-        for shape, bound in zip(point.shapes, bounds):
+        for shape, bound in zip(point.shapes, bounds, strict=True):
             if isinstance(shape, Curve):
                 own = bound(shape)
                 if own.some:
@@ -58,10 +58,13 @@ def limits_of(problem: Problem, bounds: Sequence[Callable[[Curve], Limits]]) -> 
 def rescaled(problem: Problem, point: Point, seen: Sequence[Array], ports: Sequence[Port]) -> Problem:
     """The problem with the size of each network's force as it is now, and at least a hundredth of the largest."""
     spans = np.array(
-        [float(np.ptp(s(inputs_of(p, seen) if p.knots == 0 else inputs_of(p, seen)[:, 0]))) for s, p in zip(point.shapes, ports)]
+        [
+            float(np.ptp(s(inputs_of(p, seen) if p.knots == 0 else inputs_of(p, seen)[:, 0])))
+            for s, p in zip(point.shapes, ports, strict=True)
+        ]
     )
     apart = tuple(a.visited(inputs_of(ports[a.shape], seen)[:, 0]) for a in problem.apart)
-    values = dict(zip(problem.model.parameters, problem.parameters(point)))
+    values = dict(zip(problem.model.parameters, problem.parameters(point), strict=True))
     for a in apart:  # a network that takes only what a parameter cannot has no slopes of its own at first: it is measured by the parameter
         spans[a.shape] = max(spans[a.shape], float(np.ptp(values[a.parameter] * a.sensitivity(a.x))))
     return problem.with_(scale=np.maximum(spans, max(1e-2 * float(spans.max(initial=0.0)), 1e-9)), apart=apart)
@@ -138,15 +141,16 @@ def lines(problem: Problem, shapes: Sequence[Shape], limits: Callable[[Point], L
 
 
 def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
-    """Curves on a regular grid of as many knots as there is room for, and on others in the middle between them where data want them there."""
+    """Curves on a regular grid of as many knots as there is room for, and on others in the middle between them where data want them
+    there."""
     seen = seen_by(problem, point)
     problem = rescaled(problem, point, seen, ports)
-    grids = [curve_on(p, s, seen, p.knots) for p, s in zip(ports, _curves(point))]
+    grids = [curve_on(p, s, seen, p.knots) for p, s in zip(ports, _curves(point), strict=True)]
     point = Point(point.ratios, point.starts, tuple(g.middled() for g in grids))
     fit = solve(problem, point, 3, 20.0, limits, damping=1e-6, patience=1)
     spread = covariance(problem, fit)
     at, shapes = len(point.ratios) + point.starts.size, []
-    for port, grid_, shape in zip(ports, grids, _curves(fit.point)):
+    for port, grid_, shape in zip(ports, grids, _curves(fit.point), strict=True):
         own = spread[at : at + shape.columns, at : at + shape.columns]
         at += shape.columns
         if shape.zero >= 0:

@@ -105,7 +105,7 @@ def of_residuals(residuals: Sequence[Array], goods: Sequence[NDArray[np.bool_]],
     sigma, level, colour = before.sigma.copy(), before.level.copy(), list(before.colour)
     for j in range(len(sigma)):
         lags, count = np.zeros(SETTINGS.data_orders + 1), 0
-        for r, good in zip(residuals, goods):
+        for r, good in zip(residuals, goods, strict=True):
             x = np.where(good[:, j], r[:, j], 0.0)
             lags += [float(x[i:] @ x[: len(x) - i]) for i in range(SETTINGS.data_orders + 1)]
             count += int(good[:, j].sum())

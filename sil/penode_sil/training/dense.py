@@ -34,7 +34,7 @@ class Dense:
     @property
     def columns(self) -> int:
         """Number of free values; with `zero`, the last, a bias, has no effect."""
-        return sum((i + 1) * o for i, o in zip(self.width, self.width[1:]))
+        return sum((i + 1) * o for i, o in itertools.pairwise(self.width))
 
     def with_theta(self, theta: Array) -> Dense:
         """The same shape with other numbers."""
@@ -43,7 +43,7 @@ class Dense:
     def parts(self) -> list[tuple[Array, Array]]:
         """Weights and biases of each layer."""
         found, at = [], 0
-        for i, o in zip(self.width, self.width[1:]):
+        for i, o in itertools.pairwise(self.width):
             found.append((self.theta[at : at + i * o].reshape(o, i), self.theta[at + i * o : at + (i + 1) * o]))
             at += (i + 1) * o
         return found
@@ -51,7 +51,7 @@ class Dense:
     def __call__(self, x: Array) -> Array:
         """Values at x [n] or [n, inputs]."""
         x = np.reshape(x, (-1, self.width[0])) / self.scale
-        weights = [networks.Dense(w, b, a) for (w, b), a in zip(self.parts(), self.activation)]
+        weights = [networks.Dense(w, b, a) for (w, b), a in zip(self.parts(), self.activation, strict=True)]
         if self.zero:
             weights[-1] = networks.Dense(weights[-1].weights, np.zeros(1), self.activation[-1])
         h, rest = x, np.zeros((1, self.width[0]))
@@ -101,7 +101,7 @@ def network_of(shape: Dense, template: Network, low: Array, high: Array) -> Netw
         parts[0] = (parts[0][0] / shape.scale, parts[0][1])
     if not isinstance(last, Affine):
         parts[-1] = (parts[-1][0] * shape.size, parts[-1][1] * shape.size)
-    for (w, b), activation in zip(parts, shape.activation):
+    for (w, b), activation in zip(parts, shape.activation, strict=True):
         layers.append(networks.Dense(w.astype(np.float32), b.astype(np.float32), activation))
     if shape.zero:
         layers[-1] = networks.Dense(layers[-1].weights, -_at_zero(layers), layers[-1].activation)
@@ -119,6 +119,6 @@ def _at_zero(layers: list[networks.Dense]) -> Array:
             h = networks.layer_value(layer, h.astype(float)).astype(np.float32)
             continue
         total = np.zeros(layer.n_out, np.float32)
-        for column, value in zip(layer.weights.astype(np.float32).T, h):
+        for column, value in zip(layer.weights.astype(np.float32).T, h, strict=True):
             total = total + column * value
     return total.astype(float)

@@ -52,7 +52,7 @@ def train(
     """All networks of a problem; several random starts if one does not come down to the noise. What a `start` knows is tried first."""
     limits = curves.limits_of(problem, bounds)
     tell(0.02, "straight lines")
-    first, lines = curves.lines(problem, [straight(p, n.n_inputs) for p, n in zip(ports, shapes)], limits)
+    first, lines = curves.lines(problem, [straight(p, n.n_inputs) for p, n in zip(ports, shapes, strict=True)], limits)
     seen = curves.seen_by(first, lines)
     first = curves.rescaled(first, lines, seen, ports)
     best: tuple[Problem, Fit] | None = None
@@ -85,7 +85,7 @@ def _begin(
 ) -> Point:
     """Random weights in place of the lines, or those of a start."""
     found: list[Shape] = []
-    for k, (port, network, line) in enumerate(zip(ports, shapes, lines.shapes)):
+    for k, (port, network, line) in enumerate(zip(ports, shapes, lines.shapes, strict=True)):
         x = inputs_of(port, seen)
         if isinstance(line, Curve):
             line = begin.curve(port, start.networks[port.name], float(np.max(np.abs(x)))) if port.name in start.networks else line

@@ -79,8 +79,12 @@ class Engine:
         source = "".join(
             resource("penode_sil.training", "templates", f"{part}.c").read_text(encoding="utf-8") for part in ("networks", "engine")
         )
-        head = "#include <math.h>\n#include <stddef.h>\nstatic inline double t_sigmoid(double x);\nstatic inline double t_softplus(double x);\n"
-        head += "static inline double t_sign(double x) { return (double)((x > 0.0) - (x < 0.0)); }\nstatic inline double t_step(double x) { return (x > 0.0) ? 1.0 : 0.0; }\n"
+        head = (
+            "#include <math.h>\n#include <stddef.h>\nstatic inline double t_sigmoid(double x);\n"
+            "static inline double t_softplus(double x);\n"
+            "static inline double t_sign(double x) { return (double)((x > 0.0) - (x < 0.0)); }\n"
+            "static inline double t_step(double x) { return (x > 0.0) ? 1.0 : 0.0; }\n"
+        )
         self._library = ctypes.CDLL(str(_compiled(head + found.text + source)))
         self._library.train_run.restype = ctypes.c_bool
         self._library.train_scratch.restype = ctypes.c_long
@@ -116,7 +120,7 @@ class Engine:
         nodes, shares = np.array(NODES[drive.method]), np.array(SHARES[drive.method])
         nets = (_Net * max(1, len(shapes)))()
         at, kept = len(self.free) + len(start), []
-        for net, shape in zip(nets, shapes):
+        for net, shape in zip(nets, shapes, strict=False):  # without networks, C still wants one
             kept += shape.fill(net)
             net.first = at
             at += shape.columns

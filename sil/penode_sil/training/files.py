@@ -104,11 +104,19 @@ def _write(job: Job, model: Model, after: Model, found: Trained) -> None:
     for force in found.forces:
         own = facts | {
             "penode.band": json.dumps(
-                [{"x": x[::4].tolist(), "sigma1": s[::4].tolist(), "sigma2": (2.0 * s[::4]).tolist()} for x, s in zip(force.x, force.sigma)]
+                [
+                    {"x": x[::4].tolist(), "sigma1": s[::4].tolist(), "sigma2": (2.0 * s[::4]).tolist()}
+                    for x, s in zip(force.x, force.sigma, strict=True)
+                ]
             ),
-            "penode.visited": json.dumps([{"edges": e.tolist(), "counts": c.tolist()} for e, c in zip(force.edges, force.counts)]),
+            "penode.visited": json.dumps(
+                [{"edges": e.tolist(), "counts": c.tolist()} for e, c in zip(force.edges, force.counts, strict=True)]
+            ),
         }
-        text = f"{force.name} of {found.model}; inputs in {', '.join(force.units)}, output in {force.output}; trained by penode {found.versions['penode']}"
+        text = (
+            f"{force.name} of {found.model}; inputs in {', '.join(force.units)}, output in {force.output}; trained by penode "
+            f"{found.versions['penode']}"
+        )
         onnx_file.write(job.output / f"{force.name}.onnx", onnx_file.model(force.network, force.name, text, own))
     toml = job.output / "model_trained.toml"
     with whole(toml) as part:

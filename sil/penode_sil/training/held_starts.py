@@ -26,12 +26,12 @@ def fitted(
     problem: Problem, records: tuple[Record, ...], point: Point, ports: Sequence[Port], seen: Sequence[Array]
 ) -> tuple[Problem, Point] | None:
     """Start states of other recordings, all else as trained. Straight lines in place of the networks, as they were `seen` in training, find
-    states to begin with where these are better than those of the model file. None where the model leaves all bounds from both: then it does so
-    within the recording."""
+    states to begin with where these are better than those of the model file. None where the model leaves all bounds from both: then it does
+    so within the recording."""
     own = problem.with_(records=records, frozen=True)
     begin = replace(own.begin(point.shapes), ratios=point.ratios)
     try:
-        lines = replace(begin, shapes=tuple(line(p, s, inputs_of(p, seen)) for p, s in zip(ports, point.shapes)))
+        lines = replace(begin, shapes=tuple(line(p, s, inputs_of(p, seen)) for p, s in zip(ports, point.shapes, strict=True)))
         closer = replace(begin, starts=solve(own, lines, ITERATIONS, CLOSE, damping=1e-6).point.starts)
         begin = min(begin, closer, key=own.cost)
     except FloatingPointError:

@@ -2,11 +2,11 @@
 # Copyright (c) 2026 the penode authors
 """How much a curve may bend where a fit leaves more than noise: as much as foretells parts of the recordings that it was not fitted to.
 
-What a model lacks is no noise: it is alike from sample to sample, and a fit that counts each sample as news follows it with every knot.
-So the size of a network's force, by which its bends are measured, is chosen by held-out parts, each some consecutive samples of a recording:
+What a model lacks is no noise: it is alike from sample to sample, and a fit that counts each sample as news follows it with every knot. So
+the size of a network's force, by which its bends are measured, is chosen by held-out parts, each some consecutive samples of a recording:
 the part's error as foretold from all others, by the normal equations of each part where the fit ended (cross-validation with one standard
-error; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 7.10). 0 is among the sizes: a network that foretells nothing is 0.
-"""
+error; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 7.10). 0 is among the sizes: a network that foretells nothing
+is 0."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def loud(problem: Problem, point: Point) -> bool:
     if found is None:
         return False
     stated = np.array([s.noise for s in (*problem.model.sensors, *problem.model.outputs)])
-    squares = sum(np.sum(np.where(r.good, e, 0.0) ** 2, axis=0) for e, r in zip(found[0], problem.records))
+    squares = sum(np.sum(np.where(r.good, e, 0.0) ** 2, axis=0) for e, r in zip(found[0], problem.records, strict=True))
     count = np.maximum(sum(np.sum(r.good, axis=0) for r in problem.records), 1)
     return bool(np.any((stated > 0.0) & (np.sqrt(squares / count) > SETTINGS.story_loud * stated)))
 
@@ -74,7 +74,8 @@ def foretold(found: list[Part], precision: Array, pull: Array) -> Array:
 
 
 def sizes(problem: Problem, point: Point) -> Array:
-    """Of each network's force, over that of the problem: the smallest that foretells no worse than the best by more than a standard error."""
+    """Of each network's force, over that of the problem: the smallest that foretells no worse than the best by more than a standard
+    error."""
     found, factors = parts(problem, point), np.ones(len(problem.scale))
     if len(found) < 2:
         return factors

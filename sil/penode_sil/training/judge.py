@@ -50,9 +50,9 @@ def errors(
         goods = [r.good[:, j] for r in problem.records]
         if not any(g.any() for g in goods):
             continue
-        by = {k: _rms([r.y[:, j] - z[:, j] for r, z in zip(problem.records, zs)], goods) for k, zs in kept.items()}
+        by = {k: _rms([r.y[:, j] - z[:, j] for r, z in zip(problem.records, zs, strict=True)], goods) for k, zs in kept.items()}
         own = [r[:, j] for r in residuals]
-        inside = _rms(own, [g & ~late_ for g, late_ in zip(goods, late)])
+        inside = _rms(own, [g & ~late_ for g, late_ in zip(goods, late, strict=True)])
         floor = signal.noise if signal.noise > 0.0 else float(noise.level[j])
         rows.append(Error(signal.name, signal.unit, by["before"], _rms(own, goods), by["deployed"], floor, inside))
     return tuple(rows), float(np.mean(np.concatenate(away))), float(np.mean(np.concatenate(late)))
@@ -60,7 +60,7 @@ def errors(
 
 def _outside(seen: Array, ports: Sequence[Port], ranges: Sequence[tuple[Array, Array]]) -> NDArray[np.bool_]:
     found = np.zeros(len(seen), dtype=bool)
-    for port, (low, high) in zip(ports, ranges):
+    for port, (low, high) in zip(ports, ranges, strict=True):
         for columns in port.seen:
             x = seen[:, list(columns)]
             found |= np.any((x < low) | (x > high), axis=1)
@@ -68,14 +68,14 @@ def _outside(seen: Array, ports: Sequence[Port], ranges: Sequence[tuple[Array, A
 
 
 def _rms(values: Sequence[Array], goods: Sequence[NDArray[np.bool_]]) -> float:
-    chosen = np.concatenate([v[g] for v, g in zip(values, goods)])
+    chosen = np.concatenate([v[g] for v, g in zip(values, goods, strict=True)])
     return float(np.sqrt(np.mean(chosen**2))) if chosen.size else float("nan")
 
 
 def _replayed(model: Model, measured: Sequence[Measured], point: Point) -> list[Array]:
     """Sensors, then outputs, of the generated C in float, [n, n_z] a recording; NaN from where it holds."""
     batch, found = Batch(model, np.float32), []
-    for m, start in zip(measured, point.starts):
+    for m, start in zip(measured, point.starts, strict=True):
         run = batch.run(m.u, x0=start, sensors=[s.name for s in model.sensors], outputs=[s.name for s in model.outputs])
         z = np.concatenate([run.z[0], run.y[0]], axis=1).astype(float)
         if run.first_bad[0] >= 0:

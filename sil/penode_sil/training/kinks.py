@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Where a force turns between two knots: a stop, a preload, an end of a clearance. What straight pieces miss there is more than noise, so the fit moves
-the whole curve along its input until the turn meets a knot (where 0 is follows from the forces at 0 alone, which say little). The band does not
-know of it: it is reported.
-"""
+"""Where a force turns between two knots: a stop, a preload, an end of a clearance. What straight pieces miss there is more than noise, so
+the fit moves the whole curve along its input until the turn meets a knot (where 0 is follows from the forces at 0 alone, which say little).
+The band does not know of it: it is reported."""
 
 from __future__ import annotations
 
@@ -22,9 +21,9 @@ Array = NDArray[np.float64]
 
 
 def find(curve: Curve, spread: Array) -> list[tuple[float, float]]:
-    """Places at which a curve turns at once, and the width of the cell between two knots around each; `spread` [n, n] is the covariance of the values
-    at its knots. Sure by five standard deviations (of some hundred cells none does so by chance), and three times what the curvature beside it makes
-    (what only bends makes as much). Not next to 0, where knots are dense: friction turns there."""
+    """Places at which a curve turns at once, and the width of the cell between two knots around each; `spread` [n, n] is the covariance of
+    the values at its knots. Sure by five standard deviations (of some hundred cells none does so by chance), and three times what the
+    curvature beside it makes (what only bends makes as much). Not next to 0, where knots are dense: friction turns there."""
     knots, wide = curve.knots, np.diff(curve.knots)
     rows, cells = np.zeros((len(wide), len(knots))), np.arange(len(wide))
     rows[cells, cells], rows[cells, cells + 1] = -1.0 / wide, 1.0 / wide
@@ -51,7 +50,7 @@ def find(curve: Curve, spread: Array) -> list[tuple[float, float]]:
 def notes(problem: Problem, fit: Fit, ports: Sequence[Port]) -> list[str]:
     """A line for each curve that turns between its knots."""
     spread, at, lines = covariance(problem, fit), len(fit.point.ratios) + fit.point.starts.size, []
-    for port, shape in zip(ports, fit.point.shapes):
+    for port, shape in zip(ports, fit.point.shapes, strict=True):
         columns = len(shape.theta)
         if isinstance(shape, Curve):
             own = spread[at : at + columns, at : at + columns]
@@ -61,8 +60,9 @@ def notes(problem: Problem, fit: Fit, ports: Sequence[Port]) -> list[str]:
             places = ", ".join(f"{x:.3g}" for x, _ in found)
             if found:
                 lines.append(
-                    f"{port.name} turns at once near {places} {unit}, between two knots that are {max(w for _, w in found):.1g} {unit} apart: the whole curve may lie by some of these "
-                    "beside its place, and the bands of all forces do not hold that; put the stop into the model as a law of its own, or give the network more layers"
+                    f"{port.name} turns at once near {places} {unit}, between two knots that are {max(w for _, w in found):.1g} {unit} "
+                    "apart: the whole curve may lie by some of these beside its place, and the bands of all forces do not hold that; "
+                    "put the stop into the model as a law of its own, or give the network more layers"
                 )
         at += columns
     return lines

@@ -94,7 +94,7 @@ class Problem:
     def parameters(self, point: Point) -> Array:
         """All parameters in the model's order."""
         names, values = list(self.model.parameters), self.nominal.copy()
-        for name, ratio in zip(self.engine.free, point.ratios):
+        for name, ratio in zip(self.engine.free, point.ratios, strict=True):
             values[names.index(name)] *= ratio
         return values
 
@@ -109,7 +109,7 @@ class Problem:
         if np.any(point.ratios < SETTINGS.problem_least):
             return None
         found, seen = [], []
-        for record, start in zip(self.records, point.starts):
+        for record, start in zip(self.records, point.starts, strict=True):
             z, inputs, good = self.engine.simulate(record.drive, self.parameters(point), point.shapes, start)
             if not good:
                 return None
@@ -122,7 +122,7 @@ class Problem:
         found = self.residuals(point)
         if found is None:
             return np.inf
-        total = float(sum(np.sum(self.noise.white(r, record.good) ** 2) for r, record in zip(found[0], self.records)))
+        total = float(sum(np.sum(self.noise.white(r, record.good) ** 2) for r, record in zip(found[0], self.records, strict=True)))
         return total if np.isfinite(total) else np.inf
 
     def cost(self, point: Point) -> float:
@@ -148,7 +148,7 @@ class Problem:
         scale = np.ones(columns)
         names = list(self.model.parameters)
         scale[:n_f] = [self.nominal[names.index(name)] for name in self.engine.free]
-        for e, (record, start, residual) in enumerate(zip(self.records, point.starts, residuals[0])):
+        for e, (record, start, residual) in enumerate(zip(self.records, point.starts, residuals[0], strict=True)):
             white, weight = self.noise.white(residual, record.good), self.noise.weight(record.good)
             own = np.concatenate([np.arange(n_f), n_f + e * n_x + np.arange(n_x), np.arange(n_f + len(self.records) * n_x, wide)])
             part, along = np.zeros((columns, columns)), np.zeros(columns)
@@ -197,7 +197,7 @@ class Problem:
             n_f = len(self.engine.free)
             first[:n_f, :n_f] += self.tied.T @ self.tied * SETTINGS.problem_tied**-2.0
         blocks = [first]
-        for k, (shape, size) in enumerate(zip(point.shapes, self.scale)):
+        for k, (shape, size) in enumerate(zip(point.shapes, self.scale, strict=True)):
             blocks.append(self._of_shape(shape, size))
             rows = [a.row(shape) / (SETTINGS.problem_tied * size) for a in self.apart if a.shape == k and isinstance(shape, Curve)]
             blocks[-1] = blocks[-1] + sum((np.outer(r, r) for r in rows), np.zeros(blocks[-1].shape))

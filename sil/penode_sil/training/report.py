@@ -17,8 +17,10 @@ from .result import Error, Force, Trained
 
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1"><title>{title}</title>
-<style>body{{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}}h1{{font-size:1.5rem}}h2{{font-size:1.1rem;margin-top:2rem}}
-table{{border-collapse:collapse}}td,th{{padding:.2rem .8rem .2rem 0;text-align:right}}td:first-child,th:first-child{{text-align:left}}th{{border-bottom:1px solid #999;font-weight:600}}
+<style>body{{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}}h1{{font-size:1.5rem}}\
+h2{{font-size:1.1rem;margin-top:2rem}}
+table{{border-collapse:collapse}}td,th{{padding:.2rem .8rem .2rem 0;text-align:right}}\
+td:first-child,th:first-child{{text-align:left}}th{{border-bottom:1px solid #999;font-weight:600}}
 img{{max-width:100%}}.warn{{border-left:4px solid #D55E00;padding-left:.8rem}}code{{word-break:break-all}}</style></head><body>
 <h1>{title}</h1>
 {body}
@@ -30,7 +32,8 @@ def write(path: Path, t: Trained) -> None:
     """The page, whole or not at all."""
     verdict = "The fit converged." if t.converged else "The fit did not converge, or the model cannot be what was recorded."
     parts = [
-        f"<p{'' if t.converged else ' class=warn'}>{verdict} {t.seconds:.1f} s of processor time; chi2 {t.chi2:.3f} a sample (1 is noise).</p>"
+        f"<p{'' if t.converged else ' class=warn'}>{verdict} {t.seconds:.1f} s of processor time; chi2 {t.chi2:.3f} a sample (1 is "
+        "noise).</p>"
     ]
     parts += [f"<p class=warn>{html.escape(n)}</p>" for n in t.notes]
     for force in t.forces:
@@ -48,7 +51,8 @@ def write(path: Path, t: Trained) -> None:
         parts += [f"<h2>RMS error on {title}</h2>\n{_table(errors)}"] if errors else []
     if t.holdout:
         parts.append(
-            f"<p>{100 * t.outside:.2f} % of the held-out samples lie outside of the trained range; for the last column {100 * t.masked:.1f} % are left out.</p>"
+            f"<p>{100 * t.outside:.2f} % of the held-out samples lie outside of the trained range; for the last column "
+            f"{100 * t.masked:.1f} % are left out.</p>"
         )
     facts = {"seed": t.seed, **t.versions, **t.digests}
     parts.append(
@@ -61,7 +65,7 @@ def write(path: Path, t: Trained) -> None:
 
 
 def _about(f: Force) -> str:
-    ranges = ", ".join(f"{a:.3g} to {b:.3g} {u}" for a, b, u in zip(f.low, f.high, f.units))
+    ranges = ", ".join(f"{a:.3g} to {b:.3g} {u}" for a, b, u in zip(f.low, f.high, f.units, strict=True))
     text = f"Trained as a {f.way}, over {ranges}. Beyond that range it is extrapolated, not measured."
     text += f" {f.pieces} straight pieces." if f.pieces else ""
     return text + "".join(f" {b}." for b in f.broken)
@@ -90,7 +94,7 @@ def _image(f: Force) -> str:
         figure, axes = plt.subplots(
             2, len(f.x), squeeze=False, sharex="col", height_ratios=(4, 1), figsize=(4.5 + 3.5 * len(f.x), 4.4), layout="constrained"
         )
-        for k, (x, y, s) in enumerate(zip(f.x, f.y, f.sigma)):
+        for k, (x, y, s) in enumerate(zip(f.x, f.y, f.sigma, strict=True)):
             top, low = axes[:, k]
             top.fill_between(x, y - 2 * s, y + 2 * s, color=COLOURS[5], alpha=0.3, linewidth=0, label="2 sigma")
             top.fill_between(x, y - s, y + s, color=COLOURS[5], alpha=0.5, linewidth=0, label="1 sigma")

@@ -92,8 +92,8 @@ def _force(f: Force) -> dict[str, object]:
         "high": f.high,
         "promises_broken": f.broken,
         "pieces": f.pieces,
-        "band": [{"x": x.tolist(), "y": y.tolist(), "sigma": s.tolist()} for x, y, s in zip(f.x, f.y, f.sigma)],
-        "visited": [{"edges": e.tolist(), "counts": c.tolist()} for e, c in zip(f.edges, f.counts)],
+        "band": [{"x": x.tolist(), "y": y.tolist(), "sigma": s.tolist()} for x, y, s in zip(f.x, f.y, f.sigma, strict=True)],
+        "visited": [{"edges": e.tolist(), "counts": c.tolist()} for e, c in zip(f.edges, f.counts, strict=True)],
     }
 
 
@@ -101,7 +101,7 @@ def sentences(t: Trained, folder: object) -> str:
     """What the terminal shows."""
     lines = [f"{t.model}: {'trained' if t.converged else 'NOT CONVERGED'}, {t.seconds:.1f} s of processor time, chi2 {t.chi2:.3f} a sample"]
     for f in t.forces:
-        ranges = ", ".join(f"{a:.3g} to {b:.3g} {u}" for a, b, u in zip(f.low, f.high, f.units))
+        ranges = ", ".join(f"{a:.3g} to {b:.3g} {u}" for a, b, u in zip(f.low, f.high, f.units, strict=True))
         lines.append(f"  {f.name}: {f.way}, trained over {ranges}, {2 * float(np.median(f.sigma[0])):.2g} {f.output} at 2 sigma")
         lines += [f"    {b}" for b in f.broken]
     for name, (value, sigma, before, unit) in t.parameters.items():

@@ -57,8 +57,8 @@ class Journal:
         self._states: dict[int, State] = {}
 
     def enter(self, start: Sequence[Array]) -> tuple[int, State | None]:
-        """Number of the fit that begins at `start`, all that it starts from, and where it was when it was interrupted. UserError where another
-        start is on record: then the bits of this computer are others."""
+        """Number of the fit that begins at `start`, all that it starts from, and where it was when it was interrupted. UserError where
+        another start is on record: then the bits of this computer are others."""
         number, self._entered = self._entered, self._entered + 1
         if self.path is None:
             return number, None

@@ -73,7 +73,8 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
     except FloatingPointError as exc:
         raise ModelError(
             [
-                f"{model.path}: {exc}, whatever the networks are; check signs, units and start states of the model against the recording (penode inspect)"
+                f"{model.path}: {exc}, whatever the networks are; check signs, units "
+                "and start states of the model against the recording (penode inspect)"
             ]
         ) from exc
     problem, fit = coloured(problem, fit, bounds)
@@ -90,14 +91,14 @@ def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin
     seen = curves.seen_by(problem, point)
     shapes = tuple(
         begin.curve(p, start.networks[p.name], float(np.max(np.abs(inputs_of(p, seen))))) if p.name in start.networks else s
-        for p, s in zip(ports, point.shapes)
+        for p, s in zip(ports, point.shapes, strict=True)
     )
     return Point(begin.ratios(start, problem.engine.free, problem.model, point.ratios), point.starts, shapes)
 
 
 def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], Limits]]) -> tuple[Problem, Fit]:
-    """The fit with the colour of what it leaves, for its estimate and its band. What is louder than noise is what the model lacks: there the
-    estimate stays that of least errors, and curves bend as held-out parts of the recordings allow."""
+    """The fit with the colour of what it leaves, for its estimate and its band. What is louder than noise is what the model lacks: there
+    the estimate stays that of least errors, and curves bend as held-out parts of the recordings allow."""
     loud = heldout.loud(problem, fit.point)
     if loud:
         problem, fit = heldout.bent(problem, fit, curves.limits_of(problem, bounds))
@@ -143,13 +144,15 @@ def ports_of(model: Model, engine: Engine) -> list[Port]:
         if port.promises.max_force is not None and model.outside != "clamp":
             raise ModelError(
                 [
-                    f'{model.path}: network {name} promises max_force, which training keeps with outside = "clamp" only; choose that, or promise max_slope'
+                    f'{model.path}: network {name} promises max_force, which training keeps with outside = "clamp" only; '
+                    "choose that, or promise max_slope"
                 ]
             )
         if port.promises and not knots:
             raise ModelError(
                 [
-                    f"{model.path}: network {name} makes promises, which hold for a ReLU network of one input with room for kinks; give it layers = [16, 16]"
+                    f"{model.path}: network {name} makes promises, which hold for a ReLU network of one input with room for kinks; "
+                    "give it layers = [16, 16]"
                 ]
             )
         found.append(Port(name, tuple(seen), _is_rate(port), zero, max(knots, 0) if knots >= 3 else 0))
@@ -173,8 +176,9 @@ def _with_known(model: Model, options: Options) -> tuple[Model, tuple[str, ...]]
 
 def _check_excited(model: Model, ports: Sequence[Port], visited: Sequence[Array]) -> None:
     problems = [
-        f"{model.path}: the recordings do not move the input of {p.name} ({model.networks[p.name].input_units[k]}): nothing can be learnt of it; record the plant while it moves"
-        for p, x in zip(ports, visited)
+        f"{model.path}: the recordings do not move the input of {p.name} ({model.networks[p.name].input_units[k]}): nothing can be "
+        "learnt of it; record the plant while it moves"
+        for p, x in zip(ports, visited, strict=True)
         for k in range(x.shape[1])
         if np.ptp(x[:, k]) < SETTINGS.story_still
     ]
@@ -187,7 +191,7 @@ def written(
 ) -> tuple[list[Network], Fit]:
     """Networks that are the fitted shapes, promises kept by the margin of the certificate."""
     found: list[Network] = []
-    for k, (port, template, x) in enumerate(zip(ports, templates, visited)):
+    for k, (port, template, x) in enumerate(zip(ports, templates, visited, strict=True)):
         low, high = x.min(axis=0), x.max(axis=0)
         given = model.networks[port.name].promises
         for n in range(SETTINGS.story_tries):
@@ -205,7 +209,8 @@ def written(
         else:
             raise ModelError(
                 [
-                    f"{model.path}: network {port.name} cannot keep its promises by their margin: {promises.broken(given, network, model.outside == 'clamp')[0]}; relax them"
+                    f"{model.path}: network {port.name} cannot keep its promises by their margin: "
+                    f"{promises.broken(given, network, model.outside == 'clamp')[0]}; relax them"
                 ]
             )
         found.append(network)
@@ -234,8 +239,8 @@ def _judged(
     tell(0.97, "what is known of it")
     options, known, spent = given
     band = bands.of(problem, fit)
-    values = dict(zip(model.parameters, problem.parameters(fit.point)))
-    after = judge.with_networks(model, {p.name: n for p, n in zip(ports, networks)}, values)
+    values = dict(zip(model.parameters, problem.parameters(fit.point), strict=True))
+    after = judge.with_networks(model, {p.name: n for p, n in zip(ports, networks, strict=True)}, values)
     ranges = [(x.min(axis=0), x.max(axis=0)) for x in visited]
     training, _, _ = judge.errors(problem, fit.point, train_, model, after, ports, ranges, problem.noise)
     holdout: tuple[Error, ...] = ()
@@ -247,34 +252,10 @@ def _judged(
             holdout, outside, masked = judge.errors(*there, held, model, after, ports, ranges, problem.noise)
     forces = [
         _force(model, port, shape, network, x, band.deviation(k))
-        for k, (port, shape, network, x) in enumerate(zip(ports, fit.point.shapes, networks, visited))
+        for k, (port, shape, network, x) in enumerate(zip(ports, fit.point.shapes, networks, visited, strict=True))
     ]
-    loud = [
-        e.signal
-        for e in training
-        if any(s.name == e.signal and s.noise > 0.0 and e.after > SETTINGS.story_loud * s.noise for s in (*model.sensors, *model.outputs))
-    ]
-    notes = (
-        [
-            f"{', '.join(loud)}: residuals are louder than the noise the model file states; the model lacks something that networks in their places cannot be"
-        ]
-        if loud
-        else []
-    )
-    notes += dict.fromkeys(f"{p}" for m in train_ for p in m.quality.problems)  # parts of a file have them in common
-    notes += [
-        f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, the network takes the rest"
-        for a in problem.apart
-        if ports[a.shape].knots
-    ]
-    notes += kinks.notes(problem, fit, ports)
-    if held and not holdout:
-        titles = ", ".join(m.title for m in held)
-        notes.append(
-            f"{titles}: the trained model leaves all bounds there, so there is no error on held-out data; a recording that goes further must be among --data"
-        )
-    if model.method not in ("euler", "heun", "rk4"):
-        notes.append(f"the deployed method is {model.method}; networks were trained through rk4 with the same steps")
+    loud = _loud(model, training)
+    notes = _notes(problem, fit, ports, loud, train_, held if not holdout else ())
     sigma = {n: float(band.deviations[i]) * abs(model.parameters[n].value) for i, n in enumerate(problem.engine.free)}
     parameters = {n: (float(values[n]), sigma[n], model.parameters[n].value, model.parameters[n].unit) for n in sigma}
     found = Trained(
@@ -296,6 +277,41 @@ def _judged(
         versions(),
     )
     return after, found
+
+
+def _loud(model: Model, training: Sequence[Error]) -> list[str]:
+    """The signals whose residuals are louder than the noise that the model file states."""
+    stated = [s for s in (*model.sensors, *model.outputs) if s.noise > 0.0]
+    return [e.signal for e in training if any(s.name == e.signal and e.after > SETTINGS.story_loud * s.noise for s in stated)]
+
+
+def _notes(
+    problem: Problem, fit: Fit, ports: Sequence[Port], loud: Sequence[str], train_: Sequence[Measured], left: Sequence[Measured]
+) -> list[str]:
+    """What a user must know of a fit; `left` are the held-out recordings, if the trained model leaves all bounds there."""
+    notes = []
+    if loud:
+        notes.append(
+            f"{', '.join(loud)}: residuals are louder than the noise the model file states; "
+            "the model lacks something that networks in their places cannot be"
+        )
+    notes += dict.fromkeys(p for m in train_ for p in m.quality.problems)  # parts of a file have them in common
+    notes += [
+        f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, "
+        "the network takes the rest"
+        for a in problem.apart
+        if ports[a.shape].knots
+    ]
+    notes += kinks.notes(problem, fit, ports)
+    if left:
+        titles = ", ".join(m.title for m in left)
+        notes.append(
+            f"{titles}: the trained model leaves all bounds there, so there is no error on held-out data; "
+            "a recording that goes further must be among --data"
+        )
+    if problem.model.method not in ("euler", "heun", "rk4"):
+        notes.append(f"the deployed method is {problem.model.method}; networks were trained through rk4 with the same steps")
+    return notes
 
 
 def _all_stated(model: Model, training: Sequence[Error]) -> bool:

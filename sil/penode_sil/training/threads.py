@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""One thread for the linear algebra: matrices here are small, and threads that wait for each other burn several times the processor time."""
+"""One thread for the linear algebra: matrices here are small, and threads that wait for each other burn several times the processor
+time."""
 
 from __future__ import annotations
 

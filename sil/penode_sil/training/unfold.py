@@ -78,7 +78,7 @@ def unfold(curve: Curve, template: Network, low: float, high: float) -> Network:
     layers: list[Layer] = []
     carried = np.zeros(0)  # how the sum so far follows from the layer before
     x_of = np.array([1.0])  # how x follows from it
-    for n, (width, own) in enumerate(zip(widths, shares)):
+    for n, (width, own) in enumerate(zip(widths, shares, strict=True)):
         first, last = n == 0, n == len(widths) - 1
         n_in = 1 if first else widths[n - 1]
         weights, bias, row = np.zeros((width, n_in)), np.zeros(width), 0

@@ -41,7 +41,7 @@ def _parameters(problem: Problem, fit: Fit) -> list[Unknown]:
     names, values, vectors, deviation = _seen(problem, fit)
     return [
         _direction(problem, names, vector * deviation / np.sqrt(max(value, 0.0) + 1.0))
-        for value, vector in zip(values, vectors.T)
+        for value, vector in zip(values, vectors.T, strict=True)
         if value < SETTINGS.unknown_invisible**-2.0
     ]
 
@@ -50,7 +50,7 @@ def invisible(problem: Problem, fit: Fit) -> Array:
     """Directions [., free] of the parameters, of length 1, along which no sensor changes at all."""
     names, values, vectors, deviation = _seen(problem, fit)
     found = np.zeros((int(np.sum(values < SETTINGS.unknown_nothing)), len(problem.engine.free)))
-    for row, vector in zip(found, vectors.T[values < SETTINGS.unknown_nothing]):
+    for row, vector in zip(found, vectors.T[values < SETTINGS.unknown_nothing], strict=True):
         row[[problem.engine.free.index(n) for n in names]] = vector * deviation / np.linalg.norm(vector * deviation)
     return found
 
@@ -76,21 +76,24 @@ def _seen(problem: Problem, fit: Fit) -> tuple[list[str], Array, Array, Array]:
 def _direction(problem: Problem, names: Sequence[str], by: Array) -> Unknown:
     """A direction in words; `by` are relative changes of one standard deviation."""
     some = np.abs(by) >= SETTINGS.unknown_part * np.max(np.abs(by))
-    chosen = tuple(n for n, s in zip(names, some) if s)
+    chosen = tuple(n for n, s in zip(names, some, strict=True) if s)
     size = float(np.sqrt(np.mean(by[some] ** 2)))
     like = np.ptp(by[some]) < 0.3 * np.max(np.abs(by[some])) and some.sum() > 1
     masses = {b.mass for b in problem.model.bodies}
     if like and masses & set(chosen) and problem.engine.networks:
         weigh = sorted(masses & set(chosen))[0]
         text = (
-            f"the common scale of {', '.join(chosen)} and of all forces of the networks is invisible: all of them may be {100 * size:.1f} % larger or smaller "
-            f"together, and no sensor would differ; weigh one mass and give it, --known {weigh}"
+            f"the common scale of {', '.join(chosen)} and of all forces of the networks is invisible: all of them may be "
+            f"{100 * size:.1f} % larger or smaller together, and no sensor would differ; weigh one mass and give it, --known {weigh}"
         )
         return Unknown("scale", text, (*chosen, *problem.engine.networks), size)
     if len(chosen) == 1:
-        text = f"{chosen[0]} cannot be told from these recordings; its value is that of the model file, to {100 * size:.1f} %; measure it and give it, --known {chosen[0]}"
+        text = (
+            f"{chosen[0]} cannot be told from these recordings; its value is that of the model file, to {100 * size:.1f} %; measure it "
+            f"and give it, --known {chosen[0]}"
+        )
     else:
-        parts = ", ".join(f"{n} {'up' if b > 0 else 'down'} {100 * abs(b):.1f} %" for n, b, s in zip(names, by, some) if s)
+        parts = ", ".join(f"{n} {'up' if b > 0 else 'down'} {100 * abs(b):.1f} %" for n, b, s in zip(names, by, some, strict=True) if s)
         text = f"{parts} together change no sensor; measure one of them and give it, --known {chosen[0]}"
     return Unknown("combination", text, chosen, size)
 
@@ -104,7 +107,7 @@ def _splits(problem: Problem, fit: Fit, ports: Sequence[Port], visited: Sequence
     spread = np.linalg.inv(curvature * np.outer(scale, scale) + 1e-13 * np.eye(len(scale))) * np.outer(scale, scale)
     at = len(fit.point.ratios) + fit.point.starts.size
     rows: dict[str, tuple[int, Curve, Array]] = {}
-    for port, shape, x in zip(ports, fit.point.shapes, visited):
+    for port, shape, x in zip(ports, fit.point.shapes, visited, strict=True):
         if isinstance(shape, Curve):
             rows[port.name] = (at, shape, x[:, 0])
         at += len(shape.theta)
@@ -117,7 +120,10 @@ def _splits(problem: Problem, fit: Fit, ports: Sequence[Port], visited: Sequence
             size = _constant(*rows[one], spread)
             span = max(float(np.ptp(rows[n][1](rows[n][2]))) for n in (one, other))
             if size > SETTINGS.unknown_split * span / 4.0:
-                text = f"a constant force may move between {one} and {other} by {size:.2g} N (1 sigma): only the few samples where one of them passes 0 tell them apart"
+                text = (
+                    f"a constant force may move between {one} and {other} by {size:.2g} N (1 sigma): only the few samples where one of "
+                    "them passes 0 tell them apart"
+                )
                 found.append(Unknown("split", text, (one, other), size))
     return found
 
