@@ -12,7 +12,7 @@ What can go wrong, by what the caller can do about it. Each class has a `code`, 
         RecordingError       "recording": mend the recording, or say by --channel what it means
         ScenarioError        "scenario": mend the scenario file
         ToolMissing          "tool-missing": install the compiler, the emulator, or the Python package
-        TargetError          "target": look after the board, the emulator, the controller, or the line to it
+        TargetError          "target": look after the board, the emulator, the compiler, the controller, or the line to it
         WrongUse             "usage": call the command otherwise: its options, its paths, its environment
       InternalError          exit 3, "internal": a fault of penode; send us the traceback
 
@@ -22,7 +22,6 @@ The classes from RecordingError on are in penode_sil.errors.
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, dataclass
 from typing import Any
 
 _PLACE = re.compile(r"(?!channel )(--|[^ ]+$|.*/|.*\.\w+$|.*:\d+$)")
@@ -30,7 +29,6 @@ _ADDRESS = re.compile(r"--|(tcp|udp|serial|pil):")  # what ends in a number that
 _KEY = re.compile(r"\w+(\[\d+\])?(\.\w+(\[\d+\])?)*")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Problem(str):
     """
     One thing that is wrong: the line that is printed, `PLACE:LINE: KEY: MESSAGE; REMEDY`, with its parts. As a string it is that line.
@@ -40,19 +38,19 @@ class Problem(str):
     """
 
     message: str
-    place: str = ""
-    line: int | None = None
-    key: str = ""
-    remedy: str = ""
-    channel: str = ""
+    place: str
+    line: int | None
+    key: str
+    remedy: str
+    channel: str
 
-    def __new__(cls, message: str, place: str = "", line: int | None = None, key: str = "", remedy: str = "", channel: str = "") -> Problem:
+    def __new__(cls, message: str, place: str = "", line: int | None = None, key: str = "", remedy: str = "") -> Problem:
         at = place if line is None else f"{place}:{line}"
         what = ": ".join(part for part in (at, key, message) if part)
-        return super().__new__(cls, f"{what}; {remedy}" if remedy else what)
+        return cls.shown(f"{what}; {remedy}" if remedy else what, message, place, line, key, remedy)
 
     @classmethod
-    def split(cls, text: str, line: int | None = None, channel: str = "") -> Problem:
+    def read(cls, text: str, line: int | None = None, channel: str = "") -> Problem:
         """
         The parts of a line that was written as one text, with a `line` and a `channel` that it does not show in this form.
 
@@ -80,12 +78,12 @@ class Problem(str):
     ) -> Problem:
         """A problem that is printed as `text`, whatever its parts."""
         found = super().__new__(cls, text)
-        Problem.__init__(found, message, place, line, key, remedy, channel)
+        found.message, found.place, found.line, found.key, found.remedy, found.channel = message, place, line, key, remedy, channel
         return found
 
     def as_json(self) -> dict[str, Any]:
         """The parts, None for one that is not known."""
-        return {name: None if value == "" else value for name, value in asdict(self).items()}
+        return {name: None if vars(self)[name] == "" else vars(self)[name] for name in Problem.__annotations__}
 
 
 class PenodeError(Exception):
@@ -99,7 +97,7 @@ class PenodeError(Exception):
     told = False
 
     def __init__(self, *problems: str, line: int | None = None, channel: str = ""):
-        self.problems = [Problem.split(problem, line, channel) for problem in problems]
+        self.problems = [Problem.read(problem, line, channel) for problem in problems]
         super().__init__(*problems)
 
     def __str__(self) -> str:

@@ -51,7 +51,7 @@ class Commands(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         width = formatter.width - 6 - max(map(len, COMMANDS))
         with formatter.section("Commands"):
-            formatter.write_dl([(name, click.utils.make_default_short_help(COMMANDS[name][1], width)) for name in self.list_commands(ctx)])
+            formatter.write_dl([(n, click.Command(n, help=COMMANDS[n][1]).get_short_help_str(width)) for n in self.list_commands(ctx)])
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -16,6 +16,7 @@ import tempfile
 import traceback
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import NoReturn
@@ -61,7 +62,8 @@ def _option(exc: click.UsageError) -> str:
 def _end(exc: PenodeError) -> NoReturn:
     """Say what is wrong, and end."""
     if "--json" in sys.argv and not exc.told:
-        click.echo(json.dumps(exc.as_json(), indent=2))
+        with suppress(BrokenPipeError):
+            click.echo(json.dumps(exc.as_json(), indent=2))
     for problem in exc.problems:
         click.echo(f"penode: {problem}", err=True)
     sys.exit(exc.exit)

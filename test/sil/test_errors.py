@@ -12,6 +12,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import pytest
@@ -189,15 +190,23 @@ FORMS = {
 
 @pytest.mark.parametrize("text", FORMS)
 def test_a_line_is_split(text):
-    problem = Problem.split(text)
+    problem = Problem.read(text)
     assert (problem.place, problem.line, problem.key, problem.message, problem.remedy) == FORMS[text]
-    for same in (problem, pickle.loads(pickle.dumps(problem)), copy.deepcopy(problem), Problem.split(problem)):
+    for same in (problem, pickle.loads(pickle.dumps(problem)), copy.deepcopy(problem), Problem.read(problem)):
         assert same == text == str(same) and same.as_json() == problem.as_json()
 
 
 def test_a_problem_is_its_line():
+    assert asdict(Kept([Problem("no number", "m.toml")])) == {"lines": ["m.toml: no number"]}
     assert Problem("no number", "m.toml", 3, "parameters.m", "give one") == "m.toml:3: parameters.m: no number; give one"
     assert Problem("no number", "--set") == "--set: no number" and Problem("no number", remedy="x") == "no number; x"
+
+
+@dataclass
+class Kept:
+    """As results keep what was wrong with a recording."""
+
+    lines: list[str]
 
 
 def raised() -> Iterator[tuple[str, str]]:
@@ -219,6 +228,6 @@ def test_every_raised_text_is_split_where_its_place_ends():
     assert len(texts) > 150
     for where, text in texts.items():
         expected = re.match(r"((?:--[\w-]+|a b/f\.x)(?: a b/f\.x)?): ", text)
-        problem = Problem.split(text)
+        problem = Problem.read(text)
         assert problem.place == expected[1] if expected else text.startswith(problem.place), (where, problem.as_json())
         assert problem.remedy or "; " not in text, (where, problem.as_json())

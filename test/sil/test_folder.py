@@ -212,6 +212,10 @@ def test_the_command_prints_the_table_and_ends_with_2_if_one_failed(place, penod
     code, out, lines = penode(place / "model.toml", "--data", *files, "--each", "-o", tmp_path / "out", "--resume", "--json")
     assert code == 0 and lines == []
     assert [r["diagnosis"]["verdict"] for r in json.loads(out)["recordings"]] == ["no_discrepancy", "explained"]
+    code, out, lines = penode(place / "model.toml", "--data", place / "data", "-o", tmp_path / "out", "--resume", "--json")
+    found = json.loads(out)
+    assert (code, len(lines), len(found["recordings"])) == (2, 1, 3) and found["error"]["code"] == "recording"
+    assert found["error"]["problems"][0]["place"] == str(place / "data" / "b broken.MF4")
 
 
 def test_what_cannot_begin_is_said_in_one_line_and_leaves_nothing(place, penode, tmp_path, monkeypatch):

@@ -25,6 +25,6 @@ def inspect(file: Path, model: Path | None, channel: tuple[str, ...], as_json: b
     from ..recordings import look, named
 
     loaded = None if model is None else penode_gen.load(model)
-    known = [s.name for s in (*loaded.inputs, *loaded.sensors, *loaded.outputs)] if loaded is not None else []
+    known = [] if loaded is None else [*(i.name for i in loaded.inputs), *(s.name for s in (*loaded.sensors, *loaded.outputs))]
     found = look.look(file, loaded, named.aliases(channel, known))
     click.echo(json.dumps(machine(found), indent=2) if as_json else "\n".join(people(found)))
