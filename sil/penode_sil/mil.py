@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,9 @@ from .errors import ModelError
 from .late import Held, driving
 from .scenario import Instance, Scenario, staging_samples
 from .signals import Signal
+
+if TYPE_CHECKING:
+    from scipy.integrate import OdeSolver  # slow to load
 
 Array = NDArray[np.float64]
 RTOL, ATOL = 1e-11, 1e-13
@@ -95,15 +98,16 @@ class _Inputs:
         return u, udot
 
 
-def _solver(system: penode_gen.Numeric, source: _Inputs, piece: _Piece, x: Array) -> Any:
+def _solver(system: penode_gen.Numeric, source: _Inputs, piece: _Piece, x: Array) -> OdeSolver:
     """A solver of the equations over a piece, from its first state on."""
     from scipy.integrate import DOP853, LSODA  # here, for other commands need not wait for it
 
     method = DOP853 if piece.end - piece.begin < SHORT else LSODA
-    return method(lambda t, state: system.rates(state, *source.before(t)), piece.begin, x, piece.end, rtol=RTOL, atol=ATOL)
+    solver: OdeSolver = method(lambda t, state: system.rates(state, *source.before(t)), piece.begin, x, piece.end, rtol=RTOL, atol=ATOL)
+    return solver
 
 
-def _step(solver: Any, what: str) -> None:
+def _step(solver: OdeSolver, what: str) -> None:
     """One step of a solver. UserError if `what` it solves cannot be continued."""
     message = solver.step()
     if solver.status == "failed" or not np.all(np.isfinite(solver.y)):

@@ -13,7 +13,6 @@ import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,6 @@ from .signals import ROAD_CLASSES, Bump, Chirp, Constant, Ramp, Road, Samples, S
 
 HOW = ("write", "select", "rollback")
 CHUNK = 64
-_REQUIRED: Any = object()
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class _Table:
     def __init__(self, data: object, key: str, path: Path, problems: list[str]):
         self.key, self.path, self.problems = key, path, problems
         self.asked: set[str] = set()
-        self.data: dict[str, Any] = data if isinstance(data, dict) else {}
+        self.data: dict[str, object] = data if isinstance(data, dict) else {}
         if not isinstance(data, dict):
             self.complain("", "is no table", f"write [{key}]")
 
@@ -84,17 +82,17 @@ class _Table:
         self.asked.add(key)
         return key in self.data
 
-    def raw(self, key: str, default: Any = _REQUIRED, example: str = "") -> Any:
-        """The value as it stands, or the default; a missing required key is a problem."""
-        if not self.has(key) and default is _REQUIRED:
+    def raw(self, key: str, default: object, example: str = "") -> object:
+        """The value as it stands, or the default; where that is None, a missing key is a problem."""
+        if not self.has(key) and default is None:
             self.complain(key, "is missing", f"add {key} = {example}")
-        return self.data.get(key, None if default is _REQUIRED else default)
+        return self.data.get(key, default)
 
-    def quantity(self, key: str, unit: str, default: Any = _REQUIRED, *, positive: bool = False, minimum: float = -math.inf) -> float:
+    def quantity(self, key: str, unit: str, default: float | None = None, *, positive: bool = False, minimum: float = -math.inf) -> float:
         """An SI number that measures what `unit` does; NaN after a problem, so that reading goes on."""
         value = self.raw(key, default, f'"1 {unit}"' if unit else "1")
-        if value is None or (not self.has(key) and default is not _REQUIRED):
-            return math.nan if value is None else float(value)
+        if not self.has(key):
+            return math.nan if default is None else default
         try:
             number = quantity(value, unit)
         except UnitError as exc:
@@ -110,7 +108,7 @@ class _Table:
             return math.nan
         return number
 
-    def text(self, key: str, default: Any = _REQUIRED, choices: tuple[str, ...] = ()) -> str:
+    def text(self, key: str, default: str | None = None, choices: tuple[str, ...] = ()) -> str:
         """A text, one of the choices if there are any; "" after a problem."""
         value = self.raw(key, default, f'"{choices[0]}"' if choices else '"..."')
         if value is None:
@@ -123,7 +121,7 @@ class _Table:
             return ""
         return value
 
-    def integer(self, key: str, default: Any = _REQUIRED, minimum: int = 0) -> int:
+    def integer(self, key: str, default: int | None = None, minimum: int = 0) -> int:
         value = self.raw(key, default, str(minimum))
         if isinstance(value, bool) or not isinstance(value, int) or value < minimum:
             if value is not None:

@@ -8,7 +8,7 @@ import csv
 import importlib.util
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,10 @@ from .errors import ModelError, RecordingError, ToolMissing
 from .output import Column
 
 Array = NDArray[np.float64]
+Tell = Callable[[str], None]  # gets a line
 
 
-def play(path: Path, record: Path | None, tell: Any = lambda line: None) -> list[Column]:
+def play(path: Path, record: Path | None, tell: Tell = lambda line: None) -> list[Column]:
     """
     Time, inputs and outputs at each sample, as columns. Raises UserError.
 
@@ -108,7 +109,7 @@ def _record(path: Path, known: tuple[str, ...]) -> dict[str, Array]:
 class _Fmu:
     """The component in FMPy; every refusal is a UserError with what the FMU logged."""
 
-    def __init__(self, path: Path, folder: str, description: Any, name: str, tell: Any):
+    def __init__(self, path: Path, folder: str, description: Any, name: str, tell: Tell):
         from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
         from fmpy.fmi3 import FMU3Slave
 
@@ -182,7 +183,7 @@ class _Fmu:
 
 
 @contextmanager
-def _component(path: Path, system: ssp_file.System, tell: Any) -> Iterator[_Fmu]:
+def _component(path: Path, system: ssp_file.System, tell: Tell) -> Iterator[_Fmu]:
     """The FMU in a folder of its own for as long as it runs."""
     import fmpy
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import TargetError
 
@@ -79,7 +80,7 @@ class Entry:
         """Of what a tool shows."""
         return self.method.unit
 
-    def shown(self, numbers: Any) -> Any:
+    def shown(self, numbers: NDArray[Any]) -> NDArray[Any]:
         """What a tool shows: the numbers themselves where they are not scaled, else float64."""
         plain = self.method.scale == 1.0 and self.method.offset == 0.0
         return numbers if plain else np.asarray(numbers, dtype=np.float64) * self.method.scale + self.method.offset

@@ -8,6 +8,8 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from penode_gen.model import Model
 
 from ..errors import TargetError, WrongUse
@@ -90,8 +92,8 @@ def stage_set(link: Link, a2l: A2l, chosen: ChosenSet) -> Staged:
     return Staged(chosen.name, size, seconds, checksum, identity)
 
 
-def what_runs(model: Model | None, kind: Any, found: Pages) -> tuple[str, str]:
+def what_runs(model: Model, kind: np.dtype[Any], found: Pages) -> tuple[str, str]:
     """What runs, and the reference, by name."""
-    known = pages.known_sets(model, kind) if model is not None else {}
+    known = pages.known_sets(model, kind)
     name = {checksum: known.get(checksum, f"no known set (CRC-32 0x{checksum:08x})") for checksum, _ in (found.running, found.reference)}
     return name[found.running[0]], name[found.reference[0]]

@@ -87,16 +87,19 @@ def is_number(text: str) -> bool:
 
 def numbers(texts: Sequence[str | None], decimal: str) -> Array:
     """A column; ValueError(index, text) at the first cell that is no number, (index, None) where a row has no such cell."""
-    if decimal == ".":
+    some = [text for text in texts if text is not None]
+    if decimal == "." and len(some) == len(texts):
         try:
-            return np.fromiter(map(float, texts), np.float64, len(texts))  # type: ignore[arg-type]
-        except (ValueError, TypeError):
+            return np.fromiter(map(float, some), np.float64, len(some))
+        except ValueError:
             pass
     out = np.empty(len(texts))
     for k, text in enumerate(texts):
+        if text is None:
+            raise ValueError(k, text)
         try:
-            out[k] = number(text, decimal)  # type: ignore[arg-type]
-        except (ValueError, AttributeError):
+            out[k] = number(text, decimal)
+        except ValueError:
             raise ValueError(k, text) from None
     return out
 
