@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What `penode import` does: weights from the file of another tool, as a network file for a parameter set; or a Modelica model, as a model file."""
+"""What `penode import` does: weights of another tool become a network file, a Modelica model becomes a model file."""
 
 from __future__ import annotations
 

@@ -36,7 +36,8 @@ def build(model: Model, machine: str) -> Path:
     if 10**9 % between:  # ns
         raise ModelError(
             [
-                f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of {model.sample_time!r} s; "
+                f"{model.path.name}: the emulated timer has no whole number of ticks a second for a sample_time of "
+                f"{model.sample_time!r} s; "
                 "use --on sil"
             ]
         )

@@ -37,7 +37,10 @@ def compare(model: Path, to: str, a2l: Path | None, listed: int, as_json: bool) 
     if as_json:
         keys = ("name", "unit", "running", "reference")
         click.echo(
-            json.dumps({"running": running, "reference": reference, "differing": [dict(zip(keys, row)) for row in differing]}, indent=1)
+            json.dumps(
+                {"running": running, "reference": reference, "differing": [dict(zip(keys, row, strict=True)) for row in differing]},
+                indent=1,
+            )
         )
         return
     click.echo(f"running: {running}, reference: {reference}")
