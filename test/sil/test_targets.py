@@ -133,6 +133,25 @@ def test_missing_compiler_is_said(nqvm, tmp_path, monkeypatch):
     assert not list(tmp_path.glob("*.so"))
 
 
+@pytest.mark.parametrize(
+    ("machine", "program", "packages"),
+    [("host", "gcc", "gcc libc6-dev"), ("m4f", "arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi")],
+)
+def test_missing_compiler_of_a_target_is_said(machine, program, packages, nqvm, tmp_path, monkeypatch):
+    monkeypatch.setenv("PENODE_BUILD", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(UserError, match=f"^{program} is not installed; install it, on Debian: apt-get install {packages}$"):
+        Pil(nqvm, machine)
+
+
+def test_missing_emulator_is_said(nqvm, tmp_path, monkeypatch):
+    need("arm-none-eabi-gcc")
+    pil = Pil(nqvm, "m4f")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(UserError, match="^qemu-system-arm is not installed; install it, on Debian: apt-get install qemu-system-arm$"):
+        pil.run(chirp(1))
+
+
 def test_tape_for_another_model_is_refused(nqvm, oscillator, monkeypatch):
     need("gcc")
     pil = Pil(nqvm, "host")
