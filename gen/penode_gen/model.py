@@ -224,6 +224,11 @@ class Model:
         return all(abs(s.time / step - round(s.time / step)) < 1e-6 for s in self.sampled)
 
     @property
+    def drives(self) -> tuple[Input | Sampled, ...]:
+        """The signals that drive the equations: inputs, then those of actuators that work on samples."""
+        return (*self.inputs, *self.sampled)
+
+    @property
     def states(self) -> tuple[str, ...]:
         """Names of all states: positions, velocities, then the others."""
         return tuple(b.position for b in self.bodies) + tuple(b.velocity for b in self.bodies) + tuple(s.name for s in self.extra_states)

@@ -51,11 +51,11 @@ class Dense:
 
     @property
     def n_in(self) -> int:
-        return self.weights.shape[1]
+        return int(self.weights.shape[1])
 
     @property
     def n_out(self) -> int:
-        return self.weights.shape[0]
+        return len(self.weights)
 
 
 Layer = Affine | Dense

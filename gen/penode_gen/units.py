@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from pickle import PickleError
+from typing import Any
 
 import pint
 import sympy as sp
@@ -14,7 +15,7 @@ import sympy as sp
 from .algebra import expressions as ex, functions
 
 
-def _known() -> pint.UnitRegistry:
+def _known() -> pint.UnitRegistry[Any]:
     """All units, as pint keeps them beside its own bytecode (the user's cache would name the files of one installation for all); read
     anew where it cannot, or another process is about to write there."""
     try:
@@ -86,6 +87,11 @@ def quantity(text: str) -> tuple[float, str]:
     return float(match[1]) * factor(match[2]), match[2] or "1"
 
 
+def exponents(dim: Dimension) -> dict[str, float]:
+    """Base dimension, such as "[length]" -> its power, without those of power 0."""
+    return {k: float(v) for k, v in dim.items() if v and not isinstance(v, complex)}  # which none is, but by pint's type
+
+
 def describe(dim: Dimension) -> str:
     """A dimension in base units, for messages."""
     if not dim:
@@ -125,11 +131,13 @@ def dimension_of(expr: sp.Expr, of: Callable[[sp.Basic], Dimension]) -> Dimensio
             if parts[0] or parts[1]:
                 raise UnitError(f"'{expr}': a power with a variable exponent needs numbers without unit")
             return NONE
-        return (parts[0] or NONE) ** float(exponent)
+        power: Dimension = (parts[0] or NONE) ** float(exponent)
+        return power
     if isinstance(expr, ex.Absolute):
         return parts[0]
     if isinstance(expr, functions.Root):
-        return (parts[0] or NONE) ** 0.5
+        root: Dimension = (parts[0] or NONE) ** 0.5
+        return root
     if isinstance(expr, ex.Sign):
         return NONE
     for part in parts:  # exp, tanh, ...

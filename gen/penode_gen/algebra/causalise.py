@@ -8,7 +8,7 @@ unknowns, is solved symbolically. What is left is straight-line code without any
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -44,10 +44,14 @@ class Step:
     where: tuple[str, ...] = ("model",)
 
     @property
+    def parts(self) -> tuple[sp.Expr, ...]:
+        """The expressions on the right-hand side."""
+        return self.arguments if self.network else (self.value,)
+
+    @property
     def reads(self) -> set[sp.Symbol]:
         """Symbols on the right-hand side."""
-        parts = self.arguments if self.network else (self.value,)
-        return set().union(*(p.free_symbols for p in parts))
+        return set().union(*(p.free_symbols for p in self.parts))
 
 
 @dataclass(frozen=True)
@@ -99,9 +103,9 @@ def causalise(model: Model) -> Causal:
     ports = {name: len(port.input_units) for name, port in model.networks.items()}
     kinematic, unit_of = kinematics(model)
     names = set(unit_of)
-    moving = {*model.states, *(i.name for i in (*model.inputs, *model.sampled)), *(p.name for p in model.points)}
+    moving = {*model.states, *(i.name for i in model.drives), *(p.name for p in model.points)}
 
-    def parse(where: tuple[str, ...], text: str, extra: set[str] = frozenset()) -> sp.Expr:
+    def parse(where: tuple[str, ...], text: str, extra: Set[str] = frozenset()) -> sp.Expr:
         try:
             return ex.parse(text, names | extra, ports, moving)
         except ex.ExpressionError as error:
@@ -131,7 +135,7 @@ def causalise(model: Model) -> Causal:
     causal = Causal(
         model,
         states,
-        tuple(ex.symbol(i.name) for i in (*model.inputs, *model.sampled)),
+        tuple(ex.symbol(i.name) for i in model.drives),
         tuple(_hoist(steps, names)),
         tuple(velocities.get(n, ex.derivative(n)) for n in model.states),
         tuple(signals["outputs"]),
@@ -159,14 +163,15 @@ def _check_units(model: Model, equations: list[Relation], signals: dict[str, lis
     def of(leaf: sp.Basic) -> units.Dimension:
         if isinstance(leaf, AppliedUndef):
             port = model.networks[leaf.func.__name__]
-            for argument, unit in zip(leaf.args, port.input_units):
+            for argument, unit in zip(leaf.args, port.input_units, strict=True):
                 given = units.dimension_of(argument, of)
                 if given is not None and given != units.dimension(unit):
                     raise units.UnitError(f"network '{port.name}' takes {unit}, given is {units.describe(given)}")
             return units.dimension(port.output_unit)
         name = leaf.name
         if name.startswith("der("):
-            return units.dimension(unit_of[name[4:-1]]) * per_second
+            rate: units.Dimension = units.dimension(unit_of[name[4:-1]]) * per_second
+            return rate
         return units.dimension(unit_of[name])
 
     def compare(where: tuple[str, ...], left: sp.Expr | units.Dimension, right: sp.Expr) -> Iterable[Problem]:
@@ -182,7 +187,7 @@ def _check_units(model: Model, equations: list[Relation], signals: dict[str, lis
     for q in equations:
         yield from compare(q.where, q.left, q.right)
     for section, found in signals.items():
-        for signal, value in zip(getattr(model, section), found):
+        for signal, value in zip(getattr(model, section), found, strict=True):
             yield from compare((section, signal.name), units.dimension(signal.unit), value)
 
 
@@ -201,9 +206,9 @@ def _check_result(causal: Causal) -> None:
             (("actuators", name), f"the model uses the rate of '{name}', which moves in steps", "put a lag behind it, and use that")
         )
     constants = {ex.symbol(p.name): sp.Float(p.value, 17) for p in model.parameters.values() if not p.tunable}
-    parts = [(step.where, part) for step in causal.steps for part in (step.arguments if step.network else (step.value,))]
+    parts = [(step.where, part) for step in causal.steps for part in step.parts]
     for section, found in (("outputs", causal.outputs), ("sensors", causal.sensors)):
-        parts += [((section, signal.name), value) for signal, value in zip(getattr(model, section), found)]
+        parts += [((section, signal.name), value) for signal, value in zip(getattr(model, section), found, strict=True)]
     for where, part in parts:
         for base in sorted({p.base for p in part.atoms(sp.Pow) if p.exp.is_negative}, key=str):
             if base.xreplace(constants).is_zero:
@@ -211,14 +216,12 @@ def _check_result(causal: Causal) -> None:
         if part.has(sp.zoo, sp.nan) or not all(ex.in_range(n) for n in part.atoms(sp.Number)):
             problems.append((where, "its solution holds a number that a float cannot hold", "scale the equation"))
     locals_ = {f"{s.target.name}{end}" for s in causal.steps if s.network for end in ("_in", "_slope", "_bend")}
-    for name in sorted(
-        locals_ & {*model.states, *model.parameters, *(i.name for i in (*model.inputs, *model.sampled)), *(v.name for v in model.variables)}
-    ):
+    for name in sorted(locals_ & {*model.states, *model.parameters, *(i.name for i in model.drives), *(v.name for v in model.variables)}):
         problems.append((("model",), f"the code needs the name '{name}' for a network call", f"rename '{name}'"))
     known = {*causal.states, *causal.inputs, *causal.input_rates, *(s.target for s in causal.steps)}
     known |= {ex.symbol(p) for p in model.parameters}
     for section, found in (("outputs", causal.outputs), ("sensors", causal.sensors)):
-        for signal, value in zip(getattr(model, section), found):
+        for signal, value in zip(getattr(model, section), found, strict=True):
             value = value.xreplace({ex.derivative(q.name): v for q, v in causal.kinematics.items()})
             for missing in sorted(s.name for s in value.free_symbols - known):
                 problems.append(((section, signal.name), f"'{missing}' is not computed by the model", "add an equation for it"))
@@ -262,7 +265,10 @@ def _solve(equations: list[Relation], unknowns: list[sp.Symbol]) -> list[Step]:
         except ValueError:  # a pivot is zero
             problems.append((first.where, f"equations {names} have no unique solution for {unknown}", "check for an equation given twice"))
             continue
-        steps += [Step(t, _tidy(e), comment=equations[q].comment, where=equations[q].where) for t, e, q in zip(targets, solution, block)]
+        steps += [
+            Step(t, _tidy(e), comment=equations[q].comment, where=equations[q].where)
+            for t, e, q in zip(targets, solution, block, strict=True)
+        ]
     if problems:
         raise CausaliseError(problems)
     return steps
@@ -338,7 +344,7 @@ def _blocks(needs: dict[int, list[int]]) -> list[list[int]]:
             elif other in stack:
                 low[q] = min(low[q], index[other])
         if low[q] == index[q]:
-            block = []
+            block: list[int] = []
             while not block or block[-1] != q:
                 block.append(stack.pop())
             blocks.append(sorted(block))
@@ -354,7 +360,7 @@ def _hoist(steps: list[Step], names: set[str]) -> Iterable[Step]:
     count = 0
     for step in steps:
         own = isinstance(step.value, AppliedUndef)  # the call is the step
-        value = step.value
+        value: sp.Expr = step.value
         while calls := sorted(value.atoms(AppliedUndef) - ({value} if own else set()), key=lambda c: (len(c.atoms(AppliedUndef)), str(c))):
             inner = calls[0]  # has no call within
             count += 1

@@ -103,7 +103,7 @@ def derivative(name: str) -> sp.Symbol:
     return symbol(f"der({name})")
 
 
-def network(name: str) -> type[sp.Function]:
+def network(name: str) -> sp.FunctionClass:
     """The undefined function that stands for a network's output."""
     return sp.Function(name, real=True)
 

@@ -60,5 +60,5 @@ def used(causal: Any) -> bool:
     """Does a model as straight-line code (causalise.Causal) call any of them?"""
     parts = [*causal.rates, *causal.outputs, *causal.sensors]
     for step in causal.steps:
-        parts += step.arguments if step.network else (step.value,)
+        parts += step.parts
     return any(part.has(*CALLS) for part in parts)

@@ -17,7 +17,7 @@ import sympy as sp
 
 from .. import units
 from ..laws import LAWS, for_angles
-from ..model import GROUND, Body, Element, Model, Point
+from ..model import GROUND, Body, Element, Input, Model, Point, Sampled, State
 from . import expressions as ex
 
 Motion = tuple[sp.Expr, sp.Expr]  # position and rate of an end
@@ -40,7 +40,8 @@ class Relation:
 
 def turns(model: Model, end: str) -> bool:
     """Is an end measured as an angle?"""
-    for thing in (*model.bodies, *model.points, *model.inputs, *model.sampled, *model.extra_states):
+    things: tuple[Body | Point | Input | Sampled | State, ...] = (*model.bodies, *model.points, *model.drives, *model.extra_states)
+    for thing in things:
         if thing.name == end:
             return thing.rotational if isinstance(thing, Body) else not units.same_dimension(thing.unit, "m")
     return False
@@ -77,9 +78,8 @@ def combination(text: str, moving: dict[str, Motion], parameters: set[str]) -> M
 
 def motions(model: Model) -> dict[str, Motion]:
     """Position and rate of every end of a checked model."""
-    named: dict[str, Motion] = {
-        i.name: (ex.symbol(i.name), ex.derivative(i.name)) for i in (*model.inputs, *model.sampled, *model.extra_states)
-    }
+    names = [*(i.name for i in model.drives), *(s.name for s in model.extra_states)]
+    named: dict[str, Motion] = {name: (ex.symbol(name), ex.derivative(name)) for name in names}
     named |= {b.position: (ex.symbol(b.position), ex.symbol(b.velocity)) for b in model.bodies}
     for p in model.points:
         named[p.name] = combination(p.text, named, set(model.parameters))
@@ -91,7 +91,7 @@ def kinematics(model: Model) -> tuple[list[Relation], dict[str, str]]:
     """Deflection and rate of each element, and the unit of every name of the model."""
     ends = motions(model)
     found = []
-    unit_of = {p.name: p.unit for p in model.parameters.values()} | {i.name: i.unit for i in (*model.inputs, *model.sampled)}
+    unit_of = {p.name: p.unit for p in model.parameters.values()} | {i.name: i.unit for i in model.drives}
     unit_of |= {b.position: b.unit for b in model.bodies} | {b.velocity: f"{b.unit}/s" for b in model.bodies}
     unit_of |= {s.name: s.unit for s in model.extra_states} | {v.name: v.unit for v in model.variables}
     unit_of |= {p.name: p.unit for p in model.points}

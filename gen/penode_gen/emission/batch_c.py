@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import ClassVar
 
 import sympy as sp
 
@@ -43,7 +44,9 @@ def render_batch(model: Model, causal: Causal | None = None) -> BatchCode:
 class _LanePrinter(Printer):
     """Prints expressions over lanes: selections are masks, and numbers on their own are widened."""
 
-    _calls = {function: name.replace("pen_port_", "lanes_").replace("pen_", "lanes_") for function, name in Printer._calls.items()}
+    _calls: ClassVar[dict[sp.FunctionClass, str]] = {
+        function: name.replace("pen_port_", "lanes_").replace("pen_", "lanes_") for function, name in Printer._calls.items()
+    }
     _calls[sp.Piecewise] = "lanes_pick"
 
     def __call__(self, expr: sp.Expr) -> str:
@@ -184,7 +187,9 @@ class _LaneEmitter(Equations):
 
 def _layers(code: NetworkCode) -> list[tuple[Layer, str]]:
     """Each layer with the C text of where its weights begin."""
-    return [(layer, f"&w[{piece.offset}]") for layer, piece in zip(code.network.layers, packing.network_pieces(code.network)[1:])]
+    return [
+        (layer, f"&w[{piece.offset}]") for layer, piece in zip(code.network.layers, packing.network_pieces(code.network)[1:], strict=True)
+    ]
 
 
 def _start(code: NetworkCode, model: Model) -> str:

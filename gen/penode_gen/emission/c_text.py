@@ -6,6 +6,7 @@ import math
 import re
 import textwrap
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +37,7 @@ def literals(values: npt.ArrayLike) -> list[str]:
     with np.errstate(over="ignore", invalid="ignore"):
         singles = doubles.astype(np.float32)
         exact, plain = singles == doubles, (doubles == 0.0) | ((size >= 1e-4) & (size < 1e6))  # there, NumPy and repr write no exponent
-    found = zip(doubles.tolist(), singles.astype(str).tolist(), exact.tolist(), plain.tolist())
+    found = zip(doubles.tolist(), singles.astype(str).tolist(), exact.tolist(), plain.tolist(), strict=True)
     return [(f"{text}F" if held else f"(pen_real_t){value!r}") if short else literal(value) for value, text, held, short in found]
 
 
@@ -77,7 +78,8 @@ def fold(text: str, width: int = 120) -> str:
 
 def _fold_comment(line: str, width: int) -> list[str]:
     """A line of a comment, or a comment on one line, broken between words."""
-    mark = re.match(r"\s*(/\*\*? |\* *)?", line)[0]
+    found = re.match(r"\s*(/\*\*? |\* *)?", line)
+    mark = found[0] if found else ""
     indent = mark[: len(mark) - len(mark.lstrip())]
     hang = {"/** ": f"{indent} * ", "/* ": f"{indent}   ", "* ": mark}.get(mark.lstrip(), f"{mark}  ")
     words = line[len(mark) :].replace(" */", "\0*/")  # the end stays with its last word
@@ -118,7 +120,7 @@ def _break(line: str, width: int) -> int:
 class Printer:
     """Prints SymPy expressions; `name` gives the C text of a symbol."""
 
-    _calls = {
+    _calls: ClassVar[dict[sp.FunctionClass, str]] = {
         sp.exp: "pen_exp",
         sp.tanh: "pen_tanh",
         ex.Sigmoid: "pen_sigmoid",

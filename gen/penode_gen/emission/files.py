@@ -42,8 +42,9 @@ def _replace_all(written: list[tuple[str, Path]]) -> None:
             done.append(path)
     except OSError:
         for path in done:
-            if before[path] is None:
+            kept = before[path]
+            if kept is None:
                 path.unlink()
             else:
-                path.write_bytes(before[path])
+                path.write_bytes(kept)
         raise

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from .. import units
 from ..algebra import sampled
@@ -179,7 +180,7 @@ class Emitter(Equations):
             "uses_f": uses_f,
             "reads_set": reads_set,
             "layout_float": packing.layout(model),
-            "layout_double": packing.layout(model, float),
+            "layout_double": packing.layout(model, np.float64),
             "set_length": set_length,
             "scrub": max(set_length if reads_set else 0, model.pieces if uses_f else 0),
             "verify": set_length + (model.pieces * len(self._folded()) if uses_f else 0),
@@ -284,7 +285,7 @@ class Emitter(Equations):
             "id": chosen.id,
             "pieces": pieces,
             "checksum_float": packing.set_head(self.model, name)[3],
-            "checksum_double": packing.set_head(self.model, name, float)[3],
+            "checksum_double": packing.set_head(self.model, name, np.float64)[3],
         }
 
 

@@ -50,7 +50,9 @@ class NetworkCode:
 
     def layers(self) -> list[tuple[Layer, str]]:
         """Each layer with the C text of where its values begin."""
-        return [(la, f"&p[{piece.offset}]") for la, piece in zip(self.network.layers, packing.network_pieces(self.network)[1:])]
+        return [
+            (la, f"&p[{piece.offset}]") for la, piece in zip(self.network.layers, packing.network_pieces(self.network)[1:], strict=True)
+        ]
 
 
 def network_code(model: Model) -> list[NetworkCode]:
@@ -127,7 +129,7 @@ def slope_lines(model: Model, code: NetworkCode) -> list[str]:
             layer, layers = layers[hidden][0], layers[hidden + 1 :]
             lines += [f"{g}[0] = pen_net16_slope({hidden}U, {at}, {h}[0], {s}[0]);", f"{s}[0][0] *= {t}[0][0];"]
             lines += _activation(layer, g)
-            if layer.activation != "identity":
+            if isinstance(layer, Dense) and layer.activation != "identity":
                 lines.append(f"pen_slope_{layer.activation}(1U, {g}, {s}[0]);")
             h, g, t, s, relu = g, h, s, t, _relu(layer)
             continue

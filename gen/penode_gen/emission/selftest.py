@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..sets.packing import RealType
 from ..twins.evaluate import Evaluator
 from ..twins.kernels import Kernels
 from .c_text import literal
@@ -90,7 +91,7 @@ def model_context(context: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _run(context: dict[str, Any], levels: list[Levels], real: type, strict: bool) -> int | None:
+def _run(context: dict[str, Any], levels: list[Levels], real: RealType, strict: bool) -> int | None:
     """The hash over state and outputs; None if `strict` and the run leaves the trust envelope too often, or a step does not go well."""
     machine, number, state = Evaluator(context, real), 1, _SEED
     start = machine.x
@@ -120,7 +121,7 @@ _ARGUMENTS = {
 }
 
 
-def runtime_answer(real: type) -> int:
+def runtime_answer(real: RealType) -> int:
     """The hash that src/pen_selftest.c compares with."""
     k, number, state = Kernels(real), 1, _SEED
 

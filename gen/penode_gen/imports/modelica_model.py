@@ -174,8 +174,8 @@ def _units(found: Flat, where: str) -> dict[str, str]:
             whole = next((unit for unit in (_unit_of(part, known, "") for part in parts) if unit is not None), None)
             for part in parts if whole is not None else []:
                 missing = [name for name, power in (part or {}).items() if _bare(name) not in known]
-                if len(missing) == 1 and part and part[missing[0]] == 1:
-                    unit = whole / _unit_of(part, known, missing[0])
+                if len(missing) == 1 and part and part[missing[0]] == 1 and (rest := _unit_of(part, known, missing[0])) is not None:
+                    unit = whole / rest
                     known[_bare(missing[0])] = unit * _SECOND if missing[0].startswith("der(") else unit
     return {name: found.variables[name].unit or f"{unit:~C}".replace("**", "^") or "1" for name, unit in known.items()}
 

@@ -76,12 +76,14 @@ class EndTables(NetworkTables):
             for part in ("position", "velocity"):
                 if part in entry:
                     self.name((*where, part), entry[part])
-            start = tuple(
+            start, speed = (
                 self.quantity((*where, part), entry[part], of) if part in entry else 0.0
                 for part, of in (("start_position", length), ("start_velocity", f"{length}/s"))
             )
             self.kinds[name] = length
-            yield m.Body(name, mass, entry.get("position", f"{z}_{name}"), entry.get("velocity", f"{v}_{name}"), start, key == "inertia")
+            yield m.Body(
+                name, mass, entry.get("position", f"{z}_{name}"), entry.get("velocity", f"{v}_{name}"), (start, speed), key == "inertia"
+            )
 
     def actuators(
         self, inputs: tuple[m.Input, ...], parameters: dict[str, m.Parameter], sample_time: float
@@ -135,12 +137,13 @@ class EndTables(NetworkTables):
         self,
         bodies: tuple[m.Body, ...],
         inputs: tuple[m.Input, ...],
-        states: Iterable[m.State],
+        states: Iterable[m.State | m.Sampled],
         earlier: list[m.Point],
         parameters: dict[str, m.Parameter],
     ) -> Iterable[m.Point]:
         """Linear combinations of positions; `earlier`: those that actuators are."""
-        unit_of = {p.name: p.unit for p in parameters.values()} | {i.name: i.unit for i in (*inputs, *states, *earlier)}
+        measured: tuple[m.Input | m.State | m.Sampled | m.Point, ...] = (*inputs, *states, *earlier)
+        unit_of = {p.name: p.unit for p in parameters.values()} | {i.name: i.unit for i in measured}
         unit_of |= {b.position: b.unit for b in bodies if b.position}
         moving = {name: (ex.symbol(name),) * 2 for name in unit_of if name not in parameters}
         for name, text in self.entries("points").items():
@@ -151,7 +154,7 @@ class EndTables(NetworkTables):
                 continue
             try:
                 position = combination(text, moving, set(parameters))[0]
-                dimension = units.dimension_of(position, lambda leaf: units.dimension(unit_of[leaf.name]))
+                dimension = units.dimension_of(position, lambda leaf: units.dimension(unit_of[leaf.name])) or units.NONE
             except ex.ExpressionError as error:
                 self.problem(where, str(error), 'write positions, inputs and points with parameters as coefficients, such as "z - a*theta"')
                 continue
@@ -231,14 +234,15 @@ class EndTables(NetworkTables):
         inputs = entry.get("inputs")
         if inputs is None:  # the units say which is meant
             inputs = [next((k for k, u in kinds.items() if same(u, unit)), "") for unit in takes]
-            for unit in (unit for unit, kind in zip(takes, inputs) if not kind):
+            for unit in (unit for unit, kind in zip(takes, inputs, strict=True) if not kind):
                 self.problem(
                     where,
-                    f"network '{network}' takes {unit or 'a number without unit'}, an element has a deflection in {length} and a rate in {length}/s",
+                    f"network '{network}' takes {unit or 'a number without unit'}, "
+                    f"an element has a deflection in {length} and a rate in {length}/s",
                     "mend the unit in [networks]",
                 )
         else:
-            for kind, unit in zip(inputs, takes):
+            for kind, unit in zip(inputs, takes, strict=False):  # another number of inputs is reported below
                 if kind not in list(kinds):
                     self.problem((*where, "inputs"), f"{show(kind)} is neither deflection nor rate", 'write inputs = ["deflection"]')
                 elif not same(kinds[kind], unit):

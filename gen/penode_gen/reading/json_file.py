@@ -42,10 +42,10 @@ class _Reader:
         if "denormalise" in top:
             low, high = self.min_max(top["denormalise"], "denormalise")
             layers.append(Affine(low, high - low, "rescale"))
-        low, high = None, None
+        trained: tuple[Vector, Vector] | tuple[None, None] = (None, None)
         if "trained_range" in top:
-            low, high = self.bounds(top["trained_range"], "trained_range", ("min", "max"))
-        return self.fitting(layers, low, high, "normalise" in top, "denormalise" in top)
+            trained = self.bounds(top["trained_range"], "trained_range", ("min", "max"))
+        return self.fitting(layers, trained, "normalise" in top, "denormalise" in top)
 
     def load(self) -> Any:
         try:
@@ -86,7 +86,7 @@ class _Reader:
         if not isinstance(value, list) or not value:
             raise self.error("layers", "no layers", "give a list with one object for each layer")
         scaled = [isinstance(entry, dict) and "form" in entry for entry in value]
-        return [(self.scale if scales else self.dense)(entry, f"layers[{i}]") for i, (entry, scales) in enumerate(zip(value, scaled))]
+        return [self.scale(entry, f"layers[{i}]") if scaled[i] else self.dense(entry, f"layers[{i}]") for i, entry in enumerate(value)]
 
     def scale(self, value: Any, where: str) -> Affine:
         """Form "centre": (x - shift) * factor; "rescale": x * factor + shift."""
@@ -126,13 +126,14 @@ class _Reader:
                 raise self.error(f"{where}[{i}]", "too large for a double", "train or export the network again")
         return np.array(value, dtype=np.float64)
 
-    def fitting(self, layers: list[Layer], low: Vector | None, high: Vector | None, before: bool, behind: bool) -> Network:
+    def fitting(self, layers: list[Layer], trained: tuple[Vector, Vector] | tuple[None, None], before: bool, behind: bool) -> Network:
         """The network, or an error that counts layers as the file does."""
         names = ["normalise"] * before + [f"layers[{i}]" for i in range(len(layers) - before - behind)] + ["denormalise"] * behind
         for i in range(1, len(layers)):
             if layers[i].n_in != layers[i - 1].n_out:
                 what = f"takes {layers[i].n_in} values, but {names[i - 1]} gives {layers[i - 1].n_out}"
                 raise self.error(names[i], what, "make the two sizes equal")
+        low, high = trained
         if low is not None and low.size != layers[0].n_in:
             what = f"{low.size} ranges for a network of {layers[0].n_in} inputs"
             raise self.error("trained_range", what, "give one for each input")

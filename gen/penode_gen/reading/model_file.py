@@ -7,7 +7,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,7 @@ MODEL = {
 }
 
 
-class _All(frozenset):
+class _All(frozenset[str]):
     """Contains everything."""
 
     def __contains__(self, item: object) -> bool:
@@ -63,13 +63,7 @@ class _Reader(EndTables):
     def read(self) -> m.Model:
         if not self.data:
             raise m.ModelError([one_line(f"{self.path}:1: says nothing; write a model with [model], [inputs] and [outputs]")])
-        if not self.path.name.isprintable():
-            self.problem((), "the file has a name that cannot stand in a comment", "rename it")
-        known = [*SECTIONS, "model", "points", "elements", "equations", "sets"]
-        for key in self.data:
-            if key not in known:
-                near = difflib.get_close_matches(key, known, 1)
-                self.problem((key,), "unknown section", f"did you mean [{near[0]}]?" if near else "remove it")
+        self.sections()
         head, sample_time = self.head()
         name = head.get("name", "model")
         parameters = self.parameters()
@@ -88,7 +82,7 @@ class _Reader(EndTables):
         self.folds(head, sets)
         promises.check(networks, sets, head["outside"], self.problem)
         self.unique(parameters, inputs, bodies, points, elements, (*states, *sampled), variables, networks)
-        moving = {*(s.name for s in (*states, *sampled)), *(b.position for b in bodies), *(b.velocity for b in bodies)}
+        moving = {*(s.name for s in states), *(s.name for s in sampled), *(b.position for b in bodies), *(b.velocity for b in bodies)}
         self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs))
         self.macros(parameters, networks, name)
         if not outputs and not self.data.get("outputs"):
@@ -125,6 +119,16 @@ class _Reader(EndTables):
             points=points,
             sampled=tuple(sampled),
         )
+
+    def sections(self) -> None:
+        """The name of the file, and the names of its sections."""
+        if not self.path.name.isprintable():
+            self.problem((), "the file has a name that cannot stand in a comment", "rename it")
+        known = [*SECTIONS, "model", "points", "elements", "equations", "sets"]
+        for key in self.data:
+            if key not in known:
+                near = difflib.get_close_matches(key, known, 1)
+                self.problem((key,), "unknown section", f"did you mean [{near[0]}]?" if near else "remove it")
 
     def head(self) -> tuple[dict[str, Any], float]:
         """The table [model] with its defaults, and the sample time [s]."""
@@ -275,7 +279,17 @@ class _Reader(EndTables):
                 )
             yield m.Signal(name, entry.get("value", ""), entry.get("unit", UNKNOWN), noise, entry.get("description", ""), bound)
 
-    def unique(self, parameters, inputs, bodies, points, elements, states, variables, networks) -> None:
+    def unique(
+        self,
+        parameters: Collection[str],
+        inputs: Collection[m.Input],
+        bodies: Collection[m.Body],
+        points: Collection[m.Point],
+        elements: Collection[m.Element],
+        states: Collection[m.State | m.Sampled],
+        variables: Collection[m.Variable],
+        networks: Collection[str],
+    ) -> None:
         """No name may mean two things."""
         named = [("parameter", n, self.made.get(n, ("parameters", n))) for n in parameters]
         named += [("input", i.name, ("inputs", i.name)) for i in inputs]
@@ -289,8 +303,8 @@ class _Reader(EndTables):
         ]
         named += [("network", n, ("networks", n)) for n in networks]
         for e in elements:
-            where = ("elements", e.name)
-            named += [("deflection", f"s_{e.name}", where), ("rate", f"v_{e.name}", where), ("force", f"F_{e.name}", where)]
+            of = ("elements", e.name)
+            named += [("deflection", f"s_{e.name}", of), ("rate", f"v_{e.name}", of), ("force", f"F_{e.name}", of)]
         seen: dict[str, str] = {"": ""}  # a missing name has been reported
         for kind, name, where in named:
             if seen.get(name):
@@ -311,7 +325,14 @@ class _Reader(EndTables):
                     ("outputs" if n < n_outputs else "sensors", s.name), f"'{s.name}' is already the name of another quantity", "rename one"
                 )
 
-    def expressions(self, elements, equations, signals, networks: dict[str, m.NetworkPort], n_outputs: int) -> None:
+    def expressions(
+        self,
+        elements: Iterable[m.Element],
+        equations: Iterable[m.Equation],
+        signals: Iterable[m.Signal],
+        networks: dict[str, m.NetworkPort],
+        n_outputs: int,
+    ) -> None:
         """What is wrong with expressions whatever the names in them mean: for a file with other problems."""
         texts = [(("elements", e.name), e.expression) for e in elements if e.expression]
         texts += [(("equations", q.name), side) for q in equations for side in ex.sides(q.text)]

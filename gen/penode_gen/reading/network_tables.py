@@ -140,7 +140,8 @@ class NetworkTables(Tables):
             except (OSError, ValueError) as error:
                 self.problem(where, f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})", "mend the path")
                 self.files[path] = None
-            for layer in self.files[path].layers if self.files[path] else ():  # weights may lie in files of their own
+            found = self.files[path]
+            for layer in found.layers if found else ():  # weights may lie in files of their own
                 for numbers in (v for v in vars(layer).values() if isinstance(v, np.ndarray)):
                     self.digest.update(numbers.tobytes())
         network = self.files[path]
@@ -149,7 +150,8 @@ class NetworkTables(Tables):
         if network.n_inputs != len(port.input_units) or network.n_outputs != 1:
             self.problem(
                 where,
-                f"{path.name} has {network.n_inputs} input(s) and {network.n_outputs} output(s), declared are {len(port.input_units)} and 1",
+                f"{path.name} has {network.n_inputs} input(s) and {network.n_outputs} output(s), "
+                f"declared are {len(port.input_units)} and 1",
                 "mend [networks] or the file",
             )
             return None

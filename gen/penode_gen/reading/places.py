@@ -87,16 +87,16 @@ def parse(path: Path, called: str = "") -> tuple[dict[str, Any], bytes, Lines]:
         found = re.search(r" \(at line (\d+), column \d+\)", str(error))
         toml = isinstance(error, tomllib.TOMLDecodeError)
         what = str(error).replace(found[0], "") if found else str(error) if toml else "a number or a nesting beyond all measure"
-        line = found[1] if found else raw.count(b"\n") + (not raw.endswith(b"\n"))
-        raise m.ModelError([one_line(f"{path}:{line}: is not valid TOML ({what}); mend the syntax there")]) from error
+        place = found[1] if found else raw.count(b"\n") + (not raw.endswith(b"\n"))
+        raise m.ModelError([one_line(f"{path}:{place}: is not valid TOML ({what}); mend the syntax there")]) from error
 
 
 def merge(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     """`own` over `base`, section by section; of bodies and states key by key, so that a start state can be given alone."""
     merged = base | {k: base[k] | v if isinstance(v, dict) and isinstance(base.get(k), dict) else v for k, v in own.items()}
     for section in ("bodies", "states"):
-        both = [t.get(section) for t in (base, own)]
-        if all(isinstance(entries, dict) for entries in both):
-            changed = {k: both[0][k] | v for k, v in both[1].items() if isinstance(v, dict) and isinstance(both[0].get(k), dict)}
+        theirs, ours = base.get(section), own.get(section)
+        if isinstance(theirs, dict) and isinstance(ours, dict):
+            changed = {k: theirs[k] | v for k, v in ours.items() if isinstance(v, dict) and isinstance(theirs.get(k), dict)}
             merged[section] = merged[section] | changed
     return merged

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..networks import Affine, Network
+from ..networks import Affine, Layer, Network
 
 EPS = float(np.finfo(np.float32).eps)
 
@@ -59,10 +60,10 @@ def pieces(network: Network) -> Iterator[Piece]:
         start = piece.end
 
 
-def _layer(layer) -> _Layer:
+def _layer(layer: Layer) -> _Layer:
     if isinstance(layer, Affine):
         shift, factor = ([Fraction(float(v)) for v in values.astype(np.float32)] for values in (layer.shift, layer.factor))
-        bias = [-p * q for p, q in zip(shift, factor)] if layer.form == "centre" else shift
+        bias = [-p * q for p, q in zip(shift, factor, strict=True)] if layer.form == "centre" else shift
         weights = [[q if i == j else Fraction(0) for j in range(len(factor))] for i, q in enumerate(factor)]
         relu = False
     else:
@@ -86,16 +87,16 @@ def _piece(layers: list[_Layer], start: Fraction | None) -> Piece:
     """The piece to the right of `start`; None: the leftmost."""
     s, o, shift = np.array([1], dtype=object), np.array([0], dtype=object), 0
     end: Fraction | None = None
-    patterns = []
+    patterns: list[NDArray[np.bool_] | None] = []
     for layer in layers:
         s, o = layer.weights @ s, layer.weights @ o + layer.bias * (1 << shift)
         shift += layer.shift
         if not layer.relu:
             patterns.append(None)
             continue
-        on = np.array([_is_on(a, b, start) for a, b in zip(s, o)])
+        on = np.array([_is_on(a, b, start) for a, b in zip(s, o, strict=True)])
         patterns.append(on)
-        for root in (Fraction(-b, a) for a, b, active in zip(s, o, on) if (a < 0 if active else a > 0)):
+        for root in (Fraction(-b, a) for a, b, active in zip(s, o, on, strict=True) if (a < 0 if active else a > 0)):
             end = root if end is None or root < end else end
         s, o = s * on, o * on
     scale = Fraction(1, 1 << shift)
@@ -112,10 +113,10 @@ def _is_on(slope: int, offset: int, x: Fraction | None) -> bool:
     return value > 0 or (value == 0 and slope > 0)
 
 
-def _paths(layers: list[_Layer], patterns: list, x: Fraction | None) -> float:
+def _paths(layers: list[_Layer], patterns: list[NDArray[np.bool_] | None], x: Fraction | None) -> float:
     """Margin of the slope, or with x of the force there: rounding times the sum of the sizes of all paths."""
     h, terms = np.array([1.0 if x is None else abs(float(x))]), 0
-    for layer, on in zip(layers, patterns):
+    for layer, on in zip(layers, patterns, strict=True):
         h = layer.sizes @ h + (0.0 if x is None else layer.bias_sizes)
         h = h if on is None else h * on
         terms += layer.sizes.shape[1] + 10

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import units
 from ..model import Model
@@ -31,7 +33,7 @@ class Array:
     unit: str
     blocks: tuple[Block, ...]
 
-    def indices(self) -> np.ndarray:
+    def indices(self) -> NDArray[Any]:
         """Where each element lies in a set, in the shape of the array."""
         columns = self.shape[1] if len(self.shape) > 1 else 1
         found = np.empty((sum(b.rows for b in self.blocks), columns), dtype=int)
@@ -60,7 +62,7 @@ def _of_network(model: Model, name: str, network: Network, at: int) -> list[Arra
     unit = alike.pop() if len(alike) == 1 else ""
     found = [Array(f"{name}.{edge}", (n,), unit, (Block(0, n, at + i * n),)) for i, edge in enumerate(("input_min", "input_max"))]
     dense = affine = 0
-    for layer, piece in zip(network.layers, pieces[1:]):
+    for layer, piece in zip(network.layers, pieces[1:], strict=True):
         start = at + piece.offset
         if isinstance(layer, Dense):
             dense += 1
@@ -103,7 +105,7 @@ def to_json(model: Model) -> str:
     """The table for programs."""
     table = {
         "model": model.owner,
-        "layout": {"float": packing.layout(model), "double": packing.layout(model, float)},
+        "layout": {"float": packing.layout(model), "double": packing.layout(model, np.float64)},
         "length": length(model),
         "sets": {name: s.id for name, s in model.sets.items()},
         "arrays": [asdict(a) for a in arrays(model)],
@@ -111,11 +113,12 @@ def to_json(model: Model) -> str:
     return json.dumps(table, indent=1) + "\n"
 
 
-def gather(array: Array, values: np.ndarray) -> np.ndarray:
+def gather(array: Array, values: NDArray[Any]) -> NDArray[Any]:
     """The array out of the values of a set [length]."""
-    return values[array.indices()]
+    elements: NDArray[Any] = values[array.indices()]
+    return elements
 
 
-def scatter(array: Array, elements: np.ndarray, values: np.ndarray) -> None:
+def scatter(array: Array, elements: NDArray[Any], values: NDArray[Any]) -> None:
     """The array into the values of a set [length]."""
     values[array.indices()] = elements

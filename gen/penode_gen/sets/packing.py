@@ -5,12 +5,16 @@ from __future__ import annotations
 import hashlib
 import zlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import units
 from ..model import Model, ParameterSet
 from ..networks import Dense, Network
+
+RealType = type[np.floating[Any]]  # np.float32 or np.float64
 
 ABI = 2
 _FLOAT_MAX = float(np.finfo(np.float32).max)
@@ -21,7 +25,7 @@ class Piece:
     """A stretch of values that belong together, `offset` from the start of its network or of the set."""
 
     offset: int
-    values: np.ndarray
+    values: NDArray[Any]
     comment: str
     columns: int = 8  # values a line when printed
 
@@ -40,7 +44,7 @@ def dense_rows(n_out: int) -> list[tuple[int, int]]:
     return blocks
 
 
-def stream(layer: Dense) -> np.ndarray:
+def stream(layer: Dense) -> NDArray[Any]:
     """Biases and weights of a dense layer in the order of penode/pen_net.h."""
     parts = []
     for row, size in dense_rows(len(layer.bias)):
@@ -103,14 +107,14 @@ def pieces(model: Model, chosen: ParameterSet) -> list[Piece]:
     return found
 
 
-def set_values(model: Model, set_name: str, dtype: type = np.float32) -> np.ndarray:
+def set_values(model: Model, set_name: str, dtype: RealType = np.float32) -> NDArray[Any]:
     """All values of a set [NAME_SET_LENGTH] as pen_real_t. Raises KeyError for an unknown set."""
     chosen = model.sets[set_name]
     parts = [p.values for p in pieces(model, chosen)] or [np.zeros(1)]
     return np.concatenate(parts).astype(dtype)
 
 
-def layout(model: Model, dtype: type = np.float32) -> int:
+def layout(model: Model, dtype: RealType = np.float32) -> int:
     """Fingerprint of what the values mean: model name, tunable parameters, architectures, ABI and real type."""
     nets = model.sets["default"].networks if model.sets else {}
     names = tuple(p.name for p in model.tunable) + tuple((n, net.architecture) for n, net in nets.items())
@@ -120,13 +124,13 @@ def layout(model: Model, dtype: type = np.float32) -> int:
 
 def digest(model: Model) -> str:
     """Identifies the sets of a model: what they mean and all that they hold."""
-    sha = hashlib.sha256(repr((layout(model), layout(model, float), {n: s.id for n, s in model.sets.items()})).encode())
+    sha = hashlib.sha256(repr((layout(model), layout(model, np.float64), {n: s.id for n, s in model.sets.items()})).encode())
     for name in model.sets or ("default",):
         sha.update(set_values(model, name, np.float64).tobytes() if model.sets else b"")
     return sha.hexdigest()
 
 
-def set_head(model: Model, set_name: str, dtype: type = np.float32) -> tuple[int, int, int, int]:
+def set_head(model: Model, set_name: str, dtype: RealType = np.float32) -> tuple[int, int, int, int]:
     """(layout, length, id, checksum) of a set, as pen_set_head_t."""
     values = set_values(model, set_name, dtype)
     checksum = zlib.crc32(values.astype(np.dtype(dtype).newbyteorder("<")).tobytes())

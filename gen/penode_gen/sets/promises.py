@@ -19,7 +19,13 @@ from .exact import Piece, pieces
 from .fold import foldable
 
 # keys of an entry of [networks], and what they may be
-KEYS = {"monotone": (bool, str), "dissipative": (bool, str), "max_slope": str, "max_force": str, "zero_at_zero": bool}
+KEYS: dict[str, type | tuple[type, ...]] = {
+    "monotone": (bool, str),
+    "dissipative": (bool, str),
+    "max_slope": str,
+    "max_force": str,
+    "zero_at_zero": bool,
+}
 LOOKS = (64, 16)  # evaluations that a check on the target may take: some, and some for each neuron
 FORCE = 16  # margins of a force that the target asks for
 Problem = Callable[[Sequence[str], str, str], None]
@@ -194,7 +200,7 @@ def _at_zero(network: Network, clamp: bool) -> float:
             h = (h - shift) * factor if layer.form == "centre" else h * factor + shift
             continue
         y = layer.bias.astype(np.float32)
-        for column, value in zip(layer.weights.astype(np.float32).T, h):
+        for column, value in zip(layer.weights.astype(np.float32).T, h, strict=True):
             y = y + column * value
         h = np.maximum(y, np.float32(0)) if layer.activation == "relu" else y
     return float(h[0])

@@ -7,11 +7,14 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..model import Model
 from . import packing
+from .packing import RealType
 
 MAGIC = b"PENS"
 VERSION = 1
@@ -27,10 +30,10 @@ class SerialSet:
     length: int
     id: int
     checksum: int
-    values: np.ndarray  # [length] float32 or float64
+    values: NDArray[Any]  # [length] float32 or float64
 
 
-def serial(model: Model, set_name: str, dtype: type = np.float32) -> bytes:
+def serial(model: Model, set_name: str, dtype: RealType = np.float32) -> bytes:
     """The serial form of a set of the model file. Raises KeyError for an unknown set."""
     head = packing.set_head(model, set_name, dtype)
     fields = _FIELDS.pack(MAGIC, VERSION, np.dtype(dtype).itemsize, *head, 0)

@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
-_SINGLE = {
+from ..sets.packing import RealType
+
+_SINGLE: dict[str, float | list[float]] = {
     "right_angle": [1.5703125, 0.0004837513, 7.5495336e-08, 2.563283e-12, 6.123234e-17],
     "two_by_pi": 0.63661975,
     "half_pi_high": 1.5707964,
@@ -29,7 +31,7 @@ _SINGLE = {
     "log": [0.66666776, 0.39977577, 0.29870906],
     "root": [1.5561924, -0.73886895, 0.19468726, -0.019050509],
 }
-_DOUBLE = {
+_DOUBLE: dict[str, float | list[float]] = {
     "right_angle": [1.5707963267941523, 7.443547480488527e-13, -1.9034889620193266e-25],
     "two_by_pi": 0.6366197723675814,
     "half_pi_high": 1.5707963267948966,
@@ -88,21 +90,21 @@ _DOUBLE = {
 class _Format:
     """Of a real type: the integer as wide, bits of the significand behind its leading 1, bias, and what lifts subnormal numbers."""
 
-    word: type
+    word: type[np.unsignedinteger[Any]]
     bits: int
     bias: int
     lift_bits: int
     steps: int  # of Newton for the root
 
 
-_FORMATS = {np.float32: _Format(np.uint32, 23, 127, 24, 1), np.float64: _Format(np.uint64, 52, 1023, 54, 3)}
+_FORMATS: dict[RealType, _Format] = {np.float32: _Format(np.uint32, 23, 127, 24, 1), np.float64: _Format(np.uint64, 52, 1023, 54, 3)}
 _ANGLE_MAX, _NEAR, _FAR = 8192.0, 0.5463, 1.8304
 
 
 class Elementary:
     """pen_sin, pen_cos, pen_atan, pen_log and pen_sqrt of numbers or arrays, for one real type."""
 
-    def __init__(self, real: type):
+    def __init__(self, real: RealType):
         self.real = real
         table = _SINGLE if real is np.float32 else _DOUBLE
         self._e: dict[str, Any] = {k: [real(c) for c in v] if isinstance(v, list) else real(v) for k, v in table.items()}

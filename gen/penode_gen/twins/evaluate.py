@@ -16,6 +16,7 @@ import numpy as np
 
 from ..algebra.sampled import Past
 from ..sets import packing
+from ..sets.packing import RealType
 from .fold_walk import Walk, find, value
 from .kernels import Array, Kernels
 from .translate import expression, function
@@ -36,7 +37,7 @@ class _Folded:
 class Evaluator:
     """One instance of a model with its set `default`; `context` is what the emitter gives to the templates."""
 
-    def __init__(self, context: dict[str, Any], real: type):
+    def __init__(self, context: dict[str, Any], real: RealType):
         self.context, self.real, self.k = context, real, Kernels(real)
         self.model = context["model"]
         self.n_x, self.n_u, self.n_y = context["n_x"], context["n_u"], context["n_y"]
@@ -51,7 +52,9 @@ class Evaluator:
         }
         self.sample_time = real(self.model.sample_time)
         self.h = self.sample_time / real(self.model.substeps) if self.model.substeps > 1 else self.sample_time
-        self.stages = [(expression(n, {}, real), expression(w, {}, real)) for n, w in zip(context["nodes"], context["weights"])]
+        self.stages = [
+            (expression(n, {}, real), expression(w, {}, real)) for n, w in zip(context["nodes"], context["weights"], strict=True)
+        ]
         self.x = np.array(self.model.start, real)
         self.y = np.zeros(self.n_y, real)
         self.running = 0

@@ -65,7 +65,8 @@ class Walk:
         """The pieces one way from the centre, nearest first; none if they are more than `room` or take too many looks."""
         largest = np.finfo(self.k.real).max
         x = start = centre
-        outside, begin, done = False, True, []
+        outside, begin = False, True
+        done: list[Piece] = []
         while len(done) < room and self.looks > 0:
             view = self._look(x, way, begin)
             ahead = x + (way * view.ahead)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sets.packing import dense_rows
+from ..sets.packing import RealType, dense_rows
 from .elementary import Elementary
 
 Array = NDArray[Any]
@@ -25,8 +25,8 @@ def _table(text: str) -> list[float]:
     return [float.fromhex(word) if "x" in word else float(word) for word in text.split()]
 
 
-# Constants of src/pen_math.c: bias, e^x range, sigmoid's low and scale exponent, tanh's high, then polynomials.
-_SINGLE = {
+# Constants of src/pen_math.c: bias, e^x range, sigmoid's low, tanh's high, then polynomials.
+_SINGLE: dict[str, float | list[float]] = {
     "bias": 149.0,
     "log2_e": 1.442695,
     "ln2": 0.6931472,
@@ -36,14 +36,12 @@ _SINGLE = {
     "exp_high": 89.0,
     "sigmoid_low": -20.0,
     "tanh_high": 20.0,
-    "scale_bits": 32,
-    "low_bits": 5,
     "expm1": _table("0.49999994 0.16666521 0.04166839 0.0083687175 0.001381455"),
     "tanh": _table("0.3333328 -0.13331443 0.053739727 -0.020639114 0.0057050097"),
     "softplus": _table("0.12499999 -0.0052082767 0.00034697095 -2.5853244e-05 1.6702256e-06"),
     "log1p": _table("-0.4999999 0.3333276 -0.24986029 0.19836731 -0.1561845 0.10384731 -0.039698943"),
 }
-_DOUBLE = {
+_DOUBLE: dict[str, float | list[float]] = {
     "bias": 1074.0,
     "log2_e": 1.4426950408889634,
     "ln2": 0.6931471805599453,
@@ -53,8 +51,6 @@ _DOUBLE = {
     "exp_high": 710.5,
     "sigmoid_low": -40.0,
     "tanh_high": 40.0,
-    "scale_bits": 64,
-    "low_bits": 8,
     "expm1": _table("""0.5 0.16666666666666682 0.041666666666666095 0.008333333333317032 0.0013888888889114991
         0.00019841269896386885 2.480158692750757e-05 2.755723485954443e-06 2.7557581282573863e-07 2.5112037509909843e-08
         2.082676814174302e-09"""),
@@ -70,18 +66,22 @@ _DOUBLE = {
 }
 
 
+_BITS = {np.float32: (32, 5), np.float64: (64, 8)}  # sigmoid's scale exponent, and bits of an exponent that _low has
+
+
 class Kernels(Elementary):
     """pen_math, pen_elementary, pen_net and pen_solve for one real type."""
 
-    def __init__(self, real: type):
+    def __init__(self, real: RealType):
         super().__init__(real)
         table = _SINGLE if real is np.float32 else _DOUBLE
         self._c: dict[str, Any] = {k: [real(c) for c in v] if isinstance(v, list) else real(v) for k, v in table.items()}
-        self._low_bits = table["low_bits"]
-        self._scale = real(2.0 ** -table["scale_bits"])
-        self._sigmoid_bias = real(table["bias"] - table["scale_bits"])
+        bias = int(self._c["bias"])
+        scale_bits, self._low_bits = _BITS[real]
+        self._scale = real(2.0**-scale_bits)
+        self._sigmoid_bias = real(bias - scale_bits)
         spread = 2**self._low_bits
-        self._high = np.array([2.0 ** (spread * i - int(table["bias"])) for i in range(9)], dtype=real)
+        self._high = np.array([2.0 ** (spread * i - bias) for i in range(9)], dtype=real)
         self._low = np.array([2.0**i for i in range(spread)], dtype=real)
         self.zero, self.half, self.one, self.two = real(0), real(0.5), real(1), real(2)
 
@@ -159,7 +159,7 @@ class Kernels(Elementary):
         return self.half * (x + np.abs(x))
 
     @staticmethod
-    def _sums(first: Array, products: Array) -> Array:
+    def _sums(first: Array | Real, products: Array) -> Any:
         """Row by row first + products[0] + products[1] + ..., in that order."""
         products[0] = first + products[0]
         return np.add.accumulate(products, axis=0)[-1]

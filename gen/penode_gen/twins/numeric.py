@@ -12,6 +12,7 @@ import sympy as sp
 from ..algebra import expressions as ex
 from ..algebra.causalise import Causal, causalise
 from ..model import Model
+from ..networks import Vector
 
 _NUMPY = [
     {
@@ -27,14 +28,15 @@ _NUMPY = [
 
 
 @lru_cache(maxsize=256)
-def along(expression: str, names: tuple[str, ...]) -> Callable[..., np.ndarray]:
+def along(expression: str, names: tuple[str, ...]) -> Callable[..., Vector]:
     """An expression of the model language as a function of arrays of one shape, or numbers, in the order of `names`."""
     parsed = ex.parse(expression, names, {})
     parsed = parsed.replace(sp.Max, sp.Function("larger")).replace(
         sp.Min, sp.Function("smaller")
     )  # NumPy's own take arrays of one shape only
     modules = [{"larger": lambda *x: reduce(np.maximum, x), "smaller": lambda *x: reduce(np.minimum, x)}, *_NUMPY]
-    return sp.lambdify([ex.symbol(n) for n in names], parsed, modules=modules)
+    function: Callable[..., Vector] = sp.lambdify([ex.symbol(n) for n in names], parsed, modules=modules)
+    return function
 
 
 class Numeric:
@@ -60,38 +62,37 @@ class Numeric:
         other._values = {**self._values, **values}
         return other
 
-    def initial_state(self) -> np.ndarray:
+    def initial_state(self) -> Vector:
         """Start values of all states, SI."""
         return np.array(self.model.start, dtype=float)
 
-    def rates(self, x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
+    def rates(self, x: Vector, u: Vector, udot: Vector) -> Vector:
         """dx/dt [n_x]."""
         return self._rates(x, u, udot, self._values)
 
-    def outputs(self, x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
+    def outputs(self, x: Vector, u: Vector, udot: Vector) -> Vector:
         """Outputs [n_y]."""
         return self._outputs(x, u, udot, self._values)
 
-    def sensors(self, x: np.ndarray, u: np.ndarray, udot: np.ndarray) -> np.ndarray:
+    def sensors(self, x: Vector, u: Vector, udot: Vector) -> Vector:
         """Sensors [n_z], without noise."""
         return self._sensors(x, u, udot, self._values)
 
-    def _function(self, results: tuple[sp.Expr, ...]) -> Callable[..., np.ndarray]:
+    def _function(self, results: tuple[sp.Expr, ...]) -> Callable[..., Vector]:
         causal: Causal = self._causal
         given = [*causal.states, *causal.inputs, *causal.input_rates, *map(ex.symbol, self._values)]
         kinematics = {ex.derivative(q.name): v for q, v in causal.kinematics.items()}
         results = tuple(r.subs(kinematics) for r in results)
         known = list(given)
-        plan: list[tuple[Callable[..., object], str]] = []
+        plan: list[tuple[Callable[..., list[float]], str]] = []
         for step in causal.needed(results):
-            parts = step.arguments if step.network else (step.value,)
-            plan.append((self._lambdify(known, [p.subs(kinematics) for p in parts]), step.network))
+            plan.append((self._lambdify(known, [p.subs(kinematics) for p in step.parts]), step.network))
             known.append(step.target)
         last = self._lambdify(known, results)
         networks = {n: net.evaluate for n, net in self._networks.items()}
         whole = self._whole
 
-        def function(x: np.ndarray, u: np.ndarray, udot: np.ndarray, parameters: Mapping[str, float]) -> np.ndarray:
+        def function(x: Vector, u: Vector, udot: Vector, parameters: Mapping[str, float]) -> Vector:
             values = [*x, *whole(u), *whole(udot), *parameters.values()]
             for expression, network in plan:
                 found = expression(*values)
@@ -100,20 +101,21 @@ class Numeric:
 
         return function
 
-    def _whole(self, u: np.ndarray) -> Sequence[float] | np.ndarray:
+    def _whole(self, u: Vector) -> Sequence[float] | Vector:
         """Inputs or their rates, and what actuators make of them."""
         names = [i.name for i in self.model.inputs]
         if len(u) > len(names) or not self.model.sampled:
             return u
-        of = dict(zip(names, u))
+        of = dict(zip(names, u, strict=True))
         for s in self.model.sampled:
             of[s.name] = of[s.source]
         return list(of.values())
 
     def _lambdify(self, known: list[sp.Symbol], parts: list[sp.Expr] | tuple[sp.Expr, ...]) -> Callable[..., list[float]]:
         names = [sp.Symbol(f"a{i}", real=True) for i in range(len(known))]
-        swap = dict(zip(known, names))
-        return sp.lambdify(names, [p.xreplace(swap) for p in parts], modules=_NUMPY, cse=True)
+        swap = dict(zip(known, names, strict=True))
+        function: Callable[..., list[float]] = sp.lambdify(names, [p.xreplace(swap) for p in parts], modules=_NUMPY, cse=True)
+        return function
 
 
 def numeric(model: Model, set_name: str = "default") -> Numeric:

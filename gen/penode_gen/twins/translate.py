@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from ..sets.packing import RealType
+
 _TOKEN = re.compile(
     r"\s*(?:(?P<float>(?:\d+\.\d*(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+)F?)|(?P<int>\d+)U?|(?P<name>[A-Za-z_]\w*)|(?P<op>->|[-+*/|]=|[<>=!]=|\+\+|[-+*/<>=?:&,;()\[\]{}.]))"
 )
@@ -26,7 +28,7 @@ class Untranslated(Exception):
     """A line of C that the evaluator does not know: the generator prints what its evaluator does not support."""
 
 
-def function(name: str, parameters: list[str], lines: list[str], environment: dict[str, Any], real: type) -> Any:
+def function(name: str, parameters: list[str], lines: list[str], environment: dict[str, Any], real: RealType) -> Any:
     """The lines of a C function's body as a Python function; `environment` has all that they call and name."""
     body = _Body(real, environment)
     text = [f"def {name}({', '.join(parameters)}):", *body.lines(lines), "    return None"]
@@ -35,13 +37,13 @@ def function(name: str, parameters: list[str], lines: list[str], environment: di
     return scope[name]
 
 
-def expression(text: str, environment: dict[str, Any], real: type) -> Any:
+def expression(text: str, environment: dict[str, Any], real: RealType) -> Any:
     """The value of one expression, such as a macro's text."""
     return function("value", [], [f"return {text};"], environment, real)()
 
 
 class _Body:
-    def __init__(self, real: type, environment: dict[str, Any]):
+    def __init__(self, real: RealType, environment: dict[str, Any]):
         self.real, self.environment = real, environment
         self.literals: dict[str, Any] = {}
 

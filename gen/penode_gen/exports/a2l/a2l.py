@@ -117,7 +117,7 @@ def describe(
     """
     entries = characteristics(model, values, program.find(f"{values.path}[0]"))
     names = [entry.name for entry in entries] + list(measured.found)
-    shown = [*entries, *measured.found.values()]
+    shown: list[Characteristic | Measurement] = [*entries, *measured.found.values()]
     highest = max(max(entry.address for entry in shown), values.address + values.size)
     if highest >= 1 << 32:
         raise ExportError(f"{program.path}: addresses of more than 32 bits; link the program with -no-pie")

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ..interface import ExportError
 from .elf_types import Place, Program, type_name
 
 _LAST = 1  # PEN_ROW_LAST of penode/pen_step.h: the row of the last good sample
-_FLOATS = {4: np.float32, 8: np.float64}
+_FLOATS: dict[int, packing.RealType] = {4: np.float32, 8: np.float64}
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def page(model: Model, program: Program) -> Place:
         ) from exc
     size = program.find(f"{names[1]}[0]").size
     found = program.bytes_at(head.address, 8)
-    order = "little" if program.little_endian else "big"
+    order: Literal["little", "big"] = "little" if program.little_endian else "big"
     expected = (packing.layout(model, _FLOATS[size]), layout.length(model))
     if tuple(int.from_bytes(found[i : i + 4], order) for i in (0, 4)) != expected or values.size != expected[1] * size:
         raise ExportError(
@@ -134,7 +135,7 @@ class Measurements:
         """One number. Raises KeyError if the program has it not."""
         place = self.program.find(path)
         shown, factor = scaled(unit)
-        lowest, highest = (limit if told is None else told for limit, told in zip(limits(place), (low, high)))  # in SI
+        lowest, highest = (limit if told is None else told for limit, told in zip(limits(place), (low, high), strict=True))  # in SI
         name = name if name not in self.found else f"{group}.{name}"
         self.found[name] = Measurement(name, text, place.address, a2l_type(place), shown, factor, lowest / factor, highest / factor, path)
         self.groups.setdefault(group, []).append(name)
@@ -145,7 +146,7 @@ class Measurements:
             self.add("output", output.name, f"{instance}.row[{_LAST}][{len(model.states) + n}]", output.unit, output.description)
         for n, i in enumerate(model.inputs):
             self.add("input", i.name, f"{instance}.u[0][{n}]", i.unit, i.description, i.minimum, i.maximum)
-        for n, (name, unit) in enumerate(zip(model.states, _state_units(model))):
+        for n, (name, unit) in enumerate(zip(model.states, _state_units(model), strict=True)):
             self.add("state", name, f"{instance}.row[{_LAST}][{n}]", unit)
         for n, flag in enumerate(FLAGS):
             self.add("count", f"count.{flag}", f"{instance}.head.log.count[{n}]", text=f"how often {flag} was raised since the start")
@@ -159,7 +160,8 @@ class Measurements:
         whole = self.program.find(variable)
         for place in self.program.numbers(whole):
             member = place.path[len(whole.path) :].lstrip(".")
-            self._of_sensors(model, place) or self.add("program", _plain(member) if member else variable, place.path)
+            if not self._of_sensors(model, place):
+                self.add("program", _plain(member) if member else variable, place.path)
 
     def _of_sensors(self, model: Model, place: Place) -> bool:
         """Is it a member of what NAME_sensors writes? Then it is measured as that sensor."""

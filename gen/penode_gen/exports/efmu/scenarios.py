@@ -45,14 +45,18 @@ class Scenario:
         rows = [",".join([time_column(signals), *signals, *(c for v, _, _ in self.tuned for c in columns(v))])]
         tails = [
             "".join(f",{x!r}" for values in chosen for x in np.ravel(values).tolist())
-            for chosen in zip(*((a, b) for _, a, b in self.tuned))
+            for chosen in zip(*((a, b) for _, a, b in self.tuned), strict=True)
         ] or ["", ""]
         for k, numbers in enumerate(np.concatenate([self.u, self.y], axis=1).tolist()):
             rows.append(f"{k * model.sample_time:.9g}{''.join(f',{x!r}' for x in numbers)}{tails[k >= self.at]}")
         return "\n".join(rows) + "\n"
 
     def tolerance(self, precision: str) -> list[float]:
-        """Of each output: a rounding of its largest value at every sample, in either direction, adds up to some sqrt(n) of them; four times that."""
+        """
+        Of each output [n_y]: four times sqrt(n) roundings of its largest value.
+
+        A rounding at each of n samples, in either direction, adds up to some sqrt(n) of them.
+        """
         unit = 2.0**-24 if precision == "32-bit" else 2.0**-53
         return [max(4 * float(np.abs(column).max()) * len(self.y) ** 0.5 * unit, 1e-30) for column in self.y.T]
 
@@ -82,7 +86,7 @@ def scenarios(model: Model, variables: list[Variable], asked: str | None) -> lis
                 f"--recalibration: a table of {rows} samples with {length} numbers each is too large; choose an earlier time, or none"
             )
         exchange, rows = None, _rows(model, _LASTS)
-    t = np.arange(rows) * model.sample_time
+    t = np.arange(rows, dtype=np.float64) * model.sample_time
     u = np.array([_sweep(i.minimum, i.maximum, 1.0 + 0.1 * k, t) for k, i in enumerate(model.inputs)]).reshape(len(model.inputs), rows).T
     at = round(exchange[0] / model.sample_time) if exchange else rows
     y = _reference(model, u, ["default", exchange[1] if exchange else "default"], at)
@@ -115,14 +119,18 @@ def _exchange(model: Model, asked: str | None) -> tuple[float, str] | None:
 
 def _changes(model: Model, variables: list[Variable], name: str) -> list[tuple[Variable, Array, Array]]:
     before, after = (packing.set_values(model, n, np.float64) for n in ("default", name))
-    pairs = [(v, *(layout.gather(v.element, values).reshape(v.shape) for values in (before, after))) for v in variables if v.element]
-    return [(v, a, b) for v, a, b in pairs if not np.array_equal(a, b)]
+    found: list[tuple[Variable, Array, Array]] = []
+    for v in variables:
+        if v.element is None:
+            continue
+        a, b = (layout.gather(v.element, values).reshape(v.shape) for values in (before, after))
+        found += [] if np.array_equal(a, b) else [(v, a, b)]
+    return found
 
 
 def _sweep(minimum: float | None, maximum: float | None, pace: float, t: Array) -> Array:
     """1 Hz on, faster by 0.25 Hz a second, with falling amplitude; numbers that float holds exactly."""
-    known = minimum is not None and maximum is not None
-    size = _SHARE * (maximum - minimum) / 2 if known else 0.01  # type: ignore[operator]
+    size = 0.01 if minimum is None or maximum is None else _SHARE * (maximum - minimum) / 2
     centre = max(min(0.0, np.inf if maximum is None else maximum - size), -np.inf if minimum is None else minimum + size)
     return np.asarray((centre + size * np.sin(2 * np.pi * pace * (t + 0.125 * t**2)) / (1 + 0.25 * t)).astype(np.float32), float)
 
@@ -150,7 +158,7 @@ def _step(model: Model, numeric: Numeric, x: Array, before: Array, now: Array, r
     h, linear = model.sample_time / model.substeps, model.interpolation == "linear"
     for i in range(model.substeps):
         k, total = np.zeros_like(x), np.zeros_like(x)
-        for node, weight in zip(nodes, weights):
+        for node, weight in zip(nodes, weights, strict=True):
             share = (i + node) / model.substeps if linear else 0.0
             k = numeric.rates(x + h * node * k, before + share * (now - before), rate if linear else 0.0 * rate)
             total = total + weight * k

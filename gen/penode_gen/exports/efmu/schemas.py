@@ -82,7 +82,7 @@ def _of_package(dialect: str) -> dict[str, bytes]:
 def _of_bytes(data: bytes) -> dict[str, bytes]:
     marks = list(_MARK.finditer(data))
     found: dict[str, bytes] = {}
-    for mark, after in zip(marks, [*marks[1:], None]):
+    for mark, after in zip(marks, [*marks[1:], None], strict=True):
         name = mark[1].decode()
         text = data[mark.end() : after.start() if after else mark.end() + _LARGEST]
         if name.endswith(".xsd") and text.startswith(b"<?xml") and _END in text:

@@ -103,10 +103,11 @@ def collect(model: Model, causal: Causal, used: Iterable[str]) -> list[Variable]
     for p in model.parameters.values():
         if p.name in used and not p.tunable:
             found.append(scalar(constant(p.name, taken), "constant", p.value, p.unit, p.description))
-    found += [scalar(f"state.{n}", "state", x, state_unit(model, n), f"state {n}") for n, x in zip(model.states, model.start)]
+    found += [scalar(f"state.{n}", "state", x, state_unit(model, n), f"state {n}") for n, x in zip(model.states, model.start, strict=True)]
     if model.states:
         found += [
-            scalar(f"previous({i.name})", "state", v.start, i.unit, f"{i.name} of the sample before") for i, v in zip(model.inputs, found)
+            scalar(f"previous({i.name})", "state", float(v.start), i.unit, f"{i.name} of the sample before")
+            for i, v in zip(model.inputs, found[: len(model.inputs)], strict=True)
         ]
         found.append(Variable(STARTED, "state", np.array(0.0), description="true from the first good sample on", boolean=True))
     _check(model, found)
@@ -153,12 +154,5 @@ def _check(model: Model, found: list[Variable]) -> None:
 def unit_list(found: list[Variable]) -> list[dict[str, object]]:
     """Each unit once, with exponents of SI base units; always with those of time and of numbers."""
 
-    @dataclass(frozen=True)
-    class _Has:
-        unit: str
-
-    definitions = unit_definitions([_Has(v.unit or "1") for v in found] + [_Has("1"), _Has("s")])  # type: ignore[list-item]
-    for d in definitions:
-        angle = units.is_angle(str(d["name"]))
-        d |= {"id": unit_id(str(d["name"])), "base": {"rad": 1} if angle else d["base"]}
-    return definitions
+    definitions = unit_definitions([*(v.unit or "1" for v in found), "1", "s"])
+    return [{**d, "id": unit_id(d["name"]), "base": {"rad": 1} if units.is_angle(d["name"]) else d["base"]} for d in definitions]

@@ -18,6 +18,8 @@ import numpy as np
 from ...emission.model_c import render
 from ...model import Model
 from ...resources import native, resource
+from ...sets import layout
+from ...sets.packing import RealType
 from ...tools import not_installed
 from ...version import VERSION
 from ..interface import ExportError, Option, Options
@@ -51,7 +53,7 @@ if platform.system() == "Linux" and platform.machine() in ("x86_64", "aarch64"):
     _COMPILERS[f"{platform.machine()}-linux"] = ("gcc", ".so", ("-fPIC", "-Wl,--build-id=none"))
 
 
-def dtype(options: Options) -> type:
+def dtype(options: Options) -> RealType:
     """float32 or float64 inside."""
     return np.float64 if options["real"] == "double" else np.float32
 
@@ -67,8 +69,6 @@ def context(model: Model, options: Options, fmi: int) -> dict[str, Any]:
     found = fv.variables(model, dtype(options))
     groups = fv.groups(found)
     arrays, block = [], 0
-    from ...sets import layout
-
     for array in layout.arrays(model):
         shape = (*array.shape, 1, 1)
         arrays.append({"name": array.name, "rows": shape[0], "columns": shape[1], "blocks": array.blocks, "block": block})
@@ -98,7 +98,7 @@ def context(model: Model, options: Options, fmi: int) -> dict[str, Any]:
         "sets": list(model.sets),
         "sampled": bool(model.sampled),
         "sample_time": repr(model.sample_time),
-        "units": fv.unit_definitions(found),
+        "units": fv.unit_definitions(v.unit for v in found),
         "functions": functions(fmi),
         "real": options["real"],
         "provided": _provided(fmi),

@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product, repeat
 from math import prod
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -65,17 +66,21 @@ class Variable:
         starts = repeat(None) if self.start is None else self.start
         indices = product(*([str(k + 1) for k in range(n)] for n in self.shape))
         names = (f"{self.name}[{','.join(index)}]" for index in indices) if self.shape else (self.name,)
-        yield from zip(names, range(self.first, self.first + self.count), starts)
+        yield from zip(names, range(self.first, self.first + self.count), starts, strict=False)  # None is repeated without end
 
     def scalars(self, head: str, body: str) -> str:
-        """The lines of all elements in FMI 2, with what they share: attributes, and the element inside. 200 000 of them are too many for a template's loop."""
+        """
+        The lines of all elements in FMI 2, with what they share: attributes, and the element inside.
+
+        200 000 of them are too many for a template's loop.
+        """
         before, between = '    <ScalarVariable name="', f" {head}><{body}"
         if self.start is None:
             return "".join(f'{before}{name}" valueReference="{place}"{between}/></ScalarVariable>\n' for name, place, _ in self.elements())
         kind = "choice" if self.kind == "choice" else "real"
         return "".join(
             f'{before}{name}" valueReference="{place}"{between} start="{number(start, kind)}"/></ScalarVariable>\n'
-            for (name, place, _), start in zip(self.elements(), self.start)
+            for (name, place, _), start in zip(self.elements(), self.start, strict=True)
         )
 
 
@@ -84,19 +89,41 @@ def number(value: float, kind: str = "real") -> str:
     return repr(float(value)) if kind == "real" else str(int(value))
 
 
+class _More(TypedDict, total=False):
+    """Fields of a Variable that have a default."""
+
+    unit: str
+    shape: tuple[int, ...]
+    start: tuple[float, ...] | None
+    kind: str
+    choices: tuple[str, ...]
+    minimum: float | None
+    maximum: float | None
+
+
 class _Table:
     def __init__(self) -> None:
         self.variables: list[Variable] = []
         self.end = 0
 
-    def add(self, key: str, name: str, causality: str, variability: str, description: str, **more: object) -> None:
-        self.variables.append(Variable(key, name, self.end, causality, variability, description, **more))  # type: ignore[arg-type]
+    def add(self, key: str, name: str, causality: str, variability: str, description: str, **more: Unpack[_More]) -> None:
+        self.variables.append(Variable(key, name, self.end, causality, variability, description, **more))
         self.end += self.variables[-1].count
 
 
-def variables(model: Model, dtype: type = np.float32) -> list[Variable]:
+def variables(model: Model, dtype: packing.RealType = np.float32) -> list[Variable]:
     """All variables by place. Raises ExportError where two have one name."""
     table = _Table()
+    _common(table, model)
+    _signals(table, model)
+    _jacobians(table, model)
+    _tunables(table, model, dtype)
+    _check_names(table.variables)
+    return table.variables
+
+
+def _common(table: _Table, model: Model) -> None:
+    """What every FMU has: time, choices, and what is known of the set in force."""
     table.add("time", "time", "independent", "continuous", "simulation time", unit="s")
     table.add(
         "parameter_set",
@@ -121,7 +148,31 @@ def variables(model: Model, dtype: type = np.float32) -> list[Variable]:
     table.add("set_id", "set_id", "output", "discrete", "id of the set in force; 1000 and more: written by the master", kind="whole")
     table.add("status", "status", "output", "discrete", "flags of penode/pen_status.h of the last communication step", kind="whole")
     table.add("checksum", "set_checksum", "output", "discrete", "CRC-32 of the set in force", kind="whole")
-    _signals(table, model)
+
+
+def _signals(table: _Table, model: Model) -> None:
+    """Inputs, outputs, sensors, states and constants."""
+    for i in model.inputs:
+        start = min(max(0.0, i.minimum if i.minimum is not None else 0.0), i.maximum if i.maximum is not None else np.inf)
+        more: _More = {"unit": units.si(i.unit), "start": (float(start),), "minimum": i.minimum, "maximum": i.maximum}
+        table.add("input", i.name, "input", "continuous", i.description, **more)
+    for i in model.inputs:
+        words = f"{i.name} at the end of the next communication step; read where input_between_samples is linear"
+        same = table.variables[-len(model.inputs)].start
+        table.add("early", f"early.{i.name}", "input", "continuous", words, unit=units.si(i.unit), start=same)
+    for key, signals in (("output", model.outputs), ("sensor", model.sensors)):
+        for o in signals:
+            table.add(key, o.name, "output", "continuous", o.description, unit=units.si(o.unit))
+    of = _state_units(model)
+    for name, start in zip(model.states, model.start, strict=True):
+        table.add("state", f"state.{name}", "local", "continuous", f"state {name}", unit=of[name], start=(float(start),))
+    for p in model.parameters.values():
+        if not p.tunable:
+            table.add("constant", p.name, "local", "constant", p.description, unit=units.si(p.unit), start=(float(p.value),))
+
+
+def _jacobians(table: _Table, model: Model) -> None:
+    """Derivatives of the state over a communication step."""
     n_x, n_u = len(model.states), len(model.inputs)
     if n_x:
         table.add(
@@ -141,6 +192,10 @@ def variables(model: Model, dtype: type = np.float32) -> list[Variable]:
             "state at the end of the last communication step by the inputs",
             shape=(n_x, n_u),
         )
+
+
+def _tunables(table: _Table, model: Model, dtype: packing.RealType) -> None:
+    """The arrays of the layout table, with the values of the set default."""
     values = packing.set_values(model, "default", dtype)
     described = {p.name: p.description for p in model.tunable} | {n: p.description for n, p in model.networks.items()}
     for array in layout.arrays(model):
@@ -157,29 +212,6 @@ def variables(model: Model, dtype: type = np.float32) -> list[Variable]:
             shape=array.shape,
             start=start,
         )
-    _check_names(table.variables)
-    return table.variables
-
-
-def _signals(table: _Table, model: Model) -> None:
-    """Inputs, outputs, sensors, states and constants."""
-    for i in model.inputs:
-        limits = {"minimum": i.minimum, "maximum": i.maximum}
-        start = min(max(0.0, i.minimum if i.minimum is not None else 0.0), i.maximum if i.maximum is not None else np.inf)
-        table.add("input", i.name, "input", "continuous", i.description, unit=units.si(i.unit), start=(float(start),), **limits)
-    for i in model.inputs:
-        start = table.variables[-len(model.inputs)].start
-        words = f"{i.name} at the end of the next communication step; read where input_between_samples is linear"
-        table.add("early", f"early.{i.name}", "input", "continuous", words, unit=units.si(i.unit), start=start)
-    for key, signals in (("output", model.outputs), ("sensor", model.sensors)):
-        for o in signals:
-            table.add(key, o.name, "output", "continuous", o.description, unit=units.si(o.unit))
-    of = _state_units(model)
-    for name, start in zip(model.states, model.start):
-        table.add("state", f"state.{name}", "local", "continuous", f"state {name}", unit=of[name], start=(float(start),))
-    for p in model.parameters.values():
-        if not p.tunable:
-            table.add("constant", p.name, "local", "constant", p.description, unit=units.si(p.unit), start=(float(p.value),))
 
 
 def _state_units(model: Model) -> dict[str, str]:
@@ -194,14 +226,22 @@ def _check_names(found: list[Variable]) -> None:
     for v in found:
         if v.name in seen:
             problems.append(
-                f"'{v.name}' would be two variables of the FMU, {v.causality} and {seen[v.name].causality}; rename one of them in the model file"
+                f"'{v.name}' would be two variables of the FMU, {v.causality} and {seen[v.name].causality}; "
+                "rename one of them in the model file"
             )
         seen[v.name] = v
     if problems:
         raise ExportError(*problems)
 
 
-def groups(found: list[Variable]) -> list[dict[str, object]]:
+class Group(TypedDict):
+    """Variables of one kind, and the place of the first."""
+
+    key: str
+    first: int
+
+
+def groups(found: list[Variable]) -> list[Group]:
     """First place of each group, in the order in which fmu_sets.c.j2 tells places apart."""
     keys = (
         "time",
@@ -230,11 +270,19 @@ def groups(found: list[Variable]) -> list[dict[str, object]]:
 _BASE = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[current]": "A", "[temperature]": "K", "[substance]": "mol", "[luminosity]": "cd"}
 
 
-def unit_definitions(found: list[Variable]) -> list[dict[str, object]]:
-    """Each unit once, with its exponents of SI base units; None where one is no whole number."""
-    definitions = []
-    for text in sorted({v.unit for v in found if v.unit}):
-        powers = {_BASE[k]: float(p) for k, p in units.dimension(text).items() if k in _BASE and p}
+class UnitDefinition(TypedDict):
+    """A unit, and its exponents of SI base units; None where one is no whole number."""
+
+    name: str
+    base: dict[str, int] | None
+    type: str
+
+
+def unit_definitions(texts: Iterable[str]) -> list[UnitDefinition]:
+    """Each unit of `texts` once; "" is none."""
+    definitions: list[UnitDefinition] = []
+    for text in sorted({unit for unit in texts if unit}):
+        powers = {_BASE[k]: p for k, p in units.exponents(units.dimension(text)).items() if k in _BASE}
         whole = all(p.is_integer() for p in powers.values())
         base = {k: int(p) for k, p in powers.items()} if whole else None
         definitions.append({"name": text, "base": base, "type": f"in {text}"})

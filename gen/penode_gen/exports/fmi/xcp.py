@@ -43,7 +43,8 @@ def described(
     for program in ("gcc", "objcopy"):
         if shutil.which(program) is None:
             raise ExportError(f"--xcp: the A2L needs a compiler, and {not_installed(program)}")
-    stripped, files = dict(made), {}
+    stripped = dict(made)
+    files: dict[str, bytes | str] = {}
     name = f"{model.name}.a2l"
     with tempfile.TemporaryDirectory() as folder:
         for target, data in (made or _compiled(texts, model.name, fmi)).items():

@@ -4,15 +4,15 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Set
+
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from ...algebra import expressions as ex
-from ...algebra.causalise import aliases
-from ...algebra.mechanics import Relation, balances, forces, kinematics, meanings, state_unit
+from ...algebra.mechanics import Relation, aliases, balances, forces, kinematics, meanings, state_unit
 from ...model import Model
-from ...networks import Affine, Network
+from ...networks import Affine, Layer, Network, Vector
 from ...version import VERSION
 from ..interface import ExportError
 from ..templating import render
@@ -39,9 +39,9 @@ class _Writer:
         kinematic, unit_of = kinematics(model)
         names = set(unit_of)
         ports = {name: len(port.input_units) for name, port in model.networks.items()}
-        moving = {*model.states, *(i.name for i in (*model.inputs, *model.sampled)), *(p.name for p in model.points)}
+        moving = {*model.states, *(i.name for i in model.drives), *(p.name for p in model.points)}
 
-        def parse(where: tuple[str, ...], source: str, extra: set[str] = frozenset()) -> sp.Expr:  # type: ignore[assignment]
+        def parse(where: tuple[str, ...], source: str, extra: Set[str] = frozenset()) -> sp.Expr:
             return ex.parse(source, names | extra, ports, moving)
 
         found = [*kinematic, *forces(model, parse, names, lambda *problem: None), *balances(model)]
@@ -118,7 +118,7 @@ class _Writer:
         for i in model.inputs:
             self._line("input Real", i.name, i.unit, description=i.description)
         shown = {name for name, _, _, e in self.signals if e == ex.symbol(name) and name in model.states}
-        for name, start in zip(model.states, model.start):
+        for name, start in zip(model.states, model.start, strict=True):
             self._line("output Real" if name in shown else "Real", name, state_unit(model, name), more=f", start={real(start)}, fixed=true")
         for v in model.variables:
             self.taken.add(identifier(v.name))
@@ -157,7 +157,7 @@ class _Writer:
         parts = [f"min(max({self._print(a)}, {owner}_input_min[{i}]), {owner}_input_max[{i}])" for i, a in enumerate(call.args, 1)]
         return "{" + ", ".join(parts) + "}"
 
-    def _layer(self, layer: object, part: str, name: str, k: int) -> None:
+    def _layer(self, layer: Layer, part: str, name: str, k: int) -> None:
         before, after = f"{name}_h{k - 1}", f"{name}_h{k}"
         if isinstance(layer, Affine):
             self.declared.append(f"Real {after}[{layer.n_out}];")
@@ -165,10 +165,10 @@ class _Writer:
             self.equations.append(f"for i in 1:{layer.n_out} loop {after}[i] = {form.format(before, part)}; end for;")
             return
         sums = f"{name}_p{k}"
-        self.declared += [f"Real {sums}[{layer.n_out}];", f"Real {after}[{layer.n_out}];"]  # type: ignore[attr-defined]
+        self.declared += [f"Real {sums}[{layer.n_out}];", f"Real {after}[{layer.n_out}];"]
         self.equations.append(f"{sums} = {part}_weights*{before} + {part}_bias;")
-        form = ACTIVATIONS[layer.activation].format(f"{sums}[i]")  # type: ignore[attr-defined]
-        self.equations.append(f"for i in 1:{layer.n_out} loop {after}[i] = {form}; end for;")  # type: ignore[attr-defined]
+        form = ACTIVATIONS[layer.activation].format(f"{sums}[i]")
+        self.equations.append(f"for i in 1:{layer.n_out} loop {after}[i] = {form}; end for;")
 
 
 def _used(found: list[Relation], signals: list[tuple[str, str, str, sp.Expr]]) -> list[Relation]:
@@ -195,9 +195,9 @@ ACTIVATIONS = {
 }
 
 
-def arrays(network: Network) -> list[tuple[str, np.ndarray]]:
+def arrays(network: Network) -> list[tuple[str, Vector]]:
     """The numbers of a network with the names of the paper's listing 4: layer_1_weights, layer_1_bias, and of scalings."""
-    found: list[tuple[str, np.ndarray]] = []
+    found: list[tuple[str, Vector]] = []
     if network.input_min is not None and network.input_max is not None:
         found += [("input_min", network.input_min), ("input_max", network.input_max)]
     dense = scale = 0

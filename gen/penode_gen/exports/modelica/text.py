@@ -109,7 +109,7 @@ class Printer(StrPrinter):
         return self._fold("min", e)
 
     def _fold(self, name: str, e: sp.Expr) -> str:
-        parts = [self._print(a) for a in e.args]
+        parts: list[str] = [self._print(a) for a in e.args]
         while len(parts) > 1:
             parts[:2] = [f"{name}({parts[0]}, {parts[1]})"]
         return parts[0]

@@ -24,7 +24,7 @@ _EXCHANGE = re.compile(r"\s*(\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(?:s\s*)?:\s*(\w+
 
 def schedule(model: Model, text: str) -> list[dict[str, Any]]:
     """Exchanges of `2:altered_friction, 7:default`, times in seconds, ascending. Raises ExportError."""
-    found = []
+    found: list[dict[str, Any]] = []
     for part in text.split(",") if text.strip() else []:
         match = _EXCHANGE.fullmatch(part)
         if not match:
@@ -44,15 +44,16 @@ def schedule(model: Model, text: str) -> list[dict[str, Any]]:
     return found
 
 
-def values(model: Model, name: str, dtype: type, scalar: bool) -> list[dict[str, Any]]:
+def values(model: Model, name: str, dtype: packing.RealType, scalar: bool) -> list[dict[str, Any]]:
     """The parameters of a set: name, shape and text of the values; `scalar`: a parameter for each element."""
-    numbers, found = packing.set_values(model, name, dtype), []
+    numbers = packing.set_values(model, name, dtype)
+    found: list[dict[str, Any]] = []
     for array in layout.arrays(model):
         elements = layout.gather(array, numbers)
         if scalar:
             for index in np.ndindex(array.shape):
                 suffix = f"[{','.join(str(k + 1) for k in index)}]" if array.shape else ""
-                found.append({"name": array.name + suffix, "shape": (), "text": fv.number(elements[index])})
+                found.append({"name": array.name + suffix, "shape": (), "text": fv.number(float(elements[index]))})
         else:
             found.append({"name": array.name, "shape": array.shape, "text": " ".join(fv.number(v) for v in np.ravel(elements))})
     return found
@@ -92,7 +93,7 @@ def build(model: Model, options: Options) -> bytes:
         "exchanges": exchanges,
         "chosen": options["set"],
         "stop": (exchanges[-1]["time"] if exchanges else 0.0) + 10000 * model.sample_time,
-        "units": fv.unit_definitions(fv.variables(model, dtype)),
+        "units": fv.unit_definitions(v.unit for v in fv.variables(model, dtype)),
         "signals": [v for v in fv.variables(model, dtype) if v.key in ("input", "output", "sensor")],
         "pairs": record_names(model),
     }
