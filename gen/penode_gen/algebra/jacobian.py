@@ -44,7 +44,9 @@ class Derivatives:
             found += _tidy(expr.diff(symbol)) * self._step(symbol, variable)
         for symbol in sorted(expr.free_symbols & set(self._slope_of), key=lambda s: s.name):
             target, i = self._slope_of[symbol]
-            for second, argument in zip(self.seconds.get(target, [[]] * (i + 1))[i], self._steps[target].arguments):
+            if target not in self.seconds:  # the slope of a straight network does not change
+                continue
+            for second, argument in zip(self.seconds[target][i], self._steps[target].arguments, strict=True):
                 found += expr.diff(symbol) * second * self.total(argument, variable)
         return _factored(found) if found.is_Add else found
 
@@ -58,8 +60,8 @@ class Derivatives:
         kx = [ex.symbol(f"kx[{i}]") for i in range(len(states))]
         ku = [ex.symbol(f"ku[{i}]") for i in range(len(drive))]
         along = [
-            sum((a * k for a, k in zip(row_x + row_u, kx + ku)), sp.Integer(0))
-            for row_x, row_u in zip(self.of(results, states), self.of(results, drive))
+            sum((a * k for a, k in zip(row_x + row_u, kx + ku, strict=True)), sp.Integer(0))
+            for row_x, row_u in zip(self.of(results, states), self.of(results, drive), strict=True)
         ]
         return [[self.total(g, v) for v in states] for g in along], [[self.total(g, v) for v in drive] for g in along]
 
@@ -76,7 +78,7 @@ class Derivatives:
         if key not in self._known:
             step = self._steps[target]
             if step.network:
-                parts = [s * self.total(a, variable) for s, a in zip(self.slopes[target], step.arguments)]
+                parts = [s * self.total(a, variable) for s, a in zip(self.slopes[target], step.arguments, strict=True)]
                 self._known[key] = sp.Add(*parts)
             else:
                 self._known[key] = self.total(step.value, variable)

@@ -60,7 +60,11 @@ def as_inputs(model: Model, causal: Causal) -> tuple[Model, Causal]:
 
 
 def context(model: Model) -> dict[str, Any]:
-    """What templates see of them; `of` and `at`: where in the inputs are source and signal; `word`, `ring`: where in the instance's past."""
+    """
+    What templates see of them.
+
+    `of` and `at`: where in the inputs are source and signal; `word`, `ring`: where in the instance's past.
+    """
     names = [i.name for i in model.inputs]
     found: list[dict[str, Any]] = []
     words = values = 0
@@ -111,7 +115,7 @@ class Past:
     def beside(self, u: Array) -> Array:
         """A sample [n_u] with their signals behind it."""
         whole = list(u)
-        for entry, before in zip(self._entries, self._before):
+        for entry, before in zip(self._entries, self._before, strict=True):
             source, n = whole[entry["of"]], entry["samples"]
             if entry["law"] == "delay":
                 before.append(source)

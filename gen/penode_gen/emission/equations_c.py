@@ -93,7 +93,7 @@ class Equations:
         results = tuple(r.subs(kinematics) for r in results)
         wanted: list[tuple[str, sp.Expr]] = [(f"{target}[{i}]", r) for i, r in enumerate(results)] if values else []
         if jacobian:
-            for name, variables in zip(jacobian, (self.causal.states, self.drive)):
+            for name, variables in zip(jacobian, (self.causal.states, self.drive), strict=True):
                 for i, row in enumerate(self.derivatives.of(results, variables)):
                     wanted += [(f"{name}[{i}][{j}]", entry) for j, entry in enumerate(row)]
         return self._body(wanted)
@@ -105,7 +105,7 @@ class Equations:
             return None
         wanted = [
             (f"{name}[{i}][{j}]", entry)
-            for name, rows in zip(("cx", "cu"), entries)
+            for name, rows in zip(("cx", "cu"), entries, strict=True)
             for i, row in enumerate(rows)
             for j, entry in enumerate(row)
         ]
@@ -122,7 +122,7 @@ class Equations:
         known = {s.name for s in (*causal.states, *self.drive, *(step.target for step in causal.steps))} | set(model.parameters)
         numbered = (ex.symbol(f"t{i}") for i in range(1, 10000) if f"t{i}" not in known)
         temporaries, reduced = sp.cse([e for _, e in derived], symbols=numbered, order="canonical") if derived else ([], [])
-        wanted = plain + [(name, e) for (name, _), e in zip(derived, reduced)]
+        wanted = plain + [(name, e) for (name, _), e in zip(derived, reduced, strict=True)]
         used = set().union(*(e.free_symbols for _, e in wanted), *(e.free_symbols for _, e in temporaries))
         needs_slope = {t for t, group in self.derivatives.slopes.items() if used & set(group)}
         needs_second = {t for t, rows in self.derivatives.seconds.items() if used & set().union(*rows)}

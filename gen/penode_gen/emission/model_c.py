@@ -269,9 +269,8 @@ class Emitter(Equations):
         for name, network in (first.networks if first else {}).items():
             port = self.model.networks[name]
             sizes = [network.n_inputs] + [la.n_out for la in network.layers if isinstance(la, Dense)]
-            found.append(
-                f"{name} [{', '.join(port.input_units)}] -> [{port.output_unit}]: {'-'.join(map(str, sizes))}, {network.n_parameters} parameters"
-            )
+            given, layers = ", ".join(port.input_units), "-".join(map(str, sizes))
+            found.append(f"{name} [{given}] -> [{port.output_unit}]: {layers}, {network.n_parameters} parameters")
         return found
 
     def _set(self, name: str) -> dict[str, Any]:

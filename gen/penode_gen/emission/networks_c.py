@@ -211,7 +211,7 @@ def _loops(statement: str, n: int) -> list[str]:
     """The statement for every input @, every pair of inputs @, % or every triple @, %, #."""
     if n == 1:
         return [statement.replace("@U", "0U").replace("%U", "0U").replace("@", "0").replace("%", "0").replace("#", "0")]
-    marks = [(mark, name) for mark, name in zip("@%#", "ijk") if mark in statement]
+    marks = [(mark, name) for mark, name in zip("@%#", "ijk", strict=True) if mark in statement]
     for mark, name in marks:
         statement = statement.replace(f"{mark}U", name).replace(mark, name)
     lines = [statement]

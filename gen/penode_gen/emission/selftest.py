@@ -82,7 +82,7 @@ def model_context(context: dict[str, Any]) -> dict[str, Any]:
         if double is not None:
             break
     return {
-        "levels": [{"name": i.name, "low": literal(v.low), "step": literal(v.step)} for i, v in zip(context["given"], levels)],
+        "levels": [{"name": i.name, "low": literal(v.low), "step": literal(v.step)} for i, v in zip(context["given"], levels, strict=True)],
         "n_levels": LEVELS,
         "hold": HOLD,
         "level_shift": 32 - _LEVEL_BITS,
@@ -134,8 +134,8 @@ def runtime_answer(real: RealType) -> int:
         return values
 
     with np.errstate(all="ignore"):
-        for arguments in zip(*_ARGUMENTS.values()):
-            found = [getattr(k, name)(real(a) * real(2.0**-8)) for name, a in zip(_ARGUMENTS, arguments)]
+        for arguments in zip(*_ARGUMENTS.values(), strict=True):
+            found = [getattr(k, name)(real(a) * real(2.0**-8)) for name, a in zip(_ARGUMENTS, arguments, strict=True)]
             state = hash_bits(state, np.array(found, real))
         x, w, y = fill(2), fill(63), np.zeros(21, real)
         k.pen_dense(21, 2, w, x, y)

@@ -32,5 +32,9 @@ def exporter(name: str) -> Exporter:
 
 
 def export(model: Model, name: str, path: Path, options: Options | None = None) -> bytes:
-    """The bytes of `model` in a format, for the file `path`, which is not written. Raises ExportError, and KeyError for an unknown format."""
+    """
+    The bytes of `model` in a format, for the file `path`, which is not written.
+
+    Raises ExportError, and KeyError for an unknown format.
+    """
     return run(exporter(name), name, model, path, options or {})

@@ -102,7 +102,8 @@ def flat(path: Path, text: str, model: str) -> Flat:
         said = (done.stderr.replace(alone, "").strip().splitlines() or [f"it ended with code {done.returncode}"])[-1]
         if "unsupported-feature:events" in said:
             raise ImportProblem(
-                f"{path}: {model} has events (when, reinit, or if without noEvent), which are not read; use the elements of a model file for stops and friction"
+                f"{path}: {model} has events (when, reinit, or if without noEvent), which are not read; "
+                "use the elements of a model file for stops and friction"
             )
         raise ImportProblem(f"{path}: rumoca cannot compile {model}: {said[:300]}; mend the model, or name its libraries in MODELICA_LIBS")
     return _parsed(done.stdout, f"{path}: {model}")
@@ -135,9 +136,8 @@ def _declare(found: Flat, line: str, where: str) -> None:
     words, kind, shape, name, attributes, value, description = match.groups()
     role = next((word for word in ("parameter", "constant", "input", "output") if word in words.split()), "")
     if shape or kind not in ("Real", "Integer", "Boolean") or (kind != "Real" and role not in ("parameter", "constant")):
-        raise ImportProblem(
-            f"{where}: {name} is {kind}{shape or ''}{' that changes' if kind != 'Real' and not shape else ''}, which is not read; only Real scalars are"
-        )
+        changes = " that changes" if kind != "Real" and not shape else ""
+        raise ImportProblem(f"{where}: {name} is {kind}{shape or ''}{changes}, which is not read; only Real scalars are")
     if kind == "Boolean":  # a choice that the compiler has made already
         return
     given = dict(re.findall(r'(\w+) = ("[^"]*"|[^,]+)', attributes or ""))

@@ -65,7 +65,7 @@ class _Reader:
             string, number, name, sign = match.groups()
             if string or number or name or (sign and not sign.isspace()):
                 kind = "string" if string else "number" if number else "name" if name else sign
-                self.tokens.append((line, kind, match[0].strip() if not name else name))
+                self.tokens.append((line, kind, name or match[0].strip()))
         self.tokens.append((line, "end", ""))
 
     def error(self, what: str, remedy: str) -> ImportProblem:

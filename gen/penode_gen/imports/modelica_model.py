@@ -39,7 +39,8 @@ def model_file(text: str, path: Path, model: str | None = None) -> str:
         top = re.findall(r"^(?:model|class)\s+(\w+)", text, re.M)
         if len(top) != 1:
             raise ImportProblem(
-                f"{path}: it has {len(known)} models: {', '.join(known[:20])}; choose one with --model, behind its packages: A.B.{known[-1]}"
+                f"{path}: it has {len(known)} models: {', '.join(known[:20])}; "
+                f"choose one with --model, behind its packages: A.B.{known[-1]}"
             )
         known = top
     chosen = model or known[0]

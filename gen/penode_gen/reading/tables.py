@@ -40,8 +40,8 @@ PREFIXES = (
     "network_",
 )  # of names that the generated code makes
 MACROS = (  # that each generated model defines, behind its name
-    "N_X N_U N_IN N_Y N_SENSORS N_LAST N_DRIVE N_COLUMNS N_KEPT N_Q N_W SAMPLE_TIME SUBSTEPS STEP IMPLICIT_STEP AT_FIRST AT_SECOND AT_THIRD "
-    "LAYOUT SET_LENGTH SCRUB VERIFY SAVED SAVED_MAIN PIECES TRIAL TRIAL_ROOM H SETS_H".split()
+    "N_X N_U N_IN N_Y N_SENSORS N_LAST N_DRIVE N_COLUMNS N_KEPT N_Q N_W SAMPLE_TIME SUBSTEPS STEP IMPLICIT_STEP AT_FIRST AT_SECOND "
+    "AT_THIRD LAYOUT SET_LENGTH SCRUB VERIFY SAVED SAVED_MAIN PIECES TRIAL TRIAL_ROOM H SETS_H".split()
 )
 _COMMENT = re.compile(r"(?:(?!\*/|/\*)[^\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\\]){0,200}")
 
@@ -159,7 +159,11 @@ class Tables:
             self.problem(where, f"'{name}' has a meaning of its own in C or in model files", "choose another name")
 
     def _is_macro(self, name: str) -> bool:
-        """Whether the generated C may define this name: its macros are the model's name, or that of the owner of its sets, in capitals, _ and capitals."""
+        """
+        Whether the generated C may define this name.
+
+        Its macros are the model's name, or that of the owner of its sets, in capitals, then _ and capitals.
+        """
         head = self.data.get("model")
         own = head.get("name") if isinstance(head, dict) else None
         return name.isupper() and any(isinstance(o, str) and o and name.startswith(f"{o.upper()}_") for o in (own, self.set_owner))

@@ -83,8 +83,9 @@ def type_name(die: Any) -> str:
 
 class Program:
     """
-    A linked program, or, if `shared`, a shared library, whose addresses count from where it is loaded. Raises ExportError if a file is none,
-    or has no debug information.
+    A linked program, or, if `shared`, a shared library, whose addresses count from where it is loaded.
+
+    Raises ExportError if a file is none, or has no debug information.
     """
 
     def __init__(self, path: Path, shared: bool = False):
@@ -174,7 +175,11 @@ class Program:
         return int.from_bytes(self.bytes_at(place.address, place.size), "little" if self.little_endian else "big")
 
     def pointed(self, place: Place, n: int = 0) -> Place | None:
-        """Element n of what a pointer of the program's file points to; None if it is NULL. Raises KeyError where it is no pointer to data."""
+        """
+        Element n of what a pointer of the program's file points to; None if it is NULL.
+
+        Raises KeyError where it is no pointer to data.
+        """
         plain = bare(place.type)
         if plain.tag != "DW_TAG_pointer_type" or "DW_AT_type" not in plain.attributes:
             raise KeyError(place.path)

@@ -65,7 +65,8 @@ EXPORTER = Exporter(
         ),
         Option(
             "recalibration",
-            'exchange of sets in a scenario of the Behavioral Model, such as "2:altered_friction", or none (default: at 2 s to the second set)',
+            'exchange of sets in a scenario of the Behavioral Model, such as "2:altered_friction", or none '
+            "(default: at 2 s to the second set)",
         ),
         Option("schemas", "folder with the schemas of the dialect (default for beta1: those in the package rumoca)"),
     ),

@@ -14,9 +14,9 @@ from ...algebra import expressions as ex, functions
 from ..interface import ExportError
 
 _RESERVED = frozenset(
-    "block protected public record end function method algorithm signals signal input output parameter constant Boolean Integer Real if then "
-    "elseif else for in loop and or not size self limit true false while do until break return enumeration String min max previous derivative "
-    "INVALID_ARGUMENT OVERFLOW NAN SOLVE_LINEAR_EQUATIONS_FAILED NO_SOLUTION_FOUND UNSPECIFIED_ERROR".split()
+    "block protected public record end function method algorithm signals signal input output parameter constant Boolean Integer Real "
+    "if then elseif else for in loop and or not size self limit true false while do until break return enumeration String "
+    "min max previous derivative INVALID_ARGUMENT OVERFLOW NAN SOLVE_LINEAR_EQUATIONS_FAILED NO_SOLUTION_FOUND UNSPECIFIED_ERROR".split()
 )
 # Functions of the language, also for arrays (tanh1D), and names that it keeps for such: none may be given to anything else.
 _BUILT_IN = re.compile(

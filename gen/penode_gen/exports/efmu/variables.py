@@ -27,7 +27,12 @@ _KINDS = {"input": "input ", "output": "output ", "tunableParameter": "parameter
 
 @dataclass(frozen=True)
 class Variable:
-    """`start` in the shape of the variable, () for a scalar; `causality` as the manifest calls it; `element` of the runtime's layout, if it is one."""
+    """
+    A variable of the block.
+
+    `start` in the shape of the variable, () for a scalar; `causality` as the manifest calls it; `element` of the runtime's layout,
+    if it is one.
+    """
 
     label: str
     causality: str

@@ -146,7 +146,11 @@ def flat(text: str, real: str) -> str:
 
 
 def binaries(texts: dict[str, str], name: str, fmi: int, debug: bool = False) -> dict[str, bytes]:
-    """Platform of FMI 3 -> shared library, for each compiler that is installed here; `debug`: ELF files with DWARF. Raises ExportError where one refuses."""
+    """
+    Platform of FMI 3 -> shared library, for each compiler that is installed here; `debug`: ELF files with DWARF.
+
+    Raises ExportError where one refuses.
+    """
     made: dict[str, bytes] = {}
     with tempfile.TemporaryDirectory() as folder:
         for file, text in texts.items():

@@ -5,6 +5,7 @@ The functions of FMI 3.0 and 2.0, in the order of the standard.
 
 A line is `NAME(parameters)` and stands for `fmiVStatus fmiVNAME(instance, parameters)`; another type of the result stands
 before the name, and then there is no instance unless it is written. @ stands for fmiV, & for value references and their number.
+A line with blanks before it goes on with the one above.
 """
 
 from __future__ import annotations
@@ -15,9 +16,15 @@ from dataclasses import dataclass
 _THREE = """
 const char * GetVersion(void)
 SetDebugLogging(@Boolean loggingOn, size_t nCategories, const @String categories[])
-@Instance InstantiateModelExchange(@String instanceName, @String instantiationToken, @String resourcePath, @Boolean visible, @Boolean loggingOn, @InstanceEnvironment instanceEnvironment, @LogMessageCallback logMessage)
-@Instance InstantiateCoSimulation(@String instanceName, @String instantiationToken, @String resourcePath, @Boolean visible, @Boolean loggingOn, @Boolean eventModeUsed, @Boolean earlyReturnAllowed, const @ValueReference requiredIntermediateVariables[], size_t nRequiredIntermediateVariables, @InstanceEnvironment instanceEnvironment, @LogMessageCallback logMessage, @IntermediateUpdateCallback intermediateUpdate)
-@Instance InstantiateScheduledExecution(@String instanceName, @String instantiationToken, @String resourcePath, @Boolean visible, @Boolean loggingOn, @InstanceEnvironment instanceEnvironment, @LogMessageCallback logMessage, @ClockUpdateCallback clockUpdate, @LockPreemptionCallback lockPreemption, @UnlockPreemptionCallback unlockPreemption)
+@Instance InstantiateModelExchange(@String instanceName, @String instantiationToken, @String resourcePath, @Boolean visible, @Boolean
+    loggingOn, @InstanceEnvironment instanceEnvironment, @LogMessageCallback logMessage)
+@Instance InstantiateCoSimulation(@String instanceName, @String instantiationToken, @String resourcePath, @Boolean visible, @Boolean
+    loggingOn, @Boolean eventModeUsed, @Boolean earlyReturnAllowed, const @ValueReference requiredIntermediateVariables[], size_t
+    nRequiredIntermediateVariables, @InstanceEnvironment instanceEnvironment, @LogMessageCallback logMessage, @IntermediateUpdateCallback
+    intermediateUpdate)
+@Instance InstantiateScheduledExecution(@String instanceName, @String instantiationToken, @String resourcePath, @Boolean visible, @Boolean
+    loggingOn, @InstanceEnvironment instanceEnvironment, @LogMessageCallback logMessage, @ClockUpdateCallback clockUpdate,
+    @LockPreemptionCallback lockPreemption, @UnlockPreemptionCallback unlockPreemption)
 void FreeInstance()
 EnterInitializationMode(@Boolean toleranceDefined, @Float64 tolerance, @Float64 startTime, @Boolean stopTimeDefined, @Float64 stopTime)
 ExitInitializationMode()
@@ -29,15 +36,18 @@ GetClock(&, @Clock values[])
 SetBinary(&, const size_t valueSizes[], const @Binary values[], size_t nValues)
 SetClock(&, const @Clock values[])
 GetNumberOfVariableDependencies(@ValueReference valueReference, size_t *nDependencies)
-GetVariableDependencies(@ValueReference dependent, size_t elementIndicesOfDependent[], @ValueReference independents[], size_t elementIndicesOfIndependents[], @DependencyKind dependencyKinds[], size_t nDependencies)
+GetVariableDependencies(@ValueReference dependent, size_t elementIndicesOfDependent[], @ValueReference independents[], size_t
+    elementIndicesOfIndependents[], @DependencyKind dependencyKinds[], size_t nDependencies)
 GetFMUState(@FMUState *FMUState)
 SetFMUState(@FMUState FMUState)
 FreeFMUState(@FMUState *FMUState)
 SerializedFMUStateSize(@FMUState FMUState, size_t *size)
 SerializeFMUState(@FMUState FMUState, @Byte serializedState[], size_t size)
 DeserializeFMUState(const @Byte serializedState[], size_t size, @FMUState *FMUState)
-GetDirectionalDerivative(const @ValueReference unknowns[], size_t nUnknowns, const @ValueReference knowns[], size_t nKnowns, const @Float64 seed[], size_t nSeed, @Float64 sensitivity[], size_t nSensitivity)
-GetAdjointDerivative(const @ValueReference unknowns[], size_t nUnknowns, const @ValueReference knowns[], size_t nKnowns, const @Float64 seed[], size_t nSeed, @Float64 sensitivity[], size_t nSensitivity)
+GetDirectionalDerivative(const @ValueReference unknowns[], size_t nUnknowns, const @ValueReference knowns[], size_t nKnowns, const
+    @Float64 seed[], size_t nSeed, @Float64 sensitivity[], size_t nSensitivity)
+GetAdjointDerivative(const @ValueReference unknowns[], size_t nUnknowns, const @ValueReference knowns[], size_t nKnowns, const @Float64
+    seed[], size_t nSeed, @Float64 sensitivity[], size_t nSensitivity)
 EnterConfigurationMode()
 ExitConfigurationMode()
 GetIntervalDecimal(&, @Float64 intervals[], @IntervalQualifier qualifiers[])
@@ -49,7 +59,8 @@ SetIntervalFraction(&, const @UInt64 counters[], const @UInt64 resolutions[])
 SetShiftDecimal(&, const @Float64 shifts[])
 SetShiftFraction(&, const @UInt64 counters[], const @UInt64 resolutions[])
 EvaluateDiscreteStates()
-UpdateDiscreteStates(@Boolean *discreteStatesNeedUpdate, @Boolean *terminateSimulation, @Boolean *nominalsOfContinuousStatesChanged, @Boolean *valuesOfContinuousStatesChanged, @Boolean *nextEventTimeDefined, @Float64 *nextEventTime)
+UpdateDiscreteStates(@Boolean *discreteStatesNeedUpdate, @Boolean *terminateSimulation, @Boolean *nominalsOfContinuousStatesChanged,
+    @Boolean *valuesOfContinuousStatesChanged, @Boolean *nextEventTimeDefined, @Float64 *nextEventTime)
 EnterContinuousTimeMode()
 CompletedIntegratorStep(@Boolean noSetFMUStatePriorToCurrentPoint, @Boolean *enterEventMode, @Boolean *terminateSimulation)
 SetTime(@Float64 time)
@@ -62,7 +73,8 @@ GetNumberOfEventIndicators(size_t *nEventIndicators)
 GetNumberOfContinuousStates(size_t *nContinuousStates)
 EnterStepMode()
 GetOutputDerivatives(&, const @Int32 orders[], @Float64 values[], size_t nValues)
-DoStep(@Float64 currentCommunicationPoint, @Float64 communicationStepSize, @Boolean noSetFMUStatePriorToCurrentPoint, @Boolean *eventHandlingNeeded, @Boolean *terminateSimulation, @Boolean *earlyReturn, @Float64 *lastSuccessfulTime)
+DoStep(@Float64 currentCommunicationPoint, @Float64 communicationStepSize, @Boolean noSetFMUStatePriorToCurrentPoint, @Boolean
+    *eventHandlingNeeded, @Boolean *terminateSimulation, @Boolean *earlyReturn, @Float64 *lastSuccessfulTime)
 ActivateModelPartition(@ValueReference clockReference, @Float64 activationTime)
 """
 
@@ -70,7 +82,8 @@ _TWO = """
 const char * GetTypesPlatform(void)
 const char * GetVersion(void)
 SetDebugLogging(@Boolean loggingOn, size_t nCategories, const @String categories[])
-@Component Instantiate(@String instanceName, @Type fmuType, @String fmuGUID, @String fmuResourceLocation, const @CallbackFunctions *functions, @Boolean visible, @Boolean loggingOn)
+@Component Instantiate(@String instanceName, @Type fmuType, @String fmuGUID, @String fmuResourceLocation, const @CallbackFunctions
+    *functions, @Boolean visible, @Boolean loggingOn)
 void FreeInstance()
 SetupExperiment(@Boolean toleranceDefined, @Real tolerance, @Real startTime, @Boolean stopTimeDefined, @Real stopTime)
 EnterInitializationMode()
@@ -91,7 +104,8 @@ FreeFMUstate(@FMUstate *FMUstate)
 SerializedFMUstateSize(@FMUstate FMUstate, size_t *size)
 SerializeFMUstate(@FMUstate FMUstate, @Byte serializedState[], size_t size)
 DeSerializeFMUstate(const @Byte serializedState[], size_t size, @FMUstate *FMUstate)
-GetDirectionalDerivative(const @ValueReference vUnknown_ref[], size_t nUnknown, const @ValueReference vKnown_ref[], size_t nKnown, const @Real dvKnown[], @Real dvUnknown[])
+GetDirectionalDerivative(const @ValueReference vUnknown_ref[], size_t nUnknown, const @ValueReference vKnown_ref[], size_t nKnown, const
+    @Real dvKnown[], @Real dvUnknown[])
 EnterEventMode()
 NewDiscreteStates(@EventInfo *@eventInfo)
 EnterContinuousTimeMode()
@@ -138,7 +152,7 @@ class Function:
 
 def functions(version: int) -> list[Function]:
     """All functions of FMI 2 or 3."""
-    found = [_read(line, version) for line in (_THREE if version == 3 else _TWO).split("\n") if line]
+    found = [_read(line, version) for line in (_THREE if version == 3 else _TWO).replace("\n    ", " ").split("\n") if line]
     if version == 3:
         found += [_read(f"Get{kind}(&, @{kind} values[], size_t nValues)", 3) for kind in _TYPES]
         found += [_read(f"Set{kind}(&, const @{kind} values[], size_t nValues)", 3) for kind in _TYPES]

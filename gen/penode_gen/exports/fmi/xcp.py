@@ -4,8 +4,8 @@
 FMI-LS-XCP 1.0: an A2L beside each binary of an FMU, and one for its sources.
 
 The FMU has no XCP slave of its own: the importer's reads and writes its memory between two communication steps. So the FMU has one
-instance, a static variable. Addresses count from where the binary is loaded; in the A2L of the sources they are 0, and SYMBOL_LINKs say what to
-fill in once it is compiled.
+instance, a static variable. Addresses count from where the binary is loaded; in the A2L of the sources they are 0, and SYMBOL_LINKs say
+what to fill in once it is compiled.
 """
 
 from __future__ import annotations

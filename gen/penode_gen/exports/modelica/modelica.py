@@ -31,7 +31,8 @@ EXPORTER = Exporter(
     options=(
         Option(
             "form",
-            "model: all of it, self-contained (default); library: record and block for NeuralNetwork 2.1; external: C with its block, a .zip",
+            "model: all of it, self-contained (default); library: record and block for NeuralNetwork 2.1; "
+            "external: C with its block, a .zip",
             choices=FORMS,
             default="model",
         ),

@@ -29,14 +29,16 @@ def schedule(model: Model, text: str) -> list[dict[str, Any]]:
         match = _EXCHANGE.fullmatch(part)
         if not match:
             raise ExportError(
-                f"--schedule: '{part.strip()}' is no exchange; write a time in seconds, a colon and a set, such as 2.5:{next(iter(model.sets), 'default')}"
+                f"--schedule: '{part.strip()}' is no exchange; write a time in seconds, a colon and a set, "
+                f"such as 2.5:{next(iter(model.sets), 'default')}"
             )
         time, name = float(match[1]), match[2]
         if name not in model.sets:
             raise ExportError(f"--schedule: the model file has no set '{name}'; use one of: {', '.join(model.sets)}")
         if abs(time / model.sample_time - round(time / model.sample_time)) > 1e-6:
             raise ExportError(
-                f"--schedule: {time:g} s is no multiple of the sample time, {model.sample_time:g} s; a set comes into force between two samples"
+                f"--schedule: {time:g} s is no multiple of the sample time, {model.sample_time:g} s; "
+                "a set comes into force between two samples"
             )
         if found and time <= found[-1]["time"]:
             raise ExportError(f"--schedule: {time:g} s does not come after {found[-1]['time']:g} s; give the times in order")
