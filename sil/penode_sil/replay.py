@@ -121,9 +121,9 @@ def _between(tables: list[Recording], wanted: dict[str, str], raster: Array, ste
         if worst > 0.01:  # an error of pi * 1 % at half of the highest frequency
             what = f"rows are off an even clock by {worst:.2g} of their interval"
             raise RecordingError(f"{table.path}: channel {name}: its {what}; replay it with --replay linear or held")
-        place = (raster - time[0]) / usual
-        if np.max(np.abs(place - np.rint(place))) < 1e-3 and 0.999 * step <= usual <= 1.001 * step:
-            columns.append(values[np.rint(place).astype(int)])
+        rows = (raster - time[0]) / usual
+        if np.max(np.abs(rows - np.rint(rows))) < 1e-3 and 0.999 * step <= usual <= 1.001 * step:
+            columns.append(values[np.rint(rows).astype(int)])
             continue
         kernel = recordings.Kernel(raster, float(time[0]), float(grid[1] - grid[0]), time.size, step)
         columns.append(kernel.apply(values[:, None])[:, 0])

@@ -119,8 +119,8 @@ def fit(model: Model, set_name: str, replay: Replay, start: Start) -> tuple[dict
     free = [i for i, name in enumerate(model.states) if name not in start.given]
     if sum(values.size for _, _, _, values, _ in residual.rows) < len(free):
         raise RecordingError(
-            f"{replay.plan.path}: its first {count} samples measure too little to fit {len(free)} states; give --start measured:K with "
-            "a larger K"
+            f"{replay.plan.path}: its first {count} samples measure too little to fit {len(free)} states; "
+            "give --start measured:K with a larger K"
         )
     x, unseen = _solve(residual, x, free)
     if not np.isfinite(x).all():
