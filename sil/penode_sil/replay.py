@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from penode_gen.model import Model
 
 from . import recordings, scenario as scenarios
-from .errors import RecordingError, UserError
+from .errors import Problem, RecordingError, UserError
 from .recordings import Recording
 from .signals import Samples
 
@@ -61,16 +61,17 @@ def load(path: Path, model: Model, set_name: str | None, channels: Iterable[str]
         u = np.zeros((raster.size, 0))
     for remark in remarks:
         note(f"{path}: {remark}")
-    times = np.arange(raster.size) * model.sample_time
+    times = np.arange(raster.size, dtype=np.float64) * model.sample_time
     inputs = {s.name: Samples(times, column) for s, column in zip(model.inputs, u.T, strict=True)}
     instance = scenarios.Instance(model.name, set_name or next(iter(model.sets)))
     plan = scenarios.Scenario(path.stem, float(times[-1]), inputs, {}, (instance,), path)
     return Replay(plan, times, float(raster[0]), u, sensed)
 
 
-def _sensed(tables: list[Recording], signals: dict[str, str], path: Path) -> tuple[dict[str, Sensed], dict[str, str]]:
+def _sensed(tables: list[Recording], signals: dict[str, str], path: Path) -> tuple[dict[str, Sensed], dict[str, Problem]]:
     """The sensors that the file holds, and why those that cannot be read are left out."""
-    found, broken = {}, {}
+    found: dict[str, Sensed] = {}
+    broken: dict[str, Problem] = {}
     for name, unit in signals.items():
         try:
             if not any(table.find(name, unit) for table in tables):
@@ -103,7 +104,8 @@ def _clock(path: Path, sensed: dict[str, Sensed], model: Model) -> Array:
         raise RecordingError(f"{path}: its sensors share less than two samples of {step * 1e3:g} ms; record them together")
     if count > 1000 * max(s.time.size for s in sensed.values()):
         raise RecordingError(f"{path}: it has far longer gaps than samples; split the recording there")
-    return first + np.arange(count) * step
+    raster: Array = first + np.arange(count, dtype=np.float64) * step
+    return raster
 
 
 def _between(tables: list[Recording], wanted: dict[str, str], raster: Array, step: float, how: str) -> tuple[Array, list[str]]:

@@ -26,7 +26,7 @@ from penode_gen.algebra import placeholder
 from penode_gen.model import Model
 from penode_gen.resources import native
 
-from .building import FLAGS, build_library, build_once, compiler_version, generated, include, missing_tool, model_options, sources_in
+from .building import FLAGS, Part, build_library, build_once, compiler_version, generated, include, missing_tool, model_options, sources_in
 from .choices import MACHINES as MACHINES
 from .errors import TargetError
 from .instance import Instance, Set
@@ -182,7 +182,7 @@ def build_firmware(model: Model, machine: str, source: Path | None = None, optim
     sets = ",".join(f"&{model.name}_set_{name}" for name in model.sets)
     compiler = "arm-none-eabi-gcc" if board else "gcc"
     options = [*(cross(board) if board else ["gcc", *include("inc", "port/gnu", "sil/firmware")]), *FLAGS, optimise]
-    read = [compiler_version(compiler), *runtime, *_included()]
+    read: list[Part] = [compiler_version(compiler), *runtime, *_included()]
     same = build_once(f"runtime-{machine}", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], read)  # for every model
     files = [program, *code, same, *([] if board else [port])]
     command = [*options, *model_options(model), f"-DMODEL_SETS={sets}", f"-I{source}", *map(str, files)]
@@ -200,7 +200,13 @@ def build_object(model: Any, machine: str, name: str) -> Path:
     """One file of a model's C as it is for an emulated one of MACHINES, by itself."""
     source = generated(model)
     command = [*cross(MACHINES[machine]), *FLAGS, "-O2", f"-I{source}", *include("src"), "-c", str(source / name)]
-    read = [compiler_version("arm-none-eabi-gcc"), source / name, source / f"{model.name}.h", *sources_in(("src", "*.h")), *_included()]
+    read: list[Part] = [
+        compiler_version("arm-none-eabi-gcc"),
+        source / name,
+        source / f"{model.name}.h",
+        *sources_in(("src", "*.h")),
+        *_included(),
+    ]
     return build_once(f"{Path(name).stem}-{machine}", ".o", command, read)
 
 

@@ -148,7 +148,7 @@ def test_missing_emulator_is_said(nqvm, tmp_path, monkeypatch):
     need("arm-none-eabi-gcc")
     pil = Pil(nqvm, "m4f")
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(UserError, match="^qemu-system-arm is not installed; install it, on Debian: apt-get install qemu-system-arm$"):
+    with pytest.raises(UserError, match=r"^qemu-system-arm is not installed; install it, on Debian: apt-get install qemu-system-arm$"):
         pil.run(chirp(1))
 
 

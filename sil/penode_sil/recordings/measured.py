@@ -200,7 +200,7 @@ def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
         raise RecordingError(f"{path}: its {count} samples of {step * 1e3:g} ms are too few; record at least {SHORTEST}")
     if count > 20 * sum(c.time.size * max(1.0, c.interval / step) for c in clocks):
         raise RecordingError(f"{path}: it has far longer gaps than samples; split the recording there")
-    return first + np.arange(count) * step
+    return first + np.arange(count, dtype=np.float64) * step
 
 
 def _take(raster: Array, step: float, signal: Input | Signal, table: Recording, own: Own, driving: bool, notes: list[str]) -> _Taken | None:

@@ -40,9 +40,9 @@ def described(
     """
     if importlib.util.find_spec("elftools") is None:
         raise ExportError("--xcp: the A2L needs the Python package pyelftools, which is not installed; pip install penode[xcp]")
-    for program in ("gcc", "objcopy"):
-        if shutil.which(program) is None:
-            raise ExportError(f"--xcp: the A2L needs a compiler, and {not_installed(program)}")
+    for tool in ("gcc", "objcopy"):
+        if shutil.which(tool) is None:
+            raise ExportError(f"--xcp: the A2L needs a compiler, and {not_installed(tool)}")
     stripped = dict(made)
     files: dict[str, bytes | str] = {}
     name = f"{model.name}.a2l"
