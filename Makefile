@@ -33,6 +33,8 @@ run: setup ## The main job: recalibration while it runs, on the host and a Corte
 	$(Q)$(PENODE) diagnose $(RECORDED)/model.toml --data $(RECORDED)/train.csv --holdout $(RECORDED)/holdout.csv \
 	    -o build/run/diagnosis
 
+pythons: setup build/setup/pythons ## Packages for other interpreters that are installed here, so that python-install tries the wheel with them too
+
 test: setup ## All checks; the last line adds them up
 	$(Q)$(PYTHON) test/tally.py -j $$(nproc) $(SUITES)
 
@@ -104,11 +106,12 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run test prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table ablate rigs hidden-mechanisms dist structure clean
+.PHONY: help setup run pythons test prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table ablate rigs hidden-mechanisms dist structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools
 build/setup/unity build/setup/cmock build/setup/proof: build/setup/tools
+build/setup/pythons: requirements.txt pyproject.toml build/setup/python
 build/setup/rivals: test/diagnosis/rivals/requirements.txt build/setup/tools
 build/setup/rival_training: test/training/rivals/requirements.txt build/setup/tools
 build/setup/packages: test/packages/requirements.txt build/setup/tools

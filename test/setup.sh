@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 #
-# setup.sh tools|python|unity|cmock|packages|proof|rivals|rival_training: one part of the set-up each; the Makefile calls it, once. All goes into build/
+# setup.sh tools|python|pythons|unity|cmock|packages|proof|rivals|rival_training: one part of the set-up each; the Makefile calls it, once. All goes into build/
 # but the Debian packages of `tools` and `proof`. Quiet where there is nothing to do; one line that names the remedy where it cannot.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -99,6 +99,21 @@ python()
     { build/venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt &&
         build/venv/bin/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .; } \
         >build/setup/python.log 2>&1 || give_up "pip failed, see build/setup/python.log; is the package index reachable?"
+}
+
+pythons() # what penode needs, for each other interpreter that is installed
+{
+    local version wanted
+    wanted=$(build/venv/bin/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["dependencies"])')
+    rm -rf build/pythons
+    for version in 3.11 3.12 3.13 3.14; do
+        if "python$version" --version >/dev/null 2>&1 && [ ! -e "build/venv/bin/python$version" ]; then
+            echo "setup: Python packages for python$version into build/pythons/$version"
+            { "python$version" -m venv "build/pythons/$version" &&
+                "build/pythons/$version/bin/python" -m pip install --quiet --disable-pip-version-check -c requirements.txt $wanted; } \
+                >build/setup/pythons.log 2>&1 || give_up "pip failed, see build/setup/pythons.log; is the package index reachable?"
+        fi
+    done
 }
 
 packages() # what reads manifests of packages, in a place of its own

@@ -5,7 +5,7 @@
 
 # Each takes one core there; the longest begin, so that none runs on alone.
 SUITES   := python-sil hidden-fixed hidden-fresh figures-check python-gen unit warnings misra accuracy python-tools \
-            python-diagnosis python-training python-exports symbols builds board gen-check cmock
+            python-diagnosis python-training python-exports python-install symbols builds board gen-check cmock
 PYTHONS  := $(filter python-%,$(SUITES))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
 ALIKE    := mps2-an500 mps2-an505 # same compiler as mps2-an386, same instruction set but for reals; mps3-an547 has loops of its own
