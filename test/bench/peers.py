@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import penode_gen
+from penode_gen.networks import Network
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -58,7 +59,7 @@ class Peer:
     weights_inside: int = 0  # bytes of its own constants that are weights
 
 
-def plain_layers(network: penode_gen.networks.Network) -> list[Layer]:
+def plain_layers(network: Network) -> list[Layer]:
     """Weights and biases of the dense layers in float, with the scaling of input and output worked in."""
     before, *dense, after = network.layers
     layers = [(layer.weights.copy(), layer.bias.copy()) for layer in dense]

@@ -18,6 +18,7 @@ from master import Master, Unpacked, export
 from test_fmu import SET, STEP, run, write_set
 
 import penode_gen
+from penode_gen.sets import layout
 from penode_sil.schedule import Call
 from penode_sil.targets import Sil
 
@@ -69,10 +70,10 @@ def test_libcosim_changes_weights_while_it_runs(nqvm: Any, held: Any, tmp_path: 
     values = penode_gen.set_values(nqvm, SET)
     for k in range(1000):
         if k == 500:
-            for array in penode_gen.sets.layout.arrays(nqvm):
+            for array in layout.arrays(nqvm):
                 elements = unpacked.elements(array.name)
                 manipulator.slave_real_values(
-                    slave, [unpacked.reference[n] for n in elements], np.ravel(penode_gen.sets.layout.gather(array, values)).tolist()
+                    slave, [unpacked.reference[n] for n in elements], np.ravel(layout.gather(array, values)).tolist()
                 )
         execution.step()
         found.append(observer.last_real_values(slave, [unpacked.reference["z_b"], unpacked.reference["z_w"]]))

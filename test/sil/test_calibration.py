@@ -205,7 +205,7 @@ def test_compare_names_sets_and_values() -> None:
             stage.stage_set(link, a2l, chosen)
         with links.connected(where) as link:
             seen = pages.look(link, a2l)
-    assert stage._names(model, np.dtype("f4"), seen) == ("altered_friction (set 2)", "default (set 1)")
+    assert stage.what_runs(model, np.dtype("f4"), seen) == ("altered_friction (set 2)", "default (set 1)")
     default = np.asarray(penode_gen.set_values(model, "default"))
     rows = seen.differing(a2l, pages.segment(a2l)[0])
     assert len(rows) == np.count_nonzero(default != chosen.values)
