@@ -153,13 +153,13 @@ def two_parts(value: mp.mpf, bits: int, real: str) -> tuple[float, float]:
 
 
 def horner(coefficients: list[float], real: str, variable: str) -> str:
-    """C expression of the polynomial, wrapped at 112 columns."""
+    """C expression of the polynomial, wrapped at 140 columns."""
     first, *middle, last = [literal(c, real) for c in coefficients]
     close = ")" * (2 * len(middle) + 1)
     parts = [f"{first} + ", *[f"({variable} * ({c} + " for c in middle], f"({variable} * {last}{close}"]
     lines = [""]
     for part in parts:
-        if len(lines[-1]) + len(part) > 101:
+        if len(lines[-1]) + len(part) > 129:
             lines.append("")
         lines[-1] += part
     return ("\n" + " " * 11).join(line.rstrip() for line in lines)
@@ -186,14 +186,19 @@ def constants(real: str) -> list[str]:
     return [f"#define {name} {literal(value, real)}" for name, value in values.items()]
 
 
+def spaced(text: str) -> str:
+    """The text with one space where there are several, or a line ends: a formatter may align constants."""
+    return " ".join(text.split())
+
+
 def main() -> int:
     """Print the C text, or say which part of it the file named after --check lacks."""
     parts = [part for real in PRECISION for part in (*constants(real), *(c_function(fit, real) for fit in FITS))]
     if sys.argv[1:2] != ["--check"]:
         print("\n".join(parts))
         return 0
-    source = Path(sys.argv[2]).read_text()
-    missing = [part for part in parts if part not in source]
+    source = spaced(Path(sys.argv[2]).read_text())
+    missing = [part for part in parts if spaced(part) not in source]
     print(f"{sys.argv[2]}: {len(parts) - len(missing)} of {len(parts)} constants and polynomials are the derived ones")
     print("\n".join(missing), end="")
     return 1 if missing else 0

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import mpmath as mp
-from coefficients import LN2, PRECISION, Fit, c_function, literal, rounded, two_parts
+from coefficients import LN2, PRECISION, Fit, c_function, literal, rounded, spaced, two_parts
 
 LIMIT = 8192  # rad; what pen_elementary.h states for sin and cos
 LIMIT_BITS = 13  # of n, the number of right angles in it: 5215
@@ -120,8 +120,8 @@ def main() -> int:
     if sys.argv[1:2] != ["--check"]:
         print("\n".join(parts))
         return 0
-    source = "".join(Path(name).read_text() for name in sys.argv[2:])
-    missing = [part for part in parts if part not in source]
+    source = spaced("".join(Path(name).read_text() for name in sys.argv[2:]))
+    missing = [part for part in parts if spaced(part) not in source]
     print(f"{len(parts) - len(missing)} of {len(parts)} constants and polynomials are the derived ones")
     print("\n".join(missing), end="")
     return 1 if missing else 0
