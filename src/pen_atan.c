@@ -20,18 +20,19 @@
 #include "penode/pen_math.h"
 #include "penode/pen_port.h"
 
-#define ZERO ((pen_real_t)0)
-#define ONE ((pen_real_t)1)
+#define ZERO       ((pen_real_t)0)
+#define ONE        ((pen_real_t)1)
 #define NEAR_ANGLE ((pen_real_t)0.5463) /* tan(1/2) */
-#define FAR_ANGLE ((pen_real_t)1.8304)  /* and 1 by it */
+#define FAR_ANGLE  ((pen_real_t)1.8304) /* and 1 by it */
 
 #ifdef PEN_REAL_DOUBLE
 
-#define HALF_PI_HIGH 1.5707963267948966
-#define HALF_PI_LOW 6.123233995736766e-17
+#define HALF_PI_HIGH    1.5707963267948966
+#define HALF_PI_LOW     6.123233995736766e-17
 #define QUARTER_PI_HIGH 0.7853981633974483
-#define QUARTER_PI_LOW 3.061616997868383e-17
+#define QUARTER_PI_LOW  3.061616997868383e-17
 
+/* clang-format off */ /* as test/accuracy/elementary_coefficients.py prints them */
 /* atan(t) = t - t z P(z), z = t^2; relative error 0.042 * 2^-53 */
 static pen_real_t atan_tail(pen_real_t z)
 {
@@ -40,13 +41,13 @@ static pen_real_t atan_tail(pen_real_t z)
            (z * (0.05259794228830514 + (z * (-0.047400176274711776 + (z * (0.04241784571096471 + (z * (-0.0361810618718513 +
            (z * (0.026888148678514433 + (z * (-0.014769908557299096 + (z * 0.0042758966669498326)))))))))))))))))))))))))));
 }
-
+/* clang-format on */
 #else
 
-#define HALF_PI_HIGH 1.5707964F
-#define HALF_PI_LOW -4.371139e-08F
+#define HALF_PI_HIGH    1.5707964F
+#define HALF_PI_LOW     -4.371139e-08F
 #define QUARTER_PI_HIGH 0.7853982F
-#define QUARTER_PI_LOW -2.1855694e-08F
+#define QUARTER_PI_LOW  -2.1855694e-08F
 
 /* atan(t) = t - t z P(z), z = t^2; relative error 0.041 * 2^-24 */
 static pen_real_t atan_tail(pen_real_t z)

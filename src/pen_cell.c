@@ -5,11 +5,11 @@
 
 #include "penode/pen_cell.h"
 
-#define ZERO  ((pen_real_t)0)
-#define HALF  ((pen_real_t)0.5F)
-#define ONE   ((pen_real_t)1)
-#define TWO   ((pen_real_t)2)
-#define TINY  (PEN_REAL_MIN * PEN_REAL_EPSILON) /* the smallest number: twice what underflow may lose */
+#define ZERO ((pen_real_t)0)
+#define HALF ((pen_real_t)0.5F)
+#define ONE  ((pen_real_t)1)
+#define TWO  ((pen_real_t)2)
+#define TINY (PEN_REAL_MIN * PEN_REAL_EPSILON) /* the smallest number: twice what underflow may lose */
 
 /*
  * k roundings err by at most k EPS/2 / (1 - k EPS/2) of their result (Higham, gamma_k): below 17/32 k EPS for k EPS < 1/9, so

@@ -14,17 +14,17 @@
 /* What is needed on the way: the network, its values and the work space. */
 typedef struct {
     const pen_chain_t *chain;
-    const pen_real_t  *p;    /* of the first layer */
-    pen_real_t        *line; /* two rows of values, two of derivatives */
-    bool              *active;
+    const pen_real_t *p; /* of the first layer */
+    pen_real_t *line;    /* two rows of values, two of derivatives */
+    bool *active;
 } walk_t;
 
 /* The network seen from one point along the pattern, and where the pattern ends. */
 typedef struct {
     pen_real_t value;
     pen_real_t slope;
-    pen_real_t ahead;  /* distance to the next kink */
-    size_t     neuron; /* whose kink it is; chain->neurons if there is none */
+    pen_real_t ahead; /* distance to the next kink */
+    size_t neuron;    /* whose kink it is; chain->neurons if there is none */
 } view_t;
 
 /* One side of the centre. */
@@ -32,7 +32,7 @@ typedef struct {
     pen_real_t way;   /* 1 or -1 */
     pen_real_t edge;  /* of the trust envelope */
     pen_real_t start; /* of the piece beyond the edge: the first number outside, or the edge itself going down */
-    bool       clamp;
+    bool clamp;
 } side_t;
 
 /* The smallest number above a finite x. */
@@ -127,8 +127,8 @@ static view_t view_from(const walk_t *walk, pen_real_t x, pen_real_t way, bool b
  * piece[room - 1] on, where a piece starts at its far end. *looks counts down. Returns the room from the last piece on, with
  * that piece; 0 if the pieces are more.
  */
-static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size_t capacity, pen_piece_t piece[], size_t room,
-                 bool down, size_t *looks)
+static size_t go(const walk_t *walk, const side_t *side, pen_real_t centre, size_t capacity, pen_piece_t piece[], size_t room, bool down,
+                 size_t *looks)
 {
     pen_real_t x = centre;
     pen_real_t start = centre;
@@ -182,8 +182,8 @@ static void copy_piece(pen_piece_t *to, const pen_piece_t *from)
     to->status = from->status;
 }
 
-pen_status_t pen_fold(const pen_chain_t *chain, const pen_real_t p[], bool clamp, pen_real_t line[], bool active[],
-                      size_t capacity, pen_piece_t piece[])
+pen_status_t pen_fold(const pen_chain_t *chain, const pen_real_t p[], bool clamp, pen_real_t line[], bool active[], size_t capacity,
+                      pen_piece_t piece[])
 {
     const walk_t walk = { chain, &p[2], line, active };
     const side_t low = { -ONE, p[0], p[0], clamp };

@@ -53,14 +53,12 @@ static pen_status_t noted(pen_instance_t *self, pen_status_t status)
 
 pen_status_t pen_tune_begin(const pen_model_t *model, pen_instance_t *self, const pen_set_head_t *head)
 {
-    return pen_usable(model, self) ? noted(self, pen_tuning_begin(&self->tuning, model->layout, model->length, head))
-                                   : PEN_SET_BADARG;
+    return pen_usable(model, self) ? noted(self, pen_tuning_begin(&self->tuning, model->layout, model->length, head)) : PEN_SET_BADARG;
 }
 
 pen_status_t pen_tune_begin_copy(const pen_model_t *model, pen_instance_t *self, uint32_t id)
 {
-    return pen_usable(model, self) ? noted(self, pen_tuning_begin_copy(&self->tuning, model->layout, model->length, id))
-                                   : PEN_SET_BADARG;
+    return pen_usable(model, self) ? noted(self, pen_tuning_begin_copy(&self->tuning, model->layout, model->length, id)) : PEN_SET_BADARG;
 }
 
 pen_status_t pen_tune_write(const pen_model_t *model, pen_instance_t *self, uint32_t offset, const pen_real_t value[], uint32_t n)
@@ -70,8 +68,7 @@ pen_status_t pen_tune_write(const pen_model_t *model, pen_instance_t *self, uint
 
 pen_status_t pen_tune_write_bytes(const pen_model_t *model, pen_instance_t *self, uint32_t offset, const uint8_t byte[], uint32_t n)
 {
-    return pen_usable(model, self) ? noted(self, pen_tuning_write_bytes(&self->tuning, model->length, offset, byte, n))
-                                   : PEN_SET_BADARG;
+    return pen_usable(model, self) ? noted(self, pen_tuning_write_bytes(&self->tuning, model->length, offset, byte, n)) : PEN_SET_BADARG;
 }
 
 pen_status_t pen_tune_abort(const pen_model_t *model, pen_instance_t *self)
@@ -179,8 +176,8 @@ pen_status_t pen_prepare(const pen_model_t *model, const pen_real_t value[], pen
                 status |= found;
             }
         }
-        if ((network->promise != NULL) && !pen_promise_kept(network->promise, &network->chain, p, model->clamp, model->pieces,
-                                                            folded, work, active, breach)) {
+        if ((network->promise != NULL) &&
+            !pen_promise_kept(network->promise, &network->chain, p, model->clamp, model->pieces, folded, work, active, breach)) {
             breach->network = i;
             status |= PEN_SET_PROMISE;
         }

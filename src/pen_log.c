@@ -23,29 +23,30 @@
 
 #define ZERO ((pen_real_t)0)
 #define HALF ((pen_real_t)0.5)
-#define ONE ((pen_real_t)1)
-#define TWO ((pen_real_t)2)
+#define ONE  ((pen_real_t)1)
+#define TWO  ((pen_real_t)2)
 
 #ifdef PEN_REAL_DOUBLE
 
 #define LOG_2_HIGH 0.6931471805598903
-#define LOG_2_LOW 5.497923018708371e-14
-#define ROOT_2 UINT64_C(0x16a09e667f3bcd) /* sqrt(2) as a significand */
-#define UNIT 0x1p-52 /* of a significand */
+#define LOG_2_LOW  5.497923018708371e-14
+#define ROOT_2     UINT64_C(0x16a09e667f3bcd) /* sqrt(2) as a significand */
+#define UNIT       0x1p-52                    /* of a significand */
 
+/* clang-format off */ /* as test/accuracy/elementary_coefficients.py prints them */
 /* log((1 + s)/(1 - s)) = 2 s + s z P(z), z = s^2; relative error 0.013 * 2^-53 */
 static pen_real_t log_tail(pen_real_t z)
 {
     return 0.6666666666666734 + (z * (0.3999999999941636 + (z * (0.28571428742016036 + (z * (0.22222198610804886 +
            (z * (0.18183562404338233 + (z * (0.1531409879307027 + (z * 0.147954764673815)))))))))));
 }
-
+/* clang-format on */
 #else
 
 #define LOG_2_HIGH 0.69314575F
-#define LOG_2_LOW 1.4286068e-06F
-#define ROOT_2 UINT32_C(0xb504f3) /* sqrt(2) as a significand */
-#define UNIT 0x1p-23F /* of a significand */
+#define LOG_2_LOW  1.4286068e-06F
+#define ROOT_2     UINT32_C(0xb504f3) /* sqrt(2) as a significand */
+#define UNIT       0x1p-23F           /* of a significand */
 
 /* log((1 + s)/(1 - s)) = 2 s + s z P(z), z = s^2; relative error 0.014 * 2^-24 */
 static pen_real_t log_tail(pen_real_t z)

@@ -20,10 +20,10 @@
 
 #include "penode/pen_port.h"
 
-#define ZERO ((pen_real_t)0)
-#define HALF ((pen_real_t)0.5)
-#define ONE ((pen_real_t)1)
-#define TWO ((pen_real_t)2)
+#define ZERO      ((pen_real_t)0)
+#define HALF      ((pen_real_t)0.5)
+#define ONE       ((pen_real_t)1)
+#define TWO       ((pen_real_t)2)
 #define TANH_NEAR ((pen_real_t)0.625) /* below: the polynomial */
 
 /* Where e^x is evaluated. Volatile, because a compiler that knows a limit likes to branch around what follows. */
@@ -35,34 +35,34 @@ typedef struct {
 
 #ifdef PEN_REAL_DOUBLE
 
-#define BIAS 1074.0 /* 2^-1074 is the smallest number of the type */
-#define LOG2_E 1.4426950408889634
-#define LN2 0.6931471805599453
-#define LN2_HIGH 0.6931471805598903 /* 42 bits: n * LN2_HIGH is exact */
-#define LN2_LOW 5.497923018708371e-14
-#define EXP_LOW -746.0    /* e^x rounds to 0 from here down       */
-#define EXP_HIGH 710.5    /* e^x rounds to infinity from here up  */
-#define SIGMOID_LOW -40.0 /* 1 + e^x rounds to 1 from here down   */
-#define TANH_HIGH 40.0    /* tanh(x / 2) rounds to 1 from here up */
+#define BIAS          1074.0 /* 2^-1074 is the smallest number of the type */
+#define LOG2_E        1.4426950408889634
+#define LN2           0.6931471805599453
+#define LN2_HIGH      0.6931471805598903 /* 42 bits: n * LN2_HIGH is exact */
+#define LN2_LOW       5.497923018708371e-14
+#define EXP_LOW       -746.0  /* e^x rounds to 0 from here down       */
+#define EXP_HIGH      710.5   /* e^x rounds to infinity from here up  */
+#define SIGMOID_LOW   -40.0   /* 1 + e^x rounds to 1 from here down   */
+#define TANH_HIGH     40.0    /* tanh(x / 2) rounds to 1 from here up */
 #define SIGMOID_SCALE 0x1p-64 /* keeps 1 + e^x in range wherever the quotient is above 0 */
-#define SIGMOID_BIAS (BIAS - 64.0)
+#define SIGMOID_BIAS  (BIAS - 64.0)
 
 static pen_real_t power_high(uint32_t k) /* 2^(k - k mod 256 - BIAS) */
 {
-    static const pen_real_t POWER[9] = {0x1p-1074, 0x1p-818, 0x1p-562, 0x1p-306, 0x1p-50,
-                                        0x1p206,   0x1p462,  0x1p718,  0x1p974};
+    static const pen_real_t POWER[9] = { 0x1p-1074, 0x1p-818, 0x1p-562, 0x1p-306, 0x1p-50, 0x1p206, 0x1p462, 0x1p718, 0x1p974 };
 
     return POWER[k >> 8U];
 }
 
 static pen_real_t power_low(uint32_t k) /* 2^(k mod 256) */
 {
-    static const pen_real_t MIDDLE[8] = {0x1p0, 0x1p32, 0x1p64, 0x1p96, 0x1p128, 0x1p160, 0x1p192, 0x1p224};
+    static const pen_real_t MIDDLE[8] = { 0x1p0, 0x1p32, 0x1p64, 0x1p96, 0x1p128, 0x1p160, 0x1p192, 0x1p224 };
     const uint32_t shifted = UINT32_C(1) << (k & 31U);
 
     return (pen_real_t)shifted * MIDDLE[(k >> 5U) & 7U];
 }
 
+/* clang-format off */ /* as test/accuracy/coefficients.py prints them */
 /* e^r = 1 + r + r^2 P(r); relative error 0.0067 * 2^-53 */
 static pen_real_t expm1_tail(pen_real_t r)
 {
@@ -95,25 +95,24 @@ static pen_real_t log1p_tail(pen_real_t e)
            (e * (0.0906237989589187 + (e * (-0.08197734535786168 + (e * (0.07202223010857473 + (e * (-0.057967567559433025 +
            (e * (0.038633535507900364 + (e * (-0.01814256789569002 + (e * 0.004333531766514295)))))))))))))))))))))))))))));
 }
-
+/* clang-format on */
 #else
 
-#define BIAS 149.0F /* 2^-149 is the smallest number of the type */
-#define LOG2_E 1.442695F
-#define LN2 0.6931472F
-#define LN2_HIGH 0.69314575F /* 16 bits: n * LN2_HIGH is exact */
-#define LN2_LOW 1.4286068e-06F
-#define EXP_LOW -104.0F    /* e^x rounds to 0 from here down       */
-#define EXP_HIGH 89.0F     /* e^x rounds to infinity from here up  */
-#define SIGMOID_LOW -20.0F /* 1 + e^x rounds to 1 from here down   */
-#define TANH_HIGH 20.0F    /* tanh(x / 2) rounds to 1 from here up */
+#define BIAS          149.0F /* 2^-149 is the smallest number of the type */
+#define LOG2_E        1.442695F
+#define LN2           0.6931472F
+#define LN2_HIGH      0.69314575F /* 16 bits: n * LN2_HIGH is exact */
+#define LN2_LOW       1.4286068e-06F
+#define EXP_LOW       -104.0F  /* e^x rounds to 0 from here down       */
+#define EXP_HIGH      89.0F    /* e^x rounds to infinity from here up  */
+#define SIGMOID_LOW   -20.0F   /* 1 + e^x rounds to 1 from here down   */
+#define TANH_HIGH     20.0F    /* tanh(x / 2) rounds to 1 from here up */
 #define SIGMOID_SCALE 0x1p-32F /* keeps 1 + e^x in range wherever the quotient is above 0 */
-#define SIGMOID_BIAS (BIAS - 32.0F)
+#define SIGMOID_BIAS  (BIAS - 32.0F)
 
 static pen_real_t power_high(uint32_t k) /* 2^(k - k mod 32 - BIAS) */
 {
-    static const pen_real_t POWER[9] = {0x1p-149F, 0x1p-117F, 0x1p-85F, 0x1p-53F, 0x1p-21F,
-                                        0x1p11F,   0x1p43F,   0x1p75F,  0x1p107F};
+    static const pen_real_t POWER[9] = { 0x1p-149F, 0x1p-117F, 0x1p-85F, 0x1p-53F, 0x1p-21F, 0x1p11F, 0x1p43F, 0x1p75F, 0x1p107F };
 
     return POWER[k >> 5U];
 }
@@ -146,8 +145,9 @@ static pen_real_t softplus_tail(pen_real_t z)
 /* log(1 + e) = e + e^2 P(e); relative error 0.098 * 2^-24 */
 static pen_real_t log1p_tail(pen_real_t e)
 {
-    return -0.4999999F + (e * (0.3333276F + (e * (-0.24986029F + (e * (0.19836731F + (e * (-0.1561845F + (e * (0.10384731F +
-           (e * -0.039698943F)))))))))));
+    return -0.4999999F +
+           (e *
+            (0.3333276F + (e * (-0.24986029F + (e * (0.19836731F + (e * (-0.1561845F + (e * (0.10384731F + (e * -0.039698943F)))))))))));
 }
 
 #endif
@@ -182,7 +182,7 @@ static power_t power(pen_real_t x, const range_t *range, pen_real_t bias)
 
 pen_real_t pen_exp(pen_real_t x)
 {
-    static const range_t RANGE = {EXP_LOW, EXP_HIGH, ZERO};
+    static const range_t RANGE = { EXP_LOW, EXP_HIGH, ZERO };
     const power_t e = power(x, &RANGE, BIAS);
 
     return ((ONE + e.p) * e.low) * e.high;
@@ -191,7 +191,7 @@ pen_real_t pen_exp(pen_real_t x)
 /* 1 / (1 + e^-x), scaled on both sides so that the denominator stays finite as long as the quotient is above 0. */
 pen_real_t pen_sigmoid(pen_real_t x)
 {
-    static const range_t RANGE = {SIGMOID_LOW, -EXP_LOW, ZERO};
+    static const range_t RANGE = { SIGMOID_LOW, -EXP_LOW, ZERO };
     const power_t e = power(-x, &RANGE, SIGMOID_BIAS);
     const pen_real_t scale = e.low * e.high;
     const pen_real_t sum = scale + SIGMOID_SCALE;
@@ -203,7 +203,7 @@ pen_real_t pen_sigmoid(pen_real_t x)
 /* Near 0 a polynomial; else 1 - 2 / (1 + e^2|x|), which is monotone because each of its operations is. */
 pen_real_t pen_tanh(pen_real_t x)
 {
-    static const range_t RANGE = {ZERO, TANH_HIGH, ZERO};
+    static const range_t RANGE = { ZERO, TANH_HIGH, ZERO };
     const pen_real_t size = pen_port_abs(x);
     const pen_real_t z = x * x;
     const pen_real_t bend = ZERO - (z * tanh_tail(z)); /* +0 at 0, so that the sum below keeps the sign of -0 */
@@ -219,7 +219,7 @@ pen_real_t pen_tanh(pen_real_t x)
 /* Near 0 a polynomial; else max(x, 0) + log(1 + e^-|x|). */
 pen_real_t pen_softplus(pen_real_t x)
 {
-    static const range_t RANGE = {EXP_LOW, ZERO, ZERO};
+    static const range_t RANGE = { EXP_LOW, ZERO, ZERO };
     const pen_real_t size = pen_port_abs(x);
     const pen_real_t z = x * x;
     const pen_real_t inner = LN2 + ((HALF * x) + (z * softplus_tail(z)));

@@ -99,8 +99,8 @@ static void eight_duals(size_t n_in, const pen_real_t w[], const pen_real_t x[],
     s[7] = a.d7;
 }
 
-void pen_dense_dual(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], const pen_real_t t[],
-                    pen_real_t y[], pen_real_t s[])
+void pen_dense_dual(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], const pen_real_t t[], pen_real_t y[],
+                    pen_real_t s[])
 {
     const size_t wide = n_out - (n_out % 16U);
 

@@ -23,16 +23,16 @@
 #include "penode/pen_math.h"
 #include "penode/pen_parts.h"
 
-#define ZERO ((pen_real_t)0)
-#define HALF ((pen_real_t)0.5)
-#define ONE ((pen_real_t)1)
+#define ZERO         ((pen_real_t)0)
+#define HALF         ((pen_real_t)0.5)
+#define ONE          ((pen_real_t)1)
 #define THREE_HALVES ((pen_real_t)1.5)
 
 #ifdef PEN_REAL_DOUBLE
 
-#define UNIT 0x1p-52     /* of a root of 1 to 2, as a whole number */
+#define UNIT      0x1p-52 /* of a root of 1 to 2, as a whole number */
 #define LIFT_ROOT 0x1p-27 /* root of 1 / PEN_PARTS_LIFT */
-#define STEPS 3U
+#define STEPS     3U
 
 static pen_word_t whole_of(pen_real_t s) /* s from 1 to 2 in units */
 {
@@ -61,9 +61,9 @@ static pen_real_t root_tail(pen_real_t m)
 
 #else
 
-#define UNIT 0x1p-23F     /* of a root of 1 to 2, as a whole number */
+#define UNIT      0x1p-23F /* of a root of 1 to 2, as a whole number */
 #define LIFT_ROOT 0x1p-12F /* root of 1 / PEN_PARTS_LIFT */
-#define STEPS 1U
+#define STEPS     1U
 
 static pen_word_t whole_of(pen_real_t s) /* s from 1 to 2 in units */
 {

@@ -7,12 +7,12 @@
 
 #include "penode/pen_serial.h"
 
-#define MAGIC   0x494e4550U /* "PENI" */
-#define FORM    (1U | ((uint32_t)sizeof(pen_real_t) << 16U))
-#define SETS    5U
-#define WORDS   9U
+#define MAGIC      0x494e4550U /* "PENI" */
+#define FORM       (1U | ((uint32_t)sizeof(pen_real_t) << 16U))
+#define SETS       5U
+#define WORDS      9U
 #define INITIAL_AT (4U * (4U + WORDS + 3U)) /* byte of the checksum of the set given to init */
-#define NOWHERE UINT32_MAX
+#define NOWHERE    UINT32_MAX
 
 /* Where a set's values are. */
 #define NONE    0U
@@ -113,8 +113,8 @@ static const pen_set_t *slot_set(const pen_tuning_t *tuning, uint32_t slot)
     return (idle && (slot == pen_tuning_inactive(tuning))) ? &tuning->slot[slot ^ 1U] : &tuning->slot[slot];
 }
 
-pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint32_t rows, const pen_real_t row[],
-                      uint32_t inputs, const pen_real_t u[], uint8_t byte[], size_t size)
+pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint32_t rows, const pen_real_t row[], uint32_t inputs,
+                      const pen_real_t u[], uint8_t byte[], size_t size)
 {
     pen_status_t status = PEN_SET_BADARG;
 
@@ -122,8 +122,8 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
         const pen_tuning_t *const tuning = &self->tuning;
         const pen_set_t *const set[SETS] = { &tuning->initial, slot_set(tuning, 0U), slot_set(tuning, 1U), &tuning->previous,
                                              pen_tuning_fallback(tuning) };
-        const uint32_t word[WORDS] = { self->running, self->scrub, tuning->active, tuning->pending, tuning->hold,
-                                       tuning->published, tuning->settled, tuning->open, tuning->fill };
+        const uint32_t word[WORDS] = { self->running,     self->scrub,     tuning->active, tuning->pending, tuning->hold,
+                                       tuning->published, tuning->settled, tuning->open,   tuning->fill };
         const bool banks = (tuning->bank[0] != NULL);
         bool found = true;
         size_t at = 0U;
@@ -154,8 +154,8 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
 }
 
 /* A set that could be run: is it of this model, and to be found here? Its values are somewhere in any case. */
-static bool get_known(const pen_model_t *model, const pen_tuning_t *tuning, bool none_allowed, pen_set_t *set,
-                      const uint8_t byte[], size_t *at)
+static bool get_known(const pen_model_t *model, const pen_tuning_t *tuning, bool none_allowed, pen_set_t *set, const uint8_t byte[],
+                      size_t *at)
 {
     const bool none = none_allowed && (pen_serial_get(&byte[*at + 16U]) == NONE);
     const pen_real_t *found;
@@ -188,9 +188,8 @@ static pen_status_t check(const pen_model_t *model, const pen_tuning_t *tuning, 
 
     if (pen_serial_get(&byte[size - 4U]) != ~pen_crc_bytes(PEN_CRC_START, size - 4U, byte)) {
         status = PEN_SET_CHECKSUM;
-    } else if ((pen_serial_get(&byte[0]) != MAGIC) || (pen_serial_get(&byte[4]) != FORM) ||
-               (pen_serial_get(&byte[8]) != model->source) || (pen_serial_get(&byte[12]) != banks) ||
-               (pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||
+    } else if ((pen_serial_get(&byte[0]) != MAGIC) || (pen_serial_get(&byte[4]) != FORM) || (pen_serial_get(&byte[8]) != model->source) ||
+               (pen_serial_get(&byte[12]) != banks) || (pen_serial_get(&byte[INITIAL_AT]) != tuning->initial.head.checksum) ||
                (pen_serial_get(&byte[INITIAL_AT + 4U]) != initial) || !sets_fit(model, tuning, slot, byte)) {
         status = PEN_SET_LAYOUT;
     } else {
@@ -225,8 +224,8 @@ static void get_tuning(const pen_model_t *model, pen_instance_t *self, const pen
     }
 }
 
-pen_status_t pen_restore(const pen_model_t *model, pen_instance_t *self, uint32_t rows, pen_real_t row[], uint32_t inputs,
-                         pen_real_t u[], const uint8_t byte[], size_t size)
+pen_status_t pen_restore(const pen_model_t *model, pen_instance_t *self, uint32_t rows, pen_real_t row[], uint32_t inputs, pen_real_t u[],
+                         const uint8_t byte[], size_t size)
 {
     pen_set_t slot[2];
     pen_status_t status = PEN_SET_BADARG;

@@ -14,18 +14,18 @@
 #define ONE  ((pen_real_t)1)
 #define EPS  PEN_REAL_EPSILON
 
-#define WIDE 21U /* rows of a layer: a block of 16, of 4 and of 1 */
+#define WIDE      21U /* rows of a layer: a block of 16, of 4 and of 1 */
 #define ARGUMENTS 8U
-#define ORDER 3U /* of a linear system */
+#define ORDER     3U /* of a linear system */
 
 /* Of answer(), by penode_gen/emission/selftest.py. */
 #ifdef PEN_REAL_DOUBLE
-#define SOME 0x1.0c68612285642p-33 /* libgcc for Arm: the difference to 1 is 1 ulp too small */
-#define REST 0x1.fffffffef397ap-1
+#define SOME   0x1.0c68612285642p-33 /* libgcc for Arm: the difference to 1 is 1 ulp too small */
+#define REST   0x1.fffffffef397ap-1
 #define ANSWER 0x3710667bU
 #else
-#define SOME 0x1.0c686p-9F
-#define REST 0x1.fef398p-1F
+#define SOME   0x1.0c686p-9F
+#define REST   0x1.fef398p-1F
 #define ANSWER 0x9c423b29U
 #endif
 

@@ -37,8 +37,8 @@ void pen_set_copy(pen_set_t *to, const pen_set_t *from)
 
 bool pen_set_same(const pen_set_t *a, const pen_set_t *b)
 {
-    const uint32_t differences = (a->head.layout ^ b->head.layout) | (a->head.length ^ b->head.length) |
-                                 (a->head.id ^ b->head.id) | (a->head.checksum ^ b->head.checksum);
+    const uint32_t differences = (a->head.layout ^ b->head.layout) | (a->head.length ^ b->head.length) | (a->head.id ^ b->head.id) |
+                                 (a->head.checksum ^ b->head.checksum);
 
     return (differences == 0U) && (a->value == b->value);
 }
@@ -141,8 +141,8 @@ static pen_real_t *open_bank(const pen_tuning_t *tuning)
     return ((tuning->open == YES) && (bank == value)) ? bank : NULL;
 }
 
-pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set,
-                             pen_real_t bank0[], pen_real_t bank1[])
+pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set, pen_real_t bank0[],
+                             pen_real_t bank1[])
 {
     pen_status_t status;
 
@@ -195,8 +195,7 @@ pen_status_t pen_tuning_begin(pen_tuning_t *tuning, uint32_t layout, uint32_t le
         const uint32_t slot = pen_tuning_inactive(tuning);
         const pen_real_t *const running = tuning->slot[slot ^ 1U].value;
         /* the bank that holds neither the running nor the rollback set; the latter is given up if it must be */
-        const bool first = (tuning->bank[0] != running) &&
-                           ((tuning->bank[0] != tuning->previous.value) || (tuning->bank[1] == running));
+        const bool first = (tuning->bank[0] != running) && ((tuning->bank[0] != tuning->previous.value) || (tuning->bank[1] == running));
         const uint32_t bank = first ? 0U : 1U;
         if (tuning->previous.value == tuning->bank[bank]) {
             tuning->previous.value = NULL;

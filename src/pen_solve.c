@@ -10,7 +10,7 @@
 #include "penode/pen_port.h"
 
 #define ZERO ((pen_real_t)0)
-#define ONE ((pen_real_t)1)
+#define ONE  ((pen_real_t)1)
 
 /* The row, from k on, with the largest |a[row][k]|. A NaN is passed over unless it is in row k: then it stays. */
 static size_t pivot_row(size_t n, const pen_real_t a[], size_t k)

@@ -27,7 +27,7 @@
 
 #define ZERO ((pen_real_t)0)
 #define HALF ((pen_real_t)0.5)
-#define ONE ((pen_real_t)1)
+#define ONE  ((pen_real_t)1)
 
 /* The angle is r - less. */
 typedef struct {
@@ -51,8 +51,9 @@ static angle_t difference(pen_real_t a, pen_real_t b)
 #define RIGHT_ANGLE_1 1.5707963267941523
 #define RIGHT_ANGLE_2 7.443547480488527e-13
 #define RIGHT_ANGLE_3 -1.9034889620193266e-25
-#define TWO_BY_PI 0.6366197723675814
+#define TWO_BY_PI     0.6366197723675814
 
+/* clang-format off */ /* as test/accuracy/elementary_coefficients.py prints them */
 /* sin(r) = r + r z P(z), z = r^2; relative error 0.063 * 2^-53 */
 static pen_real_t sin_tail(pen_real_t z)
 {
@@ -66,6 +67,7 @@ static pen_real_t cos_tail(pen_real_t z)
     return 0.041666666666666595 + (z * (-0.0013888888888872822 + (z * (2.4801587288700546e-05 + (z * (-2.755731413448845e-07 +
            (z * (2.0875694603749284e-09 + (z * -1.135820622186774e-11)))))))));
 }
+/* clang-format on */
 
 /* x - n pi/2 */
 static angle_t rest_of(pen_real_t x, pen_real_t n)
@@ -86,7 +88,7 @@ static angle_t rest_of(pen_real_t x, pen_real_t n)
 #define RIGHT_ANGLE_3 7.5495336e-08F
 #define RIGHT_ANGLE_4 2.563283e-12F
 #define RIGHT_ANGLE_5 6.123234e-17F
-#define TWO_BY_PI 0.63661975F
+#define TWO_BY_PI     0.63661975F
 
 /* sin(r) = r + r z P(z), z = r^2; relative error 0.15 * 2^-24 */
 static pen_real_t sin_tail(pen_real_t z)

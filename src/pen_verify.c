@@ -14,7 +14,8 @@ static bool known(const pen_model_t *model, const pen_tuning_t *tuning, uint32_t
     const bool fits = (set->head.layout == model->layout) && (set->head.length == model->length);
     const bool same = pen_set_same(set, &tuning->slot_check[slot]);
 
-    return pen_tuning_banks_known(tuning) && fits && same && ((tuning->published != 0U) || (tuning->settled == pen_port_load(&tuning->active)));
+    return pen_tuning_banks_known(tuning) && fits && same &&
+           ((tuning->published != 0U) || (tuning->settled == pen_port_load(&tuning->active)));
 }
 
 uint32_t pen_piece_crc(uint32_t crc, const pen_piece_t *piece)

@@ -7,11 +7,11 @@
 
 #include <stddef.h>
 
-#define XCP_WORKING   0U
-#define XCP_REFERENCE 1U
-#define XCP_ECU       0x01U /* modes of SET_CAL_PAGE */
-#define XCP_TOOL      0x02U
-#define XCP_ALL       0x80U
+#define XCP_WORKING     0U
+#define XCP_REFERENCE   1U
+#define XCP_ECU         0x01U /* modes of SET_CAL_PAGE */
+#define XCP_TOOL        0x02U
+#define XCP_ALL         0x80U
 #define XCP_ANY_ACCESS  0x3fU /* page properties: read and write, with and without the ECU */
 #define XCP_READ_ACCESS 0x0fU
 

@@ -10,10 +10,10 @@
 #include "penode/pen_port.h"
 #include "penode/pen_xcp_parts.h"
 
-#define XCP_TIME_SIZE 4U
+#define XCP_TIME_SIZE  4U
 #define XCP_RUNS       0x40U
 #define XCP_PROPERTIES 0x93U /* dynamic, prescaler, time stamps, overload as event */
-#define XCP_TIME_MODE 0x34U /* 4 bytes, 1 us */
+#define XCP_TIME_MODE  0x34U /* 4 bytes, 1 us */
 
 void pen_xcp_daq_init(pen_xcp_daq_t *daq, uint8_t ring[], uint32_t slots, uint32_t max_cto, uint8_t cycle, uint8_t unit)
 {

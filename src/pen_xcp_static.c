@@ -12,17 +12,17 @@
 #include "penode/pen_port.h"
 #include "penode/pen_xcp_parts.h"
 
-#define XCP_STAMPED     5U /* bytes before the entries of a first ODT: number, time stamp */
-#define XCP_STATIC      0xfeU /* all properties but: dynamic */
-#define XCP_PREDEFINED  0x07U /* properties of a list: predefined, its event is fixed, DAQ */
-#define XCP_CONFIGURABLE 0x06U
-#define XCP_CODE_NONE   0xd0U /* a command that there is not */
-#define XCP_CODE_INFO   0xd8U
+#define XCP_STAMPED        5U    /* bytes before the entries of a first ODT: number, time stamp */
+#define XCP_STATIC         0xfeU /* all properties but: dynamic */
+#define XCP_PREDEFINED     0x07U /* properties of a list: predefined, its event is fixed, DAQ */
+#define XCP_CONFIGURABLE   0x06U
+#define XCP_CODE_NONE      0xd0U /* a command that there is not */
+#define XCP_CODE_INFO      0xd8U
 #define XCP_CODE_PROCESSOR 0xdaU
-#define XCP_CODE_MODE   0xe0U
-#define XCP_CODE_WRITE  0xe1U
-#define XCP_CODE_POINTER 0xe2U
-#define XCP_CODE_CLEAR  0xe3U
+#define XCP_CODE_MODE      0xe0U
+#define XCP_CODE_WRITE     0xe1U
+#define XCP_CODE_POINTER   0xe2U
+#define XCP_CODE_CLEAR     0xe3U
 
 static uint32_t xcp_predefined(const pen_xcp_statics_t *statics)
 {

@@ -24,22 +24,22 @@ extern "C" {
 /** A network with its values and work space. */
 typedef struct {
     const pen_chain_t *chain;
-    const pen_real_t  *p;      /* values of the first layer */
-    pen_real_t        *work;   /* [8 * chain->width]        */
-    bool              *active; /* [chain->neurons]          */
+    const pen_real_t *p; /* values of the first layer */
+    pen_real_t *work;    /* [8 * chain->width]        */
+    bool *active;        /* [chain->neurons]          */
 } pen_line_t;
 
 /** The network at x, and from there on along `way` for `length`. */
 typedef struct {
     pen_real_t x;
-    pen_real_t way;                   /* direction: 1 or -1                                                        */
-    pen_real_t guard;                 /* shortest cell: more than the spacing of pen_real_t here                   */
-    pen_real_t length;                /* PEN_REAL_MAX: no neuron switches any more                                 */
-    size_t     open;                  /* how many neurons are undecided; 0: the network is straight                */
-    size_t     neuron[PEN_CELL_OPEN]; /* the first of them                                                         */
-    pen_real_t value;                 /* the exact value at x is within value +- error                             */
-    pen_real_t error;                 /* 0 if the value is exact, else at least EPS |value|                        */
-    pen_real_t least;                 /* exact slopes on the cell are from least to most; NaN after an overflow    */
+    pen_real_t way;               /* direction: 1 or -1                                                        */
+    pen_real_t guard;             /* shortest cell: more than the spacing of pen_real_t here                   */
+    pen_real_t length;            /* PEN_REAL_MAX: no neuron switches any more                                 */
+    size_t open;                  /* how many neurons are undecided; 0: the network is straight                */
+    size_t neuron[PEN_CELL_OPEN]; /* the first of them                                                         */
+    pen_real_t value;             /* the exact value at x is within value +- error                             */
+    pen_real_t error;             /* 0 if the value is exact, else at least EPS |value|                        */
+    pen_real_t least;             /* exact slopes on the cell are from least to most; NaN after an overflow    */
     pen_real_t most;
 } pen_cell_t;
 

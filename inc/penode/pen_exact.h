@@ -25,9 +25,9 @@
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__FP_FAST_FMAF) || defined(__FP_FAST_FMA)
 #if defined(__OPTIMIZE_SIZE__) && defined(__thumb2__)
-#pragma GCC optimize ("fp-contract=off", "no-tree-loop-distribute-patterns", "no-shrink-wrap")
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns", "no-shrink-wrap")
 #else
-#pragma GCC optimize ("fp-contract=off", "no-tree-loop-distribute-patterns")
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns")
 #endif
 #endif
 

@@ -32,9 +32,9 @@ extern "C" {
 
 /** One straight piece: y = offset + slope * (x - centre) from `start` on. 16 bytes (double: 32). */
 typedef struct {
-    pen_real_t   start;  /* in the first piece, which has no start: the centre of all pieces */
-    pen_real_t   offset;
-    pen_real_t   slope;
+    pen_real_t start; /* in the first piece, which has no start: the centre of all pieces */
+    pen_real_t offset;
+    pen_real_t slope;
     pen_status_t status; /* PEN_OK, or PEN_OUTSIDE beyond the trust envelope */
 } pen_piece_t;
 
@@ -53,9 +53,9 @@ typedef struct {
 /** A network that can be folded: one input, one output. */
 typedef struct {
     const pen_layer_t *layer;
-    uint32_t           layers;
-    uint32_t           width;   /* values of the widest layer         */
-    uint32_t           neurons; /* of all layers of PEN_LAYER_RELU    */
+    uint32_t layers;
+    uint32_t width;   /* values of the widest layer         */
+    uint32_t neurons; /* of all layers of PEN_LAYER_RELU    */
 } pen_chain_t;
 
 /**
@@ -69,8 +69,8 @@ typedef struct {
  * Cost: one evaluation with its derivative for each piece; at most capacity + chain->neurons + 4 for any weights. A
  * network that would take more, because neurons switch between two neighbouring numbers, is refused as well.
  */
-pen_status_t pen_fold(const pen_chain_t *chain, const pen_real_t p[], bool clamp, pen_real_t line[], bool active[],
-                      size_t capacity, pen_piece_t piece[]);
+pen_status_t pen_fold(const pen_chain_t *chain, const pen_real_t p[], bool clamp, pen_real_t line[], bool active[], size_t capacity,
+                      pen_piece_t piece[]);
 
 /**
  * The piece that x lies on; the last one for NaN. No branch on the data.

@@ -38,24 +38,24 @@ extern "C" {
 
 /** A network of the sets that is folded or has promises. */
 typedef struct {
-    pen_chain_t          chain;
-    uint32_t             at;      /* where its values begin in a set */
+    pen_chain_t chain;
+    uint32_t at;                  /* where its values begin in a set */
     const pen_promise_t *promise; /* NULL: none                      */
 } pen_network_t;
 
 /** What the runtime needs to know of a model. Constant, in flash. */
 typedef struct {
-    uint32_t             layout;    /* fingerprint that every set must carry                            */
-    uint32_t             length;    /* values of a set                                                  */
-    uint32_t             source;    /* fingerprint of the model file: models may share sets             */
-    uint32_t             on_damage; /* one of PEN_DAMAGE_...                                            */
-    bool                 clamp;     /* outside of the trust envelope: true: clamp; false: extrapolate   */
-    bool                 layers;    /* too many pieces: true: layer by layer; false: refuse             */
-    uint32_t             pieces;    /* capacity of a folded network; 0: none is folded                  */
-    uint32_t             networks;  /* of network[]; if one is folded, all of them are                  */
-    const pen_network_t *network;   /* [networks]                                                       */
-    uint32_t             sets;      /* of the model file                                                */
-    const pen_set_t *const *set;    /* [sets]                                                           */
+    uint32_t layout;              /* fingerprint that every set must carry                            */
+    uint32_t length;              /* values of a set                                                  */
+    uint32_t source;              /* fingerprint of the model file: models may share sets             */
+    uint32_t on_damage;           /* one of PEN_DAMAGE_...                                            */
+    bool clamp;                   /* outside of the trust envelope: true: clamp; false: extrapolate   */
+    bool layers;                  /* too many pieces: true: layer by layer; false: refuse             */
+    uint32_t pieces;              /* capacity of a folded network; 0: none is folded                  */
+    uint32_t networks;            /* of network[]; if one is folded, all of them are                  */
+    const pen_network_t *network; /* [networks]                                                       */
+    uint32_t sets;                /* of the model file                                                */
+    const pen_set_t *const *set;  /* [sets]                                                           */
 } pen_model_t;
 
 #define PEN_DAMAGE_REPORT   0U
@@ -72,12 +72,12 @@ typedef struct {
 
 /** The head of an instance. Owned by it; use it only through the functions of the model. */
 typedef struct {
-    uint32_t         ready;   /* layout of the model once initialised                              */
-    uint32_t         scrub;   /* what the next step checks for NaN and Inf                         */
-    uint32_t         running; /* 1 after the first good sample, 3 after the second, ...            */
-    pen_tuning_t     tuning;
-    pen_guard_t      guard;
-    pen_breach_t     breach;  /* of the last set that broke a promise                              */
+    uint32_t ready;   /* layout of the model once initialised                              */
+    uint32_t scrub;   /* what the next step checks for NaN and Inf                         */
+    uint32_t running; /* 1 after the first good sample, 3 after the second, ...            */
+    pen_tuning_t tuning;
+    pen_guard_t guard;
+    pen_breach_t breach; /* of the last set that broke a promise                              */
     pen_status_log_t log;
 } pen_instance_t;
 

@@ -39,8 +39,8 @@ pen_real_t pen_dense1_relu(size_t n_in, const pen_real_t w[], const pen_real_t x
 void pen_dense_tangent(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t t[], pen_real_t y[]);
 
 /** Both at once: y = W x + b and s = W t. The outputs may not overlap the inputs. */
-void pen_dense_dual(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], const pen_real_t t[],
-                    pen_real_t y[], pen_real_t s[]);
+void pen_dense_dual(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], const pen_real_t t[], pen_real_t y[],
+                    pen_real_t s[]);
 
 /* ---- activations, in place on h[n] ---- */
 

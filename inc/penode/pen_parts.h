@@ -15,17 +15,17 @@
 #include "penode/pen_real.h"
 
 #ifdef PEN_REAL_DOUBLE
-typedef uint64_t pen_word_t; /* as wide as pen_real_t */
-#define PEN_PARTS_BITS 52U   /* of the significand behind its leading 1 */
-#define PEN_PARTS_BIAS 1023U
+typedef uint64_t pen_word_t;    /* as wide as pen_real_t */
+#define PEN_PARTS_BITS      52U /* of the significand behind its leading 1 */
+#define PEN_PARTS_BIAS      1023U
 #define PEN_PARTS_LIFT_BITS 54U /* even, and enough to make any subnormal number a normal one */
-#define PEN_PARTS_LIFT 0x1p54
+#define PEN_PARTS_LIFT      0x1p54
 #else
 typedef uint32_t pen_word_t;
-#define PEN_PARTS_BITS 23U
-#define PEN_PARTS_BIAS 127U
+#define PEN_PARTS_BITS      23U
+#define PEN_PARTS_BIAS      127U
 #define PEN_PARTS_LIFT_BITS 24U
-#define PEN_PARTS_LIFT 0x1p24F
+#define PEN_PARTS_LIFT      0x1p24F
 #endif
 
 /** x = significand * 2^(exponent - PEN_PARTS_BIAS - PEN_PARTS_BITS), but for a number that was lifted:

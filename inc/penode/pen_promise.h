@@ -58,8 +58,8 @@ extern "C" {
 
 /** What a model file promises of a network. Numbers whose kind is not promised are ignored. */
 typedef struct {
-    uint32_t   kinds;     /* PEN_PROMISE_..., ORed                                  */
-    uint32_t   looks;     /* evaluations that a check may take: bounds its time     */
+    uint32_t kinds;       /* PEN_PROMISE_..., ORed                                  */
+    uint32_t looks;       /* evaluations that a check may take: bounds its time     */
     pen_real_t band;      /* [unit of the output], >= 0                             */
     pen_real_t max_slope; /* [unit of the output / unit of the input], >= 0         */
     pen_real_t max_force; /* [unit of the output], >= 0                             */
@@ -67,9 +67,9 @@ typedef struct {
 
 /** Which promise a set breaks, and where. */
 typedef struct {
-    uint32_t   network; /* which network of the model: written by the caller                                  */
-    uint32_t   kind;    /* PEN_PROMISE_..., ORed if several break there; all but ZERO_AT_ZERO if `looks` ran out */
-    pen_real_t at;      /* input: the end nearer to 0 of the cell on which the promise is broken, or not proven */
+    uint32_t network; /* which network of the model: written by the caller                                  */
+    uint32_t kind;    /* PEN_PROMISE_..., ORed if several break there; all but ZERO_AT_ZERO if `looks` ran out */
+    pen_real_t at;    /* input: the end nearer to 0 of the cell on which the promise is broken, or not proven */
 } pen_breach_t;
 
 /**

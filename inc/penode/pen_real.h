@@ -14,11 +14,11 @@
 
 #include <float.h>
 
-#define PEN_VERSION "0.1.0"
+#define PEN_VERSION       "0.1.0"
 #define PEN_VERSION_MAJOR 0 /* the same for #if */
 #define PEN_VERSION_MINOR 1
 #define PEN_VERSION_PATCH 0
-#define PEN_ABI 2 /* generated code names the ABI it was written for and stops the compiler on another one */
+#define PEN_ABI           2 /* generated code names the ABI it was written for and stops the compiler on another one */
 
 #ifdef __FAST_MATH__
 #error "penode: -ffast-math removes the NaN and Inf checks that this library promises; compile without it"

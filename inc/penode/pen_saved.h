@@ -28,8 +28,8 @@ extern "C" {
  * @param size  of byte[]: PEN_SAVED_HEAD + sizeof(pen_real_t) * (rows + inputs + 2 * model->length)
  * @return PEN_OK; PEN_SET_BADARG: NULL, not initialised, too little room, or a set that restore would not find
  */
-pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint32_t rows, const pen_real_t row[],
-                      uint32_t inputs, const pen_real_t u[], uint8_t byte[], size_t size);
+pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint32_t rows, const pen_real_t row[], uint32_t inputs,
+                      const pen_real_t u[], uint8_t byte[], size_t size);
 
 /**
  * Restore an instance that was initialised, with banks if the saved one had banks. A refused call changes nothing.
@@ -37,8 +37,8 @@ pen_status_t pen_save(const pen_model_t *model, const pen_instance_t *self, uint
  * @return PEN_OK; PEN_SET_BADARG; PEN_SET_LAYOUT: saved by another model or real type, or with another set given to
  *         init, or that in a bank, or a set of the model file has changed; PEN_SET_CHECKSUM: damaged
  */
-pen_status_t pen_restore(const pen_model_t *model, pen_instance_t *self, uint32_t rows, pen_real_t row[], uint32_t inputs,
-                         pen_real_t u[], const uint8_t byte[], size_t size);
+pen_status_t pen_restore(const pen_model_t *model, pen_instance_t *self, uint32_t rows, pen_real_t row[], uint32_t inputs, pen_real_t u[],
+                         const uint8_t byte[], size_t size);
 
 /** Recompute the checksums of the pieces of both slots. @param piece  [2 * networks * pieces] */
 void pen_restored(const pen_model_t *model, pen_instance_t *self, const pen_piece_t piece[]);

@@ -47,26 +47,26 @@ typedef struct {
 
 /** A whole set: borrowed values that must stay unchanged while the set is active, pending or the rollback set. */
 typedef struct {
-    pen_set_head_t    head;
+    pen_set_head_t head;
     const pen_real_t *value; /* [head.length] */
 } pen_set_t;
 
 /** The tuning state of one instance. Owned by it; touch it only through the functions below. */
 typedef struct {
-    pen_set_t         slot[2];       /* slot[active] is read by the step, the other belongs to the tuning context     */
-    volatile uint32_t active;        /* 0 or 1; written by the step only                                              */
-    volatile uint32_t pending;       /* 0, or a command to the next step: adopt a slot, withdraw it                    */
-    volatile uint32_t hold;          /* PEN_HELD: the step keeps the state                                            */
-    uint32_t          published;     /* the command last published, until its outcome is known; else 0                */
-    uint32_t          settled;       /* `active` when the last outcome was known                                      */
-    pen_set_t         slot_check[2]; /* copy of slot[]: a damaged head or address is found before it is used          */
-    pen_set_t         previous;      /* the rollback set; value is NULL if there is none                              */
-    pen_set_t         replaced;      /* the rollback set before the last publish: restored if that is withdrawn       */
-    pen_set_t         initial;       /* the set given to init: used if running and rollback set are damaged           */
-    pen_real_t       *bank[2];       /* [length] each; NULL if the model runs from selected sets only                 */
-    pen_real_t       *bank_check[2]; /* copy of bank[]: a damaged address is not written to                           */
-    uint32_t          open;          /* 1: between begin and commit                                                   */
-    uint32_t          fill;          /* bytes written so far                                                          */
+    pen_set_t slot[2];         /* slot[active] is read by the step, the other belongs to the tuning context     */
+    volatile uint32_t active;  /* 0 or 1; written by the step only                                              */
+    volatile uint32_t pending; /* 0, or a command to the next step: adopt a slot, withdraw it                    */
+    volatile uint32_t hold;    /* PEN_HELD: the step keeps the state                                            */
+    uint32_t published;        /* the command last published, until its outcome is known; else 0                */
+    uint32_t settled;          /* `active` when the last outcome was known                                      */
+    pen_set_t slot_check[2];   /* copy of slot[]: a damaged head or address is found before it is used          */
+    pen_set_t previous;        /* the rollback set; value is NULL if there is none                              */
+    pen_set_t replaced;        /* the rollback set before the last publish: restored if that is withdrawn       */
+    pen_set_t initial;         /* the set given to init: used if running and rollback set are damaged           */
+    pen_real_t *bank[2];       /* [length] each; NULL if the model runs from selected sets only                 */
+    pen_real_t *bank_check[2]; /* copy of bank[]: a damaged address is not written to                           */
+    uint32_t open;             /* 1: between begin and commit                                                   */
+    uint32_t fill;             /* bytes written so far                                                          */
 } pen_tuning_t;
 
 /**
@@ -76,8 +76,8 @@ typedef struct {
  * @param bank0, bank1  [length] each, for staging; or both NULL: then only select works
  * @return PEN_OK; PEN_BADARG; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE
  */
-pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set,
-                             pen_real_t bank0[], pen_real_t bank1[]);
+pen_status_t pen_tuning_init(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set, pen_real_t bank0[],
+                             pen_real_t bank1[]);
 
 /* All calls below but pen_tuning_adopt are for the tuning context. */
 

@@ -41,33 +41,31 @@ typedef uint32_t pen_status_t;
 #define PEN_WITHDRAWN        UINT32_C(0x000400) /* a committed set was withdrawn before it came into force             */
 
 /* Raised by a tuning call. Refused calls leave the running set as it is. */
-#define PEN_SET_BUSY         UINT32_C(0x000800) /* a committed set still waits for the next step                       */
-#define PEN_SET_CLOSED       UINT32_C(0x001000) /* no set is open: begin was not called, or it is already committed    */
-#define PEN_SET_RANGE        UINT32_C(0x002000) /* a chunk leaves a gap or runs past the end                           */
-#define PEN_SET_SHORT        UINT32_C(0x004000) /* commit before the last value was written                            */
-#define PEN_SET_CHECKSUM     UINT32_C(0x008000) /* values do not match the checksum in the head                        */
-#define PEN_SET_NONFINITE    UINT32_C(0x010000) /* a value is NaN or Inf                                               */
-#define PEN_SET_LAYOUT       UINT32_C(0x020000) /* made for another model, layout version or real type                 */
-#define PEN_SET_NO_PREVIOUS  UINT32_C(0x040000) /* rollback: there is no rollback set                                  */
-#define PEN_SET_PIECES       UINT32_C(0x080000) /* a network has more pieces than there is room for                    */
-#define PEN_SET_BADARG       UINT32_C(0x100000) /* NULL, no banks, or an instance that was not initialised             */
-#define PEN_SET_PROMISE      UINT32_C(0x200000) /* a network breaks a promise of the model file                        */
-#define PEN_SET_TRIAL        UINT32_C(0x400000) /* the trial over the last samples failed                              */
-#define PEN_SET_DAMAGED      UINT32_C(0x800000) /* verify: the running set or its pieces have changed in memory        */
-#define PEN_SET_IDLE         UINT32_C(0x1000000) /* withdraw: no committed set waits                                   */
+#define PEN_SET_BUSY        UINT32_C(0x000800)  /* a committed set still waits for the next step                       */
+#define PEN_SET_CLOSED      UINT32_C(0x001000)  /* no set is open: begin was not called, or it is already committed    */
+#define PEN_SET_RANGE       UINT32_C(0x002000)  /* a chunk leaves a gap or runs past the end                           */
+#define PEN_SET_SHORT       UINT32_C(0x004000)  /* commit before the last value was written                            */
+#define PEN_SET_CHECKSUM    UINT32_C(0x008000)  /* values do not match the checksum in the head                        */
+#define PEN_SET_NONFINITE   UINT32_C(0x010000)  /* a value is NaN or Inf                                               */
+#define PEN_SET_LAYOUT      UINT32_C(0x020000)  /* made for another model, layout version or real type                 */
+#define PEN_SET_NO_PREVIOUS UINT32_C(0x040000)  /* rollback: there is no rollback set                                  */
+#define PEN_SET_PIECES      UINT32_C(0x080000)  /* a network has more pieces than there is room for                    */
+#define PEN_SET_BADARG      UINT32_C(0x100000)  /* NULL, no banks, or an instance that was not initialised             */
+#define PEN_SET_PROMISE     UINT32_C(0x200000)  /* a network breaks a promise of the model file                        */
+#define PEN_SET_TRIAL       UINT32_C(0x400000)  /* the trial over the last samples failed                              */
+#define PEN_SET_DAMAGED     UINT32_C(0x800000)  /* verify: the running set or its pieces have changed in memory        */
+#define PEN_SET_IDLE        UINT32_C(0x1000000) /* withdraw: no committed set waits                                   */
 
 #define PEN_STATUS_FLAGS 25U /* flags above, and counters                                    */
 #define PEN_STATUS_STEP  11U /* the first 11 flags are a step's, the others a tuning call's  */
 
 /* The step did not advance: state and outputs are held. */
-#define PEN_HOLDING \
-    (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE | PEN_STEP_NONFINITE | PEN_SINGULAR | PEN_HELD | PEN_BADARG)
+#define PEN_HOLDING (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE | PEN_STEP_NONFINITE | PEN_SINGULAR | PEN_HELD | PEN_BADARG)
 
 /* Three kinds of flag. Faults need a reaction; warnings mean that results are less certain; events were requested.
  * A refused tuning call is none of them: its return value tells the caller. */
 #define PEN_FAULTS \
-    (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE | PEN_STEP_NONFINITE | PEN_SINGULAR | PEN_BADARG | PEN_WEIGHT_NONFINITE | \
-     PEN_SET_DAMAGED)
+    (PEN_INPUT_NONFINITE | PEN_STATE_NONFINITE | PEN_STEP_NONFINITE | PEN_SINGULAR | PEN_BADARG | PEN_WEIGHT_NONFINITE | PEN_SET_DAMAGED)
 #define PEN_WARNINGS (PEN_OUTSIDE | PEN_INPUT_RANGE)
 #define PEN_EVENTS   (PEN_HELD | PEN_ADOPTED | PEN_WITHDRAWN)
 
@@ -85,8 +83,8 @@ typedef struct {
 
 /** What was raised since the last read. */
 typedef struct {
-    pen_status_t flags;                   /* sticky: every flag raised at least once                    */
-    uint32_t     times[PEN_STATUS_FLAGS]; /* how often, in the order of the flags: read by pen_status_times */
+    pen_status_t flags;               /* sticky: every flag raised at least once                    */
+    uint32_t times[PEN_STATUS_FLAGS]; /* how often, in the order of the flags: read by pen_status_times */
 } pen_status_report_t;
 
 /** How often `flag`, one of the flags above, was raised: pen_status_times(&report, PEN_OUTSIDE). 0 for anything else. */

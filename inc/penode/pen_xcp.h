@@ -47,9 +47,9 @@ extern "C" {
 
 /** Memory that a master may read; for a text, the address means nothing. */
 typedef struct {
-    uint32_t       address; /* as in the A2L */
-    uint32_t       size;    /* bytes         */
-    const uint8_t *byte;    /* [size]        */
+    uint32_t address;    /* as in the A2L */
+    uint32_t size;       /* bytes         */
+    const uint8_t *byte; /* [size]        */
 } pen_xcp_region_t;
 
 #define PEN_XCP_CAL 0x01U /* resources, for `protect` and the hooks */
@@ -63,56 +63,56 @@ typedef uint32_t (*pen_xcp_command_t)(pen_xcp_t *xcp, const uint8_t in[], uint32
 
 /** What not every slave needs. A seed and a key fit one packet each. */
 typedef struct {
-    uint32_t (*seed)(uint8_t resource, uint8_t seed[]);                     /* writes up to max_cto - 2 bytes; how many  */
-    bool     (*unlock)(uint8_t resource, uint32_t n, const uint8_t key[]);  /* true: the key fits; both NULL: no keys    */
-    bool       freeze;                                                      /* the caller stores: pen_xcp_to_store       */
+    uint32_t (*seed)(uint8_t resource, uint8_t seed[]);                /* writes up to max_cto - 2 bytes; how many  */
+    bool (*unlock)(uint8_t resource, uint32_t n, const uint8_t key[]); /* true: the key fits; both NULL: no keys    */
+    bool freeze;                                                       /* the caller stores: pen_xcp_to_store       */
 } pen_xcp_options_t;
 
 /** What the slave is for. Constant; borrowed for as long as the slave is used. */
 typedef struct {
-    pen_instance_t  *instance;                      /* head of the instance: &model.head                               */
-    uint32_t         layout;                        /* NAME_LAYOUT                                                     */
-    uint32_t         length;                        /* NAME_SET_LENGTH                                                 */
-    const pen_set_t *reference;                     /* such as &NAME_set_default                                       */
-    pen_status_t   (*commit)(void);                 /* calls NAME_tune_commit for the instance                         */
-    pen_status_t   (*select)(const pen_set_t *set); /* calls NAME_tune_select for the instance                         */
-    uint32_t         address;                       /* of both pages, as in the A2L: that of the set in flash, say     */
-    uint32_t         id;                            /* of the first set that is opened; each further one has 1 more    */
-    uint32_t         quiet;                         /* ms; 0: off                                                      */
-    uint32_t         max_cto;                       /* bytes of a packet: 8 on CAN, 64 on CAN FD, at most 255          */
-    uint32_t         regions;                       /* of region[]                                                     */
-    const pen_xcp_region_t *region;                 /* [regions]                                                       */
-    const pen_xcp_region_t *text[PEN_XCP_TEXTS];    /* of GET_ID; NULL: none                                           */
-    uint32_t         protect;                       /* resources that need a key: PEN_XCP_CAL, PEN_XCP_DAQ; 0: none    */
-    const pen_xcp_options_t *options;               /* keys, storing; NULL: none                                       */
-    pen_xcp_command_t options_command;              /* pen_xcp_options_command, or NULL: not linked then               */
-    pen_xcp_daq_t   *daq;                           /* NULL: no DAQ                                                    */
-    pen_xcp_command_t daq_command;                  /* pen_xcp_daq_command, or NULL: not linked then                   */
+    pen_instance_t *instance;                     /* head of the instance: &model.head                               */
+    uint32_t layout;                              /* NAME_LAYOUT                                                     */
+    uint32_t length;                              /* NAME_SET_LENGTH                                                 */
+    const pen_set_t *reference;                   /* such as &NAME_set_default                                       */
+    pen_status_t (*commit)(void);                 /* calls NAME_tune_commit for the instance                         */
+    pen_status_t (*select)(const pen_set_t *set); /* calls NAME_tune_select for the instance                         */
+    uint32_t address;                             /* of both pages, as in the A2L: that of the set in flash, say     */
+    uint32_t id;                                  /* of the first set that is opened; each further one has 1 more    */
+    uint32_t quiet;                               /* ms; 0: off                                                      */
+    uint32_t max_cto;                             /* bytes of a packet: 8 on CAN, 64 on CAN FD, at most 255          */
+    uint32_t regions;                             /* of region[]                                                     */
+    const pen_xcp_region_t *region;               /* [regions]                                                       */
+    const pen_xcp_region_t *text[PEN_XCP_TEXTS];  /* of GET_ID; NULL: none                                           */
+    uint32_t protect;                             /* resources that need a key: PEN_XCP_CAL, PEN_XCP_DAQ; 0: none    */
+    const pen_xcp_options_t *options;             /* keys, storing; NULL: none                                       */
+    pen_xcp_command_t options_command;            /* pen_xcp_options_command, or NULL: not linked then               */
+    pen_xcp_daq_t *daq;                           /* NULL: no DAQ                                                    */
+    pen_xcp_command_t daq_command;                /* pen_xcp_daq_command, or NULL: not linked then                   */
 } pen_xcp_config_t;
 
 /** One slave. Owned by the caller; use it only through the functions below. Bytes first: shorter code on a Cortex-M. */
 struct pen_xcp {
     const pen_xcp_config_t *config;
-    bool                    connected;
-    bool                    refused;  /* the block has failed: the rest of it is ignored                               */
-    bool                    torn;     /* a block is unfinished: no commit                                              */
-    uint8_t                 answer;   /* bytes of the answer                                                           */
-    uint8_t                 page;     /* of the tool                                                                   */
-    uint8_t                 block;    /* bytes of a block of DOWNLOADs that are still to come                          */
-    uint8_t                 locked;   /* resources                                                                     */
-    uint8_t                 asked;    /* resource of the last GET_SEED                                                 */
-    uint8_t                 frozen;   /* 1: segment mode FREEZE                                                        */
-    uint8_t                 store;    /* 1: STORE_CAL requested                                                        */
-    pen_tuning_t           *tuning;   /* of the instance                                                               */
-    const uint8_t          *text;     /* GET_ID: what UPLOAD reads next; NULL: the address does                        */
-    uint32_t                left;     /* bytes of it                                                                   */
-    uint32_t                mta;      /* memory transfer address                                                       */
-    uint32_t                sets;     /* opened so far                                                                 */
-    uint32_t                idle;     /* ms since the last DOWNLOAD; `quiet`: no automatic commit                      */
-    pen_status_t            status;   /* for bytes 4 to 7 of an error                                                  */
-    const pen_real_t       *kept;     /* the working page while the reference runs                                     */
-    const pen_real_t       *waiting;  /* the set published last                                                        */
-    volatile uint32_t       sampling; /* DAQ lists that run, a bit each                                                */
+    bool connected;
+    bool refused;               /* the block has failed: the rest of it is ignored                               */
+    bool torn;                  /* a block is unfinished: no commit                                              */
+    uint8_t answer;             /* bytes of the answer                                                           */
+    uint8_t page;               /* of the tool                                                                   */
+    uint8_t block;              /* bytes of a block of DOWNLOADs that are still to come                          */
+    uint8_t locked;             /* resources                                                                     */
+    uint8_t asked;              /* resource of the last GET_SEED                                                 */
+    uint8_t frozen;             /* 1: segment mode FREEZE                                                        */
+    uint8_t store;              /* 1: STORE_CAL requested                                                        */
+    pen_tuning_t *tuning;       /* of the instance                                                               */
+    const uint8_t *text;        /* GET_ID: what UPLOAD reads next; NULL: the address does                        */
+    uint32_t left;              /* bytes of it                                                                   */
+    uint32_t mta;               /* memory transfer address                                                       */
+    uint32_t sets;              /* opened so far                                                                 */
+    uint32_t idle;              /* ms since the last DOWNLOAD; `quiet`: no automatic commit                      */
+    pen_status_t status;        /* for bytes 4 to 7 of an error                                                  */
+    const pen_real_t *kept;     /* the working page while the reference runs                                     */
+    const pen_real_t *waiting;  /* the set published last                                                        */
+    volatile uint32_t sampling; /* DAQ lists that run, a bit each                                                */
 };
 
 /**

@@ -30,7 +30,7 @@ extern "C" {
 
 typedef struct {
     const uint8_t *byte; /* NULL: not written yet */
-    uint32_t       size;
+    uint32_t size;
 } pen_xcp_entry_t;
 
 typedef struct {
@@ -48,25 +48,25 @@ typedef struct {
 
 /** Lists and ring. Owned by the caller; use it only through the functions below. */
 struct pen_xcp_daq {
-    pen_xcp_list_t    list[PEN_XCP_LISTS];
-    uint8_t           lists;
-    uint8_t           odts;
-    uint8_t           entries;
-    uint8_t           selected; /* lists, a bit each                 */
-    uint8_t           at;       /* of the DAQ pointer: entry         */
-    uint8_t           left;     /* entries of the ODT from there on  */
-    uint8_t           cycle;    /* of the event: GET_DAQ_EVENT_INFO  */
-    uint8_t           unit;     /* of the cycle: 6 is 1 ms           */
-    uint32_t          slots;    /* of the ring                       */
-    uint32_t          size;     /* of a slot: length, packet         */
-    uint8_t          *ring;     /* [slots * size]                    */
+    pen_xcp_list_t list[PEN_XCP_LISTS];
+    uint8_t lists;
+    uint8_t odts;
+    uint8_t entries;
+    uint8_t selected;           /* lists, a bit each                 */
+    uint8_t at;                 /* of the DAQ pointer: entry         */
+    uint8_t left;               /* entries of the ODT from there on  */
+    uint8_t cycle;              /* of the event: GET_DAQ_EVENT_INFO  */
+    uint8_t unit;               /* of the cycle: 6 is 1 ms           */
+    uint32_t slots;             /* of the ring                       */
+    uint32_t size;              /* of a slot: length, packet         */
+    uint8_t *ring;              /* [slots * size]                    */
     volatile uint32_t head;     /* next slot that the step fills     */
     volatile uint32_t tail;     /* next slot to send                 */
     volatile uint32_t busy;     /* 1: a sample is being taken        */
     volatile uint32_t overload; /* 1: a sample was left out          */
     volatile uint32_t time;     /* of the last sample                */
-    pen_xcp_odt_t     odt[PEN_XCP_ODTS];
-    pen_xcp_entry_t   entry[PEN_XCP_ENTRIES];
+    pen_xcp_odt_t odt[PEN_XCP_ODTS];
+    pen_xcp_entry_t entry[PEN_XCP_ENTRIES];
 };
 
 /**

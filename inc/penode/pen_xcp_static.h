@@ -26,14 +26,14 @@ extern "C" {
 
 /** A list. Constant; borrowed for as long as the slave is used. */
 typedef struct {
-    uint8_t                odts;    /* of the list, at least 1                                                   */
-    uint8_t                entries; /* of each ODT, at least 1                                                   */
-    const pen_xcp_entry_t *entry;   /* [odts * entries], ODT by ODT, size 0: none; NULL: a configurable list     */
+    uint8_t odts;                 /* of the list, at least 1                                                   */
+    uint8_t entries;              /* of each ODT, at least 1                                                   */
+    const pen_xcp_entry_t *entry; /* [odts * entries], ODT by ODT, size 0: none; NULL: a configurable list     */
 } pen_xcp_static_t;
 
 /** All lists: at most PEN_XCP_LISTS, PEN_XCP_ODTS, PEN_XCP_ENTRIES in all. */
 typedef struct {
-    uint32_t                lists;
+    uint32_t lists;
     const pen_xcp_static_t *list; /* [lists], predefined ones first */
 } pen_xcp_statics_t;
 

@@ -33,7 +33,7 @@ void board_print(const char *text)
 
 void board_print_number(uint32_t value)
 {
-    char     text[11];
+    char text[11];
     uint32_t at = sizeof(text) - 1U;
 
     text[at] = '\0';
@@ -61,12 +61,12 @@ bool board_argument(uint32_t index, char text[], uint32_t size)
 {
     static char line[512];
     struct {
-        char    *text;
+        char *text;
         uint32_t size;
     } block = { line, sizeof(line) };
     const bool known = (host_call(HOST_CMDLINE, &block) == 0U);
-    uint32_t   at = 0U;
-    uint32_t   n = 0U;
+    uint32_t at = 0U;
+    uint32_t n = 0U;
 
     for (uint32_t word = 0U; known && (word < index); word++) {
         while ((line[at] != '\0') && (line[at] != ' ')) {
@@ -98,17 +98,17 @@ int32_t board_open(const char *name, bool write)
 {
     const struct {
         const char *name;
-        uint32_t    mode;
-        uint32_t    length;
+        uint32_t mode;
+        uint32_t length;
     } block = { name, write ? 5U : 1U, length_of(name) }; /* modes "wb" and "rb" */
 
     return (int32_t)host_call(HOST_OPEN, &block);
 }
 
 typedef struct {
-    int32_t     file;
+    int32_t file;
     const void *data;
-    uint32_t    bytes;
+    uint32_t bytes;
 } transfer_t;
 
 uint32_t board_read(int32_t file, void *data, uint32_t bytes)
@@ -250,9 +250,7 @@ uint32_t board_stack_used(void)
 
 /* ---- timer ---- */
 
-__attribute__((weak)) void board_timer(void)
-{
-}
+__attribute__((weak)) void board_timer(void) {}
 
 void board_tick(void)
 {

@@ -9,8 +9,8 @@
 #define CFSR_MMARVALID (1U << 7U)
 #define CFSR_BFARVALID (1U << 15U)
 #define CFSR_NO_FRAME  ((1U << 4U) | (1U << 12U) | (1U << 20U)) /* MSTKERR, STKERR, STKOF */
-#define FRAME_LR 5U
-#define FRAME_PC 6U
+#define FRAME_LR       5U
+#define FRAME_PC       6U
 
 void board_fault_report(const uint32_t frame[], uint32_t exception);
 
@@ -31,8 +31,9 @@ __attribute__((naked)) void board_fault(void)
 
 static const char *name_of(uint32_t exception)
 {
-    static const char *const name[8] = { "exception", "exception",  "NMI",        "HardFault",
-                                         "MemManage", "BusFault",   "UsageFault", "SecureFault" };
+    static const char *const name[8] = {
+        "exception", "exception", "NMI", "HardFault", "MemManage", "BusFault", "UsageFault", "SecureFault"
+    };
 
     return name[(exception < 8U) ? exception : 0U];
 }

@@ -26,7 +26,9 @@ __attribute__((section(".vectors"), used)) static const vector_t vectors[16] = {
     board_fault, /* BusFault */
     board_fault, /* UsageFault */
     board_fault, /* SecureFault */
-    board_fault, board_fault, board_fault,
+    board_fault,
+    board_fault,
+    board_fault,
     board_fault, /* SVCall */
     board_fault, /* DebugMonitor */
     board_fault,

@@ -27,6 +27,7 @@
     "   vmul.f32 s22, s22, pen_column\n" \
     "   vmul.f32 s23, s23, pen_column\n"
 
+/* clang-format off */ /* one instruction a line */
 /* s0-s15, one row each, += weights times pen_column. VMUL and VADD take two cycles, VMLA three. */
 #define PEN_PORT_COLUMN \
     PEN_PORT_PRODUCTS \
@@ -47,6 +48,7 @@
     "   vadd.f32 s13, s13, s21\n" \
     "   vadd.f32 s14, s14, s22\n" \
     "   vadd.f32 s15, s15, s23\n"
+/* clang-format on */
 
 /* s24-s27 = max(0, s24-s27), and NaN for Inf */
 #define PEN_PORT_RELU \
@@ -141,6 +143,7 @@ PEN_PORT_INLINE float pen_port_net16(size_t hidden, const float w[], float x)
     size_t turns;
     float y;
 
+    /* clang-format off */ /* one instruction a line */
     __asm__ volatile("   vldmia   %[w]!, {s0-s15}    \n" /* first layer: biases, one column */
                      "   vmov.f32 s24, %[x]           \n"
                      "pen_column .req s24             \n" PEN_PORT_COLUMN
@@ -166,6 +169,7 @@ PEN_PORT_INLINE float pen_port_net16(size_t hidden, const float w[], float x)
                      : "cc", "memory", "s0", "s1", "s2", "s3", "s4", "s5", "s6", "s7", "s8", "s9", "s10", "s11", "s12",
                        "s13", "s14", "s15", "s16", "s17", "s18", "s19", "s20", "s21", "s22", "s23", "s24", "s25", "s26",
                        "s27");
+    /* clang-format on */
     return y;
 }
 

@@ -48,8 +48,8 @@ PEN_PORT_INLINE void pen_port_rows(size_t n_in, const float w[], const float x[]
                      "   vstmia   %[y], {s0-s15}     \n"
                      : [n] "+&r"(n_in), [w] "+&r"(w), [x] "+&r"(x), [h] "=&t"(h), [size] "=&t"(size)
                      : [y] "r"(y), [half] "t"(0.5F)
-                     : "cc", "memory", "s0", "s1", "s2", "s3", "s4", "s5", "s6", "s7", "s8", "s9", "s10", "s11", "s12",
-                       "s13", "s14", "s15", "s16", "s17", "s18", "s19", "s20", "s21", "s22", "s23");
+                     : "cc", "memory", "s0", "s1", "s2", "s3", "s4", "s5", "s6", "s7", "s8", "s9", "s10", "s11", "s12", "s13", "s14", "s15",
+                       "s16", "s17", "s18", "s19", "s20", "s21", "s22", "s23");
 }
 
 /* The network 1-16-...-16-1: its first layer is one with a single column. 160 bytes. */
@@ -105,8 +105,8 @@ PEN_PORT_INLINE float pen_port_net16(size_t hidden, const float w[], float x)
                      "   vmul.f32 %[y], %[y], %[half]\n"
                      : [hidden] "+&r"(hidden), [w] "+&r"(w), [from] "=&r"(from), [n] "=&r"(n), [x] "+&t"(x), [y] "=&t"(y)
                      : [h] "r"(h), [half] "t"(0.5F)
-                     : "cc", "memory", "s0", "s1", "s2", "s3", "s4", "s5", "s6", "s7", "s8", "s9", "s10", "s11", "s12",
-                       "s13", "s14", "s15", "s16", "s17", "s18", "s19", "s20", "s21", "s22", "s23");
+                     : "cc", "memory", "s0", "s1", "s2", "s3", "s4", "s5", "s6", "s7", "s8", "s9", "s10", "s11", "s12", "s13", "s14", "s15",
+                       "s16", "s17", "s18", "s19", "s20", "s21", "s22", "s23");
     return y;
 }
 

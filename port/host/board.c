@@ -91,27 +91,21 @@ void board_close(int32_t file)
     files[file] = NULL;
 }
 
-void board_count_start(void)
-{
-}
+void board_count_start(void) {}
 
 uint32_t board_count_stop(void)
 {
     return 0U;
 }
 
-void board_stack_paint(void)
-{
-}
+void board_stack_paint(void) {}
 
 uint32_t board_stack_used(void)
 {
     return 0U;
 }
 
-__attribute__((weak)) void board_timer(void)
-{
-}
+__attribute__((weak)) void board_timer(void) {}
 
 static void on_signal(int number)
 {

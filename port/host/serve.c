@@ -30,10 +30,10 @@
 #include "penode/pen_port.h"
 #include "xcp_frame.h"
 
-#define SLOTS 8192U
-#define ROOM  (XCP_FRAME_HEAD + 255U + XCP_FRAME_TAIL)
-#define SECOND 1000000000LL
-#define GONE   10 /* s */
+#define SLOTS   8192U
+#define ROOM    (XCP_FRAME_HEAD + 255U + XCP_FRAME_TAIL)
+#define SECOND  1000000000LL
+#define GONE    10 /* s */
 #define CONNECT 0xffU
 
 enum { WORD_KIND = 1, WORD_HOST, WORD_PORT, WORD_CTO, WORD_QUIET, WORD_STIMULUS, WORD_A2L, WORDS };
@@ -46,12 +46,12 @@ static uint32_t stimuli;
 
 /* Where answers go. */
 static struct {
-    int                socket;
-    bool               datagrams;
-    bool               frames; /* CAN */
-    bool               known;  /* a master has connected */
-    struct sockaddr_in peer;   /* that master            */
-    struct sockaddr_in from;   /* sender of the datagram */
+    int socket;
+    bool datagrams;
+    bool frames;             /* CAN */
+    bool known;              /* a master has connected */
+    struct sockaddr_in peer; /* that master            */
+    struct sockaddr_in from; /* sender of the datagram */
 } line = { .socket = -1 };
 
 /* -- stepping ------------------------------------------------------------------------------------------------------- */

@@ -19,7 +19,7 @@ case $out in /*) ;; *) out=$PWD/$out ;; esac
 cd "$(dirname "$0")/../.."
 packages=port/packages
 
-version=$(sed -n 's/^#define PEN_VERSION "\([0-9.]*\)".*/\1/p' inc/penode/pen_real.h)
+version=$(sed -n 's/^#define PEN_VERSION  *"\([0-9.]*\)".*/\1/p' inc/penode/pen_real.h)
 [ -n "$version" ] || { echo "dist.sh: no PEN_VERSION in inc/penode/pen_real.h" >&2; exit 1; }
 tree=$out/penode-$version
 one=$tree-amalgamated

@@ -47,7 +47,7 @@ void board_close(int32_t file);
  * whose clock goes by instructions (see port/cortex-m/run) as long as they are fewer than 4 million, or than fit a
  * period of the timer; 0 where nothing can be counted.
  */
-void     board_count_start(void);
+void board_count_start(void);
 uint32_t board_count_stop(void);
 
 /** Paint the free part of the stack. */

@@ -31,13 +31,19 @@ static struct {
 #endif
 } shown;
 
-#define TEXT_OF(name) TEXT_OF_(name)
+#define TEXT_OF(name)  TEXT_OF_(name)
 #define TEXT_OF_(name) #name
 const char penode_epk[] = CONTROLLER_EPK;
 static const char name_text[] = TEXT_OF(MODEL(controller));
 
-static pen_status_t commit(void) { return MODEL(tune_commit)(&controller); }
-static pen_status_t choose(const pen_set_t *set) { return MODEL(tune_select)(&controller, set); }
+static pen_status_t commit(void)
+{
+    return MODEL(tune_commit)(&controller);
+}
+static pen_status_t choose(const pen_set_t *set)
+{
+    return MODEL(tune_select)(&controller, set);
+}
 
 #define REGIONS 3U
 static pen_xcp_region_t region[REGIONS];
@@ -151,5 +157,11 @@ void controller_step(const MODEL(u_t) *u, bool late)
     pen_xcp_sample(&controller_xcp, elapsed());
 }
 
-uint32_t controller_samples(void) { return pen_port_load(&shown.sample); }
-uint32_t controller_late(void) { return pen_port_load(&shown.late_steps); }
+uint32_t controller_samples(void)
+{
+    return pen_port_load(&shown.sample);
+}
+uint32_t controller_late(void)
+{
+    return pen_port_load(&shown.late_steps);
+}

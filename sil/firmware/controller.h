@@ -24,12 +24,12 @@
 
 /** How the slave is reached. */
 typedef struct {
-    uint32_t       max_cto; /* bytes of the longest packet                                   */
-    uint32_t       quiet;   /* ms after the last DOWNLOAD, until it comes into force; 0: off */
-    uint8_t       *ring;    /* [slots * (max_cto + 1)] of DAQ lists                          */
-    uint32_t       slots;
+    uint32_t max_cto; /* bytes of the longest packet                                   */
+    uint32_t quiet;   /* ms after the last DOWNLOAD, until it comes into force; 0: off */
+    uint8_t *ring;    /* [slots * (max_cto + 1)] of DAQ lists                          */
+    uint32_t slots;
     const uint8_t *a2l;     /* [a2l_size] that GET_ID offers; NULL: none                     */
-    uint32_t       a2l_size;
+    uint32_t a2l_size;
 } controller_config_t;
 
 extern pen_xcp_t controller_xcp;

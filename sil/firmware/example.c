@@ -176,7 +176,8 @@ static bool report_status(void)
     board_print(", flags ");
     board_print_hex(report.flags);
     board_print("\n");
-    return (status == PEN_OK) && ((report.flags & ~PEN_OUTSIDE) == (PEN_HELD | PEN_ADOPTED)) && (pen_status_times(&report, PEN_ADOPTED) == 3U);
+    return (status == PEN_OK) && ((report.flags & ~PEN_OUTSIDE) == (PEN_HELD | PEN_ADOPTED)) &&
+           (pen_status_times(&report, PEN_ADOPTED) == 3U);
 }
 
 int main(void)

@@ -25,28 +25,28 @@
 #else
 #define LANES_BYTES 16
 #endif
-#define LANES (LANES_BYTES / sizeof(pen_real_t))
+#define LANES        (LANES_BYTES / sizeof(pen_real_t))
 #define LANES_INLINE static inline __attribute__((always_inline, unused))
 #define LANES_APART  static __attribute__((noinline)) /* one copy of what is long */
 
 #ifdef PEN_REAL_DOUBLE
 typedef int64_t integer_t; /* as wide as pen_real_t */
-#define SIGN_BIT INT64_MIN
+#define SIGN_BIT      INT64_MIN
 #define MANTISSA_BITS 52
-#define TRUNC __builtin_trunc
-#define UNITS 0x1p52 /* a whole number added to it stands in the lowest bits */
-#define UNITS_MASK INT64_C(0xFFFFFFFFFFFFF)
+#define TRUNC         __builtin_trunc
+#define UNITS         0x1p52 /* a whole number added to it stands in the lowest bits */
+#define UNITS_MASK    INT64_C(0xFFFFFFFFFFFFF)
 #define EXPONENT_ZERO 1023
-#define POWER_SPLIT 256 /* 2^k is the product of 2^(k mod 256) and the rest, as in pen_math.c */
+#define POWER_SPLIT   256 /* 2^k is the product of 2^(k mod 256) and the rest, as in pen_math.c */
 #else
 typedef int32_t integer_t;
-#define SIGN_BIT INT32_MIN
+#define SIGN_BIT      INT32_MIN
 #define MANTISSA_BITS 23
-#define TRUNC __builtin_truncf
-#define UNITS 0x1p23F
-#define UNITS_MASK INT32_C(0x7FFFFF)
+#define TRUNC         __builtin_truncf
+#define UNITS         0x1p23F
+#define UNITS_MASK    INT32_C(0x7FFFFF)
 #define EXPONENT_ZERO 127
-#define POWER_SPLIT 32
+#define POWER_SPLIT   32
 #endif
 
 typedef pen_real_t lanes_t __attribute__((vector_size(LANES_BYTES)));
@@ -88,12 +88,12 @@ LANES_INLINE void lanes_restore(unsigned mode)
 /** The same number in all lanes; -0 stays -0. */
 LANES_INLINE lanes_t lanes_wide(pen_real_t x)
 {
-    return x - (lanes_t){0};
+    return x - (lanes_t){ 0 };
 }
 
 LANES_INLINE lanes_t lanes_weight(weight_t w)
 {
-    return w - (lanes_t){0};
+    return w - (lanes_t){ 0 };
 }
 
 LANES_INLINE lanes_t lanes_pick(mask_t which, lanes_t yes, lanes_t no)
@@ -120,7 +120,7 @@ LANES_INLINE lanes_t lanes_abs(lanes_t x)
 LANES_INLINE mask_t lanes_finite(size_t n, const lanes_t value[])
 {
     const mask_t exponent = (mask_t)lanes_wide((pen_real_t)INFINITY);
-    mask_t bad = {0};
+    mask_t bad = { 0 };
 
     for (size_t i = 0U; i < n; i++) {
         bad |= ((mask_t)value[i] & exponent) == exponent;
@@ -134,7 +134,7 @@ LANES_INLINE mask_t lanes_finite(size_t n, const lanes_t value[])
 #define LANES_EACH(name) \
     LANES_INLINE lanes_t lanes_##name(lanes_t x) \
     { \
-        lanes_t y = {0}; \
+        lanes_t y = { 0 }; \
         for (size_t l = 0U; l < LANES; l++) { \
             y[l] = name(x[l]); \
         } \
@@ -147,7 +147,7 @@ LANES_EACH(log1p_tail)
 
 LANES_INLINE lanes_t lanes_trunc(lanes_t x)
 {
-    lanes_t y = {0};
+    lanes_t y = { 0 };
 
     for (size_t l = 0U; l < LANES; l++) {
         y[l] = TRUNC(x[l]);
@@ -252,11 +252,11 @@ LANES_INLINE lanes_t lanes_sign(lanes_t x)
 LANES_INLINE mask_t lanes_solve(size_t n, lanes_t a[], lanes_t b[])
 {
     lanes_t inverse[n]; /* n is a constant where this is inlined */
-    lanes_t nonfinite = {0};
+    lanes_t nonfinite = { 0 };
 
     for (size_t k = 0U; k < n; k++) {
         lanes_t largest = lanes_abs(a[(k * n) + k]);
-        mask_t row = (mask_t){0} + (int)k;
+        mask_t row = (mask_t){ 0 } + (int)k;
         for (size_t i = k + 1U; i < n; i++) {
             const lanes_t size = lanes_abs(a[(i * n) + k]);
             const mask_t larger = size > largest;
@@ -307,8 +307,7 @@ LANES_INLINE lanes_t lanes_rectified(lanes_t x)
  * @param bias  without it: the tangent
  * @param relu  apply the activation
  */
-LANES_INLINE void lanes_block(size_t rows, size_t n_in, const weight_t w[], const lanes_t x[], lanes_t y[],
-                              bool bias, bool relu)
+LANES_INLINE void lanes_block(size_t rows, size_t n_in, const weight_t w[], const lanes_t x[], lanes_t y[], bool bias, bool relu)
 {
     lanes_t a[16];
 
@@ -334,8 +333,7 @@ LANES_INLINE void lanes_block(size_t rows, size_t n_in, const weight_t w[], cons
  * @param after_relu  x comes from a ReLU: the last n_out % 4 rows are summed twice as large, as in pen_dense1_relu
  * @param relu        apply the activation to y
  */
-LANES_INLINE void lanes_dense(size_t n_out, size_t n_in, const weight_t w[], const lanes_t x[], lanes_t y[],
-                              bool after_relu, bool relu)
+LANES_INLINE void lanes_dense(size_t n_out, size_t n_in, const weight_t w[], const lanes_t x[], lanes_t y[], bool after_relu, bool relu)
 {
     size_t row = 0U;
 
@@ -477,7 +475,7 @@ LANES_INLINE void lanes_rescale_tangent(size_t n, const weight_t w[], lanes_t t[
 /** Lanes in which any x[i] lies outside of its range, or is NaN. */
 LANES_INLINE mask_t lanes_outside(size_t n, const weight_t range[], const lanes_t x[])
 {
-    mask_t outside = {0};
+    mask_t outside = { 0 };
 
     for (size_t i = 0U; i < n; i++) {
         outside |= ~(x[i] >= range[i]) | ~(x[i] <= range[n + i]);
@@ -543,8 +541,8 @@ typedef struct {
     mask_t folded; /* the lanes whose pieces found room */
 } lanes_pieces_t;
 
-LANES_INLINE void lanes_fold(const pen_chain_t *chain, size_t length, const weight_t w[], bool clamp,
-                             pen_real_t line[], bool active[], lanes_pieces_t *f)
+LANES_INLINE void lanes_fold(const pen_chain_t *chain, size_t length, const weight_t w[], bool clamp, pen_real_t line[], bool active[],
+                             lanes_pieces_t *f)
 {
     for (size_t l = 0U; l < LANES; l++) {
         pen_real_t own[length];
@@ -557,7 +555,7 @@ LANES_INLINE void lanes_fold(const pen_chain_t *chain, size_t length, const weig
 
 LANES_INLINE mask_t lanes_find(const lanes_pieces_t *f, lanes_t x, lanes_t *y, lanes_t *slope)
 {
-    mask_t outside = {0};
+    mask_t outside = { 0 };
 
     for (size_t l = 0U; l < LANES; l++) {
         pen_status_t status = PEN_OK;
@@ -585,14 +583,14 @@ typedef struct {
     mask_t folded;   /* all lanes, if the pieces found room */
 } lanes_pieces_t;
 
-LANES_INLINE void lanes_fold(const pen_chain_t *chain, size_t length, const weight_t w[], bool clamp,
-                             pen_real_t line[], bool active[], lanes_pieces_t *f)
+LANES_INLINE void lanes_fold(const pen_chain_t *chain, size_t length, const weight_t w[], bool clamp, pen_real_t line[], bool active[],
+                             lanes_pieces_t *f)
 {
     pen_piece_t piece[LANES_PIECES];
     const bool folded = (pen_fold(chain, w, clamp, line, active, LANES_PIECES, piece) == PEN_OK);
 
     (void)length;
-    f->folded = (mask_t){0} - (integer_t)(folded ? 1 : 0);
+    f->folded = (mask_t){ 0 } - (integer_t)(folded ? 1 : 0);
     if (folded) {
         f->centre = piece[0].start;
         f->low = -(pen_real_t)INFINITY;
@@ -616,7 +614,7 @@ LANES_INLINE void lanes_fold(const pen_chain_t *chain, size_t length, const weig
 /** pen_fold_find and pen_fold_value; the lanes outside of the trust envelope. Cost: LANES + LANES_ROWS comparisons. */
 LANES_INLINE mask_t lanes_find(const lanes_pieces_t *f, lanes_t x, lanes_t *y, lanes_t *slope)
 {
-    mask_t column = {0};
+    mask_t column = { 0 };
     lanes_t offset;
 
 #pragma GCC unroll 16

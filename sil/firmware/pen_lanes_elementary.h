@@ -14,7 +14,7 @@
 #pragma clang fp reassociate(off) contract(off)
 #elif defined(LANES_FLUSH) && defined(__GNUC__)
 #pragma GCC push_options
-#pragma GCC optimize ("no-associative-math", "signed-zeros", "fp-contract=off")
+#pragma GCC optimize("no-associative-math", "signed-zeros", "fp-contract=off")
 #endif
 #include "pen_atan.c"
 #include "pen_log.c"
@@ -32,9 +32,9 @@ LANES_EACH(pen_log)
 LANES_EACH(pen_sin)
 LANES_EACH(pen_sqrt)
 #define lanes_atan lanes_pen_atan
-#define lanes_cos lanes_pen_cos
-#define lanes_log lanes_pen_log
-#define lanes_sin lanes_pen_sin
+#define lanes_cos  lanes_pen_cos
+#define lanes_log  lanes_pen_log
+#define lanes_sin  lanes_pen_sin
 #define lanes_sqrt lanes_pen_sqrt
 
 #endif

@@ -43,10 +43,10 @@ enum { OP_END, OP_STEP, OP_BEGIN, OP_WRITE, OP_COMMIT, OP_ABORT, OP_SELECT, OP_R
 enum { KIND_NORMAL, KIND_ADOPTING, KIND_HOLDING, KINDS };
 
 typedef struct {
-    int32_t  file;
+    int32_t file;
     uint32_t at;
     uint32_t filled;
-    bool     good; /* false once anything went wrong */
+    bool good; /* false once anything went wrong */
     uint32_t word[BLOCK];
 } stream_t;
 
@@ -121,14 +121,8 @@ static void put_words(const void *source, size_t bytes)
 static bool header_fits(void)
 {
     static const uint32_t expected[] = {
-        TAPE_MAGIC,
-        (uint32_t)sizeof(pen_real_t),
-        (uint32_t)SAMPLE_X,
-        (uint32_t)sizeof(MODEL(u_t)),
-        (uint32_t)sizeof(MODEL(y_t)),
-        (uint32_t)SAMPLE_Z,
-        MODEL_SIZE(SET_LENGTH),
-        MODEL_SIZE(LAYOUT),
+        TAPE_MAGIC,         (uint32_t)sizeof(pen_real_t), (uint32_t)SAMPLE_X, (uint32_t)sizeof(MODEL(u_t)), (uint32_t)sizeof(MODEL(y_t)),
+        (uint32_t)SAMPLE_Z, MODEL_SIZE(SET_LENGTH),       MODEL_SIZE(LAYOUT),
     };
     bool fits = true;
 
@@ -235,17 +229,17 @@ static bool play(void)
     pen_status_t status = PEN_OK;
 
     switch (operation) {
-        case OP_STEP: play_steps(); break;
-        case OP_BEGIN: status = play_begin(); break;
-        case OP_WRITE: status = play_write(); break;
-        case OP_COMMIT: status = MODEL(tune_commit)(&model); break;
-        case OP_ABORT: status = MODEL(tune_abort)(&model); break;
-        case OP_SELECT: status = MODEL(tune_select)(&model, get_set()); break;
-        case OP_ROLLBACK: status = MODEL(tune_rollback)(&model); break;
-        case OP_HOLD: status = MODEL(tune_hold)(&model, get() != 0U); break;
-        case OP_STATE: status = play_state(); break;
-        case OP_END: more = false; break;
-        default: tape.good = false; break;
+    case OP_STEP: play_steps(); break;
+    case OP_BEGIN: status = play_begin(); break;
+    case OP_WRITE: status = play_write(); break;
+    case OP_COMMIT: status = MODEL(tune_commit)(&model); break;
+    case OP_ABORT: status = MODEL(tune_abort)(&model); break;
+    case OP_SELECT: status = MODEL(tune_select)(&model, get_set()); break;
+    case OP_ROLLBACK: status = MODEL(tune_rollback)(&model); break;
+    case OP_HOLD: status = MODEL(tune_hold)(&model, get() != 0U); break;
+    case OP_STATE: status = play_state(); break;
+    case OP_END: more = false; break;
+    default: tape.good = false; break;
     }
     if (more && (operation != OP_STEP)) {
         put(status);

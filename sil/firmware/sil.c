@@ -12,9 +12,8 @@ enum { SIZE_INSTANCE, SIZE_BANKS, SIZE_REAL, SIZE_X, SIZE_U, SIZE_Y, SIZE_Z, SIZ
 
 /** Sizes in bytes, in the order of the names above. */
 const uint32_t sil_sizes[SIZE_COUNT] = {
-    (uint32_t)sizeof(MODEL(t)),   (uint32_t)sizeof(MODEL(banks_t)), (uint32_t)sizeof(pen_real_t),
-    (uint32_t)SAMPLE_X,           (uint32_t)sizeof(MODEL(u_t)),     (uint32_t)sizeof(MODEL(y_t)),
-    (uint32_t)SAMPLE_Z,           (uint32_t)MODEL_SIZE(SAVED),
+    (uint32_t)sizeof(MODEL(t)),   (uint32_t)sizeof(MODEL(banks_t)), (uint32_t)sizeof(pen_real_t), (uint32_t)SAMPLE_X,
+    (uint32_t)sizeof(MODEL(u_t)), (uint32_t)sizeof(MODEL(y_t)),     (uint32_t)SAMPLE_Z,           (uint32_t)MODEL_SIZE(SAVED),
 };
 
 /**

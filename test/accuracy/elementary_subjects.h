@@ -4,11 +4,11 @@
 /* The functions of pen_elementary.h, for pen_math_accuracy.c compiled with -DPEN_ELEMENTARY. */
 #include "penode/pen_elementary.h"
 
-#define BOUND 1.5 /* what is asked of them, in ulp; pen_elementary.h promises less */
+#define BOUND     1.5 /* what is asked of them, in ulp; pen_elementary.h promises less */
 #define FUNCTIONS 5
 
-static const char *const NAME[FUNCTIONS] = {"pen_sin", "pen_cos", "pen_atan", "pen_log", "pen_sqrt"};
-static const int MONOTONE[FUNCTIONS] = {0, 0, 1, 1, 1};
+static const char *const NAME[FUNCTIONS] = { "pen_sin", "pen_cos", "pen_atan", "pen_log", "pen_sqrt" };
+static const int MONOTONE[FUNCTIONS] = { 0, 0, 1, 1, 1 };
 
 static void evaluate(pen_real_t x, pen_real_t y[FUNCTIONS])
 {

@@ -4,11 +4,11 @@
 /* The functions of pen_math.h, for pen_math_accuracy.c. */
 #include "penode/pen_math.h"
 
-#define BOUND 2.0 /* what pen_math.h promises, in ulp */
+#define BOUND     2.0 /* what pen_math.h promises, in ulp */
 #define FUNCTIONS 4
 
-static const char *const NAME[FUNCTIONS] = {"pen_exp", "pen_tanh", "pen_sigmoid", "pen_softplus"};
-static const int MONOTONE[FUNCTIONS] = {1, 1, 1, 1};
+static const char *const NAME[FUNCTIONS] = { "pen_exp", "pen_tanh", "pen_sigmoid", "pen_softplus" };
+static const int MONOTONE[FUNCTIONS] = { 1, 1, 1, 1 };
 
 static void evaluate(pen_real_t x, pen_real_t y[FUNCTIONS])
 {

@@ -32,28 +32,28 @@
 #ifdef PEN_REAL_DOUBLE
 typedef uint64_t bits_t;
 typedef long double wide_t;
-#define SIGNIFICAND DBL_MANT_DIG
+#define SIGNIFICAND  DBL_MANT_DIG
 #define EXPONENT_MIN DBL_MIN_EXP
 #define EXPONENT_MAX DBL_MAX_EXP
-#define WIDE(name) name##l
-#define TOP 0x1p1024L /* follows the largest number */
-#define STEP (UINT64_C(1) << 32)
-#define SIGN (UINT64_C(1) << 63)
-#define INFINITE UINT64_C(0x7ff0000000000000)
+#define WIDE(name)   name##l
+#define TOP          0x1p1024L /* follows the largest number */
+#define STEP         (UINT64_C(1) << 32)
+#define SIGN         (UINT64_C(1) << 63)
+#define INFINITE     UINT64_C(0x7ff0000000000000)
 #if LDBL_MANT_DIG < 64
 #error "the double build needs a long double of at least 64 bits as its reference"
 #endif
 #else
 typedef uint32_t bits_t;
 typedef double wide_t;
-#define SIGNIFICAND FLT_MANT_DIG
+#define SIGNIFICAND  FLT_MANT_DIG
 #define EXPONENT_MIN FLT_MIN_EXP
 #define EXPONENT_MAX FLT_MAX_EXP
-#define WIDE(name) name
-#define TOP 0x1p128 /* follows the largest number */
-#define STEP UINT32_C(1)
-#define SIGN (UINT32_C(1) << 31)
-#define INFINITE UINT32_C(0x7f800000)
+#define WIDE(name)   name
+#define TOP          0x1p128 /* follows the largest number */
+#define STEP         UINT32_C(1)
+#define SIGN         (UINT32_C(1) << 31)
+#define INFINITE     UINT32_C(0x7f800000)
 #endif
 
 #ifdef PEN_ELEMENTARY
@@ -63,18 +63,18 @@ typedef double wide_t;
 #endif
 
 typedef struct {
-    double     error; /* largest, ulp */
+    double error; /* largest, ulp */
     pen_real_t where;
-    uint64_t   falls; /* results below the one before */
-    pen_real_t fall;  /* the first of them            */
-    uint64_t   nan;   /* NaN where there must be none, or none where there must be one */
+    uint64_t falls;  /* results below the one before */
+    pen_real_t fall; /* the first of them            */
+    uint64_t nan;    /* NaN where there must be none, or none where there must be one */
 } finding_t;
 
 typedef struct {
-    bits_t    first; /* order of the first input */
-    bits_t    last;
-    uint64_t  stride;
-    uint64_t  inputs;
+    bits_t first; /* order of the first input */
+    bits_t last;
+    uint64_t stride;
+    uint64_t inputs;
     finding_t finding[FUNCTIONS];
 } job_t;
 
@@ -244,8 +244,8 @@ int main(int argc, char **argv)
             all.falls += other->falls;
             all.nan += other->nan;
         }
-        printf("%-13s max error %.4f ulp at %.*g (%a), not monotone at %llu", NAME[f], all.error, 17, (double)all.where,
-               (double)all.where, (unsigned long long)all.falls);
+        printf("%-13s max error %.4f ulp at %.*g (%a), not monotone at %llu", NAME[f], all.error, 17, (double)all.where, (double)all.where,
+               (unsigned long long)all.falls);
         if (all.falls > 0) {
             printf(" (first %a)", (double)all.fall);
         }

@@ -14,7 +14,7 @@
 
 #include "board.h"
 
-#define STEPS 2048U
+#define STEPS   2048U
 #define PAINTED 4U /* steps whose stack is measured: painting is slow */
 
 #ifdef MODEL_HEADER

@@ -26,8 +26,8 @@
 #define ROUNDS  200U  /* at most */
 #define POINTS  2048U /* at most */
 
-#define N_X     MODEL_SIZE(N_X)
-#define COPIES  2U   /* of the state in an instance */
+#define N_X    MODEL_SIZE(N_X)
+#define COPIES 2U /* of the state in an instance */
 
 enum { ANY_BITS, SPECIAL, ALL_SIZES, USUAL, KINDS };
 
@@ -78,8 +78,7 @@ static pen_real_t number(uint32_t kind, pen_real_t range)
         const pen_real_t tiny = bits(1U, 0U);
         const pen_real_t subnormal = bits(0x007FFFFFU, 0x000FFFFFU);
         const pen_real_t huge = bits(0x7F7FFFFFU, 0x7FEFFFFFU);
-        const pen_real_t special[] = { zero, -zero, inf,       -inf,       inf - inf, -(inf - inf),
-                                       tiny, -tiny, subnormal, -subnormal, huge,      -huge };
+        const pen_real_t special[] = { zero, -zero, inf, -inf, inf - inf, -(inf - inf), tiny, -tiny, subnormal, -subnormal, huge, -huge };
         value = special[any % (sizeof(special) / sizeof(special[0]))];
     } else if (kind == ALL_SIZES) {
         for (uint32_t k = 0U; k < (any % 160U); k++) {

@@ -11,8 +11,8 @@
 #define N 8U
 
 static volatile uint32_t ticks;
-static volatile float    tiny[N];
-static float             product[N];
+static volatile float tiny[N];
+static float product[N];
 
 static bool same(const char *a, const char *b)
 {
@@ -115,7 +115,7 @@ static void stack(void)
 
 static void subnormal(void)
 {
-    float    x[N];
+    float x[N];
     uint32_t good = 0U;
 
     for (size_t i = 0U; i < N; i++) {
@@ -140,9 +140,9 @@ static void subnormal(void)
 
 static void copy(void)
 {
-    char          name[64];
+    char name[64];
     unsigned char data[256];
-    uint32_t      n = 0U;
+    uint32_t n = 0U;
     const int32_t from = board_argument(2U, name, sizeof(name)) ? board_open(name, false) : -1;
     const int32_t to = board_argument(3U, name, sizeof(name)) ? board_open(name, true) : -1;
 

@@ -12,10 +12,10 @@
 #define PEN_PORT_INLINE static inline
 #define PEN_PORT_UNROLL
 
-uint32_t   pen_port_load(const volatile uint32_t *word);
-void       pen_port_store(volatile uint32_t *word, uint32_t value);
-void       pen_port_barrier(void);
+uint32_t pen_port_load(const volatile uint32_t *word);
+void pen_port_store(volatile uint32_t *word, uint32_t value);
+void pen_port_barrier(void);
 pen_real_t pen_port_abs(pen_real_t x);
-uint32_t   pen_port_cycles(void);
+uint32_t pen_port_cycles(void);
 
 #endif

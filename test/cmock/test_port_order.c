@@ -18,12 +18,12 @@
 
 static const pen_real_t first_value[LENGTH] = { 1, 2, 3 };
 static const pen_real_t other_value[LENGTH] = { 4, 5, 6 };
-static pen_real_t       bank[2][LENGTH];
-static pen_set_t        first;
-static pen_set_t        other;
-static pen_tuning_t     tuning;
-static char             trace[32];
-static bool             whole_at_barrier; /* when the last barrier came, the inactive slot held all of `other` */
+static pen_real_t bank[2][LENGTH];
+static pen_set_t first;
+static pen_set_t other;
+static pen_tuning_t tuning;
+static char trace[32];
+static bool whole_at_barrier; /* when the last barrier came, the inactive slot held all of `other` */
 
 static void note(char event)
 {

@@ -21,18 +21,26 @@
 #endif
 
 #define CALL(type, name) ((type)(void *)GetProcAddress(library, name))
-#define TRY(call) do { if ((call) != 0) { return __LINE__; } } while (0)
+#define TRY(call) \
+    do { \
+        if ((call) != 0) { \
+            return __LINE__; \
+        } \
+    } while (0)
 
 typedef FMI(ValueReference) reference_t;
 typedef int (*plain_t)(void *);
 #if FMI_VERSION == 3
-typedef void *(*instantiate_t)(const char *, const char *, const char *, bool, bool, bool, bool, const reference_t *, size_t, void *, void *, void *);
+typedef void *(*instantiate_t)(const char *, const char *, const char *, bool, bool, bool, bool, const reference_t *, size_t, void *,
+                               void *, void *);
 typedef int (*enter_t)(void *, bool, double, double, bool, double);
 typedef int (*reals_t)(void *, const reference_t *, size_t, double *, size_t);
 typedef int (*whole_t)(void *, const reference_t *, size_t, const int64_t *, size_t);
 typedef int (*step_t)(void *, double, double, bool, bool *, bool *, bool *, double *);
 #else
-typedef struct { void *log, *allocate, *release, *finished, *environment; } callbacks_t;
+typedef struct {
+    void *log, *allocate, *release, *finished, *environment;
+} callbacks_t;
 typedef void *(*instantiate_t)(const char *, int, const char *, const char *, const callbacks_t *, int, int);
 typedef int (*setup_t)(void *, int, double, double, int, double);
 typedef int (*reals_t)(void *, const reference_t *, size_t, double *);
@@ -95,14 +103,14 @@ static int stepped(HMODULE library, void *fmu, long k)
 }
 
 #if FMI_VERSION == 3
-#define SET "fmi3SetFloat64"
-#define GET "fmi3GetFloat64"
-#define EXIT "fmi3ExitInitializationMode"
+#define SET     "fmi3SetFloat64"
+#define GET     "fmi3GetFloat64"
+#define EXIT    "fmi3ExitInitializationMode"
 #define RELEASE "fmi3FreeInstance"
 #else
-#define SET "fmi2SetReal"
-#define GET "fmi2GetReal"
-#define EXIT "fmi2ExitInitializationMode"
+#define SET     "fmi2SetReal"
+#define GET     "fmi2GetReal"
+#define EXIT    "fmi2ExitInitializationMode"
 #define RELEASE "fmi2FreeInstance"
 #endif
 

@@ -441,8 +441,8 @@ def test_a_file_that_cannot_be_replaced_leaves_all_as_they_were(tmp_path, monkey
 
 def test_one_version_and_one_abi_everywhere():
     header = (ROOT / "inc" / "penode" / "pen_real.h").read_text()
-    assert re.search(r'#define PEN_VERSION "(.*)"', header)[1] == penode_gen.VERSION
-    assert int(re.search(r"#define PEN_ABI (\d+)", header)[1]) == packing.ABI
+    assert re.search(r'#define PEN_VERSION +"(.*)"', header)[1] == penode_gen.VERSION
+    assert int(re.search(r"#define PEN_ABI +(\d+)", header)[1]) == packing.ABI
     assert f'\nversion = "{penode_gen.VERSION}"\n' in (ROOT / "pyproject.toml").read_text()
 
 

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HERE = ROOT / "test" / "packages"
 HEADERS = sorted(path.name for path in (ROOT / "inc" / "penode").glob("*.h"))
 MODEL = ["nqvm.c", "nqvm_params.c"]
-VERSION = re.search(r'#define PEN_VERSION "(.*)"', (ROOT / "inc/penode/pen_real.h").read_text(encoding="utf-8"))[1]
+VERSION = re.search(r'#define PEN_VERSION +"(.*)"', (ROOT / "inc/penode/pen_real.h").read_text(encoding="utf-8"))[1]
 # Bits do not depend on the level, so take the fastest to compile; the reference is compiled at another one.
 CC = ["gcc", "-std=c99", "-O0", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off"]
 

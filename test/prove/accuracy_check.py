@@ -21,7 +21,7 @@ FAULTS = {
     "a digit of a coefficient is lost": ("-0.4999999F", 0, "-0.499999F"),
     "the two ways to tanh meet too early": ("((pen_real_t)0.625)", 0, "((pen_real_t)0.3)"),
     "NaN is taken for a limit": ("(x < low) ? low : x", 0, "(x > low) ? x : low"),
-    "infinity comes too early": ("#define EXP_HIGH 89.0F", 0, "#define EXP_HIGH 88.0F"),
+    "infinity comes too early": ("#define EXP_HIGH      89.0F", 0, "#define EXP_HIGH      88.0F"),
 }
 
 

@@ -33,14 +33,38 @@ static pen_piece_t piece[PIECES];
 static pen_status_log_t status_log;
 static volatile pen_real_t sink;
 
-NOINLINE static pen_real_t nothing(pen_real_t x) { return x; }
-NOINLINE static pen_real_t exp_of(pen_real_t x) { return pen_exp(x); }
-NOINLINE static pen_real_t tanh_of(pen_real_t x) { return pen_tanh(x); }
-NOINLINE static pen_real_t sigmoid_of(pen_real_t x) { return pen_sigmoid(x); }
-NOINLINE static pen_real_t softplus_of(pen_real_t x) { return pen_softplus(x); }
-NOINLINE static pen_real_t net(pen_real_t x) { return pen_net16(2U, weight, x); }
-NOINLINE static pen_real_t find96(pen_real_t x) { return pen_fold_find(96U, piece, x)->start; }
-NOINLINE static pen_real_t find128(pen_real_t x) { return pen_fold_find(128U, piece, x)->start; }
+NOINLINE static pen_real_t nothing(pen_real_t x)
+{
+    return x;
+}
+NOINLINE static pen_real_t exp_of(pen_real_t x)
+{
+    return pen_exp(x);
+}
+NOINLINE static pen_real_t tanh_of(pen_real_t x)
+{
+    return pen_tanh(x);
+}
+NOINLINE static pen_real_t sigmoid_of(pen_real_t x)
+{
+    return pen_sigmoid(x);
+}
+NOINLINE static pen_real_t softplus_of(pen_real_t x)
+{
+    return pen_softplus(x);
+}
+NOINLINE static pen_real_t net(pen_real_t x)
+{
+    return pen_net16(2U, weight, x);
+}
+NOINLINE static pen_real_t find96(pen_real_t x)
+{
+    return pen_fold_find(96U, piece, x)->start;
+}
+NOINLINE static pen_real_t find128(pen_real_t x)
+{
+    return pen_fold_find(128U, piece, x)->start;
+}
 
 NOINLINE static pen_real_t slope(pen_real_t x)
 {
@@ -62,10 +86,22 @@ NOINLINE static pen_real_t solve2(pen_real_t x)
     return (pen_real_t)pen_solve2(a, b);
 }
 
-NOINLINE static pen_real_t solve_2(pen_real_t x) { return solve(2U, x); }
-NOINLINE static pen_real_t solve_4(pen_real_t x) { return solve(4U, x); }
-NOINLINE static pen_real_t solve_8(pen_real_t x) { return solve(8U, x); }
-NOINLINE static pen_real_t solve_16(pen_real_t x) { return solve(16U, x); }
+NOINLINE static pen_real_t solve_2(pen_real_t x)
+{
+    return solve(2U, x);
+}
+NOINLINE static pen_real_t solve_4(pen_real_t x)
+{
+    return solve(4U, x);
+}
+NOINLINE static pen_real_t solve_8(pen_real_t x)
+{
+    return solve(8U, x);
+}
+NOINLINE static pen_real_t solve_16(pen_real_t x)
+{
+    return solve(16U, x);
+}
 
 NOINLINE static pen_real_t note(pen_real_t x)
 {
@@ -73,18 +109,19 @@ NOINLINE static pen_real_t note(pen_real_t x)
     return x;
 }
 
-NOINLINE static pen_real_t test(pen_real_t x) { return x + (pen_real_t)pen_selftest(); }
+NOINLINE static pen_real_t test(pen_real_t x)
+{
+    return x + (pen_real_t)pen_selftest();
+}
 
 static const struct {
     const char *name;
     pen_real_t (*call)(pen_real_t);
 } measured[] = {
-    { "pen_exp", exp_of },           { "pen_tanh", tanh_of },          { "pen_sigmoid", sigmoid_of },
-    { "pen_softplus", softplus_of }, { "pen_net16", net },             { "pen_net16_slope", slope },
-    { "pen_fold_find_96", find96 },  { "pen_fold_find_128", find128 }, { "pen_solve_2", solve_2 },
-    { "pen_solve_4", solve_4 },      { "pen_solve_8", solve_8 },       { "pen_solve_16", solve_16 },
-    { "pen_solve2", solve2 },        { "pen_status_note_step", note },
-    { "pen_selftest", test },
+    { "pen_exp", exp_of },      { "pen_tanh", tanh_of },          { "pen_sigmoid", sigmoid_of },  { "pen_softplus", softplus_of },
+    { "pen_net16", net },       { "pen_net16_slope", slope },     { "pen_fold_find_96", find96 }, { "pen_fold_find_128", find128 },
+    { "pen_solve_2", solve_2 }, { "pen_solve_4", solve_4 },       { "pen_solve_8", solve_8 },     { "pen_solve_16", solve_16 },
+    { "pen_solve2", solve2 },   { "pen_status_note_step", note }, { "pen_selftest", test },
 };
 
 static uint32_t cost(pen_real_t (*call)(pen_real_t), pen_real_t x)

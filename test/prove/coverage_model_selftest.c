@@ -10,7 +10,7 @@
 
 #include "unity.h"
 
-static MODEL(t)   model;
+static MODEL(t) model;
 static pen_real_t value[MODEL_SIZE(SET_LENGTH)];
 
 /* All zeros, with the checksum of that. */

@@ -156,7 +156,7 @@ SEEDS = [
     Seed("pen_solve.c", "(n <= PEN_SOLVE_MAX) && ", "", Run(None, "systems")),
     Seed("pen_solve.c", "for (size_t i = k + 1U; i < n; i++)", "for (size_t i = k + 1U; i <= n; i++)", Run(None, "systems")),
     Seed("pen_math.c", "UINT32_C(1) << (k & 31U)", "UINT32_C(1) << (k & 63U)", Run(None, "elements")),
-    Seed("pen_math.c", "#define EXP_HIGH 89.0F", "#define EXP_HIGH 189.0F", Run(None, "elements")),
+    Seed("pen_math.c", "#define EXP_HIGH      89.0F", "#define EXP_HIGH      189.0F", Run(None, "elements")),
     Seed("pen_net.c", "(row + 4U) <= n_out", "row < n_out", Run(None, "all_layers")),
     Seed("pen_fold.c", "while (more && (left > 0U) && ", "while (more && ", Run(None, "folding")),
     Seed("pen_fold.c", "        } else if ((kink < walk->chain->neurons) && !flat) {", "        } else if (!flat) {", Run(None, "folding")),

@@ -37,15 +37,15 @@ static const pen_set_t *const sets[] = { MODEL_SETS };
 #define SETS (sizeof(sets) / sizeof(sets[0]))
 
 typedef struct {
-    uint64_t     digest;
+    uint64_t digest;
     pen_status_t calls; /* all that the tuning calls returned */
     pen_status_t steps; /* all that the steps reported    */
-    uint32_t     done;
+    uint32_t done;
 } result_t;
 
 typedef struct {
-    MODEL(t)       model;
-    uint8_t        between[4096];
+    MODEL(t) model;
+    uint8_t between[4096];
     MODEL(banks_t) banks;
 } memory_t;
 
@@ -238,8 +238,8 @@ int main(int argc, char **argv)
             const uint32_t outcome = run(situation, bit, true, &right);
             count[outcome]++;
             if ((outcome >= WRITE_OUTSIDE) && (count[outcome] <= 5U)) {
-                printf("bit %lu of byte %lu in situation %u: %s\n", (unsigned long)(bit % 8U), (unsigned long)(bit / 8U),
-                       situation, outcome_name[outcome]);
+                printf("bit %lu of byte %lu in situation %u: %s\n", (unsigned long)(bit % 8U), (unsigned long)(bit / 8U), situation,
+                       outcome_name[outcome]);
             }
         }
     }

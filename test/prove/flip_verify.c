@@ -25,17 +25,17 @@
 
 #include MODEL_HEADER
 
-#define N       MODEL_SIZE(SET_LENGTH)
-#define ROUND   MODEL_SIZE(VERIFY)
-#define LIMIT(n) (((2U * ROUND) + (n)-1U) / (n))
+#define N        MODEL_SIZE(SET_LENGTH)
+#define ROUND    MODEL_SIZE(VERIFY)
+#define LIMIT(n) (((2U * ROUND) + (n) - 1U) / (n))
 
 enum { REPORT, HOLD, ROLLBACK };                   /* MODEL_ON_DAMAGE */
 enum { BOTH, NO_ROLLBACK, BAD_ROLLBACK, ALL_BAD }; /* what there is to go back to */
 enum { IDLE, OPEN, PENDING };
 
 typedef struct {
-    MODEL(t)       model;
-    pen_real_t     first[N]; /* the set given to init */
+    MODEL(t) model;
+    pen_real_t first[N]; /* the set given to init */
     MODEL(banks_t) banks;
 } memory_t;
 

@@ -16,25 +16,25 @@
 
 #include MODEL_HEADER
 
-#define N      MODEL_SIZE(SET_LENGTH)
-#define N_X    MODEL_SIZE(N_X)
-#define FLASH  2U
+#define N       MODEL_SIZE(SET_LENGTH)
+#define N_X     MODEL_SIZE(N_X)
+#define FLASH   2U
 #define NOWHERE 3U
 #define KNOWN   4U /* a set of the model file */
-#define POOL   8U
+#define POOL    8U
 
 /* ---- the oracle ---- */
 
 typedef struct {
-    uint32_t   id;
-    uint32_t   place; /* bank 0 or 1, FLASH, NOWHERE or KNOWN */
-    pen_set_t  set;   /* its values in `keep` */
+    uint32_t id;
+    uint32_t place; /* bank 0 or 1, FLASH, NOWHERE or KNOWN */
+    pen_set_t set;  /* its values in `keep` */
     pen_real_t keep[N];
 } known_t;
 
 static known_t running, previous, waiting, opened;
-static known_t  replaced;       /* the rollback set again, if what waits is withdrawn */
-static bool     waits, withdrawn, open_now, holding, usable;
+static known_t replaced; /* the rollback set again, if what waits is withdrawn */
+static bool waits, withdrawn, open_now, holding, usable;
 static uint32_t fill;           /* bytes */
 static uint32_t times[PEN_STATUS_FLAGS];
 
@@ -407,8 +407,8 @@ static void drop(void)
 
 static bool in_pool(const pen_real_t *values)
 {
-    return (running.set.value == values) || (previous.set.value == values) || (initial.value == values) ||
-           (replaced.set.value == values) || (waits && (waiting.set.value == values));
+    return (running.set.value == values) || (previous.set.value == values) || (initial.value == values) || (replaced.set.value == values) ||
+           (waits && (waiting.set.value == values));
 }
 
 static void pick(void)

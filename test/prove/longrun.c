@@ -20,8 +20,8 @@
 
 #include "nqvm_folded.h"
 
-#define RATE 1000U
-#define X    4U
+#define RATE   1000U
+#define X      4U
 #define WINDOW 20000U /* steps */
 
 static const pen_set_t *const set[2] = { &nqvm_folded_set_default, &nqvm_folded_set_altered_friction };
@@ -322,6 +322,7 @@ int main(int argc, char **argv)
     printf("step %.3g\ndrift %.3g\napart %.3g %.3g %.3g %.3g\n", step_share, drift_share, apart[0], apart[1], apart[2], apart[3]);
     printf("z %.9g\nrate %.9g\ns %.9g\nv %.9g\ntyre %.9g\na %.9g\nnet_s %.9g\nnet_v %.9g\nanchor_s %.9g\nanchor_v %.9g\n", most.z,
            most.rate, most.s, most.v, most.tyre, most.a, most.net_s, most.net_v, most.anchor_s, most.anchor_v);
-    printf("slope_s %.9g\nslope_v %.9g\nadopted %lu\nwithdrawn %lu\noutside %lu\nwrong %lu\n", most.slope_s, most.slope_v, adopted, withdrawn, outside, wrong);
+    printf("slope_s %.9g\nslope_v %.9g\nadopted %lu\nwithdrawn %lu\noutside %lu\nwrong %lu\n", most.slope_s, most.slope_v, adopted,
+           withdrawn, outside, wrong);
     return (wrong == 0U) ? 0 : 1;
 }

@@ -23,23 +23,23 @@ enum { SOFT, STIFF, KINKED, SETS }; /* runs first, is selected, is staged */
 static const pen_set_t *const set[SETS] = { &small_set_default, &small_set_stiff, &small_set_kinked };
 static const char *const name[KINDS] = { "begin", "write",   "commit", "abort",    "select", "rollback",
                                          "hold",  "running", "status", "withdraw", "verify", "exchange" };
-static small_t       model;
+static small_t model;
 static small_banks_t banks;
-static pen_real_t    expected[SETS];
-static bool          step_interrupts;
+static pen_real_t expected[SETS];
+static bool step_interrupts;
 
 /* of one run */
 static volatile pen_status_t result; /* of the tuning call */
-static uint32_t   kind;
-static uint32_t   in_force;  /* set */
-static uint32_t   waiting;   /* set, or SETS if none waits */
-static uint32_t   target;    /* set that the call publishes, or SETS */
-static uint32_t   adopted;   /* how often */
-static uint32_t   withdrawn; /* how often */
-static uint32_t   reported;  /* of those adopted */
+static uint32_t kind;
+static uint32_t in_force;  /* set */
+static uint32_t waiting;   /* set, or SETS if none waits */
+static uint32_t target;    /* set that the call publishes, or SETS */
+static uint32_t adopted;   /* how often */
+static uint32_t withdrawn; /* how often */
+static uint32_t reported;  /* of those adopted */
 static pen_real_t last;
-static uint32_t   failures;
-static uint32_t   runs;
+static uint32_t failures;
+static uint32_t runs;
 
 #include "interrupt.inc"
 
@@ -113,7 +113,7 @@ __attribute__((noinline)) void tune(void)
 }
 
 static pen_status_t stepped;
-static small_y_t    y;
+static small_y_t y;
 
 __attribute__((noinline)) void step(void)
 {

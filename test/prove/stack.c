@@ -28,6 +28,7 @@ static uint8_t saved[MODEL_SIZE(SAVED)];
 static bool pending;
 static volatile pen_status_t status; /* of the last call, so that none is a jump */
 
+/* clang-format off */ /* one way a line */
 WAY(init) { status = MODEL(init)(&model, sets[0], &banks); }
 WAY(step) { status = MODEL(step)(&model, &u, &y); }
 WAY(step_jacobian) { status = MODEL(step_jacobian)(&model, &u, &y, &jacobian); }
@@ -63,6 +64,7 @@ static void (*const call[])(void) = { call_init,       call_step,        call_st
                                       call_sensors_jacobian, call_get_input, call_set_input, call_tune_begin_copy, call_tune_write_bytes,
                                       call_tune_expect, call_tune_commit, call_tune_withdraw, call_step, call_tune_pending,
                                       call_verify,     call_save,        call_restore,       call_verify };
+/* clang-format on */
 #define CALLS (sizeof(call) / sizeof(call[0]))
 
 int main(void)

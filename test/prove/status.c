@@ -385,7 +385,8 @@ static void one_run(void)
         wrong[draw() % N_U] = value;
         memcpy(&input, wrong, sizeof(input));
         status = MODEL(set_input)(&model, &input);
-        right = (all_finite(wrong, sizeof(wrong)) ? PEN_OK : PEN_INPUT_NONFINITE) | ((MODEL_OUT_OF_RANGE != REPORT) ? out_of_range(wrong) : PEN_OK);
+        right = (all_finite(wrong, sizeof(wrong)) ? PEN_OK : PEN_INPUT_NONFINITE) |
+                ((MODEL_OUT_OF_RANGE != REPORT) ? out_of_range(wrong) : PEN_OK);
         for (size_t k = 0U; k < N_U; k++) {
             wrong[k] = (MODEL_OUT_OF_RANGE == CLAMP) ? fminf(fmaxf(wrong[k], range[k][0]), range[k][1]) : wrong[k];
         }

@@ -17,7 +17,7 @@
 
 #include MODEL_HEADER
 
-#define N MODEL_SIZE(SET_LENGTH)
+#define N        MODEL_SIZE(SET_LENGTH)
 #define PATIENCE 5000000U /* steps without a new set: it is lost */
 #define WAIT     10 /* [s] for the tuning thread when all its sets have come; still busy: one came twice */
 

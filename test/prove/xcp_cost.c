@@ -16,22 +16,38 @@
 #define SHOWN   0x1000U
 #define BYTES   (NQVM_SET_LENGTH * (uint32_t)sizeof(pen_real_t))
 
-static nqvm_t       model;
+static nqvm_t model;
 static nqvm_banks_t banks;
-static pen_xcp_t     xcp;
+static pen_xcp_t xcp;
 static pen_xcp_daq_t daq;
-static uint8_t       ring[SLOTS * (MAX_CTO + 1U)];
-static pen_real_t    shown[8];
-static uint8_t       out[MAX_CTO];
+static uint8_t ring[SLOTS * (MAX_CTO + 1U)];
+static pen_real_t shown[8];
+static uint8_t out[MAX_CTO];
 
-static pen_status_t commit(void) { return nqvm_tune_commit(&model); }
-static pen_status_t choose(const pen_set_t *set) { return nqvm_tune_select(&model, set); }
+static pen_status_t commit(void)
+{
+    return nqvm_tune_commit(&model);
+}
+static pen_status_t choose(const pen_set_t *set)
+{
+    return nqvm_tune_select(&model, set);
+}
 
 static const pen_xcp_region_t region[] = { { SHOWN, sizeof(shown), (const uint8_t *)shown } };
 static const pen_xcp_config_t config = {
-    .instance = &model.head, .layout = NQVM_LAYOUT, .length = NQVM_SET_LENGTH, .reference = &nqvm_set_default,
-    .commit = commit, .select = choose, .address = PAGE, .id = 1000U, .max_cto = MAX_CTO,
-    .regions = 1U, .region = region, .daq = &daq, .daq_command = pen_xcp_daq_command,
+    .instance = &model.head,
+    .layout = NQVM_LAYOUT,
+    .length = NQVM_SET_LENGTH,
+    .reference = &nqvm_set_default,
+    .commit = commit,
+    .select = choose,
+    .address = PAGE,
+    .id = 1000U,
+    .max_cto = MAX_CTO,
+    .regions = 1U,
+    .region = region,
+    .daq = &daq,
+    .daq_command = pen_xcp_daq_command,
 };
 
 static void tell(const char *name, uint32_t n)
@@ -108,7 +124,8 @@ int main(void)
     send("DOWNLOAD of 62 bytes, the first", MAX_CTO, packet);
     send("DOWNLOAD of 62 bytes, others", MAX_CTO, packet);
     send(NULL, sizeof(mta), mta);
-    send("BUILD_CHECKSUM of 4792 bytes", 8U, (const uint8_t[]){ 0xf3U, 0U, 0U, 0U, (uint8_t)(BYTES & 0xffU), (uint8_t)(BYTES >> 8U), 0U, 0U });
+    send("BUILD_CHECKSUM of 4792 bytes", 8U,
+         (const uint8_t[]){ 0xf3U, 0U, 0U, 0U, (uint8_t)(BYTES & 0xffU), (uint8_t)(BYTES >> 8U), 0U, 0U });
     send("SET_CAL_PAGE(ECU, 0), a commit", 4U, (const uint8_t[]){ 0xebU, 1U, 0U, 0U });
     step();
     send("SET_CAL_PAGE(ECU, 1)", 4U, (const uint8_t[]){ 0xebU, 1U, 0U, 1U });

@@ -104,9 +104,21 @@ static void begin(uint32_t max_cto)
     reference = (pen_set_t){ { LAYOUT, N, 1U, pen_set_checksum(reference_value, N) }, reference_value };
     region[0] = (pen_xcp_region_t){ REGION, ROOM, region_memory };
     name = (pen_xcp_region_t){ 0U, sizeof(name_text), name_memory };
-    config = (pen_xcp_config_t){ .instance = &instance, .layout = LAYOUT, .length = N, .reference = &reference, .commit = commit,
-        .select = choose, .address = SEGMENT, .id = FIRST, .quiet = QUIET, .max_cto = max_cto, .regions = 1U, .region = region,
-        .text = { NULL, &name }, .daq = &daq, .daq_command = pen_xcp_daq_command };
+    config = (pen_xcp_config_t){ .instance = &instance,
+                                 .layout = LAYOUT,
+                                 .length = N,
+                                 .reference = &reference,
+                                 .commit = commit,
+                                 .select = choose,
+                                 .address = SEGMENT,
+                                 .id = FIRST,
+                                 .quiet = QUIET,
+                                 .max_cto = max_cto,
+                                 .regions = 1U,
+                                 .region = region,
+                                 .text = { NULL, &name },
+                                 .daq = &daq,
+                                 .daq_command = pen_xcp_daq_command };
     verdict = PEN_OK;
     pen_xcp_daq_init(&daq, ring, SLOTS, max_cto, 1U, 6U);
     expect(pen_ready(&model, &instance, NULL, pen_init(&model, &instance, &reference, bank[0], bank[1])) == PEN_OK, "init", 0U, 0U);
@@ -202,7 +214,7 @@ static void elapse(uint32_t ms)
 static void likely(void)
 {
     static const uint8_t commands[] = { 0xffU, 0xfeU, 0xfaU, 0xf6U, 0xf6U, 0xf5U, 0xf4U, 0xf3U, 0xf0U, 0xf0U, 0xefU, 0xeeU, 0xebU, 0xebU,
-        0xeaU, 0xe4U, 0xe3U, 0xe2U, 0xe1U, 0xe0U, 0xdfU, 0xdeU, 0xddU, 0xd7U, 0xd6U, 0xd5U, 0xd4U, 0xd3U };
+                                        0xeaU, 0xe4U, 0xe3U, 0xe2U, 0xe1U, 0xe0U, 0xdfU, 0xdeU, 0xddU, 0xd7U, 0xd6U, 0xd5U, 0xd4U, 0xd3U };
     uint8_t in[256] = { commands[byte() % sizeof(commands)] };
     const uint32_t n = config.max_cto;
     uint32_t address = ((byte() % 4U) == 0U) ? (REGION + (byte() % 12U) - 2U) : (SEGMENT + (byte() % 28U) - 4U);

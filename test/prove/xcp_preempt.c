@@ -17,24 +17,24 @@
 #include "penode/pen_serial.h"
 #include "penode/pen_xcp_daq.h"
 
-#define BYTES    (SMALL_SET_LENGTH * 4U)
-#define MAX_CTO  255U
-#define SLOTS    16U
-#define PAGE     0x10000U
-#define PAIR     0x1000U
-#define SAMPLE   13U /* bytes of a DAQ packet: PID, time, pair */
+#define BYTES   (SMALL_SET_LENGTH * 4U)
+#define MAX_CTO 255U
+#define SLOTS   16U
+#define PAGE    0x10000U
+#define PAIR    0x1000U
+#define SAMPLE  13U /* bytes of a DAQ packet: PID, time, pair */
 
 enum { DOWNLOAD, SWITCH, REFERENCE, COPY, CHECKSUM, CONNECT, DRAIN, STOP, FREE, KINDS };
 enum { SOFT, KINKED, SETS }; /* the reference, what is written */
 
 static const char *const name[KINDS] = { "download", "switch", "reference", "copy", "checksum", "connect", "drain", "stop", "free" };
-static small_t       model;
+static small_t model;
 static small_banks_t banks;
-static pen_xcp_t     xcp;
+static pen_xcp_t xcp;
 static pen_xcp_daq_t daq;
-static uint8_t       ring[SLOTS * (MAX_CTO + 1U)];
-static pen_real_t    expected[SETS];
-static bool          step_interrupts;
+static uint8_t ring[SLOTS * (MAX_CTO + 1U)];
+static pen_real_t expected[SETS];
+static bool step_interrupts;
 static volatile uint32_t pair[2]; /* steps so far, and its complement: written by the step */
 
 /* of one run */
@@ -42,7 +42,7 @@ static uint32_t kind;
 static uint32_t in_force;
 static uint32_t waiting; /* set, or SETS */
 static volatile uint32_t target; /* set that the packet publishes, or SETS */
-static bool     good_answer;
+static bool good_answer;
 static uint32_t drained; /* the pair that the last DAQ packet held */
 static uint32_t failures;
 static uint32_t runs;
@@ -67,14 +67,30 @@ static void expect(bool good, const char *what)
 
 /* -- the slave ------------------------------------------------------------------------------------------------------ */
 
-static pen_status_t commit(void) { return small_tune_commit(&model); }
-static pen_status_t choose(const pen_set_t *set) { return small_tune_select(&model, set); }
+static pen_status_t commit(void)
+{
+    return small_tune_commit(&model);
+}
+static pen_status_t choose(const pen_set_t *set)
+{
+    return small_tune_select(&model, set);
+}
 
 static const pen_xcp_region_t region[] = { { PAIR, sizeof(pair), (const uint8_t *)(uintptr_t)pair } };
 static const pen_xcp_config_t config = {
-    .instance = &model.head, .layout = SMALL_LAYOUT, .length = SMALL_SET_LENGTH, .reference = &small_set_default,
-    .commit = commit, .select = choose, .address = PAGE, .id = 1000U, .max_cto = MAX_CTO,
-    .regions = 1U, .region = region, .daq = &daq, .daq_command = pen_xcp_daq_command,
+    .instance = &model.head,
+    .layout = SMALL_LAYOUT,
+    .length = SMALL_SET_LENGTH,
+    .reference = &small_set_default,
+    .commit = commit,
+    .select = choose,
+    .address = PAGE,
+    .id = 1000U,
+    .max_cto = MAX_CTO,
+    .regions = 1U,
+    .region = region,
+    .daq = &daq,
+    .daq_command = pen_xcp_daq_command,
 };
 
 static uint8_t out[MAX_CTO];
@@ -84,8 +100,14 @@ static bool send(uint32_t n, const uint8_t in[])
     return (pen_xcp_receive(&xcp, in, n, out) > 0U) && (out[0] == 0xffU);
 }
 
-static bool set_mta(void) { return send(8U, (const uint8_t[]){ 0xf6U, 0U, 0U, 0U, 0U, 0U, 1U, 0U }); }
-static bool set_page(uint8_t page) { return send(4U, (const uint8_t[]){ 0xebU, 1U, 0U, page }); }
+static bool set_mta(void)
+{
+    return send(8U, (const uint8_t[]){ 0xf6U, 0U, 0U, 0U, 0U, 0U, 1U, 0U });
+}
+static bool set_page(uint8_t page)
+{
+    return send(4U, (const uint8_t[]){ 0xebU, 1U, 0U, page });
+}
 
 /* A whole set is short enough for one packet. */
 static bool download(void)
@@ -105,7 +127,8 @@ static void make_list(uint8_t entries)
 {
     bool good = send(4U, (const uint8_t[]){ 0xd5U, 0U, 1U, 0U }) && send(5U, (const uint8_t[]){ 0xd4U, 0U, 0U, 0U, 1U });
 
-    good = good && send(6U, (const uint8_t[]){ 0xd3U, 0U, 0U, 0U, 0U, entries }) && send(6U, (const uint8_t[]){ 0xe2U, 0U, 0U, 0U, 0U, 0U });
+    good = good && send(6U, (const uint8_t[]){ 0xd3U, 0U, 0U, 0U, 0U, entries }) &&
+           send(6U, (const uint8_t[]){ 0xe2U, 0U, 0U, 0U, 0U, 0U });
     for (uint8_t i = 0U; i < entries; i++) {
         good = good && send(8U, (const uint8_t[]){ 0xe1U, 0xffU, 4U, 0U, (uint8_t)(4U * i), 0x10U, 0U, 0U });
     }
@@ -166,7 +189,7 @@ __attribute__((noinline)) void the_packet(void)
 }
 
 static pen_status_t stepped;
-static small_y_t    y;
+static small_y_t y;
 
 __attribute__((noinline)) void the_step(void)
 {

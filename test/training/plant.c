@@ -30,7 +30,8 @@ static double damper(const plant_t *p, double s, double v)
     switch (p->damper) {
     case 1: { /* Stribeck, Coulomb and viscous friction: breakaway, Coulomb, rate of breakaway, viscous */
         const double stribeck = sqrt(2.0) * a[2];
-        return (sqrt(2.0 * exp(1.0)) * (a[0] - a[1]) * exp(-(v / stribeck) * (v / stribeck)) * v / stribeck) + (a[1] * tanh(10.0 * v / a[2])) + (a[3] * v);
+        return (sqrt(2.0 * exp(1.0)) * (a[0] - a[1]) * exp(-(v / stribeck) * (v / stribeck)) * v / stribeck) +
+               (a[1] * tanh(10.0 * v / a[2])) + (a[3] * v);
     }
     case 2: return (v > 0.0) ? (a[0] * v / (1.0 + (v / a[1]))) : (a[2] * v / (1.0 - (v / a[3]))); /* degressive, two-sided */
     case 3: return (a[0] * s) + (a[1] * s * s) + (a[2] * (1.0 + (25.0 * s)) * tanh(v / a[3])); /* friction that grows with deflection */
@@ -53,7 +54,7 @@ static void rates(const plant_t *p, const double x[4], double road, double rate,
 /* y [samples][4]: accelerations of body and wheel, deflection, its rate, every `every` steps of step [s] */
 void measure(const plant_t *p, const double *road, const double *rate, int samples, int every, double step, double *y)
 {
-    double x[4] = {road[0], road[0], 0.0, 0.0}, k[4][4], t[4];
+    double x[4] = { road[0], road[0], 0.0, 0.0 }, k[4][4], t[4];
 
     for (int n = 0; n < samples * every; n++) {
         const double *const r = &road[2 * n], *const q = &rate[2 * n];

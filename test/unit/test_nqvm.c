@@ -15,12 +15,12 @@
 
 #define WARM 50U
 
-static nqvm_t       model;
+static nqvm_t model;
 static nqvm_banks_t banks;
-static nqvm_u_t     u;
-static nqvm_y_t     y;
-static pen_real_t   bad[3]; /* NaN, Inf, -Inf */
-static uint8_t      saved[NQVM_SAVED];
+static nqvm_u_t u;
+static nqvm_y_t y;
+static pen_real_t bad[3]; /* NaN, Inf, -Inf */
+static uint8_t saved[NQVM_SAVED];
 
 static pen_real_t road(uint32_t k)
 {
@@ -88,14 +88,14 @@ void test_init_refuses_other_sets(void)
 
 void test_null_and_uninitialised_are_refused_and_nothing_is_written(void)
 {
-    nqvm_t                    raw = { .head.ready = 0U };
-    nqvm_x_t                  x = { (pen_real_t)1, (pen_real_t)2, (pen_real_t)3, (pen_real_t)4 };
-    nqvm_z_t                  z;
-    nqvm_jacobian_t           j;
-    pen_status_report_t       report;
-    pen_set_head_t            head;
-    const nqvm_y_t            before = y;
-    const nqvm_x_t            kept = state();
+    nqvm_t raw = { .head.ready = 0U };
+    nqvm_x_t x = { (pen_real_t)1, (pen_real_t)2, (pen_real_t)3, (pen_real_t)4 };
+    nqvm_z_t z;
+    nqvm_jacobian_t j;
+    pen_status_report_t report;
+    pen_set_head_t head;
+    const nqvm_y_t before = y;
+    const nqvm_x_t kept = state();
 
     TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_step(NULL, &u, &y));
     TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_step(&raw, &u, &y));
@@ -128,7 +128,7 @@ void test_null_and_uninitialised_are_refused_and_nothing_is_written(void)
 void test_first_sample_gives_outputs_without_a_step(void)
 {
     const nqvm_x_t start = { (pen_real_t)0.01, (pen_real_t)0.02, (pen_real_t)0.3, (pen_real_t)-0.4 };
-    nqvm_x_t       now;
+    nqvm_x_t now;
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_init(&model, &nqvm_set_default, NULL));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_set_state(&model, &start));
@@ -146,8 +146,8 @@ void test_bad_input_holds_and_the_next_good_one_goes_on(void)
     for (size_t b = 0U; b < 3U; b++) {
         const nqvm_x_t before = state();
         const nqvm_y_t kept = y;
-        nqvm_x_t       after;
-        pen_status_t   status;
+        nqvm_x_t after;
+        pen_status_t status;
 
         u.z_road = bad[b];
         status = nqvm_step(&model, &u, &y);
@@ -166,7 +166,7 @@ void test_bad_state_is_refused(void)
 {
     for (size_t b = 0U; b < 3U; b++) {
         const nqvm_x_t before = state();
-        nqvm_x_t       after = before;
+        nqvm_x_t after = before;
 
         after.v_b = bad[b];
         TEST_ASSERT_EQUAL_HEX32(PEN_STATE_NONFINITE, nqvm_set_state(&model, &after));
@@ -181,8 +181,8 @@ void test_damaged_state_comes_back_from_its_copy(void)
     for (size_t i = 0U; i < NQVM_N_X; i++) {
         for (size_t b = 0U; b < 3U; b++) {
             const nqvm_x_t before = state();
-            nqvm_x_t       after;
-            pen_status_t   status;
+            nqvm_x_t after;
+            pen_status_t status;
 
             model.row[1][i] = bad[b];
             u.z_road = road(WARM);
@@ -200,11 +200,11 @@ void test_damaged_state_comes_back_from_its_copy(void)
 void test_damaged_weight_holds_until_it_is_mended(void)
 {
     for (uint32_t i = 0U; i < NQVM_SET_LENGTH; i++) {
-        const bool     envelope = (i == NQVM_AT_SPRING_NET) || (i == (NQVM_AT_SPRING_NET + 1U)) || (i == NQVM_AT_DAMPER_NET) ||
+        const bool envelope = (i == NQVM_AT_SPRING_NET) || (i == (NQVM_AT_SPRING_NET + 1U)) || (i == NQVM_AT_DAMPER_NET) ||
                               (i == (NQVM_AT_DAMPER_NET + 1U));
         const nqvm_x_t before = state();
-        nqvm_x_t       after;
-        pen_status_t   status;
+        nqvm_x_t after;
+        pen_status_t status;
 
         /* stage a good copy, run it, then damage it where it lies */
         TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_tune_begin(&model, &nqvm_set_default.head));
@@ -250,11 +250,11 @@ void test_damaged_place_of_the_scrub(void)
 
 void test_exchange_keeps_the_state_and_misses_no_sample(void)
 {
-    nqvm_t       twin;
+    nqvm_t twin;
     nqvm_banks_t twin_banks;
-    nqvm_y_t     twin_y;
-    nqvm_x_t     a;
-    nqvm_x_t     b;
+    nqvm_y_t twin_y;
+    nqvm_x_t a;
+    nqvm_x_t b;
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_init(&twin, &nqvm_set_default, &twin_banks));
     for (uint32_t k = 0U; k < WARM; k++) {
@@ -285,7 +285,7 @@ void test_exchange_keeps_the_state_and_misses_no_sample(void)
 
 void test_two_instances_do_not_know_of_each_other(void)
 {
-    nqvm_t   other;
+    nqvm_t other;
     nqvm_y_t first_y[20];
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_init(&model, &nqvm_set_default, &banks));
@@ -342,7 +342,7 @@ static uint32_t times(pen_status_t flag)
 
 void test_bad_arguments_of_a_step_are_counted_and_reported(void)
 {
-    nqvm_jacobian_t         j;
+    nqvm_jacobian_t j;
     nqvm_sensors_jacobian_t jz;
 
     (void)times(PEN_OK);
@@ -368,10 +368,10 @@ void test_bad_arguments_of_a_step_are_counted_and_reported(void)
 
 void test_new_calls_refuse_null_and_uninitialised(void)
 {
-    nqvm_t                  raw = { .head.ready = 0U };
+    nqvm_t raw = { .head.ready = 0U };
     nqvm_sensors_jacobian_t jz;
-    nqvm_u_t                was = { (pen_real_t)0.125F };
-    bool                    pending = true;
+    nqvm_u_t was = { (pen_real_t)0.125F };
+    bool pending = true;
 
     TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_get_input(&raw, &was));
     TEST_ASSERT_EQUAL_HEX32(PEN_BADARG, nqvm_get_input(NULL, &was));
@@ -428,14 +428,14 @@ void test_input_out_of_its_range_is_reported_and_used(void)
 /* As an FMI master steps: the input it set holds over the whole step. A twin sees the same input twice. */
 void test_input_held_over_the_step(void)
 {
-    nqvm_t   twin;
+    nqvm_t twin;
     nqvm_y_t twin_y;
     nqvm_u_t was;
 
     for (uint32_t k = 0U; k < 20U; k++) {
         const nqvm_x_t x = state();
-        nqvm_x_t       a;
-        nqvm_x_t       b;
+        nqvm_x_t a;
+        nqvm_x_t b;
         TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_init(&twin, &nqvm_set_default, NULL));
         TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_set_state(&twin, &x));
         u.z_road = (pen_real_t)0.01 * (pen_real_t)(k % 5U);
@@ -457,9 +457,9 @@ void test_first_sample_with_an_input_before_it_integrates(void)
 {
     const nqvm_x_t x = { (pen_real_t)0.01, (pen_real_t)0.02, (pen_real_t)0.3, (pen_real_t)-0.4 };
     const nqvm_u_t before = { (pen_real_t)0.015625F };
-    nqvm_t         twin;
-    nqvm_x_t       a;
-    nqvm_x_t       b;
+    nqvm_t twin;
+    nqvm_x_t a;
+    nqvm_x_t b;
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_init(&twin, &nqvm_set_default, NULL));
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_step(&twin, &before, &y));
@@ -500,9 +500,9 @@ void test_bad_input_before_is_refused_and_counted(void)
 
 void test_derivatives_of_the_sensors(void)
 {
-    const nqvm_x_t          far = { (pen_real_t)0.2, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0 };
+    const nqvm_x_t far = { (pen_real_t)0.2, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0 };
     nqvm_sensors_jacobian_t j;
-    pen_real_t              ratio;
+    pen_real_t ratio;
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_sensors_jacobian(&model, &j));
     TEST_ASSERT_TRUE((j.z_x[2][0] == (pen_real_t)1) && (j.z_x[2][1] == (pen_real_t)-1)); /* z_b - z_w */
@@ -524,7 +524,7 @@ void test_set_from_a_wire(void)
     uint8_t *const byte = &wire[1]; /* aligned to nothing */
     const uint32_t size = NQVM_SET_LENGTH * (uint32_t)sizeof(pen_real_t);
     pen_set_head_t head;
-    bool           pending = false;
+    bool pending = false;
 
     pen_serial_write(&nqvm_set_altered_friction.head, byte);
     pen_serial_put_bytes(nqvm_set_altered_friction.value, 0U, size, &byte[PEN_SERIAL_HEAD]);
@@ -546,8 +546,8 @@ void test_set_from_a_wire(void)
 void test_three_values_of_the_running_set(void)
 {
     static const uint32_t at[3] = { 600U, 3U, NQVM_SET_LENGTH - 1U };
-    pen_set_head_t        head;
-    uint32_t              checksum;
+    pen_set_head_t head;
+    uint32_t checksum;
 
     for (uint32_t i = 0U; i < NQVM_SET_LENGTH; i++) {
         banks.value[1][i] = nqvm_set_default.value[i]; /* the caller's own copy, for the checksum */
@@ -591,7 +591,7 @@ void test_finite_damage_is_found_within_a_round(void)
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_verify(&model, NQVM_VERIFY));
     for (uint32_t i = 0U; i < NQVM_SET_LENGTH; i += ((i < 1183U) ? 13U : 1U)) {
         pen_real_t *const value = &banks.value[0][i];
-        const pen_real_t  kept = *value;
+        const pen_real_t kept = *value;
         *value += (pen_real_t)0.5F * ((kept < (pen_real_t)1) ? (pen_real_t)1 : kept);
         TEST_ASSERT_EQUAL_HEX32(PEN_SET_DAMAGED, nqvm_verify(&model, NQVM_VERIFY));
         *value = kept;
@@ -605,11 +605,11 @@ void test_finite_damage_is_found_within_a_round(void)
 /* Into an instance that has done something else: the same samples, the same bits, also when a set is under way. */
 void test_restored_instance_goes_on_to_the_bit(void)
 {
-    nqvm_t       twin;
+    nqvm_t twin;
     nqvm_banks_t twin_banks;
-    nqvm_y_t     twin_y;
-    nqvm_x_t     a;
-    nqvm_x_t     b;
+    nqvm_y_t twin_y;
+    nqvm_x_t a;
+    nqvm_x_t b;
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, nqvm_init(&twin, &nqvm_set_default, &twin_banks));
     (void)nqvm_step(&twin, &u, &twin_y);

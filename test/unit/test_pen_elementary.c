@@ -13,21 +13,21 @@
 #include "unity.h"
 
 #define SAMPLES UINT32_C(20000) /* of each of the two kinds in sample() */
-#define WIDEST 100.0
+#define WIDEST  100.0
 
 #include "bits_fixture.inc"
 
 #ifdef PEN_REAL_DOUBLE
-#define HASHES {0x2f1ce6edU, 0x633e0482U, 0x1052d733U, 0x104341f4U, 0x2824eb93U}
+#define HASHES { 0x2f1ce6edU, 0x633e0482U, 0x1052d733U, 0x104341f4U, 0x2824eb93U }
 #else
-#define HASHES {0x98d21f59U, 0x416aa5ebU, 0x4cc35ecdU, 0x5c64afb2U, 0xe3c6cb88U}
+#define HASHES { 0x98d21f59U, 0x416aa5ebU, 0x4cc35ecdU, 0x5c64afb2U, 0xe3c6cb88U }
 #endif
 
 #define FUNCTIONS 5U
-#define ZERO ((pen_real_t)0)
-#define ONE ((pen_real_t)1)
+#define ZERO      ((pen_real_t)0)
+#define ONE       ((pen_real_t)1)
 
-static const function_t FUNCTION[FUNCTIONS] = {pen_sin, pen_cos, pen_atan, pen_log, pen_sqrt};
+static const function_t FUNCTION[FUNCTIONS] = { pen_sin, pen_cos, pen_atan, pen_log, pen_sqrt };
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -54,7 +54,7 @@ void test_sine_and_arctangent_are_odd_and_cosine_is_even_to_the_bit(void)
 
 void test_zero_keeps_its_sign(void)
 {
-    static const size_t odd[3] = {0U, 2U, 4U}; /* sin, atan, sqrt */
+    static const size_t odd[3] = { 0U, 2U, 4U }; /* sin, atan, sqrt */
     for (size_t i = 0U; i < 3U; i++) {
         expect_bits(real_of(0U), FUNCTION[odd[i]](real_of(0U)));
         expect_bits(real_of(SIGN), FUNCTION[odd[i]](real_of(SIGN)));

@@ -12,9 +12,9 @@
 #define ROOM 96U
 
 static pen_piece_t piece[ROOM];
-static pen_real_t  line[4U * 16U];
-static bool        active[48];
-static uint32_t    seed = 1U;
+static pen_real_t line[4U * 16U];
+static bool active[48];
+static uint32_t seed = 1U;
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -44,22 +44,22 @@ static void expect(size_t capacity, pen_real_t x, pen_real_t expected, pen_statu
 /* max(0, x + 1) - 2 max(0, x) + max(0, x - 1): a tent from -1 to 1 of height 1. Then envelope and layers. */
 static const pen_layer_t tent_layer[2] = { { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_DENSE, 3U, 1U } };
 static const pen_chain_t tent = { tent_layer, 2U, 3U, 3U };
+/* clang-format off */ /* one row of a layer a line */
 static const pen_real_t tent_value[12] = {
     (pen_real_t)-3, (pen_real_t)2,                  /* envelope */
     (pen_real_t)1, (pen_real_t)1,                   /* one row at a time: bias, weight */
     (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)1,
     (pen_real_t)0, (pen_real_t)1, (pen_real_t)-2, (pen_real_t)1,
 };
+/* clang-format on */
 
 /* Whole numbers and halves: no rounding, so the result is exact. */
 void test_a_tent(void)
 {
-    static const pen_real_t x[9] = {
-        (pen_real_t)-5, (pen_real_t)-3, (pen_real_t)-1, (pen_real_t)-0.5F, (pen_real_t)0, (pen_real_t)0.25F, (pen_real_t)1, (pen_real_t)2, (pen_real_t)7
-    };
-    static const pen_real_t expected[9] = {
-        (pen_real_t)0, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0.5F, (pen_real_t)1, (pen_real_t)0.75F, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0
-    };
+    static const pen_real_t x[9] = { (pen_real_t)-5,    (pen_real_t)-3, (pen_real_t)-1, (pen_real_t)-0.5F, (pen_real_t)0,
+                                     (pen_real_t)0.25F, (pen_real_t)1,  (pen_real_t)2,  (pen_real_t)7 };
+    static const pen_real_t expected[9] = { (pen_real_t)0,     (pen_real_t)0, (pen_real_t)0, (pen_real_t)0.5F, (pen_real_t)1,
+                                            (pen_real_t)0.75F, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0 };
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, tent_value, false, line, active, 12U, piece));
     TEST_ASSERT_TRUE(!(piece[0].start > (pen_real_t)-0.5F) && !(piece[0].start < (pen_real_t)-0.5F)); /* the centre */
@@ -151,9 +151,8 @@ void test_kinks_on_the_edges_and_at_the_centre_take_no_room(void)
 void test_neurons_that_switch_at_one_place_end_one_piece(void)
 {
     static const pen_real_t p[12] = {
-        (pen_real_t)-3, (pen_real_t)2,
-        (pen_real_t)1, (pen_real_t)1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)0, (pen_real_t)1,
-        (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)-1,
+        (pen_real_t)-3, (pen_real_t)2, (pen_real_t)1, (pen_real_t)1, (pen_real_t)0,  (pen_real_t)1,
+        (pen_real_t)0,  (pen_real_t)1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)-1,
     };
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&tent, p, false, line, active, 6U, piece));
@@ -242,15 +241,12 @@ void test_random_networks_against_their_layers(void)
  * layers, three values are scaled there and back. */
 void test_scaled_input_and_output(void)
 {
-    static const pen_layer_t layer[6] = {
-        { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_CENTRE, 3U, 3U }, { PEN_LAYER_RESCALE, 3U, 3U },
-        { PEN_LAYER_DENSE, 3U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U }
-    };
+    static const pen_layer_t layer[6] = { { PEN_LAYER_CENTRE, 1U, 1U },  { PEN_LAYER_RELU, 1U, 3U },  { PEN_LAYER_CENTRE, 3U, 3U },
+                                          { PEN_LAYER_RESCALE, 3U, 3U }, { PEN_LAYER_DENSE, 3U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U } };
     static const pen_chain_t chain = { layer, 6U, 3U, 3U };
-    static const pen_real_t there_and_back[12] = {
-        (pen_real_t)1, (pen_real_t)2, (pen_real_t)3, (pen_real_t)2, (pen_real_t)4, (pen_real_t)0.5F,
-        (pen_real_t)0.5F, (pen_real_t)0.25F, (pen_real_t)2, (pen_real_t)1, (pen_real_t)2, (pen_real_t)3
-    };
+    static const pen_real_t there_and_back[12] = { (pen_real_t)1, (pen_real_t)2,    (pen_real_t)3,    (pen_real_t)2,
+                                                   (pen_real_t)4, (pen_real_t)0.5F, (pen_real_t)0.5F, (pen_real_t)0.25F,
+                                                   (pen_real_t)2, (pen_real_t)1,    (pen_real_t)2,    (pen_real_t)3 };
     static const pen_real_t x[5] = { (pen_real_t)-1, (pen_real_t)1, (pen_real_t)2, (pen_real_t)3.5F, (pen_real_t)5 };
     static const pen_real_t expected[5] = { (pen_real_t)1, (pen_real_t)3, (pen_real_t)5, (pen_real_t)2, (pen_real_t)1 };
     pen_real_t p[28] = { (pen_real_t)-4, (pen_real_t)8, (pen_real_t)2, (pen_real_t)0.5F };
@@ -294,9 +290,8 @@ void test_without_edges_and_without_an_end(void)
     static const pen_layer_t one_layer[2] = { { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_DENSE, 1U, 1U } };
     static const pen_chain_t one = { one_layer, 2U, 1U, 1U };
     const pen_real_t last[6] = { (pen_real_t)-1, (pen_real_t)1, PEN_REAL_MAX, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1 };
-    const pen_real_t beyond[6] = {
-        (pen_real_t)-1, (pen_real_t)1, PEN_REAL_MAX * (pen_real_t)0.5F, -PEN_REAL_MIN, (pen_real_t)0, (pen_real_t)1
-    };
+    const pen_real_t beyond[6] = { (pen_real_t)-1, (pen_real_t)1, PEN_REAL_MAX * (pen_real_t)0.5F,
+                                   -PEN_REAL_MIN,  (pen_real_t)0, (pen_real_t)1 };
     pen_real_t p[12];
 
     for (size_t i = 0U; i < 12U; i++) {
@@ -370,6 +365,7 @@ void test_no_more_evaluations_than_allowed(void)
     };
     static const pen_chain_t chain = { layer, 4U, 4U, 6U };
     const pen_real_t tooth = PEN_REAL_EPSILON / (pen_real_t)64;
+    /* clang-format off */ /* one row of a layer a line */
     const pen_real_t p[25] = {
         (pen_real_t)0, (pen_real_t)2, (pen_real_t)1, (pen_real_t)1,
         -tooth, (pen_real_t)-2 * tooth, (pen_real_t)-3 * tooth, (pen_real_t)-4 * tooth,
@@ -378,6 +374,7 @@ void test_no_more_evaluations_than_allowed(void)
         (pen_real_t)-0.5F * tooth, (pen_real_t)1, (pen_real_t)-2, (pen_real_t)2, (pen_real_t)-2,
         (pen_real_t)3, (pen_real_t)1, (pen_real_t)1,
     };
+    /* clang-format on */
 
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_fold(&chain, p, false, line, active, 6U, piece));
     expect(6U, (pen_real_t)0.5F, (pen_real_t)3, PEN_OK);

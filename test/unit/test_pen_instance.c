@@ -18,25 +18,25 @@
 #define SLOT     (NETWORKS * ROOM)
 #define ROUND    (N + SLOT)
 
-static const pen_layer_t   layer[2] = { { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_DENSE, 3U, 1U } };
+static const pen_layer_t layer[2] = { { PEN_LAYER_RELU, 1U, 3U }, { PEN_LAYER_DENSE, 3U, 1U } };
 static const pen_network_t network[NETWORKS] = { { { layer, 2U, 3U, 3U }, 1U, NULL }, { { layer, 2U, 3U, 3U }, 1U + NETWORK, NULL } };
-static const pen_real_t    tent[NETWORK] = {
-    (pen_real_t)-3, (pen_real_t)2, (pen_real_t)1, (pen_real_t)1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)1,
-    (pen_real_t)0, (pen_real_t)1, (pen_real_t)-2, (pen_real_t)1,
+static const pen_real_t tent[NETWORK] = {
+    (pen_real_t)-3, (pen_real_t)2, (pen_real_t)1, (pen_real_t)1, (pen_real_t)0,  (pen_real_t)1,
+    (pen_real_t)-1, (pen_real_t)1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)-2, (pen_real_t)1,
 };
 /* how many values a call of verify looks at */
 static const uint32_t chunks[] = { 1U, 7U, N, ROUND - 1U, ROUND, ROUND + 3U, UINT32_MAX };
 
 #define CHUNKS (sizeof(chunks) / sizeof(chunks[0]))
 
-static pen_model_t    model;
+static pen_model_t model;
 static pen_instance_t instance;
-static pen_piece_t    piece[2U * SLOT];
-static pen_real_t     bank[2][N];
-static pen_real_t     first_value[N];
-static pen_real_t     other_value[N];
-static pen_set_t      first;
-static pen_set_t      other;
+static pen_piece_t piece[2U * SLOT];
+static pen_real_t bank[2][N];
+static pen_real_t first_value[N];
+static pen_real_t other_value[N];
+static pen_set_t first;
+static pen_set_t other;
 
 static void fill(pen_set_t *set, pen_real_t value[], uint32_t id)
 {
@@ -268,13 +268,13 @@ void test_damaged_heads_and_addresses_at_once(void)
 {
     pen_tuning_t *const tuning = &instance.tuning;
     uint8_t *const place[] = {
-        (uint8_t *)&tuning->slot[1].head, (uint8_t *)&tuning->slot[1].value, (uint8_t *)&tuning->slot_check[1].head,
-        (uint8_t *)&tuning->slot_check[1].value, (uint8_t *)&tuning->bank[0], (uint8_t *)&tuning->bank[1],
-        (uint8_t *)&tuning->bank_check[0], (uint8_t *)&tuning->bank_check[1], (uint8_t *)&tuning->settled,
+        (uint8_t *)&tuning->slot[1].head,        (uint8_t *)&tuning->slot[1].value, (uint8_t *)&tuning->slot_check[1].head,
+        (uint8_t *)&tuning->slot_check[1].value, (uint8_t *)&tuning->bank[0],       (uint8_t *)&tuning->bank[1],
+        (uint8_t *)&tuning->bank_check[0],       (uint8_t *)&tuning->bank_check[1], (uint8_t *)&tuning->settled,
     };
     const size_t size[] = {
         sizeof(pen_set_head_t), sizeof(pen_real_t *), sizeof(pen_set_head_t), sizeof(pen_real_t *), sizeof(pen_real_t *),
-        sizeof(pen_real_t *), sizeof(pen_real_t *), sizeof(pen_real_t *), sizeof(uint32_t),
+        sizeof(pen_real_t *),   sizeof(pen_real_t *), sizeof(pen_real_t *),   sizeof(uint32_t),
     };
 
     run_copy(5U);

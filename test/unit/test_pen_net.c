@@ -12,7 +12,7 @@
 
 #define MAX_OUT 40U
 #define MAX_IN  20U
-#define POISON  ((pen_real_t)-99)
+#define POISON  (-(pen_real_t)99)
 
 static pen_real_t weight[MAX_OUT][MAX_IN]; /* as a mathematician writes them */
 static pen_real_t bias[MAX_OUT];
@@ -21,7 +21,7 @@ static pen_real_t x[MAX_IN];
 static pen_real_t y[MAX_OUT + 1U];
 static pen_real_t nan_value;
 static pen_real_t inf_value;
-static uint32_t   seed;
+static uint32_t seed;
 
 /* Eighths from -2 to 2: every product and sum below is exact in float, so expected values are exact, too. */
 static pen_real_t eighth(void)
@@ -417,7 +417,8 @@ void test_slopes_and_bends_of_softplus(void)
     const pen_real_t a[3] = { (pen_real_t)2, (pen_real_t)-1, (pen_real_t)1.5 };
     const pen_real_t b[3] = { (pen_real_t)3, (pen_real_t)2, (pen_real_t)1 };
     const pen_real_t c[3] = { (pen_real_t)8, (pen_real_t)1, (pen_real_t)-0.5 };
-    const pen_real_t slope[3] = { (pen_real_t)1.769593735428761054, (pen_real_t)0.6321205588285576784, (pen_real_t)-0.47510646581606802851 };
+    const pen_real_t slope[3] = { (pen_real_t)1.769593735428761054, (pen_real_t)0.6321205588285576784,
+                                  (pen_real_t)-0.47510646581606802851 };
     const pen_real_t bend[3] = { (pen_real_t)2.8032144755813897219, (pen_real_t)0.167032242958898419, (pen_real_t)-0.40414399152927165168 };
     pen_real_t sloped[4] = { c[0], c[1], c[2], POISON };
     pen_real_t bent[4] = { c[0], c[1], c[2], POISON };
@@ -501,9 +502,9 @@ void test_envelope_flag(void)
 void test_clamp(void)
 {
     const pen_real_t zeros[4] = { (pen_real_t)0, (pen_real_t)-1, (pen_real_t)1, (pen_real_t)0 };
-    const pen_real_t inside[3][2] = {
-        { (pen_real_t)1, (pen_real_t)15 }, { (pen_real_t)-1, (pen_real_t)20 }, { (pen_real_t)3, (pen_real_t)10 }
-    };
+    const pen_real_t inside[3][2] = { { (pen_real_t)1, (pen_real_t)15 },
+                                      { (pen_real_t)-1, (pen_real_t)20 },
+                                      { (pen_real_t)3, (pen_real_t)10 } };
     const pen_real_t negative_zero[2] = { -(pen_real_t)0, -(pen_real_t)0 };
     const pen_real_t low[2] = { (pen_real_t)-7, (pen_real_t)9 };
     const pen_real_t high[2] = { (pen_real_t)4, (pen_real_t)25 };

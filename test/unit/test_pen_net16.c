@@ -22,7 +22,7 @@
 static pen_real_t w[LENGTH];
 static pen_real_t nan_value;
 static pen_real_t inf_value;
-static uint32_t   seed;
+static uint32_t seed;
 
 void setUp(void)
 {

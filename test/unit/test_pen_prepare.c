@@ -16,19 +16,19 @@
 #define ROOM     8U
 #define NETWORKS 2U
 
-static const pen_layer_t   layer[2] = { { PEN_LAYER_RELU, 1U, 2U }, { PEN_LAYER_DENSE, 2U, 1U } };
+static const pen_layer_t layer[2] = { { PEN_LAYER_RELU, 1U, 2U }, { PEN_LAYER_DENSE, 2U, 1U } };
 static const pen_promise_t promise = { PEN_PROMISE_MAX_SLOPE, 100U, (pen_real_t)0, (pen_real_t)1.5F, (pen_real_t)0 };
 static const pen_promise_t rising = { PEN_PROMISE_INCREASING, 100U, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0 };
-static const pen_real_t    bow[NETWORK] = {
+static const pen_real_t bow[NETWORK] = {
     (pen_real_t)-3, (pen_real_t)2, (pen_real_t)0, (pen_real_t)1, (pen_real_t)0, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)1,
 };
 
-static pen_network_t  network[NETWORKS];
-static pen_model_t    model;
+static pen_network_t network[NETWORKS];
+static pen_model_t model;
 static pen_instance_t instance;
-static pen_piece_t    piece[NETWORKS * ROOM];
-static pen_real_t     value[N];
-static pen_breach_t   breach;
+static pen_piece_t piece[NETWORKS * ROOM];
+static pen_real_t value[N];
+static pen_breach_t breach;
 
 void setUp(void)
 {

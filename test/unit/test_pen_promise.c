@@ -13,8 +13,8 @@ static pen_real_t work[8U * 17U];
 static bool active[17];
 static pen_breach_t breach;
 
-void setUp(void) { }
-void tearDown(void) { }
+void setUp(void) {}
+void tearDown(void) {}
 
 /* max(0, x) a + max(0, -x) b + c: two pieces that meet at 0. */
 static const pen_layer_t bow_layer[2] = { { PEN_LAYER_RELU, 1U, 2U }, { PEN_LAYER_DENSE, 2U, 1U } };
@@ -33,9 +33,8 @@ static bool kept(const pen_chain_t *chain, const pen_real_t p[], bool clamp, uin
 
 static bool bow_keeps(double a, double b, double c, bool clamp, uint32_t kind, double limit)
 {
-    const pen_real_t p[9] = {
-        (pen_real_t)-2, (pen_real_t)4, (pen_real_t)0, (pen_real_t)1, (pen_real_t)0, (pen_real_t)-1, (pen_real_t)c, (pen_real_t)a, (pen_real_t)b
-    };
+    const pen_real_t p[9] = { (pen_real_t)-2, (pen_real_t)4, (pen_real_t)0, (pen_real_t)1, (pen_real_t)0,
+                              (pen_real_t)-1, (pen_real_t)c, (pen_real_t)a, (pen_real_t)b };
 
     return kept(&bow, p, clamp, kind, (pen_real_t)limit);
 }
@@ -82,9 +81,8 @@ void test_dissipation(void)
 /* The step sees the edge of the envelope at 0 if 0 lies outside. */
 void test_an_envelope_without_zero(void)
 {
-    pen_real_t p[9] = {
-        (pen_real_t)1, (pen_real_t)4, (pen_real_t)0, (pen_real_t)1, (pen_real_t)0, (pen_real_t)-1, (pen_real_t)-1, (pen_real_t)1, (pen_real_t)0
-    };
+    pen_real_t p[9] = { (pen_real_t)1,  (pen_real_t)4,  (pen_real_t)0, (pen_real_t)1, (pen_real_t)0,
+                        (pen_real_t)-1, (pen_real_t)-1, (pen_real_t)1, (pen_real_t)0 };
 
     TEST_ASSERT_TRUE(kept(&bow, p, true, PEN_PROMISE_ZERO_AT_ZERO, (pen_real_t)0));
     TEST_ASSERT_TRUE(kept(&bow, p, true, PEN_PROMISE_DISSIPATIVE, (pen_real_t)0.001F));
@@ -114,9 +112,8 @@ void test_a_kept_promise_writes_no_breach(void)
     TEST_ASSERT_FALSE(bow_keeps(1.0, -1.0, 0.0, true, PEN_PROMISE_MAX_FORCE, 3.5));
     {
         static const pen_promise_t promise = { PEN_PROMISE_INCREASING, LOOKS, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0 };
-        static const pen_real_t p[9] = {
-            (pen_real_t)-2, (pen_real_t)4, (pen_real_t)1, (pen_real_t)1, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1
-        };
+        static const pen_real_t p[9] = { (pen_real_t)-2, (pen_real_t)4, (pen_real_t)1, (pen_real_t)1, (pen_real_t)1,
+                                         (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1 };
         const pen_real_t at = breach.at;
         TEST_ASSERT_TRUE(pen_promise_kept(&promise, &bow, p, false, 0U, NULL, work, active, &breach));
         TEST_ASSERT_EQUAL_HEX32(PEN_PROMISE_MAX_FORCE, breach.kind);
@@ -129,9 +126,8 @@ void test_zero_of_a_folded_network(void)
 {
     static const pen_promise_t promise = { PEN_PROMISE_ZERO_AT_ZERO, 0U, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0 };
     pen_piece_t piece[4];
-    const pen_real_t p[9] = {
-        (pen_real_t)-2, (pen_real_t)4, (pen_real_t)0, (pen_real_t)1, (pen_real_t)0, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)1
-    };
+    const pen_real_t p[9] = { (pen_real_t)-2, (pen_real_t)4, (pen_real_t)0, (pen_real_t)1, (pen_real_t)0,
+                              (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)1 };
 
     for (size_t i = 0U; i < 4U; i++) {
         piece[i].start = (pen_real_t)0;
@@ -148,16 +144,16 @@ void test_zero_of_a_folded_network(void)
 /* Scaled there and back, an activation at the end: max(0, ((x + 1) 2 - 2) / 2 3) = max(0, 3 x). */
 void test_scaled_and_rectified(void)
 {
-    static const pen_layer_t layer[4] = { { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U } };
-    static const pen_chain_t chain = { layer, 4U, 1U, 2U };
-    static const pen_real_t p[10] = {
-        (pen_real_t)-1, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)2, (pen_real_t)0, (pen_real_t)1, (pen_real_t)0.5F, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)3
+    static const pen_layer_t layer[4] = {
+        { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U }
     };
+    static const pen_chain_t chain = { layer, 4U, 1U, 2U };
+    static const pen_real_t p[10] = { (pen_real_t)-1, (pen_real_t)1,    (pen_real_t)-1, (pen_real_t)2, (pen_real_t)0,
+                                      (pen_real_t)1,  (pen_real_t)0.5F, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)3 };
     static const pen_layer_t back_layer[3] = { { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_DENSE, 1U, 1U } };
     static const pen_chain_t back = { back_layer, 3U, 1U, 1U };
-    static const pen_real_t q[8] = {
-        (pen_real_t)-1, (pen_real_t)1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)2, (pen_real_t)0.5F, (pen_real_t)1, (pen_real_t)1
-    };
+    static const pen_real_t q[8] = { (pen_real_t)-1, (pen_real_t)1,    (pen_real_t)0, (pen_real_t)1,
+                                     (pen_real_t)2,  (pen_real_t)0.5F, (pen_real_t)1, (pen_real_t)1 };
 
     TEST_ASSERT_TRUE(kept(&chain, p, false, PEN_PROMISE_ZERO_AT_ZERO, (pen_real_t)0));
     TEST_ASSERT_TRUE(kept(&chain, p, false, PEN_PROMISE_MAX_SLOPE, (pen_real_t)3.001F));
@@ -227,10 +223,9 @@ void test_slopes_that_cancel(void)
 {
     static const pen_layer_t layer[3] = { { PEN_LAYER_RELU, 1U, 2U }, { PEN_LAYER_RELU, 2U, 1U }, { PEN_LAYER_DENSE, 1U, 1U } };
     static const pen_chain_t chain = { layer, 3U, 2U, 3U };
-    const pen_real_t p[11] = {
-        (pen_real_t)-2, (pen_real_t)4, (pen_real_t)3, (pen_real_t)1, (pen_real_t)3, (pen_real_t)1, /* twice x + 3 */
-        (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1 / PEN_REAL_EPSILON
-    };
+    const pen_real_t p[11] = { (pen_real_t)-2, (pen_real_t)4, (pen_real_t)3,  (pen_real_t)1, (pen_real_t)3,
+                               (pen_real_t)1, /* twice x + 3 */
+                               (pen_real_t)0,  (pen_real_t)1, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1 / PEN_REAL_EPSILON };
 
     TEST_ASSERT_TRUE(kept(&chain, p, true, PEN_PROMISE_MAX_SLOPE, (pen_real_t)50)); /* (4 + 12 + 11) EPS times 2 / EPS */
     TEST_ASSERT_FALSE(kept(&chain, p, true, PEN_PROMISE_MAX_SLOPE, (pen_real_t)0.5F));
@@ -248,9 +243,8 @@ void test_overflow(void)
 
 void test_no_more_evaluations_than_allowed(void)
 {
-    static const pen_real_t p[9] = {
-        (pen_real_t)-2, (pen_real_t)4, (pen_real_t)1, (pen_real_t)1, (pen_real_t)1, (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1
-    };
+    static const pen_real_t p[9] = { (pen_real_t)-2, (pen_real_t)4, (pen_real_t)1, (pen_real_t)1, (pen_real_t)1,
+                                     (pen_real_t)-1, (pen_real_t)0, (pen_real_t)1, (pen_real_t)-1 };
     pen_promise_t promise = { PEN_PROMISE_INCREASING, 0U, (pen_real_t)0, (pen_real_t)0, (pen_real_t)0 };
     bool good = false;
 

@@ -26,7 +26,7 @@ static pen_status_t verify_and_recover(void)
     const pen_status_t status = pen_verify(&model, &a.head, NULL, N);
 
     if (status == PEN_SET_DAMAGED) {
-        pen_set_t    ready;
+        pen_set_t ready;
         pen_status_t found = pen_fallback(&model, &a.head, 0U, &ready);
         if (found != PEN_OK) {
             found = pen_fallback(&model, &a.head, 1U, &ready);

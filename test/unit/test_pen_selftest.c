@@ -17,23 +17,29 @@ static nqvm_t model;
 
 /* The control register of the floating-point unit; a core without one has no modes that could be wrong. */
 #if defined(__x86_64__)
-#define MODES 1
+#define MODES          1
 #define FLUSH_RESULTS  0x8000U
 #define FLUSH_OPERANDS 0x0040U
-#define DOWN 0x2000U
-#define UP   0x4000U
-#define ZERO 0x6000U
+#define DOWN           0x2000U
+#define UP             0x4000U
+#define ZERO           0x6000U
 
-static uint32_t mode(void) { return __builtin_ia32_stmxcsr(); }
-static void set_mode(uint32_t word) { __builtin_ia32_ldmxcsr(word); }
+static uint32_t mode(void)
+{
+    return __builtin_ia32_stmxcsr();
+}
+static void set_mode(uint32_t word)
+{
+    __builtin_ia32_ldmxcsr(word);
+}
 
 #elif defined(__ARM_FP)
-#define MODES 1
+#define MODES          1
 #define FLUSH_RESULTS  0x01000000U
 #define FLUSH_OPERANDS 0x01000000U
-#define UP   0x00400000U
-#define DOWN 0x00800000U
-#define ZERO 0x00c00000U
+#define UP             0x00400000U
+#define DOWN           0x00800000U
+#define ZERO           0x00c00000U
 
 static uint32_t mode(void)
 {
@@ -42,18 +48,27 @@ static uint32_t mode(void)
     return word;
 }
 
-static void set_mode(uint32_t word) { __asm__ volatile("vmsr fpscr, %0" : : "r"(word)); }
+static void set_mode(uint32_t word)
+{
+    __asm__ volatile("vmsr fpscr, %0" : : "r"(word));
+}
 
 #else
-#define MODES 0
+#define MODES          0
 #define FLUSH_RESULTS  0U
 #define FLUSH_OPERANDS 0U
-#define UP   0U
-#define DOWN 0U
-#define ZERO 0U
+#define UP             0U
+#define DOWN           0U
+#define ZERO           0U
 
-static uint32_t mode(void) { return 0U; }
-static void set_mode(uint32_t word) { (void)word; }
+static uint32_t mode(void)
+{
+    return 0U;
+}
+static void set_mode(uint32_t word)
+{
+    (void)word;
+}
 #endif
 
 void setUp(void) {}

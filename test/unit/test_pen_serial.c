@@ -27,8 +27,8 @@ static const pen_set_head_t golden_head = { 0x11223344U, 0x00000506U, 0xa1b2c3d4
 /* numpy.array([1, -2.5, 0.15625], "<f4" or "<f8").tobytes(): all exact in both types */
 static const pen_real_t value[VALUES] = { (pen_real_t)1, (pen_real_t)-2.5F, (pen_real_t)0.15625F };
 static const uint8_t value_float[12] = { 0U, 0U, 0x80U, 0x3fU, 0U, 0U, 0x20U, 0xc0U, 0U, 0U, 0x20U, 0x3eU };
-static const uint8_t value_double[24] = { 0U, 0U, 0U, 0U, 0U, 0U, 0xf0U, 0x3fU, 0U, 0U, 0U, 0U, 0U, 0U, 0x04U, 0xc0U,
-                                          0U, 0U, 0U, 0U, 0U, 0U, 0xc4U, 0x3fU };
+static const uint8_t value_double[24] = { 0U, 0U, 0U,    0U,    0U, 0U, 0xf0U, 0x3fU, 0U, 0U, 0U,    0U,
+                                          0U, 0U, 0x04U, 0xc0U, 0U, 0U, 0U,    0U,    0U, 0U, 0xc4U, 0x3fU };
 
 static const uint8_t *golden;
 static const uint8_t *golden_value;

@@ -246,8 +246,8 @@ void test_the_rollback_set_wherever_sets_lie(void)
         uint32_t exchanges = at / 6U;
 
         fill(&other, flash, 2U);
-        TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_tuning_init(&tuning, LAYOUT, N, &other, &memory[N * place[at % 6U][0]],
-                                                        &memory[N * place[at % 6U][1]]));
+        TEST_ASSERT_EQUAL_HEX32(
+            PEN_OK, pen_tuning_init(&tuning, LAYOUT, N, &other, &memory[N * place[at % 6U][0]], &memory[N * place[at % 6U][1]]));
         for (uint32_t k = 0U; k < 5U; k++) {
             const uint32_t kind = (previous == 0U) ? (exchanges % 2U) : (exchanges % 3U); /* no rollback set at first */
             const uint32_t before = running;

@@ -10,10 +10,10 @@
 #include "unity.h"
 
 #ifdef PEN_REAL_DOUBLE
-#define EPSILON DBL_EPSILON
+#define EPSILON  DBL_EPSILON
 #define SMALLEST 0x1p-1074
 #else
-#define EPSILON FLT_EPSILON
+#define EPSILON  FLT_EPSILON
 #define SMALLEST 0x1p-149F
 #endif
 
@@ -23,7 +23,7 @@ static pen_real_t a[(N + 1U) * (N + 1U)]; /* room for an order too many, should 
 static pen_real_t b[N + 1U];
 static pen_real_t kept[N * N];
 static pen_real_t wanted[N];
-static uint32_t   noise;
+static uint32_t noise;
 
 void setUp(void)
 {
@@ -81,9 +81,9 @@ static bool is_finite(pen_real_t x)
 
 void test_order_one_divides(void)
 {
-    static const pen_real_t matrix[1] = {4};
-    static const pen_real_t right[1] = {-10};
-    static const pen_real_t x[1] = {(pen_real_t)-2.5};
+    static const pen_real_t matrix[1] = { 4 };
+    static const pen_real_t right[1] = { -10 };
+    static const pen_real_t x[1] = { (pen_real_t)-2.5 };
     load(1U, matrix, right);
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_solve(1U, a, b));
     expect_solution(1U, x);
@@ -91,9 +91,9 @@ void test_order_one_divides(void)
 
 void test_zero_on_the_diagonal_is_exchanged(void)
 {
-    static const pen_real_t matrix[4] = {0, 2, 4, 1};
-    static const pen_real_t right[2] = {6, 11};
-    static const pen_real_t x[2] = {2, 3};
+    static const pen_real_t matrix[4] = { 0, 2, 4, 1 };
+    static const pen_real_t right[2] = { 6, 11 };
+    static const pen_real_t x[2] = { 2, 3 };
     load(2U, matrix, right);
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_solve(2U, a, b));
     expect_solution(2U, x);
@@ -102,9 +102,9 @@ void test_zero_on_the_diagonal_is_exchanged(void)
 /* Column 0 needs row 1, what is then left of column 1 needs row 2: pivots -4, 4, -0.25, all powers of two. */
 void test_order_three_with_two_exchanges(void)
 {
-    static const pen_real_t matrix[9] = {2, 1, 1, -4, 2, 2, 1, (pen_real_t)3.5, 4};
-    static const pen_real_t right[3] = {7, 6, 20}; /* matrix * (1, 2, 3) */
-    static const pen_real_t x[3] = {1, 2, 3};
+    static const pen_real_t matrix[9] = { 2, 1, 1, -4, 2, 2, 1, (pen_real_t)3.5, 4 };
+    static const pen_real_t right[3] = { 7, 6, 20 }; /* matrix * (1, 2, 3) */
+    static const pen_real_t x[3] = { 1, 2, 3 };
     load(3U, matrix, right);
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_solve(3U, a, b));
     expect_solution(3U, x);
@@ -133,8 +133,8 @@ void test_scaled_permutation_of_the_largest_order(void)
  */
 void test_small_pivot_does_not_swallow_the_other_row(void)
 {
-    static const pen_real_t matrix[4] = {EPSILON / 16, 1, 1, 1}; /* e, 1, 1, 1 */
-    static const pen_real_t right[2] = {1, 2}; /* x = (1, 1) / (1 - e), up to e */
+    static const pen_real_t matrix[4] = { EPSILON / 16, 1, 1, 1 }; /* e, 1, 1, 1 */
+    static const pen_real_t right[2] = { 1, 2 };                   /* x = (1, 1) / (1 - e), up to e */
     load(2U, matrix, right);
     TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_solve(2U, a, b));
     TEST_ASSERT_TRUE(pen_port_abs(b[0] - (pen_real_t)1) <= (8 * EPSILON));
@@ -194,11 +194,11 @@ void test_order_of_the_equations_does_not_matter(void)
 
 void test_singular_matrices_are_reported(void)
 {
-    static const pen_real_t right[3] = {1, 2, 3};
-    static const pen_real_t zero[9] = {0};
-    static const pen_real_t equal_rows[4] = {2, 3, 2, 3};
-    static const pen_real_t dependent[9] = {1, 2, 3, 2, 4, 6, 1, 0, 1};
-    static const pen_real_t zero_column[9] = {1, 0, 3, 2, 0, 6, 1, 0, 1};
+    static const pen_real_t right[3] = { 1, 2, 3 };
+    static const pen_real_t zero[9] = { 0 };
+    static const pen_real_t equal_rows[4] = { 2, 3, 2, 3 };
+    static const pen_real_t dependent[9] = { 1, 2, 3, 2, 4, 6, 1, 0, 1 };
+    static const pen_real_t zero_column[9] = { 1, 0, 3, 2, 0, 6, 1, 0, 1 };
     load(1U, zero, right);
     TEST_ASSERT_EQUAL_HEX32(PEN_SINGULAR, pen_solve(1U, a, b));
     load(3U, zero, zero); /* even with b = 0 */
@@ -213,9 +213,9 @@ void test_singular_matrices_are_reported(void)
 
 void test_pivots_at_the_ends_of_the_range(void)
 {
-    static const pen_real_t right[1] = {0};
-    static const pen_real_t smallest[1] = {SMALLEST}; /* 1 / it is no number */
-    static const pen_real_t largest[1] = {PEN_REAL_MAX};
+    static const pen_real_t right[1] = { 0 };
+    static const pen_real_t smallest[1] = { SMALLEST }; /* 1 / it is no number */
+    static const pen_real_t largest[1] = { PEN_REAL_MAX };
     load(1U, smallest, right);
     TEST_ASSERT_EQUAL_HEX32(PEN_SINGULAR, pen_solve(1U, a, b));
     load(1U, largest, right);
@@ -224,8 +224,8 @@ void test_pivots_at_the_ends_of_the_range(void)
 
 void test_overflow_inside_is_reported(void)
 {
-    static const pen_real_t matrix[4] = {1, PEN_REAL_MAX, -1, PEN_REAL_MAX};
-    static const pen_real_t right[2] = {1, 1};
+    static const pen_real_t matrix[4] = { 1, PEN_REAL_MAX, -1, PEN_REAL_MAX };
+    static const pen_real_t right[2] = { 1, 1 };
     load(2U, matrix, right);
     TEST_ASSERT_EQUAL_HEX32(PEN_SINGULAR, pen_solve(2U, a, b));
 }
@@ -234,7 +234,7 @@ void test_overflow_inside_is_reported(void)
 void test_nan_or_infinity_in_any_place_is_reported(void)
 {
     const volatile pen_real_t zero = 0;
-    const pen_real_t bad[3] = {1 / zero, -1 / zero, zero / zero};
+    const pen_real_t bad[3] = { 1 / zero, -1 / zero, zero / zero };
     for (size_t n = 1U; n <= 5U; n++) {
         for (size_t shape = 0U; shape < 4U; shape++) {
             for (size_t i = 0U; i < (n * n); i++) {
@@ -245,7 +245,7 @@ void test_nan_or_infinity_in_any_place_is_reported(void)
             }
             for (size_t place = 0U; place < ((n * n) + n); place++) {
                 for (size_t kind = 0U; kind < 3U; kind++) {
-                    static const pen_real_t right[5] = {1, 0, -1, 0, 1};
+                    static const pen_real_t right[5] = { 1, 0, -1, 0, 1 };
                     load(n, kept, right);
                     if (place < (n * n)) {
                         a[place] = bad[kind];
@@ -265,7 +265,7 @@ void test_nan_or_infinity_in_any_place_is_reported(void)
 void test_ok_never_comes_with_a_solution_that_is_no_number(void)
 {
     const volatile pen_real_t zero = 0;
-    const pen_real_t kind[8] = {zero, 1, -1, SMALLEST, PEN_REAL_MAX, -PEN_REAL_MAX, 1 / zero, zero / zero};
+    const pen_real_t kind[8] = { zero, 1, -1, SMALLEST, PEN_REAL_MAX, -PEN_REAL_MAX, 1 / zero, zero / zero };
     uint32_t solved = 0U;
     for (uint32_t trial = 0U; trial < 3000U; trial++) {
         bool good = true;

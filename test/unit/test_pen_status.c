@@ -7,11 +7,11 @@
 #include "penode/pen_status.h"
 #include "unity.h"
 
-#define ALL UINT32_C(0xffffffff)
+#define ALL        UINT32_C(0xffffffff)
 #define STEP_FLAGS 0x000007ffU
 #define TUNE_FLAGS 0x01fff800U
 
-static pen_status_log_t    status_log;
+static pen_status_log_t status_log;
 static pen_status_report_t report;
 
 void setUp(void)
@@ -154,8 +154,9 @@ void test_clear_forgets_what_was_not_read(void)
 
 void test_a_step_advanced_unless_something_held_it(void)
 {
-    static const pen_status_t holding[] = {PEN_INPUT_NONFINITE, PEN_STATE_NONFINITE, PEN_STEP_NONFINITE,
-                                           PEN_SINGULAR, PEN_HELD, PEN_BADARG};
+    static const pen_status_t holding[] = {
+        PEN_INPUT_NONFINITE, PEN_STATE_NONFINITE, PEN_STEP_NONFINITE, PEN_SINGULAR, PEN_HELD, PEN_BADARG
+    };
     TEST_ASSERT_TRUE(pen_advanced(PEN_OK));
     TEST_ASSERT_TRUE(pen_advanced(PEN_OUTSIDE | PEN_ADOPTED | PEN_WEIGHT_NONFINITE));
     for (size_t i = 0U; i < (sizeof holding / sizeof holding[0]); i++) {

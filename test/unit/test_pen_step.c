@@ -13,9 +13,9 @@
 #define KEPT 2U /* inputs */
 
 static pen_instance_t self;
-static pen_real_t     row[3U * LAST];
-static pen_real_t     u[2U * KEPT];
-static pen_real_t     bad[3]; /* NaN, Inf, -Inf */
+static pen_real_t row[3U * LAST];
+static pen_real_t u[2U * KEPT];
+static pen_real_t bad[3]; /* NaN, Inf, -Inf */
 
 void setUp(void)
 {

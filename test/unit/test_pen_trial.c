@@ -12,9 +12,18 @@
 
 static void at_barrier(void);
 
-static inline uint32_t pen_port_load(const volatile uint32_t *word) { return *word; }
-static inline void pen_port_store(volatile uint32_t *word, uint32_t value) { *word = value; }
-static inline void pen_port_barrier(void) { at_barrier(); }
+static inline uint32_t pen_port_load(const volatile uint32_t *word)
+{
+    return *word;
+}
+static inline void pen_port_store(volatile uint32_t *word, uint32_t value)
+{
+    *word = value;
+}
+static inline void pen_port_barrier(void)
+{
+    at_barrier();
+}
 
 #include "penode/pen_trial.h"
 

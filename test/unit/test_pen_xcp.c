@@ -64,8 +64,8 @@ void test_silent_to_nothing_and_to_stimulation(void)
 
 void test_unknown_commands(void)
 {
-    static const uint8_t unknown[] = { 0xc0U, 0xcfU, 0xd0U, 0xd2U, 0xd3U, 0xe3U, 0xecU, 0xedU, 0xf1U, 0xf2U,
-                                       0xe5U, 0xe6U, 0xf7U, 0xf8U, 0xf9U };
+    static const uint8_t unknown[] = { 0xc0U, 0xcfU, 0xd0U, 0xd2U, 0xd3U, 0xe3U, 0xecU, 0xedU,
+                                       0xf1U, 0xf2U, 0xe5U, 0xe6U, 0xf7U, 0xf8U, 0xf9U };
 
     for (uint32_t i = 0U; i < sizeof(unknown); i++) {
         BAD(UNKNOWN, unknown[i], 0, 0, 0, 0, 0, 0, 0);
@@ -154,8 +154,8 @@ void test_upload_sizes(void)
 
 void test_addresses_outside_are_denied(void)
 {
-    static const uint32_t outside[] = { 0U, REGION - 1U, REGION + 9U, REGION + 10U, SEGMENT - 1U, SEGMENT - 2U, SEGMENT + SIZE - 1U,
-                                        SEGMENT + SIZE, 0xffffffffU, 0xfffffffeU };
+    static const uint32_t outside[] = { 0U,           REGION - 1U,         REGION + 9U,    REGION + 10U, SEGMENT - 1U,
+                                        SEGMENT - 2U, SEGMENT + SIZE - 1U, SEGMENT + SIZE, 0xffffffffU,  0xfffffffeU };
 
     for (uint32_t i = 0U; i < (sizeof(outside) / sizeof(outside[0])); i++) {
         TEST_ASSERT_EQUAL_UINT32(8U, send_word(0xf4U, 2U, outside[i]));

@@ -9,7 +9,7 @@
 
 #define UNITY_INCLUDE_DOUBLE
 #define UNITY_SUPPORT_64
-#define UNITY_OUTPUT_CHAR(character) unity_output(character)
+#define UNITY_OUTPUT_CHAR(character)         unity_output(character)
 #define UNITY_OUTPUT_CHAR_HEADER_DECLARATION unity_output(int character)
 
 #endif

@@ -7,7 +7,7 @@
 /* Line by line: each print stops an emulated machine for a while. */
 void unity_output(int character)
 {
-    static char     line[128];
+    static char line[128];
     static uint32_t length;
 
     line[length] = (char)character;

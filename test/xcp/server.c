@@ -29,11 +29,17 @@ static struct {
     uint32_t samples;
     uint32_t id;         /* of the set in force                    */
     uint32_t adopted_at; /* sample of the last adoption            */
-    float    z_b;
+    float z_b;
 } shown;
 
-static pen_status_t commit(void) { return nqvm_tune_commit(&model); }
-static pen_status_t choose(const pen_set_t *set) { return nqvm_tune_select(&model, set); }
+static pen_status_t commit(void)
+{
+    return nqvm_tune_commit(&model);
+}
+static pen_status_t choose(const pen_set_t *set)
+{
+    return nqvm_tune_select(&model, set);
+}
 
 static const uint8_t name[] = "nqvm";
 static const uint8_t epk[] = "nqvm 0.1.0 test";

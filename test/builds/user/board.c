@@ -146,18 +146,14 @@ void board_close(int32_t file)
     (void)call(CLOSE, file, 0, 0, 0);
 }
 
-void board_count_start(void)
-{
-}
+void board_count_start(void) {}
 
 uint32_t board_count_stop(void)
 {
     return 0U;
 }
 
-void board_stack_paint(void)
-{
-}
+void board_stack_paint(void) {}
 
 uint32_t board_stack_used(void)
 {

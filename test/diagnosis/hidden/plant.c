@@ -26,17 +26,23 @@ typedef struct {
     size_t knots;
 } plant_t;
 
-typedef struct { double value, rate; } sample_t;
+typedef struct {
+    double value, rate;
+} sample_t;
 
 /* Cubic through the knots, with the slopes of central differences: error of order 4, continuous rate. */
 static sample_t track(const double *y, size_t n, double x, double rate)
 {
-    if (x < 1.0) { x = 1.0; }
-    if (x > (double)n - 2.000001) { x = (double)n - 2.000001; }
+    if (x < 1.0) {
+        x = 1.0;
+    }
+    if (x > (double)n - 2.000001) {
+        x = (double)n - 2.000001;
+    }
     const size_t i = (size_t)x;
     const double u = x - (double)i, m0 = 0.5 * (y[i + 1] - y[i - 1]), m1 = 0.5 * (y[i + 2] - y[i]), step = y[i + 1] - y[i];
     const double c2 = 3.0 * step - 2.0 * m0 - m1, c3 = m0 + m1 - 2.0 * step;
-    return (sample_t){y[i] + u * (m0 + u * (c2 + u * c3)), rate * (m0 + u * (2.0 * c2 + u * 3.0 * c3))};
+    return (sample_t){ y[i] + u * (m0 + u * (c2 + u * c3)), rate * (m0 + u * (2.0 * c2 + u * 3.0 * c3)) };
 }
 
 static double curve(const law_t *l, double x)
@@ -51,6 +57,7 @@ static double force(const law_t *l, double s, double v, double v_a, double q, do
     double f = 0.0;
     *dq = 0.0;
     switch (l->kind) {
+        /* clang-format off */ /* one law a line */
     case LINEAR: f = p[0] * s + p[1] * v; break;                            /* stiffness, damping */
     case RATE_CURVE: f = curve(l, v); break;
     case DEFLECTION_CURVE: f = curve(l, s); break;
@@ -68,6 +75,7 @@ static double force(const law_t *l, double s, double v, double v_a, double q, do
     case SKYHOOK: f = v * (p[0] + p[1] * tanh(500.0 * v_a * v)); break;     /* mean damping, half of the swing */
     case TRACK_SPRING: f = p[0] * time_value * s + p[1] * time_value * v; break;
     case CONTACT: f = curve(l, s) * fmax(0.0, 1.0 + p[0] * v); break;       /* loss of the contact, s/m */
+    /* clang-format on */
     default: break;
     }
     return f;
@@ -78,27 +86,44 @@ static void rates(const plant_t *m, double k, const double *x, double *dx, doubl
 {
     const int n = m->masses;
     const sample_t motion = track(m->motion, m->knots, k, m->knot_rate), aux = track(m->auxiliary, m->knots, k, m->knot_rate);
-    double pull[MAX_MASSES] = {0.0};
+    double pull[MAX_MASSES] = { 0.0 };
     *reaction = 0.0;
     for (int i = 0; i < m->laws; i++) {
         const law_t *l = &m->law[i];
-        const int end[2] = {l->a, l->b};
-        double z[2] = {0.0, 0.0}, v[2] = {0.0, 0.0};
+        const int end[2] = { l->a, l->b };
+        double z[2] = { 0.0, 0.0 }, v[2] = { 0.0, 0.0 };
         for (int e = 0; e < 2; e++) {
-            if (end[e] >= 0) { z[e] = x[end[e]]; v[e] = x[n + end[e]]; }
-            if (end[e] == MOTION) { z[e] = motion.value; v[e] = motion.rate; }
-            if (end[e] == AUXILIARY) { z[e] = aux.value; v[e] = aux.rate; }
+            if (end[e] >= 0) {
+                z[e] = x[end[e]];
+                v[e] = x[n + end[e]];
+            }
+            if (end[e] == MOTION) {
+                z[e] = motion.value;
+                v[e] = motion.rate;
+            }
+            if (end[e] == AUXILIARY) {
+                z[e] = aux.value;
+                v[e] = aux.rate;
+            }
         }
         const double now = l->p[3] > 0.0 ? motion.value : aux.value; /* TRACK: p3 = 1 takes the motion as a force */
         const double f = force(l, z[0] - z[1], v[0] - v[1], v[0], x[2 * n + i], now, &dx[2 * n + i]);
-        if (end[0] >= 0) { pull[end[0]] -= f; }
-        if (end[1] >= 0) { pull[end[1]] += f; }
-        if (end[0] == MOTION) { *reaction += f; }
+        if (end[0] >= 0) {
+            pull[end[0]] -= f;
+        }
+        if (end[1] >= 0) {
+            pull[end[1]] += f;
+        }
+        if (end[0] == MOTION) {
+            *reaction += f;
+        }
     }
     for (int i = 0; i < n; i++) {
         dx[i] = x[n + i];
         dx[n + i] = 0.0;
-        for (int j = 0; j < n; j++) { dx[n + i] += m->inverse[i * n + j] * pull[j]; }
+        for (int j = 0; j < n; j++) {
+            dx[n + i] += m->inverse[i * n + j] * pull[j];
+        }
     }
 }
 
@@ -107,28 +132,42 @@ static void rates(const plant_t *m, double k, const double *x, double *dx, doubl
 int simulate(const plant_t *m, double *x, double output_rate, size_t outputs, int steps, double *out)
 {
     const int n = m->masses, states = 2 * n + m->laws;
-    const double h = 1.0 / (output_rate * steps), part[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
+    const double h = 1.0 / (output_rate * steps), part[4] = { 0.0, 0.5, 0.5, 1.0 }, weight[4] = { 1.0, 2.0, 2.0, 1.0 };
     double dx[4][MAX_STATES], at[MAX_STATES], reaction;
-    if (n > MAX_MASSES || m->laws > MAX_LAWS) { return 1; }
+    if (n > MAX_MASSES || m->laws > MAX_LAWS) {
+        return 1;
+    }
     for (size_t k = 0; k < outputs; k++) {
         double *row = &out[k * (3 * (size_t)n + 1)];
         rates(m, 2.0 + (double)k / output_rate * m->knot_rate, x, dx[0], &row[3 * n]);
-        for (int i = 0; i < n; i++) { row[i] = x[i]; row[n + i] = x[n + i]; row[2 * n + i] = dx[0][n + i]; }
+        for (int i = 0; i < n; i++) {
+            row[i] = x[i];
+            row[n + i] = x[n + i];
+            row[2 * n + i] = dx[0][n + i];
+        }
         for (int step = 0; step < steps; step++) {
             const double time = (double)k / output_rate + step * h;
             for (int r = 0; r < 4; r++) {
-                for (int i = 0; i < states; i++) { at[i] = x[i] + (r > 0 ? part[r] * h * dx[r - 1][i] : 0.0); }
+                for (int i = 0; i < states; i++) {
+                    at[i] = x[i] + (r > 0 ? part[r] * h * dx[r - 1][i] : 0.0);
+                }
                 rates(m, 2.0 + (time + part[r] * h) * m->knot_rate, at, dx[r], &reaction);
             }
             for (int i = 0; i < states; i++) {
-                for (int r = 0; r < 4; r++) { x[i] += h / 6.0 * weight[r] * dx[r][i]; }
+                for (int r = 0; r < 4; r++) {
+                    x[i] += h / 6.0 * weight[r] * dx[r][i];
+                }
             }
             for (int i = 0; i < m->laws; i++) {                             /* what a step of a slider went too far */
                 const law_t *l = &m->law[i];
-                if (l->kind == SLIDER) { x[2 * n + i] = fmax(-l->p[1], fmin(l->p[1], x[2 * n + i])); }
+                if (l->kind == SLIDER) {
+                    x[2 * n + i] = fmax(-l->p[1], fmin(l->p[1], x[2 * n + i]));
+                }
             }
         }
-        if (!isfinite(row[3 * n]) || (n > 0 && !isfinite(x[0]))) { return 1; }
+        if (!isfinite(row[3 * n]) || (n > 0 && !isfinite(x[0]))) {
+            return 1;
+        }
     }
     return 0;
 }

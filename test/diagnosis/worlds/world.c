@@ -5,7 +5,28 @@
  * m q'' = -A' f + G u + ext; u, du, ext are given at every step and joined by straight lines. */
 #include <math.h>
 
-enum { LINEAR, WAVE, RUB, ATAN, STRIBECK, POWER, ONE_SIDE, STOP, PLAY, SKEW, KNEE, FADE, HYSTERESIS, MAXWELL, LIFT, PRESSED, AERATED, SINE, MOUNT, CONSTANT };
+enum {
+    LINEAR,
+    WAVE,
+    RUB,
+    ATAN,
+    STRIBECK,
+    POWER,
+    ONE_SIDE,
+    STOP,
+    PLAY,
+    SKEW,
+    KNEE,
+    FADE,
+    HYSTERESIS,
+    MAXWELL,
+    LIFT,
+    PRESSED,
+    AERATED,
+    SINE,
+    MOUNT,
+    CONSTANT
+};
 #define WIDE 8 /* parameters a law */
 #define ROOM 64
 
@@ -16,7 +37,10 @@ typedef struct {
     const double *p;
 } world_t;
 
-static double ramp(double x, double e) { return 0.5 * (x + sqrt(x * x + e * e)); } /* max(x, 0), rounded */
+static double ramp(double x, double e)
+{
+    return 0.5 * (x + sqrt(x * x + e * e));
+} /* max(x, 0), rounded */
 
 /* Force of a law; its state w changes at *dw. */
 static double law(int type, const double *p, double s, double v, double w, double t, double *dw)
@@ -32,9 +56,7 @@ static double law(int type, const double *p, double s, double v, double w, doubl
     case POWER: return p[2] > 0.0 ? p[0] * v * fabs(v) : p[0] * s * s * s;
     case ONE_SIDE: return -p[0] * (ramp(-s, p[1]) - 0.5 * p[1]); /* stiffer in compression by p0 */
     case STOP: return p[2] * p[0] * (ramp(p[2] * s - p[1], p[3]) - ramp(-p[1], p[3]));
-    case PLAY:
-        x = s / p[1] * (s / p[1]);
-        return -p[0] * s / sqrt(sqrt(sqrt(1.0 + x * x * x * x)));
+    case PLAY: x = s / p[1] * (s / p[1]); return -p[0] * s / sqrt(sqrt(sqrt(1.0 + x * x * x * x)));
     case SKEW: return p[0] * (sqrt(v * v + p[1] * p[1]) - p[1]);
     case KNEE: return -p[0] * (v - p[1] * asinh(v / p[1]));
     case FADE: return -p[0] * v * (t < p[1] ? t / p[1] : 1.0);
@@ -48,14 +70,13 @@ static double law(int type, const double *p, double s, double v, double w, doubl
         *dw = v - x / p[0];
         return x - p[0] * v;
     case SINE: return p[0] * sin(s) + p[1] * v;
-    case MOUNT: /* damper p0 on a flexible mount p1; w is the stretch of the mount */
-        *dw = v - p[1] * w / p[0];
-        return p[1] * w - p[0] * v;
+    case MOUNT: /* damper p0 on a flexible mount p1; w is the stretch of the mount */ *dw = v - p[1] * w / p[0]; return p[1] * w - p[0] * v;
     default: return p[0];
     }
 }
 
-static void rates(const world_t *a, const double *y, const double *u, const double *du, const double *ext, double t, double *dy, double *force)
+static void rates(const world_t *a, const double *y, const double *u, const double *du, const double *ext, double t, double *dy,
+                  double *force)
 {
     const int n = a->n, wide = n + a->nu;
     for (int i = 0; i < n; ++i) {
@@ -75,13 +96,14 @@ static void rates(const world_t *a, const double *y, const double *u, const doub
 }
 
 /* out: per sample q, q', q'', forces. Returns 0, or 1 if it ran away. */
-int world_run(int n, int nu, int np, int nl, const double *m, const double *A, const double *G, const int *type, const int *place, const double *p,
-              const double *u, const double *du, const double *ext, const double *start, long steps, double h, int every, double *out)
+int world_run(int n, int nu, int np, int nl, const double *m, const double *A, const double *G, const int *type, const int *place,
+              const double *p, const double *u, const double *du, const double *ext, const double *start, long steps, double h, int every,
+              double *out)
 {
-    const world_t a = {n, nu, np, nl, m, A, G, type, place, p};
+    const world_t a = { n, nu, np, nl, m, A, G, type, place, p };
     const int size = 2 * n + nl;
-    const double at[4] = {0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0};
-    double y[ROOM] = {0}, z[ROOM], k[4][ROOM], force[ROOM], un[ROOM], dun[ROOM], en[ROOM];
+    const double at[4] = { 0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0 };
+    double y[ROOM] = { 0 }, z[ROOM], k[4][ROOM], force[ROOM], un[ROOM], dun[ROOM], en[ROOM];
     if (size > ROOM) return 1;
     for (int i = 0; i < 2 * n; ++i) y[i] = start[i];
     for (long j = 0; j <= steps; ++j) {

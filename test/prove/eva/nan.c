@@ -20,8 +20,8 @@ int main(void)
             const uint32_t bits = (sign << 31U) | EXPONENT | mantissa;
             float x;
             memcpy(&x, &bits, sizeof x);
-            const float y[] = { pen_exp(x), pen_tanh(x), pen_sigmoid(x), pen_softplus(x), pen_sin(x), pen_cos(x),
-                                pen_atan(x), pen_log(x), pen_sqrt(x) };
+            const float y[] = { pen_exp(x), pen_tanh(x), pen_sigmoid(x), pen_softplus(x), pen_sin(x),
+                                pen_cos(x), pen_atan(x), pen_log(x),     pen_sqrt(x) };
             for (size_t i = 0U; i < (sizeof y / sizeof y[0]); i++) {
                 lost += (y[i] == y[i]) ? 1U : 0U; /* it must stay NaN */
             }

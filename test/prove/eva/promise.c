@@ -23,10 +23,14 @@ extern volatile uint32_t any; /* each read gives any number */
 volatile pen_real_t seen; /* results go here: nothing is left out */
 
 static const pen_layer_t layer[] = {
-    { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, WIDTH }, { PEN_LAYER_DENSE, WIDTH, 1U }, { PEN_LAYER_RESCALE, 1U, 1U },
+    { PEN_LAYER_CENTRE, 1U, 1U },
+    { PEN_LAYER_RELU, 1U, WIDTH },
+    { PEN_LAYER_DENSE, WIDTH, 1U },
+    { PEN_LAYER_RESCALE, 1U, 1U },
 };
 static const pen_layer_t bent[] = {
-    { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_RESCALE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U }, { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U },
+    { PEN_LAYER_RELU, 1U, 1U },   { PEN_LAYER_RESCALE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U },
+    { PEN_LAYER_CENTRE, 1U, 1U }, { PEN_LAYER_RELU, 1U, 1U },
 };
 
 static void fill(void *at, size_t bytes)

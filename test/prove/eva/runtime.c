@@ -23,7 +23,7 @@
 
 extern volatile uint32_t any; /* each read gives any number */
 
-#define WIDE  37U /* two blocks of 16 rows, one of 4, one row */
+#define WIDE 37U /* two blocks of 16 rows, one of 4, one row */
 #define ROOM (WIDE * (WIDE + 1U))
 
 static pen_real_t w[ROOM];
@@ -48,7 +48,7 @@ static void fill_all(void)
 }
 
 /* The last n numbers of w, and of the others. */
-#define W(n) (&w[ROOM - (n)])
+#define W(n)          (&w[ROOM - (n)])
 #define END(array, n) (&array[WIDE - (n)])
 
 static void layers(size_t n_out, size_t n_in)

@@ -133,7 +133,8 @@ void xcp_write_entries(void)
         //@ loop unroll 10;
         for (uint32_t n = 0U; n <= (ROOM + 1U); n++) {
             const uint32_t size = (n <= ROOM) ? n : Frama_C_unsigned_int_interval(ROOM + 1U, 255U);
-            write_entry(Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - 1U), Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES), place(k), size);
+            write_entry(Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES - 1U), Frama_C_unsigned_int_interval(0U, PEN_XCP_ENTRIES),
+                        place(k), size);
             //@ loop unroll 64;
             for (size_t i = 0U; i < PEN_XCP_ENTRIES; i++) {
                 /*@ assert daq.entry[i].byte == \null || daq.entry[i].size <= ROOM - ((k <= ROOM) ? k : 0); */
@@ -232,7 +233,8 @@ static const pen_xcp_entry_t constant[4] = { { &region_byte[0], 4U }, { &region_
 static const pen_xcp_entry_t huge[1] = { { region_byte, UINT32_MAX } };
 static const pen_xcp_static_t some_lists[3] = { { 2U, 2U, constant }, { 3U, 2U, NULL }, { 27U, 2U, NULL } };
 static const pen_xcp_static_t wrong[5] = { { 1U, 1U, NULL }, { 2U, 2U, constant }, { 1U, 1U, huge }, { 0U, 1U, NULL }, { 1U, 65U, NULL } };
-static const pen_xcp_statics_t statics[] = { { 3U, some_lists }, { 5U, wrong }, { 2U, wrong }, { 1U, &wrong[2] }, { 1U, &wrong[3] }, { 1U, &wrong[4] }, { 0U, wrong } };
+static const pen_xcp_statics_t statics[] = { { 3U, some_lists }, { 5U, wrong },     { 2U, wrong }, { 1U, &wrong[2] },
+                                             { 1U, &wrong[3] },  { 1U, &wrong[4] }, { 0U, wrong } };
 
 /* To a list that there is, or (3, 4) any other; entry 0, 1 or any other. */
 static void packet_of_static(uint32_t n, uint8_t code, uint32_t to, uint32_t entry)

@@ -13,7 +13,8 @@ typedef struct {
     int touched[N_N + 1][2];
 } calls_t;
 
-static void evaluate_calls(const job_t *job, double *const zero[], const double *x, const double *u, bool slopes, calls_t *c, double *const g[], double *seen, double *work)
+static void evaluate_calls(const job_t *job, double *const zero[], const double *x, const double *u, bool slopes, calls_t *c,
+                           double *const g[], double *seen, double *work)
 {
     for (int m = 0; m < N_N; m++) {
         const net_t *const net = &job->net[job->net_of[m]];
@@ -25,7 +26,11 @@ static void evaluate_calls(const job_t *job, double *const zero[], const double 
             }
         }
         double plain[MOST_INPUTS];
-        c->N[m] = network(net, zero[job->net_of[m]], a, slopes ? c->slope[m] : (net->kind == CURVE) ? plain : NULL, slopes ? g[m] : NULL, c->touched[m], work);
+        c->N[m] = network(net, zero[job->net_of[m]], a,
+                          slopes                 ? c->slope[m]
+                          : (net->kind == CURVE) ? plain
+                                                 : NULL,
+                          slopes ? g[m] : NULL, c->touched[m], work);
         if (!slopes) {
             continue;
         }
@@ -208,7 +213,8 @@ static void propagate(const job_t *job, stage_t *st, double *const g[][N_N + 1],
     spread(job, st, phi, g, spare);
 }
 
-static void substep(const job_t *job, double *const zero[], const double *drive, stage_t *st, double *const g[][N_N + 1], double *spare, double *work)
+static void substep(const job_t *job, double *const zero[], const double *drive, stage_t *st, double *const g[][N_N + 1], double *spare,
+                    double *work)
 {
     const bool slopes = job->columns > 0;
     double xs[N_X + 1];
@@ -241,7 +247,8 @@ static void observe(const job_t *job, double *const zero[], int k, stage_t *st, 
     const double *const u = &job->u[k * 2 * N_U];
     double zx[N_Z * N_X + 1], zp[N_Z * N_F + 1], zn[N_Z * N_N + 1], B[N_Z * N_N + 1];
 
-    evaluate_calls(job, zero, job->x, u, slopes, &st->c, g, (job->inputs_seen != NULL) ? &job->inputs_seen[k * job->inputs_total] : NULL, work);
+    evaluate_calls(job, zero, job->x, u, slopes, &st->c, g, (job->inputs_seen != NULL) ? &job->inputs_seen[k * job->inputs_total] : NULL,
+                   work);
     sensors(job->x, u, &u[N_U], job->p, st->c.N, &job->z[k * N_Z], slopes ? zx : NULL, zp, zn);
     if (!slopes) {
         return;
@@ -306,7 +313,8 @@ bool train_run(const job_t *job, int first, int last)
     for (int k = first; k < last; k++) {
         observe(job, zero, k, &st[0], g[MOST_STAGES], at);
         for (int i = 0; (k + 1 < job->samples) && (i < job->substeps); i++) {
-            substep(job, zero, &job->drive[(((size_t)k * (size_t)job->substeps) + (size_t)i) * (size_t)job->stages * 2U * N_U], st, (double *const (*)[N_N + 1])g, spare, at);
+            substep(job, zero, &job->drive[(((size_t)k * (size_t)job->substeps) + (size_t)i) * (size_t)job->stages * 2U * N_U], st,
+                    (double *const(*)[N_N + 1]) g, spare, at);
         }
         for (int i = 0; i < N_X; i++) {
             if (!(fabs(job->x[i]) < far)) {

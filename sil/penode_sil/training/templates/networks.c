@@ -38,8 +38,14 @@ typedef struct {
     int inputs_total;
 } job_t;
 
-static inline double t_sigmoid(double x) { return (x >= 0.0) ? (1.0 / (1.0 + exp(-x))) : (exp(x) / (1.0 + exp(x))); }
-static inline double t_softplus(double x) { return ((x > 0.0) ? x : 0.0) + log1p(exp(-fabs(x))); }
+static inline double t_sigmoid(double x)
+{
+    return (x >= 0.0) ? (1.0 / (1.0 + exp(-x))) : (exp(x) / (1.0 + exp(x)));
+}
+static inline double t_softplus(double x)
+{
+    return ((x > 0.0) ? x : 0.0) + log1p(exp(-fabs(x)));
+}
 
 /* cell of a curve; the outermost ones go on for ever */
 static int cell_of(const net_t *net, double x)
@@ -93,7 +99,11 @@ static double forward(const net_t *net, const double *x, double *h)
                 sum += w[(o * n_in) + i] * h[i];
             }
             const int a = net->activation[l];
-            y[o] = (a == RELU) ? ((sum > 0.0) ? sum : 0.0) : (a == TANH) ? (1.0 - (2.0 / (exp(2.0 * sum) + 1.0))) : (a == SIGMOID) ? t_sigmoid(sum) : (a == SOFTPLUS) ? t_softplus(sum) : sum;
+            y[o] = (a == RELU)       ? ((sum > 0.0) ? sum : 0.0)
+                   : (a == TANH)     ? (1.0 - (2.0 / (exp(2.0 * sum) + 1.0)))
+                   : (a == SIGMOID)  ? t_sigmoid(sum)
+                   : (a == SOFTPLUS) ? t_softplus(sum)
+                                     : sum;
         }
         w = &b[n_out];
         h = y;
@@ -158,7 +168,7 @@ static void backward(const net_t *net, const double *h, double sign, double *g, 
 /* what a network gives at 0, which is taken away from it */
 static void at_zero(const net_t *net, double *h, double *value)
 {
-    const double none[MOST_LAYERS] = {0};
+    const double none[MOST_LAYERS] = { 0 };
 
     *value = forward(net, none, h);
 }
@@ -184,4 +194,3 @@ static double network(const net_t *net, const double *zero, const double *in, do
     }
     return value;
 }
-
