@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 #
-# The suites of `make test`, each also a target of its own. What a suite prints is what test/tally.py counts.
+# The suites of `make test`, each also a target of its own. What a suite prints is what test/tally.py counts. It runs the gates of
+# a suite (GATES.suite; else the suite is one) and the Python tests as they come, not one suite after the other.
 
-# Each takes one core there; the longest begin, so that none runs on alone.
-SUITES   := python-sil hidden-fixed hidden-fresh figures-check python-gen unit warnings misra accuracy python-tools \
-            python-diagnosis python-training python-exports python-install symbols builds board gen-check cmock
-PYTHONS  := $(filter python-%,$(SUITES))
+SUITES   := hidden-fixed hidden-fresh figures-check accuracy misra builds unit symbols warnings board gen-check cmock \
+            python-sil python-gen python-training python-tools python-diagnosis python-exports python-install
+PYTHONS   = $(filter python-%,$(SUITES))
+GATES     = $(foreach s,$(filter-out python-% packages,$(SUITES)),$(or $(GATES.$s),$s))
+FOLDERS   = $(PYTHONS:python-%=test/%) $(patsubst %,test/%,$(filter packages,$(SUITES)))
 MACHINES := $(shell . port/cortex-m/machines.sh && echo $$machines)
 ALIKE    := mps2-an500 mps2-an505 # same compiler as mps2-an386, same instruction set but for reals; mps3-an547 has loops of its own
 RUNTIME  := $(wildcard src/*.c)
@@ -16,7 +18,7 @@ LIBRARY  := $(RUNTIME) $(MODEL)
 INCLUDE  := -Igen/nqvm/c
 
 .SECONDARY:
-.PHONY: $(SUITES) python hidden misra-long python-long
+.PHONY: $(SUITES) python hidden hidden-nightly misra-long python-long
 # A suite can also be called on its own; python is the last part of the set-up that one needs, unity aside.
 READY := build/setup/python
 
@@ -26,7 +28,7 @@ CC.gcc    := port/host/cc gcc
 CC.clang  := port/host/cc clang-19
 $(foreach m,$(MACHINES),$(eval CC.$m := port/cortex-m/cc $m))
 
-# -- no warning from any compiler, in float and in double -------------------------------------------------------------
+# -- objects: library and model for each compiler, type and level; `warnings` makes them, `symbols` looks into them, `unit` links them --
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wmissing-prototypes \
             -Wstrict-prototypes -Wfloat-equal -Wcast-qual -Wcast-align -Wundef -Wswitch-enum -Wvla -Wredundant-decls \
@@ -37,32 +39,46 @@ TOLD     := '-DMODEL_HEADER="nqvm.h"' '-DMODEL(name)=nqvm_\#\#name' '-DMODEL_SIZ
 BOARD.gcc   := $(wildcard port/host/*.c)
 BOARD.clang := $(BOARD.gcc)
 $(foreach m,$(MACHINES),$(eval BOARD.$m := $(wildcard port/cortex-m/*.c)))
-
-warnings: $(COMPILERS:%=warnings-%-float) $(patsubst %,warnings-%-double,$(filter-out $(ALIKE),$(COMPILERS))) warnings-everything ## Every compiler, strict, must be content
-
 REAL.float  :=
 REAL.double := -DPEN_REAL_DOUBLE -Wno-double-promotion
+# The port for bare metal keeps gcc from calling memcpy; here it may try, `symbols` sees that it does not.
+$(foreach m,$(MACHINES),$(eval TRIES.$m := -ftree-loop-distribute-patterns))
+COMMANDS := test/test.mk $(wildcard port/*/cc) port/cortex-m/machines.sh # an object is made anew when they change
+
+objects = $(patsubst %.c,build/objects/$(1)/%.o,$(2)) # (1) tree, (2) sources
+
+# (1) tree, (2) command
+define tree
+build/objects/$(1)/%.o: %.c $(COMMANDS) | $(READY)
+	@mkdir -p $$(@D)
+	$(Q)$(2) $(INCLUDE) -MMD -MP -c -o $$@ $$<
+endef
+LEVELS := -O2 -Os -O3
+$(foreach c,$(COMPILERS),$(foreach r,float double,$(foreach l,$(LEVELS),$(eval \
+    $(call tree,$c-$r$l,$(CC.$c) -std=c99 $l $(TRIES.$c) $(WARNINGS) $(REAL.$r) $(TOLD))))))
+
+# -- no warning from any compiler, in float and in double -------------------------------------------------------------
+
+GATES.warnings := $(COMPILERS:%=warnings-%-float) $(patsubst %,warnings-%-double,$(filter-out $(ALIKE),$(COMPILERS))) warnings-everything
+warnings: $(GATES.warnings) ## Every compiler, strict, must be content
 
 # (1) compiler, (2) float or double
 define warnings
 .PHONY: warnings-$(1)-$(2)
-warnings-$(1)-$(2): | $(READY)
-	@test/check "warnings $(1) $(2)" test/each $(CC.$(1)) -std=c99 -O2 $(WARNINGS) $(REAL.$(2)) $(INCLUDE) $(TOLD) \
-	    -c -o /dev/null -- $(RUNTIME) $(MODEL) $(FIRMWARE) $(BOARD.$(1))
+warnings-$(1)-$(2): $(call objects,$(1)-$(2)-O2,$(LIBRARY) $(FIRMWARE) $(BOARD.$(1)))
+	@echo "ok    warnings $(1) $(2)"
 endef
 $(foreach c,$(COMPILERS),$(foreach r,float double,$(eval $(call warnings,$c,$r))))
 
 # All that clang can say about library and model, but for its opinions on C99, padding, comments and plain arrays.
 .PHONY: warnings-everything
 warnings-everything: | $(READY)
-	@test/check "warnings clang -Weverything" test/each $(CC.clang) -std=c99 -O2 -Weverything -Werror -Wno-padded \
-	    -Wno-documentation -Wno-declaration-after-statement -Wno-unsafe-buffer-usage $(INCLUDE) -c -o /dev/null -- $(LIBRARY)
+	@test/check "warnings clang -Weverything" $(CC.clang) -std=c99 -fsyntax-only -Weverything -Werror -Wno-padded \
+	    -Wno-documentation -Wno-declaration-after-statement -Wno-unsafe-buffer-usage $(INCLUDE) $(LIBRARY)
 
 # -- no symbol from outside; on a core without FPU the compiler's own soft float --------------------------------------
 
 ALLOWED.mps2-an385 := __aeabi_(f[a-z0-9]*|u?i2f)
-LEVELS := -O2 -Os -O3
-
 # Cores that no port has. Most call memcpy for a copied struct sooner than a Cortex-M; clang needs no more than itself.
 SOFT_FLOAT  := __gnu_thumb1_case_(uqi|sqi|uhi|shi|si)|__aeabi_(f[a-z0-9]*|u?i2f|u?i?divmod|u?idiv)|__(add|sub|mul|div|eq|ne|lt|le|gt|ge|unord)sf[23]|__float(un)?sisf|__fix(uns)?sfsi
 CORES       := rv32 rv32-clang rv64 m0 m0plus-clang mips ppc s390x
@@ -75,18 +91,20 @@ CC.mips     := clang-19 --target=mips-none-elf
 CC.ppc      := clang-19 --target=ppc32-none-elf
 CC.s390x    := s390x-linux-gnu-gcc -fexcess-precision=fast
 
-symbols: $(foreach c,$(filter-out $(ALIKE),$(COMPILERS)),$(foreach l,$(LEVELS),symbols-$c$l)) $(ALIKE:%=symbols-%-O2) symbols-m0-O2 symbols-rv32-O2 $(CORES:%=symbols-%-Os) ## Library and model must need nothing from outside
+GATES.symbols := $(foreach c,$(filter-out $(ALIKE),$(COMPILERS)),$(LEVELS:%=symbols-$c%)) $(ALIKE:%=symbols-%-O2) \
+                 symbols-m0-O2 symbols-rv32-O2 $(CORES:%=symbols-%-Os)
+symbols: $(GATES.symbols) ## Library and model must need nothing from outside
 
-# (1) compiler, (2) optimisation; the port for bare metal keeps gcc from calling memcpy, here it may try
+# (1) compiler, (2) optimisation, (3) tree of objects
 define symbols
 .PHONY: symbols-$(1)$(2)
-symbols-$(1)$(2): | $(READY)
-	@test/check "symbols $(1) $(2)" test/symbols '$(ALLOWED.$(1))' $(CC.$(1)) -std=c99 $(2) \
-	    $(if $(filter $(1),$(MACHINES)),-ftree-loop-distribute-patterns) $(INCLUDE) $(LIBRARY)
+symbols-$(1)$(2): $(call objects,$(3),$(LIBRARY))
+	@test/check "symbols $(1) $(2)" test/symbols '$(ALLOWED.$(1))' $$^
 endef
-$(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),$(eval $(call symbols,$c,$l))))
-$(foreach c,$(CORES),$(eval ALLOWED.$c := $(SOFT_FLOAT))$(eval CC.$c += -ffreestanding -Iinc -Iport/gnu -Wall -Wextra -Werror))
-$(foreach c,$(CORES),$(foreach l,-O2 -Os,$(eval $(call symbols,$c,$l))))
+$(foreach c,$(COMPILERS),$(foreach l,$(LEVELS),$(eval $(call symbols,$c,$l,$c-float$l))))
+$(foreach c,$(CORES),$(eval ALLOWED.$c := $(SOFT_FLOAT)))
+$(foreach c,$(CORES),$(foreach l,-O2 -Os,\
+    $(eval $(call tree,$c$l,$(CC.$c) -ffreestanding -Iinc -Iport/gnu -Wall -Wextra -Werror -std=c99 $l))$(eval $(call symbols,$c,$l,$c$l))))
 
 # -- MISRA C:2012, as far as cppcheck's addon goes --------------------------------------------------------------------
 
@@ -96,8 +114,10 @@ HEADERS      := $(wildcard inc/penode/*.h) port/template/pen_port_target.h sil/f
 
 # The runtime is read with the first model. The others, read against its headers, are programs of `make misra-long`.
 FIRST := nqvm
-misra: misra-plain-$(FIRST) $(patsubst %,misra-model-%,$(filter-out $(FIRST),$(MODELS))) misra-gnuc misra-canary misra-table ## cppcheck with its MISRA addon: nothing in the library, much in a bad file
-misra-long: $(MODELS:%=misra-plain-%) ## Each model with the whole runtime, as the program that it is part of
+GATES.misra := misra-gnuc misra-plain-$(FIRST) $(patsubst %,misra-model-%,$(filter-out $(FIRST),$(MODELS))) misra-canary misra-table
+misra: $(GATES.misra) ## cppcheck with its MISRA addon: nothing in the library, much in a bad file
+GATES.misra-long := $(MODELS:%=misra-plain-%)
+misra-long: $(GATES.misra-long) ## Each model with the whole runtime, as the program that it is part of
 
 build/misra/%.c: gen/nqvm/c/%.h $(HEADERS) test/misra/every_entry
 	@mkdir -p $(@D)
@@ -126,62 +146,75 @@ gen-check: | $(READY) ## The committed C must be, to the byte, what the generato
 	    test/check "gen-check $$model" $(PENODE) generate gen/nqvm/$$model.toml -o build/gen-check || exit; done
 	@test/check "gen-check compare" diff -r build/gen-check gen/nqvm/c
 
-# -- Unity: every test/unit/test_*.c is a program, built and run in every variant -------------------------------------
+# -- Unity: all files test/unit/test_*.c in one program for each variant -----------------------------------------------
 
 # A variant is a compiler with options, and the way to run what it makes; "small" has the kernels of a size build.
 FPUS        := $(filter-out mps2-an385,$(MACHINES))
 VARIANTS    := $(COMPILERS) sanitize double small
-CC.sanitize := port/host/cc gcc -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
+CC.sanitize := port/host/cc gcc -g -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 CC.double   := port/host/cc gcc -DPEN_REAL_DOUBLE
 CC.small    := port/host/cc gcc
-LEVEL.small := -Os
-$(foreach v,gcc clang sanitize double small,$(eval RUN.$v := port/host/run gcc))
-$(foreach m,$(MACHINES),$(eval RUN.$m := port/cortex-m/run $m))
+$(foreach v,gcc clang sanitize double small,$(eval RUN.$v := port/host/run gcc)$(eval OBJCOPY.$v := objcopy))
+$(foreach m,$(MACHINES),$(eval RUN.$m := port/cortex-m/run $m)$(eval OBJCOPY.$m := arm-none-eabi-objcopy))
 $(foreach m,$(MACHINES),$(eval LIBS.$m := -lc)) # Unity's setjmp
-$(foreach m,$(FPUS),$(foreach k,CC RUN LIBS,$(eval $k.small-$m := $($k.$m)))$(eval LEVEL.small-$m := -Os))
+# Library and model of a variant are one of the trees above, but for those with sanitizers.
+$(foreach c,$(COMPILERS),$(eval TREE.$c := $c-float-O2))
+TREE.double   := gcc-double-O2
+TREE.small    := gcc-float-Os
+TREE.sanitize := sanitize
+$(eval $(call tree,sanitize,$(CC.sanitize) -std=c99 -O1 -Wall -Wextra -Werror))
 
+UNITS := $(patsubst test/unit/%.c,%,$(wildcard test/unit/test_*.c))
+NEEDS := gen/nqvm/c/nqvm.c gen/nqvm/c/nqvm_params.c gen/nqvm/c/nqvm_selftest.c
 KERNELS := test_pen_net test_pen_net16
-UNITS   := $(patsubst test/unit/%.c,%,$(wildcard test/unit/test_*.c))
-$(foreach t,$(UNITS),$(eval NEEDS.$t := $(shell sed -n 's|.*needs: \(.*\) \*/.*|\1|p' test/unit/$t.c))) # read once, not for each variant
-objects  = $(patsubst %.c,build/unit/$(1)/%.o,$(2))
-UNIT_CFLAGS := -std=c99 -g -Wall -Wextra -Werror $(INCLUDE) -Itest/unit -Ibuild/unity/src -include unity_config.h
+UNIT_CFLAGS := -std=c99 -O1 -Wall -Wextra -Werror $(INCLUDE) -I. -Itest/unit -Ibuild/unity/src -include unity_config.h
 
 # Tests without arithmetic on reals are left out on cores with the instruction set of another. Those: cores-long.
 INTEGERS := $(filter test_pen_recover test_pen_saved test_pen_serial test_pen_set test_pen_set_staging test_pen_status test_pen_xcp% test_xcp_frame,$(UNITS))
-UNIT_LONG := $(foreach v,$(ALIKE),$(INTEGERS:%=unit-$v-%))
+GATES.unit := $(VARIANTS:%=unit-%) $(FPUS:%=unit-%-kernels)
 .PHONY: cores-long
-cores-long: $(UNIT_LONG) $(ALIKE:%=warnings-%-double) $(ALIKE:%=symbols-%-Os) $(ALIKE:%=symbols-%-O3) ## What suites leave out on cores that are like others
-unit: $(filter-out $(UNIT_LONG),$(foreach v,$(VARIANTS),$(UNITS:%=unit-$v-%)) $(foreach t,$(KERNELS),$(FPUS:%=unit-small-%-$t))) ## The C unit tests, on this machine and on the emulated ones
+GATES.cores-long := $(ALIKE:%=unit-%-integers) $(ALIKE:%=warnings-%-double) $(ALIKE:%=symbols-%-Os) $(ALIKE:%=symbols-%-O3)
+cores-long: $(GATES.cores-long) ## What suites leave out on cores that are like others
+unit: $(GATES.unit) ## The C unit tests, on this machine and on the emulated ones; FILES="test_pen_set ..." takes some of them
 
 build/unit/runner/%.c: test/unit/%.c build/setup/unity
 	@mkdir -p $(@D)
-	$(Q)ruby build/unity/auto/generate_test_runner.rb $< $@
+	$(Q)ruby build/unity/auto/generate_test_runner.rb --main_name=main_$* $< $@
+	$(Q)sed -i '1i #include "$<"\n#undef RUN_TEST' $@
 
+# A file and its runner are one object in which all but the runner's entry is static: files may use the same names.
 # (1) variant
 define objects_of_variant
-build/unit/$(1)/%.o: %.c build/setup/unity
+build/unit/$(1)/%.o: build/unit/runner/%.c $(COMMANDS)
 	@mkdir -p $$(@D)
-	$(Q)$(CC.$(1)) $(or $(LEVEL.$(1)),-O2) $(UNIT_CFLAGS) -MMD -c -o $$@ $$<
+	$(Q)$(CC.$(1)) $(UNIT_CFLAGS) -MMD -MP -c -o $$@ $$<
+	$(Q)$(OBJCOPY.$(1)) --keep-global-symbol=main_$$* $$@
+build/unit/$(1)/unity/%.o: build/unity/src/%.c build/setup/unity $(COMMANDS)
+	@mkdir -p $$(@D)
+	$(Q)$(CC.$(1)) $(UNIT_CFLAGS) -c -o $$@ $$<
+build/unit/$(1)/unity_output.o: test/unit/unity_output.c build/setup/unity $(COMMANDS)
+	@mkdir -p $$(@D)
+	$(Q)$(CC.$(1)) $(UNIT_CFLAGS) -MMD -MP -c -o $$@ $$<
 endef
+$(foreach v,$(VARIANTS),$(eval $(call objects_of_variant,$v)))
 
-# (1) variant, (2) test
+# (1) target, (2) variant, (3) files, (4) tree of objects, (5) sources of it
 define unit
-build/unit/$(1)/$(2): $(call objects,$(1),build/unit/runner/$(2).c test/unit/$(2).c test/unit/unity_output.c \
-                                          build/unity/src/unity.c $(RUNTIME) $(NEEDS.$(2)))
-	$(Q)$(CC.$(1)) -O2 -o $$@ $$^ $(LIBS.$(1))
-.PHONY: unit-$(1)-$(2)
-unit-$(1)-$(2): build/unit/$(1)/$(2)
-	@test/unit/show $(2) $(1) $(RUN.$(1)) $$<
+build/unit/$(2)/$(1): test/unit/main.c $(patsubst %,build/unit/$(2)/%.o,$(3) unity/unity unity_output) $(call objects,$(4),$(5))
+	$(Q)$(CC.$(2)) $(UNIT_CFLAGS) '-DUNITS=$(foreach t,$(3),UNIT($t))' -o $$@ $$^ $(LIBS.$(2))
+.PHONY: $(1)
+$(1): build/unit/$(2)/$(1)
+	@test/unit/show $(1:unit-%=%) $(RUN.$(2)) $$< -- $$(or $$(filter $$(FILES),$(3)),$(3))
 endef
-
-$(foreach v,$(VARIANTS) $(FPUS:%=small-%),$(eval $(call objects_of_variant,$v)))
-$(foreach v,$(VARIANTS),$(foreach t,$(UNITS),$(eval $(call unit,$v,$t))))
-$(foreach m,$(FPUS),$(foreach t,$(KERNELS),$(eval $(call unit,small-$m,$t))))
--include $(shell find build/unit -name '*.d' 2>/dev/null)
+$(foreach v,$(VARIANTS),$(eval $(call unit,unit-$v,$v,$(if $(filter $v,$(ALIKE)),$(filter-out $(INTEGERS),$(UNITS)),$(UNITS)),$(TREE.$v),$(RUNTIME) $(NEEDS))))
+$(foreach m,$(ALIKE),$(eval $(call unit,unit-$m-integers,$m,$(INTEGERS),$m-float-O2,$(RUNTIME))))
+$(foreach m,$(FPUS),$(eval $(call unit,unit-$m-kernels,$m,$(KERNELS),$m-float-Os,$(filter src/pen_net% src/pen_math.c,$(RUNTIME)))))
+-include $(shell find build/objects build/unit -name '*.d' 2>/dev/null)
 
 # -- the ports themselves ---------------------------------------------------------------------------------------------
 
-board: $(MACHINES:%=board-%) ## Each emulated machine: counts, stack, files, interrupt, fault reports
+GATES.board := $(MACHINES:%=board-%)
+board: $(GATES.board) ## Each emulated machine: counts, stack, files, interrupt, fault reports
 board-%: | $(READY)
 	@test/board/check.sh $*
 
@@ -195,7 +228,8 @@ cmock: build/setup/unity build/setup/cmock ## The order in which the library use
 STRIDE := 64 # 1: all 2^32 floats, five minutes
 ACCURACY := -std=c99 -O2 -ffp-contract=off -Iinc -Iport/gnu
 
-accuracy: accuracy-float accuracy-double accuracy-source accuracy-elementary ## Error of exp, tanh, sigmoid, softplus; STRIDE=1 takes all floats
+GATES.accuracy := accuracy-float accuracy-double accuracy-source accuracy-elementary
+accuracy: $(GATES.accuracy) ## Error of exp, tanh, sigmoid, softplus; STRIDE=1 takes all floats
 
 build/accuracy:
 	@mkdir -p $@
@@ -227,7 +261,9 @@ hidden: hidden-fixed hidden-fresh ## The diagnosis has to find what recordings h
 hidden-fixed: | $(READY)
 	@$(HIDDEN) --seed 1 --out build/campaign/fixed
 hidden-fresh: | $(READY)
-	@$(HIDDEN) --out build/campaign/fresh
+	@$(HIDDEN) --cases 4 --out build/campaign/fresh
+hidden-nightly: | $(READY)
+	@$(HIDDEN) --cases 24 --out build/campaign/nightly
 
 # -- the price ----------------------------------------------------------------------------------------------------------
 
