@@ -36,7 +36,10 @@ run: setup ## The main job: recalibration while it runs, on the host and a Corte
 pythons: setup build/setup/pythons ## Packages for other interpreters that are installed here, so that python-install tries the wheel with them too
 
 test: setup ## All checks; the last line adds them up
-	$(Q)$(PYTHON) test/tally.py -j $$(nproc) $(SUITES)
+	$(Q)$(PYTHON) test/tally.py -j $$(nproc) --python $(FOLDERS) -- $(GATES)
+
+nightly: setup ## What `make test` takes a sample of: 24 fresh recordings with something hidden, and all tests marked as long
+	$(Q)$(PYTHON) test/tally.py -j $$(nproc) hidden-nightly python-long $(GATES.misra-long) $(GATES.cores-long)
 
 prove: setup build/setup/proof ## The proofs: all values, all orders, all statements; each also has to find seeded faults
 	$(Q)$(PYTHON) test/tally.py $(PROVE_STATIC) $(PROVE_DYNAMIC)
@@ -106,7 +109,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run pythons test prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table ablate rigs hidden-mechanisms dist structure clean
+.PHONY: help setup run pythons test nightly prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table ablate rigs hidden-mechanisms dist structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

@@ -9,14 +9,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import penode_gen
 
-ROOT = Path(__file__).resolve().parents[2]
-NQVM = ROOT / "gen" / "nqvm" / "nqvm.toml"
 sys.path.insert(0, str(Path(__file__).parent))
+
+from case_study import NQVM  # needs the path above
 
 if importlib.util.find_spec("fmpy") is None:
     collect_ignore = ["test_fmu.py", "test_fmu_derivatives.py", "test_fmu_long.py"]
@@ -71,10 +70,3 @@ def production(efmu: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory)
         return Production(efmu, real, folders[real])
 
     return made
-
-
-def chirp(duration: float) -> np.ndarray:
-    """The road of the case study's scenario, 0.15 m/s from 1 Hz on, faster by 0.25 Hz a second; sample by sample [n, 1], float."""
-    t = np.arange(round(duration / 1e-3) + 1) * 1e-3
-    rate = 2 * np.pi * (1 + 0.25 * t)
-    return (0.15 / rate * np.sin(2 * np.pi * (t + 0.125 * t**2))).astype(np.float32)[:, None]

@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from case_study import ROOT, chirp
 from click.testing import CliRunner
-from conftest import ROOT, chirp
 from efmu_container import Schemas, contents, export, problems
 from galec import Block
 from galec_against_c import distances

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOT
+from case_study import ROOT
 from efmu_container import SCHEMAS as WITH_SCHEMAS, Schemas, contents, export, problems, unmapped
 from efmu_instance import FOLDERS
 

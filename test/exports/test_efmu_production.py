@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from conftest import ROOT, chirp
+from case_study import ROOT, chirp
 from efmu_container import SCHEMAS, contents, export, problems, unmapped
 from efmu_instance import FOLDERS, Production
 

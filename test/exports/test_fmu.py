@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import chirp
+from case_study import chirp
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from master import DISCARD, ERROR, WARNING, Master, Unpacked, export

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import chirp
+from case_study import chirp
 from master import Master, Unpacked, export
 
 STEP = 1e-3

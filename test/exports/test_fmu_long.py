@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import chirp
+from case_study import chirp
 from fmpy.build import build_platform_binary
 from master import Master, Unpacked, export
 from test_fmu import SET, STEP, run, write_set

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import chirp
+from case_study import chirp
 from master import ERROR, WARNING, Master, Unpacked, export
 
 import penode_gen

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import chirp
+from case_study import chirp
 
 import penode_gen
 from penode_gen import exports

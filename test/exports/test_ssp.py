@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from case_study import chirp
 from click.testing import CliRunner
-from conftest import chirp
 
 import penode_gen
 from penode_gen import exports

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import ROOT, chirp
+from case_study import ROOT, chirp
 from master import Unpacked
 
 from penode_gen.exports.fmi import files as fmu_files

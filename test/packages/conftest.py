@@ -6,10 +6,14 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from pathlib import Path
 
-import build
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import build  # needs the path above
 from build import ROOT, VERSION, Built, run
 
 WORK = ROOT / "build" / "packages-test"

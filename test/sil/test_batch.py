@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import HERE
+from places import HERE
 from samples import sample
 
 import penode_gen

@@ -11,7 +11,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import HERE, ROOT
+from places import HERE, ROOT
 
 MODEL = HERE / "models" / "oscillator.toml"
 NQVM = ROOT / "gen" / "nqvm" / "nqvm.toml"

@@ -10,7 +10,7 @@ import shutil
 import subprocess
 
 import pytest
-from conftest import ROOT
+from places import ROOT
 from samples import sample
 
 from penode_sil.building import generated

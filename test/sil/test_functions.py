@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import HERE
+from places import HERE
 from samples import sample
 from test_targets import BOARDS, HARD_FLOAT, need
 

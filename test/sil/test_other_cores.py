@@ -9,7 +9,7 @@ import re
 import shutil
 
 import pytest
-from conftest import ROOT
+from places import ROOT
 from test_targets import chirp, every_call, need
 
 import penode_gen

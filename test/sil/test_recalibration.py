@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from places import ROOT
 
 import penode_gen
 from penode_sil import mil, scenario as scenarios

@@ -8,7 +8,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import HERE
+from places import HERE
 from test_cli import table
 
 import penode_gen

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from places import ROOT
 
 import penode_gen
 from penode_sil.errors import UserError
