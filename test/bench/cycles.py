@@ -19,6 +19,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import cortex_m4
@@ -57,6 +58,11 @@ def plugin() -> Path:
 
 def symbols(elf: Path) -> dict[str, int]:
     """Addresses of the functions of a program."""
+    return _symbols(elf, elf.stat().st_mtime_ns)
+
+
+@lru_cache(8)
+def _symbols(elf: Path, _made: int) -> dict[str, int]:
     lines = subprocess.run(["arm-none-eabi-nm", str(elf)], check=True, capture_output=True, text=True).stdout.splitlines()
     return {
         name: int(address, 16) & ~1 for address, kind, name in (line.split() for line in lines if len(line.split()) == 3) if kind in "tTwW"
