@@ -122,4 +122,5 @@ build/setup/%:
 	$(Q)test/setup.sh $*
 
 include test/test.mk
+include test/tools/check.mk
 include test/prove/prove.mk

@@ -3,11 +3,12 @@
 #
 # `make check`: all that can be said about the sources without running the project; seconds. `make format` mends layout.
 
-CHECKS := check-types check-c check-lint check-pages check-structure check-format # the longest begin
-RUFF   := $(PYTHON) -m ruff
+GATES.check := check-types check-c check-lint check-pages check-structure check-format # the longest begin
+RUFF := $(PYTHON) -m ruff
 
-.PHONY: check format $(CHECKS)
-check: $(CHECKS) ## Layout, lint and types of the Python, layout and lint of the C, references of all pages, the counts of structure.json
+.PHONY: check format $(GATES.check)
+check: ## Seconds: layout, lint and types of the Python, layout and lint of the C, references of all pages, the counts of structure.json
+	$(Q)$(MAKE) -j$$(nproc) -k --output-sync $(GATES.check)
 
 check-format: | $(READY)
 	@test/check "layout of the Python" $(RUFF) format --check --quiet .
@@ -20,9 +21,9 @@ check-pages: | $(READY)
 check-structure: | $(READY)
 	@test/check "counts of structure.json" $(PYTHON) test/tools/structure.py
 check-c: | $(READY)
-	@test/tools/c_check
+	@$(PYTHON) test/tools/c_check.py
 
 format: | $(READY) ## Lay out the Python and the C, and sort imports
 	$(Q)$(RUFF) check --quiet --select I --fix .
 	$(Q)$(RUFF) format --quiet .
-	$(Q)test/tools/c_check --fix
+	$(Q)$(PYTHON) test/tools/c_check.py --format
