@@ -25,6 +25,7 @@
 #define WINDOW 20000U /* steps */
 
 static const pen_set_t *const set[2] = { &nqvm_folded_set_default, &nqvm_folded_set_altered_friction };
+static unsigned long wrong, adopted, outside, withdrawn;
 static nqvm_folded_t model;
 static nqvm_folded_banks_t banks;
 
@@ -250,13 +251,38 @@ static pen_status_t tune(unsigned long second, unsigned int millisecond)
     return status;
 }
 
+/* The flags of step k: counted, and those that must come, and no others. */
+static void take(unsigned long k, pen_status_t status)
+{
+    adopted += ((status & PEN_ADOPTED) != PEN_OK) ? 1U : 0U;
+    outside += ((status & PEN_OUTSIDE) != PEN_OK) ? 1U : 0U;
+    withdrawn += ((status & PEN_WITHDRAWN) != PEN_OK) ? 1U : 0U;
+    wrong += ((status & ~(PEN_ADOPTED | PEN_OUTSIDE | PEN_WITHDRAWN)) == PEN_OK) ? 0U : 1U;
+    wrong += (((status & PEN_WITHDRAWN) != PEN_OK) == (((k % RATE) == 898U) && withdraws(k / RATE))) ? 0U : 1U;
+    wrong += (((status & PEN_ADOPTED) != PEN_OK) == ((k % RATE) == 900U)) ? 0U : 1U;
+}
+
+/* What the model has counted since the last time. */
+static void read_counters(unsigned long counted[3])
+{
+    pen_status_report_t report;
+
+    (void)nqvm_folded_status(&model, &report);
+    counted[0] += pen_status_times(&report, PEN_OUTSIDE);
+    counted[1] += pen_status_times(&report, PEN_ADOPTED);
+    counted[2] += pen_status_times(&report, PEN_WITHDRAWN);
+}
+
+static void print_most(void)
+{
+    printf("z %.9g\nrate %.9g\ns %.9g\nv %.9g\ntyre %.9g\na %.9g\nnet_s %.9g\nnet_v %.9g\nanchor_s %.9g\nanchor_v %.9g\n", most.z,
+           most.rate, most.s, most.v, most.tyre, most.a, most.net_s, most.net_v, most.anchor_s, most.anchor_v);
+    printf("slope_s %.9g\nslope_v %.9g\n", most.slope_s, most.slope_v);
+}
+
 int main(int argc, char **argv)
 {
     const unsigned long seconds = (argc > 5) ? strtoul(argv[1], NULL, 10) : 0U;
-    unsigned long wrong = 0U;
-    unsigned long adopted = 0U;
-    unsigned long outside = 0U;
-    unsigned long withdrawn = 0U;
     unsigned long counted[3] = { 0U, 0U, 0U };
     double rho[X];
     double x[X] = { 0.0, 0.0, 0.0, 0.0 };
@@ -280,12 +306,7 @@ int main(int argc, char **argv)
 
         wrong += (tune(k / RATE, (unsigned int)(k % RATE)) == PEN_OK) ? 0U : 1U;
         status = nqvm_folded_step(&model, &u, &y);
-        adopted += ((status & PEN_ADOPTED) != PEN_OK) ? 1U : 0U;
-        outside += ((status & PEN_OUTSIDE) != PEN_OK) ? 1U : 0U;
-        withdrawn += ((status & PEN_WITHDRAWN) != PEN_OK) ? 1U : 0U;
-        wrong += ((status & ~(PEN_ADOPTED | PEN_OUTSIDE | PEN_WITHDRAWN)) == PEN_OK) ? 0U : 1U;
-        wrong += (((status & PEN_WITHDRAWN) != PEN_OK) == (((k % RATE) == 898U) && withdraws(k / RATE))) ? 0U : 1U;
-        wrong += (((status & PEN_ADOPTED) != PEN_OK) == ((k % RATE) == 900U)) ? 0U : 1U;
+        take(k, status);
         (void)nqvm_folded_get_state(&model, &now);
         if (k > 0U) {
             const double state[X] = { (double)now.z_b, (double)now.z_w, (double)now.v_b, (double)now.v_w };
@@ -304,15 +325,11 @@ int main(int argc, char **argv)
         }
         if ((((k + 1U) % (60U * RATE)) == 0U) && (k > WINDOW)) {
             double bound[X];
-            pen_status_report_t report;
             drift(k, rho, bound);
             for (size_t n = 0U; n < X; n++) {
                 note(&drift_share, (x[n] - d[n]) / bound[n]);
             }
-            (void)nqvm_folded_status(&model, &report);
-            counted[0] += pen_status_times(&report, PEN_OUTSIDE);
-            counted[1] += pen_status_times(&report, PEN_ADOPTED);
-            counted[2] += pen_status_times(&report, PEN_WITHDRAWN);
+            read_counters(counted);
         }
     }
     wrong += (counted[0] == outside) ? 0U : 1U;
@@ -320,9 +337,7 @@ int main(int argc, char **argv)
     wrong += (counted[2] == withdrawn) ? 0U : 1U;
     wrong += ((step_share <= 1.0) && (drift_share <= 1.0)) ? 0U : 1U;
     printf("step %.3g\ndrift %.3g\napart %.3g %.3g %.3g %.3g\n", step_share, drift_share, apart[0], apart[1], apart[2], apart[3]);
-    printf("z %.9g\nrate %.9g\ns %.9g\nv %.9g\ntyre %.9g\na %.9g\nnet_s %.9g\nnet_v %.9g\nanchor_s %.9g\nanchor_v %.9g\n", most.z,
-           most.rate, most.s, most.v, most.tyre, most.a, most.net_s, most.net_v, most.anchor_s, most.anchor_v);
-    printf("slope_s %.9g\nslope_v %.9g\nadopted %lu\nwithdrawn %lu\noutside %lu\nwrong %lu\n", most.slope_s, most.slope_v, adopted,
-           withdrawn, outside, wrong);
+    print_most();
+    printf("adopted %lu\nwithdrawn %lu\noutside %lu\nwrong %lu\n", adopted, withdrawn, outside, wrong);
     return (wrong == 0U) ? 0 : 1;
 }
