@@ -60,7 +60,7 @@ static int64_t nanoseconds(void)
 {
     struct timespec now;
 
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
     return ((int64_t)now.tv_sec * SECOND) + now.tv_nsec;
 }
 
@@ -73,7 +73,7 @@ static void *stepping(void *unused)
         controller_step(&stimulus[k % stimuli], (nanoseconds() - due) > period);
         due += period;
         const struct timespec next = { due / SECOND, due % SECOND };
-        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &next, NULL);
+        (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &next, NULL);
     }
     return unused;
 }
@@ -265,19 +265,20 @@ static void *read_file(const char *name, size_t *size)
 {
     FILE *const file = fopen(name, "rb");
     void *byte = NULL;
+    long end = -1L;
 
-    if ((file == NULL) || (fseek(file, 0L, SEEK_END) != 0)) {
+    if ((file != NULL) && (fseek(file, 0L, SEEK_END) == 0)) {
+        end = ftell(file);
+    }
+    if (end >= 0L) {
+        *size = (size_t)end;
+        byte = malloc(*size + 1U);
+    }
+    if ((byte == NULL) || (fseek(file, 0L, SEEK_SET) != 0) || (fread(byte, 1U, *size, file) != *size)) {
         perror(name);
         exit(1);
     }
-    *size = (size_t)ftell(file);
-    rewind(file);
-    byte = malloc(*size + 1U);
-    if ((byte == NULL) || (fread(byte, 1U, *size, file) != *size)) {
-        perror(name);
-        exit(1);
-    }
-    fclose(file);
+    (void)fclose(file);
     return byte;
 }
 
@@ -286,23 +287,23 @@ static int bind_to(const char *host, const char *port)
 {
     const int found = socket(AF_INET, line.datagrams ? SOCK_DGRAM : SOCK_STREAM, 0);
     const int on = 1;
-    struct sockaddr_in at = { .sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(port)) };
+    struct sockaddr_in at = { .sin_family = AF_INET, .sin_port = htons((uint16_t)strtoul(port, NULL, 10)) };
     socklen_t size = sizeof(at);
 
-    setsockopt(found, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
-    if ((inet_pton(AF_INET, host, &at.sin_addr) != 1) || (bind(found, (struct sockaddr *)&at, size) != 0) ||
+    if ((found < 0) || (setsockopt(found, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on)) != 0) ||
+        (inet_pton(AF_INET, host, &at.sin_addr) != 1) || (bind(found, (struct sockaddr *)&at, size) != 0) ||
         (getsockname(found, (struct sockaddr *)&at, &size) != 0) || (!line.datagrams && (listen(found, 1) != 0))) {
         perror("serve");
         exit(3);
     }
     printf("%d\n", ntohs(at.sin_port));
-    fflush(stdout);
+    (void)fflush(stdout);
     return found;
 }
 
 int main(int count, char *word[])
 {
-    controller_config_t config = { .ring = ring, .slots = SLOTS };
+    static controller_config_t config = { .ring = ring, .slots = SLOTS };
     pthread_t thread;
     size_t size = 0U;
 
@@ -311,8 +312,8 @@ int main(int count, char *word[])
     }
     line.frames = strcmp(word[WORD_KIND], "frames") == 0;
     line.datagrams = line.frames || (strcmp(word[WORD_KIND], "udp") == 0);
-    config.max_cto = (uint32_t)atoi(word[WORD_CTO]);
-    config.quiet = (uint32_t)atoi(word[WORD_QUIET]);
+    config.max_cto = (uint32_t)strtoul(word[WORD_CTO], NULL, 10);
+    config.quiet = (uint32_t)strtoul(word[WORD_QUIET], NULL, 10);
     stream.max = config.max_cto;
     stimulus = read_file(word[WORD_STIMULUS], &size);
     stimuli = (uint32_t)(size / sizeof(*stimulus));
