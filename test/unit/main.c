@@ -14,7 +14,7 @@ UNITS
 
 static const struct {
     const char *name;
-    int         (*run)(void);
+    int (*run)(void);
 } FILES[] = { UNITS };
 
 /* Unity calls these in a runner that no file here uses; each file has its own. */
@@ -26,8 +26,8 @@ int main(void)
     char first[64];
     char last[64];
     const bool some = board_argument(1U, first, sizeof(first)) && board_argument(2U, last, sizeof(last));
-    bool   running = !some;
-    int    failed = 0;
+    bool running = !some;
+    int failed = 0;
     size_t i;
 
     for (i = 0U; i < (sizeof(FILES) / sizeof(FILES[0])); i++) {
