@@ -33,6 +33,8 @@ from .output import whole
 
 Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
+SIMPLE = ("-O1", "-march=native")  # with gcc: half of the time to compile, and code that takes twice as long
+SHORT = 1_000_000  # steps of all runs together, up to which a call is by SIMPLE: 10 ms, of which the other code would save half
 # Not -ffast-math, which takes nothing for NaN. But gcc drops 0*x, by which lanes_max and its like pass NaN on: states, inputs and outputs
 # that are not finite are detected by their bits all the same.
 QUICK = (
@@ -94,13 +96,16 @@ class _Job(ctypes.Structure):
 class Batch:
     """A model's batch library, compiled for this processor; `lanes` runs go at once. Without `exact` sums and products
     may be fused and put in another order, and subnormal numbers are 0: in about half of the time, but other bits than
-    NAME_step has, and other ones from machine to machine. For fits. `causal`: see render_batch."""
+    NAME_step has, and other ones from machine to machine. For fits. `causal`: see render_batch.
+
+    Calls of few steps run code that is compiled sooner, others code that runs faster; which of the two depends on the shapes of the
+    arguments alone, so a call has the same bits whenever it is made."""
 
     def __init__(self, model: penode_gen.Model, dtype: type = np.float64, exact: bool = True, causal: Causal | None = None):
         self.model, self.dtype, self.exact = model, dtype, exact
         self._code = render_batch(model, causal)
-        self._libraries: dict[bool, ctypes.CDLL] = {}
-        self.lanes = ctypes.c_size_t.in_dll(self._library(False), "batch_lanes").value
+        self._libraries: dict[tuple[bool, bool], ctypes.CDLL] = {}
+        self.lanes = ctypes.c_size_t.in_dll(self._library(False, True), "batch_lanes").value
 
     def run(
         self,
@@ -158,7 +163,8 @@ class Batch:
         job.count = tuple(map(len, wanted))
         job.which, job.kept = (tuple(a.ctypes.data for a in arrays) for arrays in (wanted, kept))
         kept += self._observed(observer, job, -(-n // every), padded)  # arrays that the job points to
-        if not self._step(self._library(per_run), job, vectors, threads):
+        short = n * runs * model.substeps <= SHORT
+        if not self._step(self._library(per_run, short), job, vectors, threads):
             raise WrongUse(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
         x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept[:3])
         return BatchRun(x, y, z, *first[:, :runs].astype(np.int64))
@@ -239,13 +245,14 @@ class Batch:
                 raise WrongUse(f"{self.model.path}: no {kind} '{name}'; it has {', '.join(known) or 'none'}")
         return np.array([known.index(name) for name in (known if wanted is None else wanted)], dtype=np.uintp)
 
-    def _library(self, per_run: bool) -> ctypes.CDLL:
-        if per_run not in self._libraries:
-            library = ctypes.CDLL(str(_build(self.model, self._code, self.dtype, per_run, self.exact)))
+    def _library(self, per_run: bool, short: bool) -> ctypes.CDLL:
+        key = per_run, short
+        if key not in self._libraries:
+            library = ctypes.CDLL(str(_build(self.model, self._code, self.dtype, per_run, self.exact, short)))
             library.batch_run.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t)
             library.batch_run.restype = ctypes.c_bool
-            self._libraries[per_run] = library
-        return self._libraries[per_run]
+            self._libraries[key] = library
+        return self._libraries[key]
 
 
 @cache
@@ -258,17 +265,17 @@ def _processor(compiler: str) -> bytes:
 
 
 def _compiler(model: penode_gen.Model) -> str:
-    """clang where it is installed, for a model without networks: it takes two thirds of gcc's time, and its code six sevenths. That of
-    layers takes a tenth more, and gcc alone picks among the pieces of folded networks in registers."""
+    """That of long calls: clang where it is installed, for a model without networks: it takes two thirds of gcc's time, and its code six
+    sevenths. That of layers takes a tenth more, and gcc alone picks among the pieces of folded networks in registers."""
     return next(filter(shutil.which, () if model.networks else ("clang-19", "clang")), "gcc")
 
 
-def _build(model: penode_gen.Model, code: BatchCode, dtype: type, per_run: bool, exact: bool) -> Path:
+def _build(model: penode_gen.Model, code: BatchCode, dtype: type, per_run: bool, exact: bool, short: bool) -> Path:
     """The shared library of a batch code, compiled once; keyed by sources, compiler and processor."""
-    compiler = _compiler(model)
+    compiler = "gcc" if short else _compiler(model)
     command = [
         compiler,
-        *OPTIMISE,
+        *(SIMPLE if short else OPTIMISE),
         *FLAGS,
         *(() if exact else QUICK),
         "-fPIC",
