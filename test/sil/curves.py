@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Smooth inputs of plants that SciPy integrates one time after the other."""
+"""Smooth inputs of plants, and their integration."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,3 +21,24 @@ def curve(z: NDArray[np.float64], step: float) -> Callable[[float], float]:
         return ((a * x + b) * x + c) * x + d
 
     return at
+
+
+def integrate(
+    rates: Callable[[float, list[float]], Sequence[float]], start: Sequence[float], step: float, samples: int, substeps: int = 2
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """States and their rates [states, samples] of x' = rates(time, x) at multiples of `step` [s], by Runge-Kutta of order 4.
+
+    Plain numbers, for plants of a few states: SciPy's solvers take ten times as long for the same steps.
+    """
+    h, x, rows = step / substeps, list(start), []
+    for i in range(samples):
+        for j in range(substeps):
+            time = i * step + j * h
+            p = rates(time, x)
+            if j == 0:
+                rows.append((x, p))
+            q = rates(time + 0.5 * h, [y + 0.5 * h * v for y, v in zip(x, p)])
+            r = rates(time + 0.5 * h, [y + 0.5 * h * v for y, v in zip(x, q)])
+            s = rates(time + h, [y + h * v for y, v in zip(x, r)])
+            x = [y + h / 6.0 * (a + 2.0 * b + 2.0 * c + d) for y, a, b, c, d in zip(x, p, q, r, s)]
+    return np.array([x for x, _ in rows]).T, np.array([v for _, v in rows]).T
