@@ -255,11 +255,11 @@ python-long: | $(READY) ## The Python tests of which `make test` takes a sample:
 
 # -- hidden effects: a draw that never changes, and one that nobody has seen --------------------------------------------
 
-HIDDEN := $(PYTHON) test/diagnosis/campaign.py --cases 12 --brief --gate --command "$(PENODE) diagnose"
+HIDDEN := OPENBLAS_NUM_THREADS=1 $(PYTHON) test/diagnosis/campaign.py --brief --gate --fork --command "penode diagnose"
 
 hidden: hidden-fixed hidden-fresh ## The diagnosis has to find what recordings hide; a right program fails less than once in 1000 runs
 hidden-fixed: | $(READY)
-	@$(HIDDEN) --seed 1 --out build/campaign/fixed
+	@$(HIDDEN) --cases 12 --seed 1 --out build/campaign/fixed
 hidden-fresh: | $(READY)
 	@$(HIDDEN) --cases 4 --out build/campaign/fresh
 hidden-nightly: | $(READY)

@@ -18,9 +18,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from importlib import import_module
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -47,19 +50,48 @@ def pace() -> float:
     return time.process_time() - begin
 
 
-def diagnose(command: str, folder: Path, recordings: list[Path], timeout: float) -> tuple[dict | None, float, str]:
+def started(call: list[str], timeout: float) -> tuple[int, str]:
+    """Exit code and stderr of a command. Raises TimeoutExpired."""
+    done = subprocess.run(call, capture_output=True, text=True, timeout=timeout, env={**os.environ, **ONE_CORE})
+    return done.returncode, done.stderr
+
+
+def forked(call: list[str], timeout: float) -> tuple[int, str]:
+    """The same of a penode command, in a process of its own that has the modules of this one."""
+
+    def penode(stderr: str) -> None:
+        from penode_sil.cli import main
+
+        sys.argv = call
+        with open(os.devnull, "w") as sys.stdout, open(stderr, "w") as sys.stderr:
+            main()
+
+    with tempfile.NamedTemporaryFile("r") as stderr:
+        process = get_context("fork").Process(target=penode, args=(stderr.name,))
+        process.start()
+        process.join(timeout)
+        if process.is_alive():
+            process.kill()
+            process.join()
+            raise subprocess.TimeoutExpired(call, timeout)
+        return process.exitcode or 0, stderr.read()
+
+
+def diagnose(
+    command: str, folder: Path, recordings: list[Path], timeout: float, start: Callable[[list[str], float], tuple[int, str]] = started
+) -> tuple[dict | None, float, str]:
     """Runs the command as a user would. Returns the diagnosis or None, seconds of one core that it took, and why there is none."""
     answer = folder / "diagnosis"
     call = [*shlex.split(command), folder / "model.toml", "--data", *recordings[:-1], "--holdout", recordings[-1], "-o", answer]
     try:
         begin = worked()
-        done = subprocess.run(list(map(str, call)), capture_output=True, text=True, timeout=timeout, env={**os.environ, **ONE_CORE})
+        code, stderr = start(list(map(str, call)), timeout)
     except subprocess.TimeoutExpired:
         return None, timeout, "timeout"
     seconds = worked() - begin
-    (folder / "stderr.txt").write_text(done.stderr)
-    if done.returncode:
-        return None, seconds, f"exit {done.returncode}: {(done.stderr.strip().splitlines() or [''])[-1][:160]}"
+    (folder / "stderr.txt").write_text(stderr)
+    if code:
+        return None, seconds, f"exit {code}: {(stderr.strip().splitlines() or [''])[-1][:160]}"
     try:
         return json.loads((answer / "diagnosis.json").read_text()), seconds, ""
     except (OSError, ValueError) as problem:
@@ -78,14 +110,16 @@ def simulated(command: str, model: Path, recording: Path) -> dict[str, float]:
     return {name.split("_[")[0]: float(np.sqrt(np.mean((seen[name][:n] - said[name][:n]) ** 2))) for name in both}
 
 
-def run(seed: int, index: int, commands: dict[str, str], simulate: str, timeout: float, out: Path, keep: bool) -> list[dict]:
+def run(
+    seed: int, index: int, commands: dict[str, str], simulate: str, timeout: float, out: Path, keep: bool, fork: bool = False
+) -> list[dict]:
     """One case from draw to scores, one for each command. The truth is written only after the commands are through."""
     case = cases.make(seed, index)
     folder = out / "cases" / f"{seed}-{index}"
     shutil.rmtree(folder, ignore_errors=True)
     recordings, answers = case.write(folder), []
     for name, command in commands.items():
-        found, seconds, why = diagnose(command, folder, recordings, timeout)
+        found, seconds, why = diagnose(command, folder, recordings, timeout, forked if fork else started)
         error: dict[str, float] = {}
         if simulate and found and not case.bench.moving:  # else it needs a start state that only the diagnosis knows
             error = simulated(simulate, folder / "diagnosis" / "model_extended.toml", recordings[-1])
@@ -205,6 +239,7 @@ def arguments() -> argparse.ArgumentParser:
         help="measure the gain by COMMAND model_extended.toml --input REC -o OUT.csv, not by what the diagnosis says",
     )
     add("--timeout", type=float, default=240, help="seconds for one case, by the clock (240)")
+    add("--fork", action="store_true", help="the commands are penode's: fork them, so that modules are loaded once")
     add("--jobs", type=int, default=1, help="cases at the same time (1)")
     add(
         "--alone",
@@ -283,12 +318,15 @@ def main() -> int:
     left = [(s, i) for s, i in chosen if f"{s}:{i}" not in through]
     if before:
         print(f"{len(chosen) - len(left)} of them are through", flush=True)
+    if asked.fork:  # what the command loads, once for all cases
+        import_module("penode_sil.cli")
+        import_module("penode_sil.diagnosis.files")
     with ProcessPoolExecutor(asked.jobs) as pool:
         if asked.generate:
             for job in [pool.submit(generate, *one, asked.out) for one in chosen]:
                 print(job.result(), flush=True)
             return 0
-        more = (commands, asked.simulate, asked.timeout, asked.out, asked.keep or bool(asked.only))
+        more = (commands, asked.simulate, asked.timeout, asked.out, asked.keep or bool(asked.only), asked.fork)
         jobs = [pool.submit(run, *one, *more) for one in left]
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         try:

@@ -226,15 +226,17 @@ def summary(rows: Sequence[Mapping]) -> dict:
 def gate(rows: Sequence[Mapping], risk: float = 1e-3) -> dict[str, str]:
     """Groups -> what is wrong in each, empty if nothing: more failures than a program at the demanded rates has by chance.
 
-    Groups are the strata and, as few cases say little of one stratum, all cases together; each takes an equal part of the risk, so that
-    a right program fails any of them with at most `risk`. The null strata ask for no false alarm in 100; one in 500 is taken as right here.
+    Groups are the strata and, as few cases say little of one stratum, all cases together, but those of so few cases that all of them may
+    be wrong by chance; each takes an equal part of the risk, so that a right program fails any of them with at most `risk`. The null strata
+    ask for no false alarm in 100; one in 500 is taken as right here.
     """
-    groups = {s: [r for r in rows if r["stratum"] == s] for s in DEMANDED if any(r["stratum"] == s for r in rows)}
-    groups["all"] = list(rows)
+    groups = {s: own for s in DEMANDED if (own := [r for r in rows if r["stratum"] == s])} | {"all": list(rows)}
+    rates = {name: [0.998 if r["stratum"] == "null" else DEMANDED[r["stratum"]][0] for r in own] for name, own in groups.items()}
+    told = [name for name, own in rates.items() if name == "all" or allowed_failures(own, risk) < len(own)]
     found = {}
-    for name, own in groups.items():
-        rates = [0.998 if r["stratum"] == "null" else DEMANDED[r["stratum"]][0] for r in own]
-        wrong, most = sum(not r["right"] for r in own), allowed_failures(rates, risk / len(groups))
+    for name in told:
+        own = groups[name]
+        wrong, most = sum(not r["right"] for r in own), allowed_failures(rates[name], risk / len(told))
         found[name] = f"{name}: {wrong} of {len(own)} wrong, at most {most} can be chance" if wrong > most else ""
     return found
 

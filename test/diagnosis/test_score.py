@@ -256,6 +256,23 @@ def test_gate_names_the_stratum_that_is_too_bad():
     assert found["null"] == "" and found["all"].startswith("all: 10 of 40 wrong")
 
 
+def test_gate_leaves_out_groups_that_cannot_fail():
+    """One case of a stratum may be wrong by chance; three of three may not."""
+    few = [{**row, "right": False} for stratum in ("single_common", "single_foreign", "null") for row in rows(stratum, 1, 1)]
+    assert score.gate([few[0], few[1], *rows("null", 1, 1)]) == {"all": ""}
+    assert score.gate(few) == {"all": "all: 3 of 3 wrong, at most 2 can be chance"}
+
+
+def test_a_forked_command_ends_as_one_that_was_started(tmp_path):
+    (tmp_path / "model.toml").write_text("no model")
+    started, forked = (
+        campaign.diagnose(command, tmp_path, [tmp_path / "a.csv", tmp_path / "b.csv"], 60.0, start)
+        for command, start in ((f"{sys.executable} -m penode_sil diagnose", campaign.started), ("penode diagnose", campaign.forked))
+    )
+    assert started[0] is forked[0] is None and started[2] == forked[2] and started[2].startswith("exit 2: penode: ")
+    assert campaign.diagnose("penode diagnose", tmp_path, [tmp_path / "a.csv"], 1e-3, campaign.forked)[2] == "timeout"
+
+
 def test_tables_add_up():
     out = score.summary(rows("single_common", 18, 20) + rows("null", 10, 10))
     assert out["strata"]["single_common"]["right"] == 18 and out["strata"]["null"]["share"] == 1.0
@@ -302,12 +319,12 @@ def test_campaign_that_is_stopped_has_tables_of_what_is_through(tmp_path):
     mark, script, page = tmp_path / "second", tmp_path / "explain.py", tmp_path / "page.md"
     script.write_text(
         "import json, pathlib, sys, time\nout = pathlib.Path(sys.argv[sys.argv.index('-o') + 1])\n"
-        f"if '-1/' in sys.argv[1]:\n    pathlib.Path({str(mark)!r}).touch()\n    time.sleep(600)\n"
+        f"if '-9/' in sys.argv[1]:\n    pathlib.Path({str(mark)!r}).touch()\n    time.sleep(600)\n"
         f"out.mkdir()\n{ANSWERS['honest']}\n"
     )
-    call = [sys.executable, campaign.__file__, "--cases", "4", "--seed", "1", "--out", tmp_path / "out", "--page", page, "--timeout", "5"]
+    call = [sys.executable, campaign.__file__, "--strata", "null", "--cases", "4", "--seed", "1", "--out", tmp_path / "out", "--page", page]
     running = subprocess.Popen(
-        [*map(str, call), "--command", f"{sys.executable} {script}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        [*map(str, call), "--timeout", "5", "--command", f"{sys.executable} {script}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
     while not mark.exists():
         assert running.poll() is None
@@ -353,7 +370,7 @@ def test_a_time_by_itself_counts_where_there_is_one():
 
 def test_a_draw_that_was_stopped_goes_on(tmp_path):
     """With its own seed, and only the cases that are left; not by another command."""
-    call = [sys.executable, campaign.__file__, "--brief", "--out", tmp_path]
+    call = [sys.executable, campaign.__file__, "--brief", "--strata", "null", "--out", tmp_path]
 
     def run(*more: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([*call, *more], capture_output=True, text=True)
@@ -364,11 +381,11 @@ def test_a_draw_that_was_stopped_goes_on(tmp_path):
     seed = json.loads(head)["seed"]
     assert first.stdout.startswith(f"1 cases, seed {seed}\n")
     assert again.stdout.startswith(f"2 cases, seed {seed}\n1 of them are through\n")
-    assert [json.loads(r)["case"] for r in rows] == [f"{seed}:0", f"{seed}:1"]
+    assert [json.loads(r)["case"] for r in rows] == [f"{seed}:1", f"{seed}:9"]
     assert "# Campaign of 2 cases" in (tmp_path / "campaign.md").read_text()
     timed = run("--cases", "2", "--command", "false", "--resume", "--alone", "-1")
     _, *rows = map(json.loads, (tmp_path / "rows.jsonl").read_text().splitlines())
-    assert timed.returncode == 0 and [r["case"] for r in rows] == [f"{seed}:{i}" for i in (0, 1, 0, 1)]
+    assert timed.returncode == 0 and [r["case"] for r in rows] == [f"{seed}:{i}" for i in (1, 9, 1, 9)]
     assert ["alone" in r for r in rows] == [False, False, True, True]
     assert run("--cases", "2", "--command", "false", "--resume", "--alone", "-1").stdout.count("through") == 1
     assert "# Campaign of 2 cases" in (page := (tmp_path / "campaign.md").read_text()) and "Of the 2 cases" in page
