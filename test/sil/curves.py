@@ -37,8 +37,8 @@ def integrate(
             p = rates(time, x)
             if j == 0:
                 rows.append((x, p))
-            q = rates(time + 0.5 * h, [y + 0.5 * h * v for y, v in zip(x, p)])
-            r = rates(time + 0.5 * h, [y + 0.5 * h * v for y, v in zip(x, q)])
-            s = rates(time + h, [y + h * v for y, v in zip(x, r)])
-            x = [y + h / 6.0 * (a + 2.0 * b + 2.0 * c + d) for y, a, b, c, d in zip(x, p, q, r, s)]
+            q = rates(time + 0.5 * h, [y + 0.5 * h * v for y, v in zip(x, p, strict=True)])
+            r = rates(time + 0.5 * h, [y + 0.5 * h * v for y, v in zip(x, q, strict=True)])
+            s = rates(time + h, [y + h * v for y, v in zip(x, r, strict=True)])
+            x = [y + h / 6.0 * (a + 2.0 * b + 2.0 * c + d) for y, a, b, c, d in zip(x, p, q, r, s, strict=True)]
     return np.array([x for x, _ in rows]).T, np.array([v for _, v in rows]).T
