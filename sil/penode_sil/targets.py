@@ -159,7 +159,7 @@ class SilInstance(Instance):
 
 # -- PiL --------------------------------------------------------------------------------------------------------------
 
-TAPE_MAGIC = 0x314C4950
+TAPE_MAGIC = int.from_bytes(b"PIL1", "little")
 OPERATION = {"end": 0, "step": 1, "begin": 2, "write": 3, "commit": 4, "abort": 5, "select": 6, "rollback": 7, "hold": 8, "state": 9}
 COST_KINDS = ("normal", "adopting", "holding")
 PORT = native("port", "cortex-m")

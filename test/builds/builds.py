@@ -79,7 +79,7 @@ def flags() -> None:
         check(f"{' '.join(compiler)} is refused", run.returncode != 0 and "penode:" in run.stderr, run.stderr)
     runs = [compile(["gcc", "-O2", *HARMLESS, "-Werror", "-c", "-o", "/dev/null"], file) for file in [*RUNTIME, *MODEL]]
     check(f"gcc {' '.join(HARMLESS)} passes", not any(r.returncode for r in runs), "".join(r.stderr for r in runs))
-    numbers = [re.search(rf"PEN_VERSION_{part} (\d+)", header)[1] for part in ("MAJOR", "MINOR", "PATCH")]  # type: ignore[index]
+    numbers = [re.search(rf"PEN_VERSION_{part} (\d+)", header)[1] for part in ("MAJOR", "MINOR", "PATCH")]
     check("the version in numbers is that in words", f'"{".".join(numbers)}"' in header)
 
 
@@ -119,7 +119,7 @@ def contraction() -> None:
         (place / "inc/penode/pen_exact.h").write_text("")
         for name in FUSING:
             check(f"found without pen_exact.h by {name}", fused(DEFAULT[name], [place / "src/pen_net.c"], place) > 10)
-    first = [re.search(r'#include [<"](.*?)[>"]', file.read_text())[1] for file in [*RUNTIME, *MODEL]]  # type: ignore[index]
+    first = [re.search(r'#include [<"](.*?)[>"]', file.read_text())[1] for file in [*RUNTIME, *MODEL]]
     check("pen_exact.h is the first of all includes", set(first) == {"penode/pen_exact.h"}, str(first))
 
 

@@ -27,7 +27,7 @@ def table(path: Path, columns: dict[str, object], part: tuple[float, float] = (0
     y = np.interp(even, t, raw[:, head.index(str(columns["sensor"]))])
     u = np.zeros(len(t))
     if "input" in columns:
-        u = np.interp(even, t, raw[:, head.index(str(columns["input"]))]) * float(columns.get("scale", 1.0))  # type: ignore[arg-type]
+        u = np.interp(even, t, raw[:, head.index(str(columns["input"]))]) * float(columns.get("scale", 1.0))
     return even - even[0], u, y
 
 

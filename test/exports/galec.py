@@ -290,7 +290,7 @@ class Block:
             found = product(of, right) if sign == "*" else of if of.kind == "Real" and right == REAL else None
             self._want(found is not None, tree, f"{of.kind}{list(of.shape)} {sign} {right.kind}{list(right.shape)}")
             text = f"mv({text}, {other})" if of.shape and right.shape else f"({text} {sign} {other})"
-            of = found  # type: ignore[assignment]
+            of = found
         return text, of
 
     def _neg(self, tree: lark.Tree[Any], scope: _Scope) -> tuple[str, Of]:

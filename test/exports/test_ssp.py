@@ -116,7 +116,7 @@ def test_the_player_gives_the_bits_of_sil(ssp: Path, held: Any, tmp_path: Path) 
     files = contents(ssp)
     del files["extra/penode/schedule.xml"]
     plain = tmp_path / "plain.ssp"
-    plain.write_bytes(zipped(files))  # type: ignore[arg-type]
+    plain.write_bytes(zipped(files))
     play("--ssp", str(plain), "--input", str(record), "-o", str(output))
     without = np.loadtxt(output, delimiter=",", skiprows=1)[:, 2:4].astype(np.float32)
     assert np.array_equal(without, Sil(held).run(u).y) and not np.array_equal(without, reference)

@@ -39,7 +39,7 @@ def formats(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     extra = dataclasses.replace(absent, extra="nowhere")
     for name, exporter in (("shout", shout), ("absent", absent), ("extra", extra)):
         module = types.ModuleType(f"penode_gen.exports.{name}")
-        module.EXPORTER = exporter  # type: ignore[attr-defined]
+        module.EXPORTER = exporter
         monkeypatch.setitem(sys.modules, module.__name__, module)
         monkeypatch.setitem(exports.FORMATS, name, name)
     exports.exporter.cache_clear()

@@ -91,7 +91,8 @@ def road(seed: int) -> np.ndarray:
 
 def drive(z: np.ndarray, force, mass: float = M_B, load: float = 0.0, stiffer: float = 0.0) -> dict[str, np.ndarray]:
     """Sensors without noise of a quarter vehicle with an extra force(s, v) in its suspension and a load on its body. Within half a second
-    in the middle its spring gets stiffer, by a share. Steps of 1 ms err by 1.4 % of the noise at most, where friction turns round within 4 mm/s.
+    in the middle its spring gets stiffer, by a share. Steps of 1 ms err by 1.4 % of the noise at most, where friction turns round within
+    4 mm/s.
     """
     height, middle = curve(z, STEP), 0.5 * STEP * (SAMPLES - 1)
 

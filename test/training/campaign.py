@@ -146,18 +146,18 @@ def line(rows: list[dict[str, object]]) -> str:
     def span(values: list[float], form: str = ".2f") -> str:
         return f"{min(values):{form}} .. {max(values):{form}}" if values else ""
 
-    forces = "; ".join(f"{n} {span([r['forces'][n] for r in good])}" for n in (good[0]["forces"] if good else ()))  # type: ignore[index,attr-defined]
-    cover = [c for r in good for c in r["covered"]]  # type: ignore[attr-defined]
+    forces = "; ".join(f"{n} {span([r['forces'][n] for r in good])}" for n in (good[0]["forces"] if good else ()))
+    cover = [c for r in good for c in r["covered"]]
     cells = [
         str(rows[0]["case"]),
         f"{sum(bool(r['converged']) for r in good)} of {len(rows)}",
-        span([r["seconds"] for r in good], ".1f"),  # type: ignore[misc]
+        span([r["seconds"] for r in good], ".1f"),
         span([r["seconds"] / r["loop"] for r in good], ".0f"),
-        forces,  # type: ignore[operator,misc]
+        forces,
         span([r["ratios"] for r in good]),
         span([r["absolute"] for r in good]),
         span([r["holdout"] for r in good]),
-        span([r["masked"] for r in good], ".1f"),  # type: ignore[misc]
+        span([r["masked"] for r in good], ".1f"),
         f"{np.mean(cover):.0f}" if cover else "",
         f"{sum(bool(r['scale']) for r in good)} of {len(good)}",
     ]

@@ -148,7 +148,7 @@ def asked(rows: list[Row]) -> list[Asked]:
 def table(folder: Path, name: str) -> list[tuple[str, str, bool]]:
     """Rows of another part; none where it has not run."""
     path = folder / f"{name}.json"
-    return [tuple(r) for r in json.loads(path.read_text(encoding="utf-8"))] if path.exists() else []  # type: ignore[misc]
+    return [tuple(r) for r in json.loads(path.read_text(encoding="utf-8"))] if path.exists() else []
 
 
 def page(folder: Path) -> str:

@@ -43,10 +43,10 @@ def halves(path: Path, folder: Path) -> list[Path]:
 def beside(extended: Path, place: str, out: Path) -> Path:
     """The extended model with networks beside its laws, which stay as they are."""
     text = extended.read_text()
-    base = (extended.parent / re.search(r'extends = "([^"]*)"', text)[1]).resolve()  # type: ignore[index]
+    base = (extended.parent / re.search(r'extends = "([^"]*)"', text)[1]).resolve()
     text = re.sub(r'extends = "[^"]*"', f'extends = "{base}"\noutside = "clamp"', text)
     text = re.sub(r', tolerance = ("unknown"|[0-9.e+-]+)', ", exact = true", text)
-    value = re.search(r'\[sensors\]\nforce = \{ value = "([^"]*)"', text)[1]  # type: ignore[index]
+    value = re.search(r'\[sensors\]\nforce = \{ value = "([^"]*)"', text)[1]
     text = text.replace(f'"{value}"', f'"({value}) + F_place_nn + F_rate_nn"')
     elements = "".join(NETWORKS.format(at=at, place=place) for at in ("place", "rate"))
     networks = '[networks]\nplace_net = { inputs = ["m"], output = "N" }\nrate_net = { inputs = ["m/s"], output = "N" }\n\n'

@@ -164,7 +164,7 @@ def test_another_call_is_refused(given: list[str], says: str, stopped: Path, sho
 
 def refused(folder: Path, result: Result, says: str) -> None:
     """One line that says so, and the checkpoint stays."""
-    (problem,) = result.exception.problems  # type: ignore[union-attr]
+    (problem,) = result.exception.problems
     assert says in problem and "--resume" in problem, problem
     assert [p.name for p in folder.iterdir()] == [resume.NAME]
 
@@ -190,7 +190,7 @@ def test_other_bits_or_a_damaged_file_are_refused(stopped: Path, short: Path) ->
 
 def test_nothing_to_resume(short: Path, whole: tuple[Path, int], tmp_path: Path) -> None:
     """An ended training is not trained again; where none began, it begins."""
-    (problem,) = call(whole[0], short, "--resume").exception.problems  # type: ignore[union-attr]
+    (problem,) = call(whole[0], short, "--resume").exception.problems
     assert "has ended" in problem
     assert call(tmp_path / "new", short, "--resume").exit_code == 0
     assert results(tmp_path / "new") == results(whole[0])

@@ -119,7 +119,7 @@ def watched(name: str, value: Any) -> Any:
 class Watcher(importlib.machinery.SourceFileLoader):
     """Loads a module with its named numbers watched."""
 
-    def source_to_code(self, data: Any, path: Any, *, _optimize: int = -1) -> CodeType:  # type: ignore[override]
+    def source_to_code(self, data: Any, path: Any, *, _optimize: int = -1) -> CodeType:
         tree = ast.parse(data)
         for node in tree.body:
             named = isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and node.targets[0].id.isupper()
