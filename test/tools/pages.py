@@ -130,9 +130,9 @@ def look(of: Project, page: str) -> Iterator[str]:
 
 
 def main(root: Path = ROOT) -> int:
-    from penode_sil.cli import cli
+    from penode_sil.cli import COMMANDS
 
-    of = project(root, frozenset(cli.commands))
+    of = project(root, frozenset(COMMANDS))
     lines = [line for page in sorted(of.files) if page.endswith(".md") for line in look(of, page)]
     print("\n".join(lines), file=sys.stderr)
     return int(bool(lines))
