@@ -51,6 +51,11 @@ def complaints(folder: Path, name: str, toolchains: Sequence[tuple[str, list[str
     return found
 
 
+def every_second(things: Sequence, turn: int) -> list:
+    """Half of them, the other half in the next turn; all of them for `make python-long`."""
+    return list(things) if "PENODE_LONG" in os.environ else list(things)[turn % 2 :: 2]
+
+
 def in_turn(k: int) -> list[tuple[str, list[str]]]:
     """One of the toolchains for model k, the next for the next one; all of them for `make python-long`."""
     return TOOLCHAINS if "PENODE_LONG" in os.environ else [TOOLCHAINS[k % len(TOOLCHAINS)]]
@@ -61,15 +66,15 @@ def in_turn(k: int) -> list[tuple[str, list[str]]]:
 
 def test_the_same_bytes_in_every_process_and_folder(tmp_path):
     """Hash seeds and folders differ, bytes do not; no path but the model file's own name is printed."""
-    script = "import sys, penode_gen; penode_gen.generate(penode_gen.load(sys.argv[1]), sys.argv[2])"
+    script = "import sys, penode_gen\nfor k in (1, 3): penode_gen.generate(penode_gen.load(sys.argv[k]), sys.argv[k + 1])"
     results = []
     for seed in ("1", "4711"):
         folder = tmp_path / f"folder_of_seed_{seed}"
         folder.mkdir()
         model = models.rich(folder, "ros2", outside="fade", substeps=3)
-        for path, out in ((model, "rich"), (NQVM[0], "nqvm")):
-            environment = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT / "gen")}
-            subprocess.run([sys.executable, "-c", script, str(path), str(folder / out)], check=True, env=environment)
+        environment = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT / "gen")}
+        words = map(str, (model, folder / "rich", NQVM[0], folder / "nqvm"))
+        subprocess.run([sys.executable, "-c", script, *words], check=True, env=environment)
         files = sorted(p for p in folder.rglob("*.[ch]"))
         assert len(files) == 10
         results.append({p.relative_to(folder): p.read_bytes() for p in files})
@@ -137,16 +142,16 @@ def test_folded_lines_say_the_same(line):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_no_warnings(tmp_path, method):
-    """All policies, inputs and substeps. Of one method each takes its turn in float and double, by every compiler that is installed; the
-    next method begins with the next of these."""
+    """All policies, inputs and substeps, of one method or the next. Of one method each takes its turn in float and double, by every
+    compiler that is installed; the next method begins with the next of these."""
     assert COMPILERS
     folders = []
+    turn = METHODS.index(method)
     curved = [("parabola", "clamp", 1), ("parabola", "fade", 3), ("cubic", "clamp", 3)]
-    for input, outside, substeps in [*itertools.product(INPUTS, OUTSIDE, SUBSTEPS), *curved]:
+    for input, outside, substeps in [*every_second([*itertools.product(INPUTS, OUTSIDE, SUBSTEPS)], turn), *curved]:
         model = penode_gen.load(models.rich(tmp_path, method, input=input, outside=outside, substeps=substeps))
         folders.append(tmp_path / f"{input}_{outside}_{substeps}")
         penode_gen.generate(model, folders[-1])
-    turn = METHODS.index(method)
     with ThreadPoolExecutor(2) as pool:
         assert not [
             c for found in pool.map(lambda k: complaints(folders[k], "rich", in_turn(turn + k)), range(len(folders))) for c in found
@@ -172,12 +177,14 @@ SPARSE = {
 
 @pytest.mark.parametrize("method", METHODS)
 def test_no_warnings_where_little_is_used(tmp_path, method):
-    """Models that need only some of state, input, parameters and networks leave nothing unused; any name is fine."""
+    """Models that need only some of state, input, parameters and networks leave nothing unused; any name is fine. Each in one method or
+    the next."""
     models.network_file(tmp_path / "n.json", [1, 4, 1], ["tanh", "identity"], 2)
     folders = []
-    curved = itertools.product(("constant rate", "input only", "state only"), ["parabola", "cubic"])
-    turn = METHODS.index(method)  # each model with each input, in one method or the next
-    for name, input in [*((n, INPUTS[(i + turn) % 2]) for i, n in enumerate(SPARSE)), *curved]:
+    curved = [*itertools.product(("constant rate", "input only", "state only"), ["parabola", "cubic"])]
+    turn = METHODS.index(method)
+    straight = [(n, INPUTS[(i // 2 + turn // 2) % 2]) for i, n in enumerate(SPARSE)]  # two methods on with the other input
+    for name, input in every_second([*straight, *curved], turn):
         equation, output = SPARSE[name]
         own = (
             "".join(f'{n} = {{ unit = "1" }}\n' for n in ("x", "y", "p", "fx", "node", "rates", "status", "h", "t1"))
