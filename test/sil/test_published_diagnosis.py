@@ -15,7 +15,7 @@ from samples import sample
 from penode_sil import diagnosis
 from penode_sil.recordings.measured import load
 
-SECONDS = 20.0
+SECONDS = 10.0
 NOISE = {"a_body": 0.02, "deflection": 1e-4}
 
 
