@@ -14,13 +14,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-import session
 
 import penode_gen
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
+sys.path.insert(0, str(HERE))
 sys.path.append(str(ROOT / "test" / "training"))  # generator.py
+
+import session  # needs the path above
+
 SOURCES = ("gen/penode_gen", "sil/penode_sil", "sil/firmware", "inc", "src", "port")
 
 
