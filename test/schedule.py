@@ -18,7 +18,7 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 from xdist.workermanage import WorkerController
 
-TOGETHER = {"packages"}  # folders whose tests share what lies at one place: for one worker
+TOGETHER = {"install", "packages"}  # folders whose tests share what lies at one place: for one worker
 # Where no run before says so, these begin.
 LONG = ("test_emit.py", "test_diagnosis.py", "test_train.py", "test_parts.py", "test_packages.py", "test_worlds.py", "test_measured.py")
 took: Counter[str] = Counter()

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 import itertools
 import subprocess
+from pathlib import Path
 
 import pytest
 from test_emit import COMPILERS, REALS, STRICT
 
 import penode_gen
-from penode_sil.building import ROOT
 
+ROOT = Path(__file__).resolve().parents[2]
 NQVM = ROOT / "gen" / "nqvm"
 SHARING = ("nqvm", "nqvm_euler", "nqvm_folded")
 MAIN = """

@@ -11,7 +11,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, Installed, run
+from wheels import ROOT, Installed, run
 
 import penode_gen
 from penode_gen.exports import FORMATS

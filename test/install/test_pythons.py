@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, install
+from wheels import ROOT, install
 
 OTHERS = [v for v in ("3.11", "3.12", "3.13", "3.14") if v != f"{sys.version_info.major}.{sys.version_info.minor}"]
 

@@ -14,8 +14,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, build
 from packaging.requirements import Requirement
+from wheels import ROOT, build
 
 import penode_gen
 

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 import pytest
-from conftest import ROOT
+from places import ROOT
 
 from penode_sil.cli import COMMANDS, cli
 

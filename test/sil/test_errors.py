@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import pytest
-from conftest import HERE, ROOT
+from places import HERE, ROOT
 
 import penode_gen
 from penode_gen.exports import ExportError
