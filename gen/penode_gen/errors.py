@@ -88,13 +88,13 @@ class Problem(str):
 
 class PenodeError(Exception):
     """
-    Something that keeps penode from what it was asked to do; `problems` has one line for each thing that is wrong. `told`: the command has
+    Something that keeps penode from what it was asked to do; `problems` has one line for each thing that is wrong. `printed`: the command has
     printed it as part of its result.
     """
 
     code: str
     exit: int
-    told = False
+    printed = False
 
     def __init__(self, *problems: str, line: int | None = None, channel: str = ""):
         self.problems = [Problem.read(problem, line, channel) for problem in problems]

@@ -61,7 +61,7 @@ def _option(exc: click.UsageError) -> str:
 
 def _end(exc: PenodeError) -> NoReturn:
     """Say what is wrong, and end."""
-    if "--json" in sys.argv and not exc.told:
+    if "--json" in sys.argv and not exc.printed:
         with suppress(BrokenPipeError):
             click.echo(json.dumps(exc.as_json(), indent=2))
     for problem in exc.problems:

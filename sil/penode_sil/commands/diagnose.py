@@ -71,7 +71,7 @@ def diagnose(
     failed = RecordingError(*(row.error for row in rows if row.error))
     if as_json:
         click.echo(table.as_json(name, rows, failed.as_json() if failed.problems else {}))
-        failed.told = True
+        failed.printed = True
     else:
         click.echo(table.sentences(name, rows, output))
     if failed.problems:
