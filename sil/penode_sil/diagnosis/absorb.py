@@ -115,7 +115,7 @@ def roomy(model: Model, network: Network) -> bool:
 
 def learn(network: Network, x: Array, wanted: Array) -> tuple[Network, float]:
     """The network with weights such that it gives `wanted` [n] at inputs x [n, inputs]; and the RMS that is left."""
-    damping = 1e-3
+    damping = 1.0  # short steps first: long ones throw neurons out of the motion that was seen
     off = wanted - network.evaluate(x)[:, 0]
     for _ in range(ITERATIONS):
         slopes = derivatives(network, x)
