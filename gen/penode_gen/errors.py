@@ -88,8 +88,8 @@ class Problem(str):
 
 class PenodeError(Exception):
     """
-    Something that keeps penode from what it was asked to do; `problems` has one line for each thing that is wrong. `printed`: the command has
-    printed it as part of its result.
+    Something that keeps penode from what it was asked to do; `problems` has one line for each thing that is wrong. `printed`: the command
+    has printed it as part of its result.
     """
 
     code: str

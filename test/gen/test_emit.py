@@ -450,7 +450,6 @@ def test_one_version_and_one_abi_everywhere():
     header = (ROOT / "inc" / "penode" / "pen_real.h").read_text()
     assert re.search(r'#define PEN_VERSION +"(.*)"', header)[1] == penode_gen.VERSION
     assert int(re.search(r"#define PEN_ABI +(\d+)", header)[1]) == packing.ABI
-    assert f'\nversion = "{penode_gen.VERSION}"\n' in (ROOT / "pyproject.toml").read_text()
 
 
 def test_names_that_look_like_those_of_the_generated_code(tmp_path):

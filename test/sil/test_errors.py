@@ -104,7 +104,7 @@ def test_a_compiler_that_is_missing(failing, monkeypatch, tmp_path):
     monkeypatch.setenv("PENODE_BUILD", str(tmp_path / "build"))
     (tmp_path / "s.toml").write_text(SCENARIO.replace("softer", "stiff"))
     found = failing("simulate", MODEL, "--scenario", "s.toml", "--on", "sil", *RUN)
-    assert (found["code"], found["exit"]) == ("tool-missing", 2) and "gcc" in found["problems"][0]["place"]
+    assert (found["code"], found["exit"]) == ("tool-missing", 2) and found["problems"][0]["message"] == "gcc is not installed"
 
 
 def test_a_fault_of_ours_names_the_traceback(failing, monkeypatch):

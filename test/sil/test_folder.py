@@ -6,14 +6,13 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import re
-import signal
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from dying import dying
 from samples import sample
 
 from penode_sil.cli import main
@@ -135,13 +134,6 @@ def cluster():
 
 def test_a_cluster_finds_the_same(alone, place, cluster, tmp_path):
     assert results(folder.diagnose(job(place, tmp_path / "out"), scheduler=cluster)) == results(alone[0])
-
-
-def dying(one: Job) -> folder.Answer:
-    """Takes its process down for one of the recordings; for the others it claims to have written files."""
-    if "friction" in one.data[0].name:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return {"verdict": "no_discrepancy", "causes": [], "gain": {}, "seconds": 0.0}, ""
 
 
 @pytest.mark.parametrize("where", sample(["processes", "cluster"], "processes"))

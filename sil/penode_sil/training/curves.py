@@ -36,12 +36,12 @@ def curve_on(port: Port, before: Curve, seen: Sequence[Array], count: int) -> Cu
 
 
 def limits_of(problem: Problem, bounds: Sequence[Callable[[Curve], Limits]]) -> Callable[[Point], Limits]:
-    """Limits on all unknowns from those on each curve."""
+    """Limits on all unknowns from those on each curve; `bounds`: one for each shape, or none at all."""
 
     def found(point: Point) -> Limits:
         n = len(point.vector)
         at, rows, least = len(point.ratios) + point.starts.size, [], []
-        for shape, bound in zip(point.shapes, bounds, strict=True):
+        for shape, bound in zip(point.shapes, bounds, strict=bool(bounds)):
             if isinstance(shape, Curve):
                 own = bound(shape)
                 if own.some:
