@@ -33,8 +33,8 @@ from .output import whole
 
 Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
-SIMPLE = ("-O1", "-march=native")  # with gcc: half of the time to compile, and code that takes twice as long
-SHORT = 1_000_000  # steps of all runs together, up to which a call is by SIMPLE: 10 ms, of which the other code would save half
+SIMPLE = ("-O1", "-march=native")  # with gcc: 0.1 s to compile instead of 0.3 s, and code that takes two to six times as long
+SHORT = 200_000  # steps of all runs and calls, up to which code is by SIMPLE: 2 to 12 ms; most models of a diagnosis are run no further
 # Not -ffast-math, which takes nothing for NaN. But gcc drops 0*x, by which lanes_max and its like pass NaN on: states, inputs and outputs
 # that are not finite are detected by their bits all the same.
 QUICK = (
@@ -98,13 +98,14 @@ class Batch:
     may be fused and put in another order, and subnormal numbers are 0: in about half of the time, but other bits than
     NAME_step has, and other ones from machine to machine. For fits. `causal`: see render_batch.
 
-    Calls of few steps run code that is compiled sooner, others code that runs faster; which of the two depends on the shapes of the
-    arguments alone, so a call has the same bits whenever it is made."""
+    The first SHORT steps run code that is compiled sooner, all later calls code that runs faster: of many models of a diagnosis only a few
+    are ever run for long. With `exact` both have the same bits; without it, the same calls in the same order have."""
 
     def __init__(self, model: penode_gen.Model, dtype: type = np.float64, exact: bool = True, causal: Causal | None = None):
         self.model, self.dtype, self.exact = model, dtype, exact
         self._code = render_batch(model, causal)
         self._libraries: dict[tuple[bool, bool], ctypes.CDLL] = {}
+        self._steps = 0
         self.lanes = ctypes.c_size_t.in_dll(self._library(False, True), "batch_lanes").value
 
     def run(
@@ -163,8 +164,8 @@ class Batch:
         job.count = tuple(map(len, wanted))
         job.which, job.kept = (tuple(a.ctypes.data for a in arrays) for arrays in (wanted, kept))
         kept += self._observed(observer, job, -(-n // every), padded)  # arrays that the job points to
-        short = n * runs * model.substeps <= SHORT
-        if not self._step(self._library(per_run, short), job, vectors, threads):
+        self._steps += n * runs * model.substeps
+        if not self._step(self._library(per_run, self._steps <= SHORT), job, vectors, threads):
             raise WrongUse(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
         x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept[:3])
         return BatchRun(x, y, z, *first[:, :runs].astype(np.int64))

@@ -177,7 +177,7 @@ CHOICES = [
     sample([(choices, dtype) for dtype in TYPES for choices in CHOICES], *zip(CHOICES, itertools.cycle(TYPES), strict=False)),
 )
 def test_each_lane_has_the_bits_of_the_step(tmp_path, monkeypatch, choices, dtype):
-    """Of short calls, which are by code that is compiled sooner (float), and of long ones (double)."""
+    """Of the first calls, which are by code that is compiled sooner (float), and of later ones (double)."""
     monkeypatch.setattr(library, "SHORT", 0 if dtype == np.float64 else library.SHORT)
     model = rich(tmp_path, *choices)
     u = drive(600)
