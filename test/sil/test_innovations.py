@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Evidence by innovations: the filter, the observer in the batch, held-out blocks, and whole searches on rigs whose data come from an
-integrator of this file."""
+"""Evidence by innovations: the filter, the observer in the batch, held-out blocks, and whole searches on rigs that share no
+integrator with the diagnosis."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from curves import integrate
+from samples import sample
 from scipy import linalg, stats
 
 import penode_gen
@@ -56,22 +58,15 @@ def swing(folder, torque, seed=1, k=0.64, tolerance=", tolerance = 0.05", second
     drive = np.cumsum(rng.standard_normal(n // 25 + 2))
     drive = np.interp(np.arange(n + 1) / 25.0, np.arange(len(drive)), drive - np.linspace(0.0, drive[-1], len(drive)))
     drive *= 0.25 / np.std(drive)
-    x, seen = np.zeros(2), []
-    fine = 4
+    tau, fine = drive.tolist(), 4
 
-    def rate(y, i, share):
-        tau = drive[i] + (drive[i + 1] - drive[i]) * share / fine
-        return np.array([y[1], (tau - 0.64 * y[0] - 0.004 * y[1] - torque(y[0], y[1])) / 0.01])
+    def rates(time, x):
+        i = min(int(time / h + 1e-6), n - 1)
+        pushed = tau[i] + (tau[i + 1] - tau[i]) * (time / h - i)
+        return x[1], (pushed - 0.64 * x[0] - 0.004 * x[1] - torque(x[0], x[1])) / 0.01
 
-    s = h / fine
-    for i in range(n):
-        seen.append(x[0])
-        for j in range(fine):
-            a = rate(x, i, j)
-            b = rate(x + 0.5 * s * a, i, j + 0.5)
-            c = rate(x + 0.5 * s * b, i, j + 0.5)
-            x = x + s / 6.0 * (a + 2.0 * b + 2.0 * c + rate(x + s * c, i, j + 1.0))
-    rows = np.column_stack([np.arange(n) * h, drive[:n], np.array(seen) + 1e-4 * rng.standard_normal(n)])
+    angle = integrate(rates, [0.0, 0.0], h, n, fine)[0][0]
+    rows = np.column_stack([np.arange(n) * h, drive[:n], angle + 1e-4 * rng.standard_normal(n)])
     (folder / "model.toml").write_text(SWING.format(k=k, tolerance=tolerance))
     np.savetxt(folder / "train_1.csv", rows, delimiter=",", header="time [s],tau [N*m],phi [rad]", comments="", fmt="%.9g")
     model = penode_gen.load(folder / "model.toml")
@@ -237,7 +232,7 @@ def test_sensor_noise_does_not_judge_what_is_bent_everywhere(tmp_path):
 BENT = 0.03 * 0.64 * 0.5  # a spring of waves, 3 % of what acts: no law of the catalogue
 
 
-@pytest.mark.parametrize("seed", (1, 2))
+@pytest.mark.parametrize("seed", sample((1, 2), 1))
 def test_friction_in_a_wrong_world(tmp_path, seed, show):
     """Coulomb friction of 0.06 N*m beside a spring that is bent in waves: one name, and its size within its interval widened by what the
     waves may take of it (their rms, 0.007 N*m)."""
