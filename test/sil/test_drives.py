@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from samples import sample
 
 import penode_gen
 from penode_sil.diagnosis import driven, plant, propose, real, rounds, worth
@@ -65,7 +66,7 @@ def drive(folder, shaft, bearing, seed=1, seconds=12.0, zero=0.0):
     t = np.arange(n * FINE + 1) * h
     tones = np.linspace(0.5, 12.0, 47)
     torque = np.sum(np.sin(2.0 * np.pi * tones[:, None] * t + rng.uniform(0.0, 2.0 * np.pi, (47, 1))), axis=0)
-    torque = np.interp(t, t[::FINE], (torque * 8.0 * J_M / np.std(torque))[::FINE])
+    torque = np.interp(t, t[::FINE], (torque * 8.0 * J_M / np.std(torque))[::FINE]).tolist()
 
     def rates(a, b, va, vb, tau):
         f = shaft(a - b) + D * (va - vb)
@@ -104,10 +105,10 @@ def waves(size, s):
 
 def touching(s, gap, rounding=0.0005):
     """Deflection of a shaft behind a play, -gap to gap, whose flanks meet gradually."""
-    return rounding * (np.logaddexp(0.0, (s - gap) / rounding) - np.logaddexp(0.0, (-s - gap) / rounding))
+    return rounding * float(np.logaddexp(0.0, (s - gap) / rounding) - np.logaddexp(0.0, (-s - gap) / rounding))
 
 
-@pytest.mark.parametrize("bent", (0.04, 0.06))
+@pytest.mark.parametrize("bent", sample((0.04, 0.06), 0.06))
 def test_friction_where_little_acts(tmp_path, bent, show):
     """Friction of 0.017 N*m rms at the load, beside the 0.04 N*m of its bearing, and a shaft that is bent by 2 and 4 % of its 0.36 N*m:
     what the shaft does is more of the innovations, and the friction is named, not its bearing's damping; with more waves once a curve of
@@ -124,11 +125,11 @@ def shaken(friction, rough, seconds=12.0):
     """A bearing's torque with noise of `rough` N*m rms below 60 Hz, which no model has. `drive` calls it four times per integration
     step."""
     noise = np.convolve(np.random.default_rng(3).standard_normal(int(seconds / STEP) * FINE + 12), np.hanning(12), "same")
-    noise, calls = np.repeat(noise * rough / np.std(noise), 4), itertools.count()
+    noise, calls = np.repeat(noise * rough / np.std(noise), 4).tolist(), itertools.count()
     return lambda v: friction(v) + noise[next(calls)]
 
 
-@pytest.mark.parametrize("rough, force", [(0.02, 0.015), (0.015, 0.012)])
+@pytest.mark.parametrize("rough, force", sample([(0.02, 0.015), (0.015, 0.012)], (0.015, 0.012)))
 def test_damping_does_not_stand_for_friction(tmp_path, rough, force, show):
     """Friction of a seventh of what acts in a bearing that is shaken by more than that: a damping that the file does not vouch for takes
     most of it, and leaves a fifth of the misfit to friction. With friction in the model the damping is as the file has it, so friction is
