@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from one_mass import STEP, model
+from samples import sample
 from scipy.signal import StateSpace, lsim
 
 import penode_gen
@@ -96,7 +97,7 @@ def test_a_hold_is_named_with_its_period_and_written_down(answer, tmp_path):
     assert (held.source, held.law, held.time) == ("push", "held", 0.024)  # the nearest whole number of samples
 
 
-@pytest.mark.parametrize("top", (1.0, 2.0))
+@pytest.mark.parametrize("top", sample((1.0, 2.0), 1.0))
 def test_a_hold_of_a_slow_force(answer, top):
     """Innovations are means over about half of a period: in them a hold is hardly more than a delay."""
     (cause,) = answer("hold", 0.04325, 2, top).causes
