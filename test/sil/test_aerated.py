@@ -8,6 +8,7 @@ import json
 
 import numpy as np
 import pytest
+from samples import sample
 
 import penode_gen
 from penode_sil.diagnosis import driven, plant, real
@@ -39,12 +40,12 @@ a = { value = "der(v)", unit = "m/s^2", noise = 0.01 }
 
 
 def rig(folder, gas: float, seed: int):
-    """Model and recording of 12 s: the damper's piston meets gas of `gas` [m] to either side, whose spring is p/(gas - |p|)."""
-    n, fine, h = 6000, 10, 2e-3
+    """Model and recording of 8 s: the damper's piston meets gas of `gas` [m] to either side, whose spring is p/(gas - |p|)."""
+    n, fine, h = 4000, 10, 2e-3
     rng = np.random.default_rng(seed)
     waves = [(w, rng.uniform(0, 2 * np.pi)) for w in 2 * np.pi * rng.uniform(0.7, 6.0, 24)]
     t = np.arange(n * fine) * h / fine
-    push = 22.0 * sum(np.sin(w * t + p) for w, p in waves)
+    push = (22.0 * sum(np.sin(w * t + p) for w, p in waves)).tolist()
     z = v = pressed = 0.0
     rows = []
     for i in range(n * fine):
@@ -67,7 +68,7 @@ def rig(folder, gas: float, seed: int):
     return model, [driven.experiment(r, model) for r in load([folder / "train.csv"], model)]
 
 
-@pytest.mark.parametrize("gas", (0.0, 1.5e-3))
+@pytest.mark.parametrize("gas", sample((0.0, 1.5e-3), 0.0))  # with a gas, make test asks the command below
 def test_a_damper_that_has_lost_oil_is_found(tmp_path, gas, show):
     model, experiments = rig(tmp_path, gas, 5)
     places = plant.places(model)
