@@ -58,7 +58,7 @@ angle_load = {{ value = "phi_load", unit = "rad", noise = 5e-5 }}
 """
 
 
-def drive(folder, shaft, bearing, seed=1, seconds=12.0, zero=0.0):
+def drive(folder, shaft, bearing, seed=1, seconds=8.0, zero=0.0):
     """A model file and a recording of the drive with shaft(s) in place of its spring and with bearing(omega) at the load as well, from an
     angle `zero` of both on; driven by tones from 0.5 to 12 Hz."""
     n, h = int(seconds / STEP), STEP / FINE
@@ -121,7 +121,7 @@ def test_friction_where_little_acts(tmp_path, bent, show):
     assert low - 0.003 < 0.02 < high + 0.003
 
 
-def shaken(friction, rough, seconds=12.0):
+def shaken(friction, rough, seconds=8.0):
     """A bearing's torque with noise of `rough` N*m rms below 60 Hz, which no model has. `drive` calls it four times per integration
     step."""
     noise = np.convolve(np.random.default_rng(3).standard_normal(int(seconds / STEP) * FINE + 12), np.hanning(12), "same")
