@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import itertools
 import json
 import re
 import sys
@@ -98,33 +99,40 @@ def c_functions(text: str) -> Iterator[tuple[int, int]]:
         last = last if character.isspace() else character
 
 
-def python_functions(text: str) -> Iterator[tuple[int, int]]:
-    for node in ast.walk(ast.parse(text)):
+def python_functions(tree: ast.Module) -> Iterator[tuple[int, int]]:
+    for node in statements(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield node.lineno, (node.end_lineno or node.lineno) - node.lineno + 1
+
+
+def statements(node: ast.AST) -> Iterator[ast.stmt]:
+    """All statements of a module, nested ones too, without a walk through their expressions."""
+    blocks = (getattr(node, name, ()) for name in ("body", "orelse", "finalbody", "handlers", "cases"))
+    for part in itertools.chain(*blocks):
+        if isinstance(part, ast.stmt):
+            yield part
+        yield from statements(part)
 
 
 def is_number(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and type(node.value) in (int, float)
 
 
-def tabled(text: str) -> Iterator[int]:
+def tabled(tree: ast.Module) -> Iterator[int]:
     """Lines of numbers inside module-level tuples, tables and calls with a name in capitals."""
-    for node in ast.parse(text).body:
+    for node in tree.body:
         targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
         value = node.value if any(isinstance(t, ast.Name) and t.id.isupper() for t in targets) else None
         if isinstance(value, ast.Tuple | ast.List | ast.Set | ast.Dict | ast.Call):
             yield from (part.lineno for part in ast.walk(value) if is_number(part))
 
 
-def compared(text: str) -> Iterator[int]:
+def compared(node: ast.AST, inside: bool = False) -> Iterator[int]:
     """Lines of numbers inside comparisons, but for 0 and 1."""
-    seen: set[int] = set()  # a comparison inside another one counts once
-    for node in ast.walk(ast.parse(text)):
-        for part in ast.walk(node) if isinstance(node, ast.Compare) else ():
-            if is_number(part) and part.value not in (0, 1) and id(part) not in seen:
-                seen.add(id(part))
-                yield part.lineno
+    if inside and is_number(node) and node.value not in (0, 1):
+        yield node.lineno
+    for part in ast.iter_child_nodes(node):
+        yield from compared(part, inside or isinstance(node, ast.Compare))
 
 
 def crowded(root: Path) -> list[str]:
@@ -139,12 +147,11 @@ def crowded(root: Path) -> list[str]:
     return [f"{name}: {n} files" for name, n in count.items() if n > FOLDER_FILES]
 
 
-def thresholds(text: str) -> Iterator[int]:
+def thresholds(tree: ast.Module) -> Iterator[int]:
     """Lines of module-level numbers with a name in capitals, and of numbers in a class Rules or Settings."""
     numbers = ast.Constant | ast.UnaryOp | ast.BinOp | ast.operator | ast.unaryop
-    body = ast.parse(text).body
-    ruled = [node for table in body if isinstance(table, ast.ClassDef) and table.name in ("Rules", "Settings") for node in table.body]
-    for node in [*body, *ruled]:
+    ruled = [node for table in tree.body if isinstance(table, ast.ClassDef) and table.name in ("Rules", "Settings") for node in table.body]
+    for node in [*tree.body, *ruled]:
         targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
         named = node in ruled or any(isinstance(t, ast.Name) and t.id.isupper() for t in targets)
         parts = list(ast.walk(node.value)) if named and node.value is not None else []
@@ -153,15 +160,17 @@ def thresholds(text: str) -> Iterator[int]:
             yield node.lineno
 
 
-def python_imports(root: Path, package: Path) -> dict[str, set[str]]:
+def python_imports(trees: dict[Path, ast.Module], package: Path) -> dict[str, set[str]]:
     """Which modules of a package each of them imports, wherever the import stands."""
     modules = {
-        ".".join(p.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__"): p for p in sorted(package.rglob("*.py"))
+        ".".join(p.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__"): p
+        for p in trees
+        if p.is_relative_to(package)
     }
     edges: dict[str, set[str]] = {name: set() for name in modules}
     for name, path in modules.items():
         here = name if path.name == "__init__.py" else name.rpartition(".")[0]
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in statements(trees[path]):
             if isinstance(node, ast.Import):
                 edges[name] |= {a.name for a in node.names} & modules.keys()
             elif isinstance(node, ast.ImportFrom):
@@ -206,6 +215,7 @@ def look(root: Path) -> tuple[dict[str, int], Found]:
     found: Found = {kind: [] for kind in (*RATCHETS, *BUDGETS)}
     found["crowded folders"] = crowded(root)
     files = sources(root)
+    trees = {path: ast.parse(path.read_text()) for path in files if path.suffix == ".py"}
     runtime = dict.fromkeys(BUDGETS, 0)
     for path in files:
         name, text = path.relative_to(root).as_posix(), path.read_text()
@@ -213,18 +223,18 @@ def look(root: Path) -> tuple[dict[str, int], Found]:
         if lines > FILE_LINES:
             found["long files"].append(f"{name}: {lines} lines")
         found["silenced lines"] += [f"{name}:{n}" for n, line in enumerate(text.splitlines(), 1) if SILENCED.search(line)]
-        functions = c_functions(text) if path.suffix in {".c", ".h"} else python_functions(text) if path.suffix == ".py" else ()
+        functions = c_functions(text) if path.suffix in {".c", ".h"} else python_functions(trees[path]) if path in trees else ()
         found["long functions"] += [f"{name}:{first}: {n} lines" for first, n in functions if n > FUNCTION_LINES]
         if name.startswith("sil/penode_sil/") and path.suffix == ".py":
             kind = NEWER if ROOMS.match(name) else TABLE if name.endswith("training/settings.py") else "named thresholds"
-            found[kind] += [f"{name}:{line}" for line in thresholds(text)]
-            found["tabled numbers"] += [f"{name}:{line}" for line in tabled(text)]
-            found["compared numbers"] += [f"{name}:{line}" for line in compared(text)]
+            found[kind] += [f"{name}:{line}" for line in thresholds(trees[path])]
+            found["tabled numbers"] += [f"{name}:{line}" for line in tabled(trees[path])]
+            found["compared numbers"] += [f"{name}:{line}" for line in compared(trees[path])]
         if name.startswith(("inc/penode/", "src/")):
             runtime[budget(path.name)] += lines
     for package in ("gen/penode_gen", "sil/penode_sil"):
         if (root / package).is_dir():
-            found["circular imports"] += circular(python_imports(root, root / package))
+            found["circular imports"] += circular(python_imports(trees, root / package))
     found["circular imports"] += circular(header_includes(files))
     counts = {kind: len(items) for kind, items in found.items()}
     return counts | {kind: n for kind, n in runtime.items() if kind not in (NEWER, TABLE)}, found
