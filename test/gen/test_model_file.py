@@ -599,7 +599,7 @@ def edited(draw) -> str:
     return text
 
 
-@settings(FUZZ, max_examples=400)
+@settings(FUZZ, max_examples=200)
 @given(edited())
 def test_edited_files(folder, text):
     path = folder / "fuzz.toml"
@@ -630,7 +630,7 @@ EXPRESSIONS = st.recursive(
 )
 
 
-@settings(FUZZ, max_examples=150)
+@settings(FUZZ, max_examples=60)
 @given(*[EXPRESSIONS] * 4, st.sampled_from(["rk4", "ros1", "ros2"]))
 def test_any_expression(folder, a, b, c, d, method):
     """Equations, an output and a sensor of random expressions become C, or are refused."""
