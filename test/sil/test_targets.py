@@ -74,10 +74,10 @@ def test_sil_and_pil_agree_to_the_bit_in_every_sample(name, machine):
 
 @pytest.mark.parametrize("name", ["nqvm", "nqvm_folded"])
 def test_steps_are_the_same_everywhere(name, monkeypatch, show):
-    """100 000 folded steps; of the layered model, which takes minutes, 10 000, and as many with PENODE_LONG=1."""
+    """100 000 folded steps; of the layered model, which takes minutes, 4 000, and as many with PENODE_LONG=1."""
     need("gcc", "clang-19", "qemu-system-arm", "arm-none-eabi-gcc")
     monkeypatch.setenv("SHIFT", "none")  # bits are compared, not counts
-    steps = 100_000 if name == "nqvm_folded" or "PENODE_LONG" in os.environ else 10_000
+    steps = 100_000 if name == "nqvm_folded" or "PENODE_LONG" in os.environ else 4_000
     nqvm, u = penode_gen.load(ROOT / "gen" / "nqvm" / f"{name}.toml"), chirp(steps)
     digests = {" ".join(compiler): Sil(nqvm, compiler=compiler).run(u).digest for compiler in COMPILERS}
     with ThreadPoolExecutor(2) as pool:  # the work is done by other processes
