@@ -20,7 +20,10 @@ from xdist.workermanage import WorkerController
 
 TOGETHER = {"install", "packages"}  # folders whose tests share what lies at one place: for one worker
 # Where no run before says so, these begin.
-LONG = ("test_emit.py", "test_diagnosis.py", "test_train.py", "test_parts.py", "test_packages.py", "test_worlds.py", "test_measured.py")
+LONG = (
+    "test_diagnosis test_coarse_rigs test_drives test_bench test_commands test_packages test_targets "
+    "test_holding test_folder test_recording test_batch test_selftest test_hidden test_emit"
+).split()
 took: Counter[str] = Counter()
 
 
@@ -75,7 +78,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     known = seconds(Path(os.environ["PENODE_DURATIONS"]))
     length: Counter[str] = Counter()
     for item in items:
-        length[group_of(item.nodeid)] += known.get(item.nodeid, 0.0) if known else 1e3 * (item.path.name in LONG)
+        length[group_of(item.nodeid)] += known.get(item.nodeid, 0.0) if known else 1e3 * (item.path.stem in LONG)
     items.sort(key=lambda item: -length[group_of(item.nodeid)])
 
 
