@@ -83,7 +83,7 @@ def test_an_oscillator_with_nine_samples_a_period(tmp_path, penode):
     h, records = 2e-3, []
     for seed in (1, 2):
         rng = np.random.default_rng(seed)
-        u = 10.0 * waves(rng, 60, 2.0, 150.0, 2000, h)
+        u = 10.0 * waves(rng, 60, 2.0, 150.0, 1200, h)
         x = simulate(lambda x, v, u: (u - 0.6 - 40.0 * v - 1.2e5 * x - 4e11 * x**3) / 1.0, u, h)[:, 0]
         records.append((h, u, "x [m]", x + 2e-7 * rng.standard_normal(len(x))))
     found = diagnosed(tmp_path, penode, file(2, {"m": (0.8, "kg"), "d": (60, "N*s/m"), "k": (1e5, "N/m")}), records)
@@ -134,7 +134,7 @@ def converters(seeds, noise: float):
     records = []
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        u = np.repeat((10.0 * waves(rng, 8, 0.2, 1.2, 3000, 10e-3))[::FINE], FINE)
+        u = np.repeat((10.0 * waves(rng, 8, 0.2, 1.2, 2000, 10e-3))[::FINE], FINE)
         v = simulate(lambda x, v, u: (u - 12.0 * v) / 2.0, u, 10e-3)[:, 1]
         records.append((10e-3, u, "v [m/s]", v + noise * rng.standard_normal(len(v))))
     model = file(10, {"m": (3, "kg"), "d": (5, "N*s/m")}, "", f'v = {{ value = "v", unit = "m/s", noise = {noise} }}')
@@ -186,8 +186,8 @@ level = { value = "lower", unit = "m" }
 
 
 def tanks(rng, leak: float):
-    """The level [m] of the second of two tanks in a row, 700 samples of 4 s; of the first a share of what is above 4 m is lost."""
-    u = 3.0 + 1.2 * waves(rng, 15, 0.001, 0.02, 700, 4.0)
+    """The level [m] of the second of two tanks in a row, 450 samples of 4 s; of the first a share of what is above 4 m is lost."""
+    u = 3.0 + 1.2 * waves(rng, 15, 0.001, 0.02, 450, 4.0)
     a, b, dt, level = 3.0, 4.0, 4.0 / FINE, []
     for i, pump in enumerate(u.tolist()):
         if i % FINE == 0:
