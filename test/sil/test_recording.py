@@ -8,12 +8,17 @@ MDF files are written by asammdf, with values that are computed here.
 from __future__ import annotations
 
 import re
+import sys
 import time as clock
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "prove"))
+
+import mdf_files  # needs the path above
 
 from penode_sil.errors import UserError
 from penode_sil.recordings import aliases, on_raster, pick, read, read_csv, resample
@@ -179,6 +184,13 @@ def mdf(tmp_path):
     return write_file
 
 
+@pytest.fixture
+def quick():
+    """MDF files are read in forked processes; `test_mdf_gives_what_csv_gives` starts those that a user gets."""
+    with mdf_files.quick():
+        yield
+
+
 T = np.arange(500) * 1e-3
 
 
@@ -190,7 +202,7 @@ def test_mdf_gives_what_csv_gives(mdf, name, version):
     assert table.channel("count", "V").tolist() == (np.arange(500) % 256).tolist()
 
 
-def test_mdf_groups_keep_their_clocks_until_a_raster_is_asked_for(mdf):
+def test_mdf_groups_keep_their_clocks_until_a_raster_is_asked_for(mdf, quick):
     slow = np.arange(100) * 5e-3 + 0.0005
     path = mdf((T, {"a": ("m", 2.0 * T), "note": ("", T.astype("S8"))}), (slow, {"b": ("m", 3.0 * slow)}))
     tables = read(path, ["a", "b", "time"])
@@ -201,14 +213,14 @@ def test_mdf_groups_keep_their_clocks_until_a_raster_is_asked_for(mdf):
     assert values[:, 0] == pytest.approx(2.0 * raster, abs=1e-12) and len(notes) == 2
 
 
-def test_mdf_samples_marked_as_invalid_are_missing(mdf):
+def test_mdf_samples_marked_as_invalid_are_missing(mdf, quick):
     (table,) = read(mdf((T, {"a": ("m", T, np.arange(500) == 7)})), ["a"])
     assert np.flatnonzero(np.isnan(table.columns["a"])).tolist() == [7]
     with pytest.raises(UserError, match=r"r\.mf4: sample 8: channel a has no finite value there; cut"):
         table.channel("a", "m")
 
 
-def test_broken_mdf_gives_one_line(mdf, tmp_path):
+def test_broken_mdf_gives_one_line(mdf, quick, tmp_path):
     def problem(path, name="a", unit="m"):
         with pytest.raises(UserError) as caught:
             pick(read(path, [name]), name, unit).channel(name, unit)
@@ -233,9 +245,9 @@ def test_broken_mdf_gives_one_line(mdf, tmp_path):
 SLOW = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
-@settings(SLOW, max_examples=6)
+@settings(SLOW, max_examples=30, derandomize=True)  # `make prove-readers` searches further
 @given(st.lists(st.tuples(st.integers(8, 3000), st.integers(0, 255)), min_size=1, max_size=20))
-def test_damaged_mdf_is_read_or_refused(mdf, tmp_path, damage):
+def test_damaged_mdf_is_read_or_refused(mdf, quick, tmp_path, damage):
     data = bytearray(mdf((T[:40], {"a": ("m", T[:40])})).read_bytes())
     for place, byte in damage:
         data[place % len(data)] = byte
