@@ -251,7 +251,7 @@ $(PYTHONS): python-%: | $(READY)
 	@HYPOTHESIS_STORAGE_DIRECTORY=build/hypothesis OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q --durations=12 --durations-min=5 test/$* # one thread each: parts run side by side
 python-long: | $(READY) ## The Python tests of which `make test` takes a sample: the others
 	@PENODE_LONG=1 $(PYTHON) -m pytest -q test/gen/test_emit.py test/gen/test_selftest.py
-	@for part in gen sil tools exports training; do OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q -m long test/$$part || exit; done
+	@for part in gen sil tools exports training diagnosis; do OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q -m long test/$$part || exit; done
 
 # -- hidden effects: a draw that never changes, and one that nobody has seen --------------------------------------------
 
