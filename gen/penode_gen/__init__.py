@@ -6,9 +6,9 @@ What stands in `__all__` is imported when it is asked for: sympy and onnx take a
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from .on_demand import names_from
 from .version import VERSION
 
 if TYPE_CHECKING:
@@ -52,13 +52,7 @@ _FROM = {  # name -> module that has it
 }
 
 
-def __getattr__(name: str) -> Any:
-    """A name of `__all__`, from its module (PEP 562)."""
-    if name not in _FROM:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = getattr(import_module(f".{_FROM[name]}", __name__), name)
-    globals()[name] = found
-    return found
+__getattr__ = names_from(__name__, _FROM)
 
 
 def __dir__() -> list[str]:
