@@ -34,8 +34,10 @@ SLOW = 20.0  # seconds; tests that took longer are named at the end
 UNITY = re.compile(r"\b(\d+) Tests (\d+) Failures (\d+) Ignored")
 PYTEST = re.compile(r"^(?:=+ )?((?:\d+ \w+(?:, )?)+|no tests ran) in [\d.]+s")
 GATE = re.compile(r"^(ok|FAIL|skip)  ")
-BEGIN, END = re.compile(r"^== (\S+)$"), re.compile(r"^-- (\S+): (\d+) ms$")
-BAD = re.compile(r"^make: (?:\*\*\* \[.*?(?:: )?([^\s:]+)\] |Target '(.*)' not remade|\*\*\* No rule to make target '(.*?)'[ .])")
+BEGIN, END = re.compile(r"^== (\S+)$"), re.compile(r"^-- (\S+): (\d+) ms(, exit \d+)?$")
+BAD = re.compile(
+    r"^make(?:\[\d+\])?: (?:\*\*\* \[.*?(?:: )?([^\s:]+)\] |Target '(.*)' not remade|\*\*\* No rule to make target '(.*?)'[ .])"
+)
 PYTEST_WORDS = {
     "passed": "passed",
     "xfailed": "passed",
@@ -100,6 +102,7 @@ def read(lines: Iterable[str], gates: Iterable[str]) -> list[Result]:
             current = match[1]
         elif (match := END.match(line)) and match[1] == current:
             seconds[match[1]] += int(match[2]) / 1000
+            bad |= {match[1]} if match[3] else set()
             current = ""
         elif match := BAD.match(line):
             bad.add(next(filter(None, match.groups())))
@@ -138,6 +141,8 @@ def run_gates(gates: list[str], cores: Cores) -> list[Result]:
         pass_fds=[cores.pipe],
     ) as make:
         found = read(make.stdout or [], gates)
+    if make.returncode != 0 and not any(result.count.failed for result in found):
+        found.append(Result("make", Count(failed=1), 0.0))
     cores.free(MANY)
     return found
 

@@ -95,8 +95,10 @@ def test_a_failing_gate_does_not_keep_the_next_from_running(jobs, tmp_path):
         ("absent", "0 passed, 1 failed, 0 skipped"),
     ],
 )
-def test_each_bad_gate_is_one_failure(gate, total, tmp_path):
-    code, said = tally(tmp_path, "-j2", gate, "good")
+@pytest.mark.parametrize("level", "01")
+def test_each_bad_gate_is_one_failure(gate, total, level, tmp_path):
+    """Called from a make too, which then puts its level into what it says."""
+    code, said = tally(tmp_path, "-j2", gate, "good", MAKELEVEL=level)
     assert code == 1 and f"FAILED {gate}: {total}" in said
 
 
