@@ -10,7 +10,7 @@ import click
 
 from penode_gen.version import VERSION
 
-from . import environment  # noqa: F401 isort: split
+from . import environment  # noqa: F401 - checks the variables that numerical libraries read, before any is loaded
 from .guard import guarded
 
 # name -> its module of commands/ and the command there, and the first line of its help
