@@ -225,7 +225,7 @@ cmock: build/setup/unity build/setup/cmock ## The order in which the library use
 
 # -- elementary functions against wider arithmetic --------------------------------------------------------------------
 
-STRIDE := 256 # 1: all 2^32 floats, five minutes
+STRIDE := 64 # 1: all 2^32 floats, five minutes
 ACCURACY := -std=c99 -O2 -ffp-contract=off -Iinc -Iport/gnu
 
 GATES.accuracy := accuracy-float accuracy-double accuracy-source accuracy-elementary
