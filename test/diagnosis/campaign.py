@@ -113,8 +113,7 @@ def simulated(command: str, model: Path, recording: Path) -> dict[str, float]:
 def run(
     seed: int, index: int, commands: dict[str, str], simulate: str, timeout: float, out: Path, keep: bool, fork: bool = False
 ) -> list[dict]:
-    """One case from draw to scores, one for each command. The truth is written only after the commands are through. With `fork`, rivals
-    are simulated only for an answer that is not right without them."""
+    """One case from draw to scores, one for each command. The truth is written only after the commands are through."""
     case = cases.make(seed, index)
     folder = out / "cases" / f"{seed}-{index}"
     shutil.rmtree(folder, ignore_errors=True)
@@ -127,12 +126,8 @@ def run(
         answers.append((name, found, seconds, why, error))
         if (folder / "diagnosis").exists() and len(commands) > 1:
             (folder / "diagnosis").rename(folder / f"diagnosis of {name}")
-    nominal = nominals(folder / "model.toml")
-    for whole in (False, True) if fork and not keep else (True,):
-        truth = case.truth(whole)
-        rows = [{"command": name, **score.score(truth, *answer, nominal)} for name, *answer in answers]
-        if all(row["right"] for row in rows):
-            break
+    truth, nominal = case.truth(), nominals(folder / "model.toml")
+    rows = [{"command": name, **score.score(truth, found, seconds, why, error, nominal)} for name, found, seconds, why, error in answers]
     if keep or not rows[0]["right"]:
         cases.write_truth(truth, out / "truth" / f"{seed}-{index}.json")
     if not keep:

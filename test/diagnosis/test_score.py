@@ -314,22 +314,6 @@ def test_campaign_runs_a_command_and_survives_it(tmp_path, answer, outcome):
     assert json.loads((tmp_path / "out" / "truth" / "1-1.json").read_text())["effects"] == []
 
 
-@pytest.mark.parametrize("kind, asked", [("backlash", [False]), ("cubic_spring", [False, True])])
-def test_rivals_are_simulated_for_answers_that_need_them(tmp_path, monkeypatch, kind, asked):
-    """A cubic spring is right for what is a play only as a simulated rival of it."""
-    case, calls = campaign.cases.make(1, 1), []
-
-    def known(self, simulated=True):
-        calls.append(simulated)
-        rivals = [{"kind": "cubic_spring", "where": [], "left": 12.0}] * simulated
-        return truth(FRICTION | {"kind": "backlash", "where": [], "rivals": rivals})
-
-    monkeypatch.setattr(type(case), "truth", known)
-    monkeypatch.setattr(campaign, "diagnose", lambda *given: (said(cause(kind, "", ["backlash"])), 1.0, ""))
-    (row,) = campaign.run(1, 1, {"mine": ""}, "", 5.0, tmp_path, keep=False, fork=True)
-    assert row["right"] and calls == asked
-
-
 def test_campaign_that_is_stopped_has_tables_of_what_is_through(tmp_path):
     """As soon as one of four cases is; the second never ends by itself."""
     mark, script, page = tmp_path / "second", tmp_path / "explain.py", tmp_path / "page.md"

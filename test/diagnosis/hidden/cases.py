@@ -127,8 +127,8 @@ class Case:
                 found[i] = min(found[i], self.bench.left(step, self.others(i)))
         return found
 
-    def rivals(self, i: int, simulated: bool = True) -> list[dict]:
-        """Answers that leave less than APART of effect i unexplained: exact or near equivalents, those that have to be simulated too."""
+    def rivals(self, i: int) -> list[dict]:
+        """Answers that leave less than APART of effect i unexplained: exact or near equivalents."""
         bench, effect, x, others = self.bench, self.effects[i], self.differences[i], self.others(i)
         if effect.form.kind == OUTSIDE or self.energies[i] < BOUND:
             return []
@@ -136,7 +136,7 @@ class Case:
         tried += [(kind, s, y) for (kind, s), y in bench.of_sensors.items()]
         rng = np.random.default_rng([self.seed, self.index, 77, i])
         near = 3 * NEAR.get(effect.form.kind, ())  # three draws of gaps, time constants and so on
-        for kind in () if not simulated else near if self.energies[i] > FAINT else (*near, *KINDS):
+        for kind in near if self.energies[i] > FAINT else (*near, *KINDS):
             form = next(f for f in FORMS if f.kind == kind and f.common)
             for where in places(form, bench.plant, list(bench.noise)):
                 build, size = form.make(rng, bench.place(where)), float(np.sqrt(form.sizes[0] * form.sizes[1]))
@@ -186,8 +186,8 @@ class Case:
         )
         return {"share": float(np.mean(np.concatenate(full) != np.concatenate(rest)))}
 
-    def truth(self, simulated: bool = True) -> dict:
-        """Everything that is known about the case; all values in SI. Rivals that have to be simulated may be left out."""
+    def truth(self) -> dict:
+        """Everything that is known about the case; all values in SI."""
         bench, found = self.bench, []
         for i, e in enumerate(self.effects):
             values = {**e.change.parameters, **(e.change.memory(self.motions[0].memory) if e.change.memory else {}), **self.lost(i)}
@@ -200,7 +200,7 @@ class Case:
                     "energy": round(self.energies[i], 1),
                     "ratio": round(float(np.sqrt(self.energies[i] / bench.samples)), 3),
                     "parameters": {k: float(v) for k, v in values.items()},
-                    "rivals": self.rivals(i, simulated),
+                    "rivals": self.rivals(i),
                 }
             )
         return {
