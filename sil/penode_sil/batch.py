@@ -151,8 +151,9 @@ class Batch:
         per_run = values.ndim == 2 and len(values) > 1
         if per_run:
             values = self._spread(values.T, padded).reshape(-1, vectors, self.lanes).swapaxes(0, 1).copy()
-        kinds = (("state", states, model.states), ("output", outputs, model.outputs), ("sensor", sensors, model.sensors))
-        wanted = tuple(self._columns(kind, names, [getattr(s, "name", s) for s in known]) for kind, names, known in kinds)
+        signals = ([s.name for s in model.outputs], [s.name for s in model.sensors])
+        named = zip(("state", "output", "sensor"), (states, outputs, sensors), (model.states, *signals), strict=True)
+        wanted = tuple(self._columns(*each) for each in named)
         kept = [np.empty((-(-n // every), len(columns), padded), dtype=dtype) for columns in wanted]
         first = np.empty((2, padded), dtype=np.int64 if dtype == np.float64 else np.int32)
         job = _Job(samples=n, every=every, runs=padded, input_runs=padded if u.ndim == 3 else 1, set_length=default.size)
