@@ -3,9 +3,7 @@
 """Model in the loop: the exact solution that every target is compared with, in float64 with tight tolerances.
 
 The inputs are functions of continuous time. The integrator stops and starts anew wherever the right-hand side changes
-its form: at parameter exchanges, at both ends of a hold, and at the knots of the inputs. The kinks that ReLU networks
-have within a piece are left to the step control; LSODA needs a third of DOP853's evaluations for them, DOP853 starts
-faster, which counts where pieces are short (a recording has a knot at each sample).
+its form: at parameter exchanges, at both ends of a hold, and at the knots of the inputs.
 """
 
 from __future__ import annotations
@@ -13,25 +11,21 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-import penode_gen
 from penode_gen.model import Model
 
 from .errors import ModelError
-from .late import Held, driving
+from .late import driving
+from .reference import compiled
+from .reference.accuracy import Unsolved
+from .reference.by_scipy import ByScipy
 from .scenario import Instance, Scenario, staging_samples
 from .signals import Signal
 
-if TYPE_CHECKING:
-    from scipy.integrate import OdeSolver  # slow to load
-
 Array = NDArray[np.float64]
-RTOL, ATOL = 1e-11, 1e-13
-SHORT = 0.02  # [s] pieces below it are for DOP853
 Progress = Callable[[float], None]  # gets the time [s] reached
 
 
@@ -68,7 +62,10 @@ def _pieces(instance: Instance, duration: float, set_length: int, sample_time: f
             samples = staging_samples(set_length, exchange.chunk) - 1
             holds.append((exchange.time - samples * sample_time, exchange.time))
     cuts = {0.0, duration} | {time for time, _ in changes} | {time for hold in holds for time in hold} | knots
-    edges = sorted(cut for cut in cuts if 0.0 <= cut <= duration)
+    edges, tiny = [0.0], 4.0 * np.spacing(duration)
+    for cut in sorted(cut for cut in cuts if 0.0 < cut <= duration):
+        if cut - edges[-1] > tiny:  # else the same time, but for rounding
+            edges.append(cut)
     pieces = []
     for begin, end in itertools.pairwise(edges):
         middle = 0.5 * (begin + end)
@@ -77,42 +74,26 @@ def _pieces(instance: Instance, duration: float, set_length: int, sample_time: f
     return pieces
 
 
-class _Inputs:
-    """All inputs and their rates at one time, seen from within a piece (at its end: the rate before the knot)."""
-
-    def __init__(self, signals: tuple[Signal, ...], begin: float, end: float):
-        self.signals, self.begin, self.last = signals, begin, float(np.nextafter(end, begin))
-        middle = np.array(0.5 * (begin + end))
-        self.steps = {i: float(signal.value(middle)) for i, signal in enumerate(signals) if isinstance(signal, Held)}
-
-    def __call__(self, t: float) -> tuple[Array, Array]:
-        at, inside = np.array(t), np.array(min(max(t, self.begin), self.last))
-        u = np.array([float(signal.value(at)) for signal in self.signals])
-        return u, np.array([float(signal.slope(inside)) for signal in self.signals])
-
-    def before(self, t: float) -> tuple[Array, Array]:
-        """The same for the equations: at the end of the piece, what moves in steps has not moved yet."""
-        u, udot = self(t)
-        for i, level in self.steps.items():
-            u[i] = level
-        return u, udot
+def _integrator(model: Model, set_name: str, signals: tuple[Signal, ...], x: Array) -> compiled.Compiled | ByScipy:
+    """What solves a model from x on: compiled code, but for models whose fastest motion an explicit method would follow in far too many
+    steps."""
+    if not compiled.available():
+        return ByScipy(model)
+    found = compiled.Compiled(model)
+    u, v = (np.array([float(of(np.array(0.0))) for of in each]) for each in ([s.value for s in signals], [s.slope for s in signals]))
+    width = 1e-7 * (1.0 + np.abs(x))
+    ends = [[found.rates(set_name, x + sign * step, u, v) for sign in (1.0, -1.0)] for step in np.diag(width)]
+    jacobian = np.array([(more - less) / (2.0 * h) for (more, less), h in zip(ends, width, strict=True)]).reshape(x.size, x.size)
+    fast = np.isfinite(jacobian).all() and np.abs(np.linalg.eigvals(jacobian)).max(initial=0.0) * model.sample_time > compiled.MANY
+    return ByScipy(model) if fast else found
 
 
-def _solver(system: penode_gen.Numeric, source: _Inputs, piece: _Piece, x: Array) -> OdeSolver:
-    """A solver of the equations over a piece, from its first state on."""
-    from scipy.integrate import DOP853, LSODA  # here, for other commands need not wait for it
-
-    method = DOP853 if piece.end - piece.begin < SHORT else LSODA
-    solver: OdeSolver = method(lambda t, state: system.rates(state, *source.before(t)), piece.begin, x, piece.end, rtol=RTOL, atol=ATOL)
-    return solver
-
-
-def _step(solver: OdeSolver, what: str) -> None:
-    """One step of a solver. UserError if `what` it solves cannot be continued."""
-    message = solver.step()
-    if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
-        why = message or "a state is not finite"
-        raise ModelError([f"{what} cannot be continued after {solver.t:.6g} s ({why}); the model is unstable there"])
+def _seen(signals: tuple[Signal, ...], edges: Array, times: Array) -> tuple[Array, Array]:
+    """Inputs and their rates [n, n_u] at `times` [n]; at the end of a piece, the rate before the knot."""
+    piece = np.clip(np.searchsorted(edges, times, side="left") - 1, 0, edges.size - 2)
+    inside = np.clip(times, edges[piece], np.nextafter(edges[piece + 1], edges[piece]))
+    u, v = [s.value(times) for s in signals], [s.slope(inside) for s in signals]
+    return np.array(u, dtype=float).reshape(-1, times.size).T, np.array(v, dtype=float).reshape(-1, times.size).T
 
 
 def solve(
@@ -128,42 +109,30 @@ def solve(
     """Exact states, outputs and sensors of one instance at `times` [s] (increasing, within 0..duration)."""
     signals = driving(model, inputs, duration)
     knots = {knot for signal in signals for knot in signal.knots()}
-    equations = {name: penode_gen.numeric(model, name) for name in model.sets}
-    x = np.array(equations[instance.set].initial_state(), dtype=float)
+    x = np.array(model.start, dtype=float)
     for name, value in (initial or {}).items():
         x[model.states.index(name)] = value
-    rows_x = np.empty((times.size, x.size))
-    rows_y, rows_z = np.empty((times.size, len(model.outputs))), np.empty((times.size, len(model.sensors)))
+    integrator = _integrator(model, instance.set, signals, x)
+    rows_x, rows_y, rows_z = (np.empty((times.size, n)) for n in (x.size, len(model.outputs), len(model.sensors)))
     done = 0
-
-    def keep(row: int, state: Array, system: penode_gen.Numeric, source: _Inputs) -> None:
-        u, udot = source(float(times[row]))
-        rows_x[row], rows_y[row], rows_z[row] = state, system.outputs(state, u, udot), system.sensors(state, u, udot)
-
-    for piece in _pieces(instance, duration, set_length, model.sample_time, knots):
-        system, source = equations[piece.set], _Inputs(signals, piece.begin, piece.end)
+    pieces = _pieces(instance, duration, set_length, model.sample_time, knots)
+    for (name, held), group in itertools.groupby(pieces, key=lambda piece: (piece.set, piece.held)):
+        own = list(group)
+        edges = np.array([own[0].begin, *(piece.end for piece in own)])
         # a sample that lies on the end of a piece belongs to it: the set before an exchange
-        last = int(np.searchsorted(times, piece.end, side="right"))
-        if piece.held:
-            for row in range(done, last):
-                keep(row, x, system, source)
-                rows_y[row] = rows_y[max(row - 1, 0)]  # outputs are held as well, sensors are not
-            done = last
-            continue
-        solver = _solver(system, source, piece, x)
-        while done < last and times[done] <= piece.begin:
-            keep(done, x, system, source)
-            done += 1
-        while solver.status == "running":
-            _step(solver, f"{model.path}: the exact solution of {instance.name}")
-            reached = int(np.searchsorted(times, solver.t, side="right"))
-            if reached > done:
-                between = solver.dense_output()
-                for row in range(done, reached):
-                    keep(row, solver.y if times[row] == solver.t else between(times[row]), system, source)
-                done = reached
-                progress(solver.t)
-        x = solver.y
+        last = int(np.searchsorted(times, edges[-1], side="right"))
+        at = slice(done, last)
+        rows_x[at] = x
+        if not held:
+            try:
+                rows_x[at], x = integrator.run(name, signals, edges, x, times[at], progress)
+            except Unsolved as stop:
+                what = f"{model.path}: the exact solution of {instance.name} cannot be continued after {stop.args[0]:.6g} s"
+                raise ModelError([f"{what} (no step is small enough); the model is unstable there"]) from stop
+        rows_y[at], rows_z[at] = integrator.look(name, rows_x[at], *_seen(signals, edges, times[at]))
+        if held:
+            rows_y[at] = rows_y[max(done - 1, 0)]  # outputs are held as well, sensors are not
+        done = last
     return Trajectory(rows_x, rows_y, rows_z, tuple(round(e.time / model.sample_time) + 1 for e in instance.exchanges))
 
 

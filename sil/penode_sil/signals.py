@@ -200,7 +200,10 @@ class Road:
     def slope(self, t: Array) -> Array:
         t = np.asarray(t, dtype=float)
         fade, rise = self._fade(t)
-        return fade * self._sum(t, True) + np.where(rise > 0.0, rise * self._sum(t, False), 0.0)
+        slope = np.atleast_1d(fade * self._sum(t, True))
+        fading = np.atleast_1d(rise > 0.0)
+        slope[fading] += np.atleast_1d(rise)[fading] * self._sum(np.atleast_1d(t)[fading], False)
+        return slope.reshape(np.shape(t))
 
     def knots(self) -> tuple[float, ...]:
         return (self.fade_in,) if self.fade_in > 0.0 else ()

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What integrators keep to, and what they raise."""
+
+RTOL, ATOL = 1e-13, 1e-15  # errors of a step. At a kink the estimates are too small: errors of some 1e-9 of a state
+
+
+class Unsolved(Exception):
+    """No step is small enough, or a state is not finite, at a time [s], the only argument."""
