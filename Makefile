@@ -52,7 +52,7 @@ bench: setup ## The same with the steps of other tools (ten minutes, downloads t
 	$(Q)$(PYTHON) test/bench/bench.py
 	$(Q)$(PYTHON) test/prove/promises.py
 
-campaign: campaign-diagnosis campaign-proofs ## Both campaigns, hours
+campaign: campaign-diagnosis campaign-proofs campaign-fmu ## All three campaigns, hours
 
 campaign-diagnosis: setup build/setup/rivals ## Hide effects in CASES recordings and let the diagnosis and its rivals look for them; RESUME=1 goes on with a draw that was stopped
 	$(Q)$(PYTHON) test/diagnosis/campaign.py --cases $(CASES) $(LEAST:%=--least %) $(RESUME:%=--resume) --jobs $$(nproc) --alone 10 --gate \

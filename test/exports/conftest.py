@@ -13,9 +13,10 @@ import pytest
 
 import penode_gen
 
+sys.path.insert(0, str(Path(__file__).parent / "fmu"))
 sys.path.insert(0, str(Path(__file__).parent))
 
-from case_study import NQVM  # needs the path above
+from case_study import NQVM  # needs the paths above
 
 if importlib.util.find_spec("fmpy") is None:
     collect_ignore = ["test_fmu.py", "test_fmu_derivatives.py", "test_fmu_long.py"]

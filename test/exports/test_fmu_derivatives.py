@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from case_study import chirp
+from case_study import NQVM, chirp
 from master import Master, Unpacked, export
+
+import penode_gen
 
 STEP = 1e-3
 
@@ -80,3 +83,41 @@ def test_directional_derivatives_in_float(unpacked: Unpacked, double: Unpacked) 
         twin.fmu.terminate()
         twin.fmu.freeInstance()
     assert (np.abs(np.array(small) - large) <= 1e-4 * np.abs(large).max(axis=0)).all()
+
+
+VARIANTS = {
+    "plain": "",
+    "folded and tried": "pieces = 96\ntrial = 20\n",
+    "delayed": '[actuators]\nlate = { input = "z_road", law = "delay", samples = 7 }\n'
+    '[elements]\ntyre = { between = ["wheel", "late"], law = "linear_spring", stiffness = "c_t" }\n',
+}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_what_is_asked_for_late_is_the_same_and_changes_nothing(variant: str, tmp_path: Path) -> None:
+    """Derivatives and sensors after every step, after every fifth, and after a change of inputs and sets that the next step is to see."""
+    path = tmp_path / "variant.toml"
+    path.write_text(f'[model]\nextends = "{NQVM}"\nname = "variant"\n{VARIANTS[variant]}')
+    unpacked = Unpacked(export(penode_gen.load(path), 3, tmp_path), tmp_path / "unpacked")
+    asked = ("jacobian.state_state", "jacobian.state_input", "a_body", "a_wheel", "status")
+    often, seldom, never = (Master(unpacked).initialise() for _ in range(3))
+    for k, u in enumerate(chirp(0.2)[:-1, 0].astype(float)):
+        for master in (often, seldom, never):
+            master.set("z_road", np.nan if k == 72 else u)
+            if k == 50:
+                master.set("parameter_set", 2)
+            master.step(2 * STEP if k % 3 == 0 else STEP)
+        found = often.get(*asked)
+        if k % 5 == 2:
+            for master in (often, seldom):
+                master.set("z_road", u + 0.01)
+                master.set("parameter_set", 1 + (k // 5) % 2)
+            never.set("parameter_set", 1 + (k // 5) % 2)
+            assert np.array_equal(seldom.get(*asked), found)
+        state = often.get("z_b", "z_w", *STATES, "set_checksum")
+        assert np.array_equal(seldom.get("z_b", "z_w", *STATES, "set_checksum"), state)
+        assert np.array_equal(never.get("z_b", "z_w", *STATES, "set_checksum"), state)
+    kept = seldom.save()
+    seldom.step(STEP)
+    seldom.restore(kept)
+    assert np.array_equal(seldom.get(*asked), often.get(*asked))

@@ -128,10 +128,21 @@ def runtime(model: Model) -> dict[str, str]:
 def sources(model: Model, context: dict[str, Any], interface: tuple[str, ...]) -> dict[str, str]:
     """Name -> text of all C, in one folder; `interface`: templates of this version of FMI."""
     texts = runtime(model)
-    rates = "y_u_before[" in texts[f"{model.name}.h"]
-    for name in ("fmu_core.h", "fmu_core.c", "fmu_sets.h", "fmu_sets.c", "fmu_model.c", *interface):
-        texts[name] = template(f"fmi/{name}.j2", **context, uses_input_rate=rates)
+    header = texts[f"{model.name}.h"]
+    derived = {"uses_input_rate": "y_u_before[" in header, "stepped": _stepped(header, model.name)}
+    for name in ("fmu_core.h", "fmu_core.c", "fmu_samples.c", "fmu_sets.h", "fmu_sets.c", "fmu_model.c", *interface):
+        texts[name] = template(f"fmi/{name}.j2", **context, **derived)
     return {name: flat(text, context["real"]) for name, text in texts.items()}
+
+
+def _stepped(header: str, name: str) -> list[str]:
+    """
+    Members of the instance that a step changes and reads again. Folded pieces come with a set; samples kept for a trial are written
+    alone, the same when a step is done again.
+    """
+    instance = header[: header.index(f"}} {name}_t;")].rpartition("typedef struct {")[2]
+    members: list[str] = re.findall(r"^ +\w+ +(\w+)[\[;]", instance, re.M)
+    return [member for member in members if member not in ("piece", "sample")]
 
 
 def flat(text: str, real: str) -> str:
