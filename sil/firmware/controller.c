@@ -34,7 +34,7 @@ static struct {
 #define TEXT_OF(name)  TEXT_OF_(name)
 #define TEXT_OF_(name) #name
 const char penode_epk[] = CONTROLLER_EPK;
-static const char name_text[] = TEXT_OF(MODEL(controller));
+static const char name_text[] = TEXT_OF(MODEL()); /* the model's name, which its A2L has too, and an underscore */
 
 static pen_status_t commit(void)
 {
@@ -86,7 +86,7 @@ static void declare_all(const controller_config_t *config)
     declare(&controller, sizeof(controller));
     declare(&shown, sizeof(shown));
     declare(penode_epk, sizeof(penode_epk));
-    name_region = region_of(name_text, sizeof(name_text) - 1U);
+    name_region = region_of(name_text, sizeof(name_text) - 2U);
     epk_region = region_of(penode_epk, sizeof(penode_epk) - 1U);
     a2l_region = region_of(config->a2l, config->a2l_size);
     xcp_config.text[0] = &epk_region;

@@ -42,6 +42,7 @@ _REMEDIES = {
     "ERR_CMD_UNKNOWN": "it has no such command",
     "ERR_DAQ_ACTIVE": "another measurement runs; stop it",
     "ERR_MEMORY_OVERFLOW": "measure fewer signals",
+    "ERR_RESOURCE_TEMPORARY_NOT_ACCESSIBLE": "another tool is connected; end its session",
 }
 
 

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import json
-import threading
+import math
+import time
 from pathlib import Path
 
 import click
@@ -16,6 +17,11 @@ from ..console import note
 from ..errors import WrongUse
 from .emulated import WITH_UART, emulated
 from .virtual import Served, inputs, served
+
+_WHY = {
+    True: "this machine is too slow for the sample time, or a virtual one that is paused; use another, or a longer sample time",
+    False: "other programs run first; end them, or give penode the right to real-time priority (CAP_SYS_NICE, or ulimit -r 1)",
+}
 
 
 def serve(
@@ -62,7 +68,7 @@ def serve(
             if as_json
             else f"{loaded.name} at {found.address}, a step each {loaded.sample_time * 1e3:g} ms; end with Ctrl-C"
         )
-        _wait(duration)
+        _wait(duration, found)
     if place == "sil":
         _tell_end(found, as_json)
 
@@ -75,8 +81,15 @@ def _tell_end(found: Served, as_json: bool) -> None:
     )
 
 
-def _wait(duration: float | None) -> None:
+def _wait(duration: float | None, found: Served, interval: float = 5.0) -> None:
+    """Until the end; late steps are shown as they come, a line each `interval` [s] at most."""
+    end = time.monotonic() + duration if duration is not None else math.inf
+    told = 0
     try:
-        threading.Event().wait(duration)
+        while (left := end - time.monotonic()) > 0:
+            time.sleep(min(left, interval))
+            if found.late > told:
+                told = found.late
+                note(f"{found.late} of {found.steps} steps so far came more than a period late: {_WHY[found.first]}")
     except KeyboardInterrupt:
         click.echo("", err=True)

@@ -8,7 +8,8 @@ import importlib.util
 import socket
 import subprocess
 import tempfile
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,12 +57,16 @@ def build(model: Model) -> Path:
     """The virtual controller of a model. Raises UserError."""
     source, firmware = generated(model), native("sil", "firmware")
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
-    own = [native("port", "host", "serve.c"), firmware / "controller.c", native("port", "xcp", "xcp_frame.c")]
+    own = [
+        *(native("port", "host", name) for name in ("serve.c", "serve_line.c")),
+        firmware / "controller.c",
+        native("port", "xcp", "xcp_frame.c"),
+    ]
     folders = [*include("inc", "port/gnu", "port/xcp", "sil/firmware"), f"-I{source}"]
     options = ["gcc", "-O2", "-g", *FLAGS, "-fno-pie", *folders]
     read: list[Part] = [
         compiler_version("gcc"),
-        *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("sil/firmware", "*.h")),
+        *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("port/xcp", "*.h"), ("port/host", "*.h"), ("sil/firmware", "*.h")),
     ]
     same = build_once("runtime-serve", ".o", [*options[:-1], "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     told = [f'-DCONTROLLER_EPK="{identity(model)}"', f"-DCONTROLLER_PERIOD={period(model)}ULL"]
@@ -94,12 +99,23 @@ def free_port(host: str, datagrams: bool) -> int:
 
 @dataclass
 class Served:
-    """A virtual controller that runs: `address` is what --to takes. steps and late are known at its end."""
+    """
+    A virtual controller that runs: `address` is what --to takes. `steps` and `late` are told each second that adds late ones, and at its
+    end; `first`: it steps before all other programs (SCHED_FIFO).
+    """
 
     address: str
     a2l: str
+    first: bool = False
     steps: int = 0
     late: int = 0
+
+    def listen(self, said: Iterable[str]) -> None:
+        """Take over steps and late steps from the lines of the controller, until they end."""
+        for line in said:
+            words = line.split()
+            if len(words) == 2:
+                self.steps, self.late = int(words[0]), int(words[1])
 
 
 @contextmanager
@@ -131,14 +147,15 @@ def served(
             start_new_session=True,
         ) as process:
             assert process.stdin and process.stdout and process.stderr
-            if not process.stdout.readline():
+            begun = process.stdout.readline().split()
+            if not begun:
                 process.wait()
                 raise TargetError(f"{kind}:{host}:{port}: {TROUBLE.get(process.returncode, 'it did not start')}; choose another port")
-            found = Served(f"{kind}:{host}:{port}", a2l)
+            found = Served(f"{kind}:{host}:{port}", a2l, begun[1:] == ["fifo"])
+            ear = threading.Thread(target=found.listen, args=(process.stdout,))
+            ear.start()
             try:
                 yield found
             finally:
                 process.stdin.close()
-                words_ = process.stdout.readline().split()
-                if len(words_) == 2:
-                    found.steps, found.late = int(words_[0]), int(words_[1])
+                ear.join()
