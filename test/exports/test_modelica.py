@@ -92,6 +92,45 @@ def test_a_foreign_compiler_reads_the_values_of_the_record(nqvm: Any, tmp_path: 
             assert result[f"{name}_[{','.join(str(i + 1) for i in index)}]"][0] == values[index], (name, index)
 
 
+DAMPED = """
+[model]
+name = "damped"
+sample_time = "1 ms"
+[parameters]
+m = { value = 30, unit = "kg" }
+c = { value = 20000, unit = "N/m" }
+d = { value = 500, unit = "N*s/m" }
+[inputs]
+z_road = { unit = "m" }
+[bodies]
+wheel = { mass = "m", position = "z_w", velocity = "v_w" }
+[elements]
+spring = { between = ["wheel", "z_road"], law = "linear_spring", stiffness = "c" }
+damper = { between = ["wheel", "z_road"], law = "linear_damper", damping = "d" }
+[outputs]
+z_w = { value = "z_w", unit = "m" }
+"""
+
+
+@RUMOCA
+def test_the_rate_of_an_input_is_an_input(tmp_path: Path) -> None:
+    """Alone as a top model, whose inputs have no derivatives, it compiles; driven by a sine and its derivative, it is the model."""
+    import rumoca
+
+    (tmp_path / "damped.toml").write_text(DAMPED)
+    model = penode_gen.load(tmp_path / "damped.toml")
+    (tmp_path / "damped.mo").write_text(text := export(model, "model"))
+    assert 'input Real der_z_road(unit="m/s")' in text and "der(z_road)" not in text
+    rumoca.Session().load(str(tmp_path / "damped.mo"), model="damped")  # compiles it
+    equations = "plant.z_road = 0.01*sin(30.0*time);\n  plant.der_z_road = 0.3*cos(30.0*time);"
+    (tmp_path / "driven").mkdir()
+    (tmp_path / "driven" / "Driven.mo").write_text(f"{text}\nmodel Driven\n  damped plant;\nequation\n  {equations}\nend Driven;\n")
+    found = rumoca.Session().load(str(tmp_path / "driven" / "Driven.mo"), model="Driven").simulate(0.5, dt=1e-3)["plant.z_w"]
+    u = 0.01 * np.sin(30.0 * np.arange(501) * 1e-3)[:, None]
+    # the input is linear between samples, with a rate that is that of the sine within 30^3/12 * 1e-6 * 0.01 m/s
+    assert np.abs(found - Sil(model, np.float64).run(u).y[:, 0]).max() <= 1e-5
+
+
 def test_networks_as_c_beside_one_another(nqvm: Any, tmp_path: Path) -> None:
     """Both networks in one file, with names of their own, equal to numpy in double; no warning."""
     data = exports.export(nqvm, "modelica", Path("m.zip"), {"form": "external"})

@@ -30,6 +30,7 @@ class _Writer:
         self.declared: list[str] = []
         self.equations: list[str] = []
         self.calls: dict[sp.Expr, str] = {}
+        self.rates: dict[sp.Expr, sp.Expr] = {}
         self.taken = {identifier(n) for n in (*model.states, *model.parameters, *(i.name for i in model.inputs))}
         self.relations, self.signals, self.unit_of = self._parsed()
 
@@ -90,7 +91,7 @@ class _Writer:
     def _print(self, e: sp.Expr) -> str:
         for call in sorted(e.atoms(AppliedUndef), key=str):
             self.calls.setdefault(call, self._free(f"{call.func.__name__}_{1 + sum(c.func == call.func for c in self.calls)}"))
-        return expression(e.xreplace({call: ex.symbol(f"{name}_y") for call, name in self.calls.items()}))
+        return expression(e.xreplace({call: ex.symbol(f"{name}_y") for call, name in self.calls.items()} | self.rates))
 
     def _free(self, name: str) -> str:
         while name in self.taken:
@@ -115,8 +116,15 @@ class _Writer:
     def _signals(self) -> None:
         """Inputs, outputs and states; an output that shows a state of its own name is that state."""
         model = self.model
+        differentiated = set().union(
+            *(q.right.free_symbols | q.left.free_symbols for q in self.relations), *(e.free_symbols for *_, e in self.signals)
+        )
         for i in model.inputs:
             self._line("input Real", i.name, i.unit, description=i.description)
+            if ex.derivative(i.name) in differentiated:  # an input of a top model has no derivative: it is another input
+                rate = self._free(f"der_{i.name}")
+                self.rates[ex.derivative(i.name)] = ex.symbol(rate)
+                self._line("input Real", rate, f"{i.unit or '1'}/s", description=f"rate of {i.name}: give its derivative")
         shown = {name for name, _, _, e in self.signals if e == ex.symbol(name) and name in model.states}
         for name, start in zip(model.states, model.start, strict=True):
             self._line("output Real" if name in shown else "Real", name, state_unit(model, name), more=f", start={real(start)}, fixed=true")
