@@ -160,9 +160,12 @@ def _signals(table: _Table, model: Model) -> None:
         words = f"{i.name} at the end of the next communication step; read where input_between_samples is linear"
         same = table.variables[-len(model.inputs)].start
         table.add("early", f"early.{i.name}", "input", "continuous", words, unit=units.si(i.unit), start=same)
-    for key, signals in (("output", model.outputs), ("sensor", model.sensors)):
-        for o in signals:
-            table.add(key, o.name, "output", "continuous", o.description, unit=units.si(o.unit))
+    shown = {o.name for o in model.outputs}
+    for o in model.outputs:
+        table.add("output", o.name, "output", "continuous", o.description, unit=units.si(o.unit))
+    for o in model.sensors:  # as in an A2L
+        name = f"sensor.{o.name}" if o.name in shown else o.name
+        table.add("sensor", name, "output", "continuous", o.description, unit=units.si(o.unit))
     of = _state_units(model)
     for name, start in zip(model.states, model.start, strict=True):
         table.add("state", f"state.{name}", "local", "continuous", f"state {name}", unit=of[name], start=(float(start),))
