@@ -25,6 +25,12 @@ C_WORDS = set(
     "self NULL linux unix size_t ptrdiff_t wchar_t "
     "H GH SUBSTEPS N_X N_U N_Y N_Q N_W N_DRIVE N_KEPT N_COLUMNS AT_CHANGE AT_BEND AT_TWIST N_SENSORS".split()
 )
+CPP_WORDS = set(  # of C++20: headers name states and signals, and C++ programs include them
+    "alignas alignof and and_eq asm bitand bitor catch char8_t char16_t char32_t class co_await co_return co_yield compl concept "
+    "consteval constexpr constinit const_cast decltype delete dynamic_cast explicit export friend mutable namespace new noexcept not "
+    "not_eq nullptr operator or or_eq private protected public reinterpret_cast requires static_assert static_cast template this "
+    "thread_local throw try typeid typename using virtual xor xor_eq".split()
+)
 C_PATTERN = re.compile(r"u?int\w*_t|U?INT\w*_(MAX|MIN|C)|(SIZE|PTRDIFF|WCHAR|SIG_ATOMIC|WINT)_(MAX|MIN)")
 RESERVED = {*ex.FUNCTIONS, "der", "where", m.GROUND}
 PREFIXES = (
@@ -157,6 +163,8 @@ class Tables:
             )
         elif name in C_WORDS or name in RESERVED or C_PATTERN.fullmatch(name) or name.startswith(prefixes) or self._is_macro(name):
             self.problem(where, f"'{name}' has a meaning of its own in C or in model files", "choose another name")
+        elif name in CPP_WORDS:
+            self.problem(where, f"'{name}' has a meaning of its own in C++, whose programs include the header", "choose another name")
 
     def _is_macro(self, name: str) -> bool:
         """
