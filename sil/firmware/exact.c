@@ -40,18 +40,12 @@ void exact_look(const exact_set_t *set, size_t rows, const size_t n[4], const do
 static double activated(int kind, double z)
 {
     switch (kind) {
-    case RELU:
-        return exact_larger(z, 0.0);
-    case TANH:
-        return tanh(z);
-    case SIGMOID:
-        return exact_sigmoid(z);
-    case SOFTPLUS:
-        return exact_softplus(z);
-    case STEP:
-        return isnan(z) ? z : ((z >= 0.0) ? 1.0 : 0.0);
-    default:
-        return z;
+    case RELU: return exact_larger(z, 0.0);
+    case TANH: return tanh(z);
+    case SIGMOID: return exact_sigmoid(z);
+    case SOFTPLUS: return exact_softplus(z);
+    case STEP: return isnan(z) ? z : ((z >= 0.0) ? 1.0 : 0.0);
+    default: return z;
     }
 }
 

@@ -20,7 +20,7 @@ KEPT = ROOT / "build" / "check"
 TIDIED = ("src/", "port/host/", "port/xcp/", "sil/firmware/")
 FOLDERS = ("inc", "port/gnu", "port/xcp", "port/cortex-m", "sil/firmware", "gen/nqvm/c")
 MODEL = ['-DMODEL_HEADER="nqvm.h"', "-DMODEL(name)=nqvm_##name", "-DMODEL_SIZE(name)=NQVM_##name", "-DMODEL_SETS=&nqvm_set_default"]
-FLAGS = ["-std=c99", "-ffp-contract=off", *(f"-I{folder}" for folder in FOLDERS), *MODEL, "-DBOARD_TICK_MHZ=25U"]
+FLAGS = ["-std=c99", "-ffp-contract=off", *(f"-I{folder}" for folder in FOLDERS), *MODEL, "-DBOARD_TICK_MHZ=25U", "-DEXACT_WIDTH=16U"]
 
 
 def tool(name: str) -> str:
