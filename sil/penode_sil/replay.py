@@ -16,6 +16,7 @@ from penode_gen.model import Model
 from . import recordings, scenario as scenarios
 from .errors import Problem, RecordingError, UserError
 from .recordings import Recording
+from .recordings.order import ordered
 from .signals import Samples
 
 Array = NDArray[np.float64]
@@ -79,13 +80,13 @@ def _sensed(tables: list[Recording], signals: dict[str, str], path: Path) -> tup
             table = recordings.pick(tables, name, unit)
             time = table.channel("time", "s", finite=False)
             values = table.channel(name, unit, finite=False)
+            sound = np.flatnonzero(np.isfinite(time) & np.isfinite(values))
+            rows = ordered(time[sound], lambda k, table=table, sound=sound: table.place(int(sound[k])))
         except UserError as exc:
             broken[name] = exc.problems[0]
             continue
-        sound = np.isfinite(time) & np.isfinite(values)
-        order = np.argsort(time[sound], kind="stable")
-        if order.size:
-            found[name] = Sensed(unit, time[sound][order], values[sound][order])
+        if sound.size:
+            found[name] = Sensed(unit, rows.time, values[sound][rows.rows])
     return found, broken
 
 

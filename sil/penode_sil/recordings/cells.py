@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Cells of a table as numbers: decimal points and commas, missing values, dates and times of day."""
+"""Cells of a table as numbers: decimal points and commas, missing values."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from datetime import date
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
+from .dates import DATE, STAMP, NoOffset, stamps
 
 Array = NDArray[np.float64]
 MISSING = frozenset(
@@ -50,10 +50,6 @@ MISSING = frozenset(
 FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))[dD]([+-]?\d+)")
 GROUPS = re.compile(r"[+-]?\d{1,3}(?:['\u2019\u00a0\u202f ]\d{3})+(?:[.,]\d+)?")
 NUMBER = re.compile(r"\s*[+-]?(?:\d+([.,]?)\d*|([.,])\d+)(?:[eEdD][+-]?\d+)?\s*")
-DAY = r"(?:(?P<y>\d{4})[-/.](?P<m>\d\d?)[-/.](?P<d>\d\d?)|(?P<a>\d\d?)[-/.](?P<b>\d\d?)[-/.](?P<c>\d{4}))"
-CLOCK = r"(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d))?(?:[.,:](?P<f>\d{1,9}))?\s*(?P<half>[AaPp][Mm])?"
-DATE = re.compile(rf"\s*{DAY}\s*")
-STAMP = re.compile(rf"\s*(?:{DAY}[T_ ,]+)?{CLOCK}\s*(?:Z|UTC|[+-]\d\d:?\d\d)?\s*")
 
 
 def number(text: str, decimal: str = ".") -> float:
@@ -104,51 +100,6 @@ def numbers(texts: Sequence[str | None], decimal: str) -> Array:
     return out
 
 
-def stamps(texts: Sequence[str | None]) -> Array:
-    """Dates and times of day in s since the first day's midnight; ValueError as for `numbers`. NaN where a cell is empty."""
-    found = [None if not text or not text.strip() else STAMP.fullmatch(text) for text in texts]
-    for k, (match, text) in enumerate(zip(found, texts, strict=True)):
-        if match is None and text and text.strip():
-            raise ValueError(k, text)
-    seconds = np.array([np.nan if match is None else _of_day(match) for match in found])
-    spans = [days + seconds for days in _days(found)]
-    best: Array = min(spans, key=lambda time: float(np.nanmax(time) - np.nanmin(time)) if np.isfinite(time).any() else 0.0)
-    if not any(match is not None and (match["y"] or match["c"]) for match in found):  # past midnight
-        known = np.flatnonzero(np.isfinite(best))
-        best[known] += 86400.0 * np.cumsum(np.diff(best[known], prepend=best[known[:1]]) < -43200.0)
-    return best
-
-
-def _of_day(match: re.Match[str]) -> float:
-    hour, minute, second, part = int(match["h"]), int(match["min"]), match["s"], match["f"]
-    fraction = int(part) / 10.0 ** len(part) if part else 0.0
-    if second is None and part:  # minutes and seconds, as Excel shows them
-        return 60.0 * hour + minute + fraction
-    if match["half"]:
-        hour = hour % 12 + 12 * (match["half"].lower() == "pm")
-    return 3600.0 * hour + 60.0 * minute + int(second or 0) + fraction
-
-
-def _days(found: Sequence[re.Match[str] | None]) -> Iterator[Array]:
-    """Whole days [s] since the first one, in every order of day and month that has such days."""
-    for first, second in (("b", "a"), ("a", "b")):
-        try:
-            days = [np.nan if m is None else _day(m, first, second) for m in found]
-        except ValueError:
-            continue
-        known = [day for day in days if day == day]
-        yield (np.array(days) - (known[0] if known else 0.0)) * 86400.0
-        if not any(m is not None and m["c"] for m in found):
-            return
-    yield np.zeros(len(found))
-
-
-def _day(match: re.Match[str], month: str, day: str) -> int:
-    if match["y"]:
-        return date(int(match["y"]), int(match["m"]), int(match["d"])).toordinal()
-    return date(int(match["c"]), int(match[month]), int(match[day])).toordinal() if match["c"] else 0
-
-
 class Columns(Mapping[str, Array]):
     """Columns of text cells that become numbers when they are asked for; a cell that nobody needs refuses nothing.
 
@@ -171,6 +122,10 @@ class Columns(Mapping[str, Array]):
             texts = self._texts[key]
             try:
                 self._ready[key] = stamps(texts) if key in self._stamped else numbers(texts, self._decimal)
+            except NoOffset as exc:
+                row, text = exc.args
+                what = f'channel {key}: "{text.strip()}" has no offset from UTC, other stamps of the channel have one'
+                raise RecordingError(f"{self._place(row)}: {what}; write it behind all of them, or behind none") from None
             except ValueError as exc:
                 row, text = exc.args
                 raise RecordingError(f"{self._place(row)}: {self._what(key, row, text)}") from None

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from . import cells, header, layout
+from . import cells, dates, header, layout
 from .decode import read_text
 from .table import Recording
 
@@ -114,7 +114,7 @@ def _slow(path: Path, lines: Sequence[str], found: layout.Layout, named: Sequenc
     short = {k: len(row) for k, row in enumerate(rows) if len(row) < width}
     texts = {c.key: [row[k] if k < len(row) else None for row in rows] for k, c in enumerate(named)}
     first = {key: next((cell for cell in column if cell and cell.strip()), "") for key, column in texts.items()}
-    stamped = frozenset(key for key, cell in first.items() if cells.STAMP.fullmatch(cell))
+    stamped = frozenset(key for key, cell in first.items() if dates.STAMP.fullmatch(cell))
     columns = cells.Columns(texts, found.decimal, stamped, lambda row: f"{path}:{numbers[row]}", short)
     return _table(path, found, named, numbers, columns, form, stamped)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
+from .order import ordered
 from .resampling import Kernel
 from .stamps import evened, sampled_evenly
 from .table import GAP, Recording, more
@@ -40,17 +41,13 @@ def clock_of(table: Recording, notes: list[str]) -> Clock:
     if rows.size < time.size:
         bad = np.flatnonzero(~np.isfinite(time))
         notes.append(f"{table.place(bad[0])}: channel time has no value there{more(bad.size)}; such rows are left out")
-    back = np.flatnonzero(np.diff(time[rows]) < 0.0)
-    if back.size:
-        order = np.argsort(time[rows], kind="stable")
-        place = f"{table.place(rows[back[0] + 1])}: channel time goes back there{more(back.size)}"
-        if np.any(np.diff(time[rows][order]) == 0.0):
-            raise RecordingError(f"{place}, and times repeat; split the recording where its clock starts anew")
-        rows = rows[order]
-        notes.append(f"{place}; rows are sorted by time")
+    found = ordered(time[rows], lambda k: table.place(int(rows[k])))
+    notes += [found.note] if found.note else []
+    time = time.copy()
+    time[rows[found.rows]] = found.time
+    rows = rows[found.rows]
     if (even := evened(time[rows])) is not None:
         notes.append(f"{table.path}: {even.note}")
-        time = time.copy()
         time[rows] = even.time
     again = np.flatnonzero(np.diff(time[rows]) == 0.0)
     if again.size:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, UserError, hint
 from . import named, unit_text
+from .order import ordered
 from .stamps import evened
 from .units import UnitError
 
@@ -172,6 +173,12 @@ class Recording:
         """The times [s], checked: increasing, without gaps; coarse stamps are spread evenly, which goes to the notes. UserError lists
         each kind of trouble once."""
         time = self.channel("time", "s")
+        if np.any(np.diff(time) < 0.0):
+            found = ordered(time, self.place)
+            if np.all(np.diff(found.rows) > 0):
+                time = found.time
+                if notes is not None:
+                    notes.append(found.note.removeprefix(f"{self.path}: "))
         if np.all(np.diff(time) >= 0.0) and (even := evened(time)) is not None:
             time = even.time
             if notes is not None:
