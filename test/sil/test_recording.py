@@ -143,7 +143,7 @@ DOUBTS = [
     ("time [s],x_b\n0,1\n1,4\n", r"no channel x; "),  # bytes are no length
     ("time [s],x_in\n0,1\n1,4\n", r"no channel x; "),  # inner or inch?
     ("time [s],x\n0,1\n1,4\n", r'channel x has no unit; write "x \[m\]"'),
-    ("time [s];x [m]\n0;1.000,5\n1;4\n", r':2: channel x: "1.000,5" is no number'),
+    ("time [s];x [m]\n0;1.00,5\n1;4\n", r':2: channel x: "1.00,5" is no number'),
     ("time [s],x [g]\n0,1\n1,4\n", r":1: channel x: g cannot be turned into m"),
 ]
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from .dates import DATE, STAMP, NoOffset, stamps
+from .notation import GROUPED, OTHER, Doubt, File, Signs, seen
 
 Array = NDArray[np.float64]
 MISSING = frozenset(
@@ -52,18 +53,15 @@ GROUPS = re.compile(r"[+-]?\d{1,3}(?:['\u2019\u00a0\u202f ]\d{3})+(?:[.,]\d+)?")
 NUMBER = re.compile(r"\s*[+-]?(?:\d+([.,]?)\d*|([.,])\d+)(?:[eEdD][+-]?\d+)?\s*")
 
 
-def number(text: str, decimal: str = ".") -> float:
+def number(text: str, signs: Signs) -> float:
     """One cell; NaN if it is empty or a sign for a missing value. ValueError if it is no number in this notation."""
-    text = text.strip()
-    if decimal == "," and "," in text:
-        if "." in text:
-            raise ValueError(text)
-        text = text.replace(",", ".")
+    if text.strip().casefold() in MISSING:
+        return float("nan")
+    text = signs.plain(text.strip())
     try:
         return float(text)
     except ValueError:
-        if text.casefold() in MISSING:
-            return float("nan")
+        pass
     text = text.replace("\u2212", "-")
     if GROUPS.fullmatch(text):
         text = re.sub(r"['\u2019\u00a0\u202f ]", "", text)
@@ -71,20 +69,26 @@ def number(text: str, decimal: str = ".") -> float:
 
 
 def decimal_sign(some: Sequence[Sequence[str]]) -> str:
-    """What parts whole numbers from fractions in rows of cells: a comma if there are some and no points."""
-    signs = {m[1] or m[2] for row in some for cell in row if (m := NUMBER.fullmatch(cell))} - {"", None}
+    """What parts whole numbers from fractions in rows of cells: a comma if there are some and no points, or points only where thousands are
+    parted."""
+    found = seen(cell for row in some for cell in row)
+    signs = found.fractions or {OTHER[sign] for sign in found.thousands} or {sign for sign, count in found.unclear.items() if count}
     return "," if signs == {","} else "."
 
 
 def is_number(text: str) -> bool:
     """May a cell be a value: a number, a stamp of time?"""
-    return any(kind.fullmatch(text) for kind in (NUMBER, STAMP, DATE, GROUPS)) or text.strip().casefold() in ("nan", "inf", "-inf")
+    return (
+        any(kind.fullmatch(text) for kind in (NUMBER, STAMP, DATE, GROUPS))
+        or bool(GROUPED.fullmatch(text.strip()))
+        or text.strip().casefold() in ("nan", "inf", "-inf")
+    )
 
 
-def numbers(texts: Sequence[str | None], decimal: str) -> Array:
+def numbers(texts: Sequence[str | None], signs: Signs) -> Array:
     """A column; ValueError(index, text) at the first cell that is no number, (index, None) where a row has no such cell."""
     some = [text for text in texts if text is not None]
-    if decimal == "." and len(some) == len(texts):
+    if signs == Signs(".") and len(some) == len(texts):
         try:
             return np.fromiter(map(float, some), np.float64, len(some))
         except ValueError:
@@ -94,7 +98,7 @@ def numbers(texts: Sequence[str | None], decimal: str) -> Array:
         if text is None:
             raise ValueError(k, text)
         try:
-            out[k] = number(text, decimal)
+            out[k] = number(text, signs)
         except ValueError:
             raise ValueError(k, text) from None
     return out
@@ -115,13 +119,19 @@ class Columns(Mapping[str, Array]):
         short: Mapping[int, int],
     ):
         self._texts, self._decimal, self._stamped, self._place, self._short = texts, decimal, stamped, place, short
+        self._notation = File({key: column for key, column in texts.items() if key not in stamped}, decimal)
         self._ready: dict[str, Array] = {}
 
     def __getitem__(self, key: str) -> Array:
         if key not in self._ready:
             texts = self._texts[key]
             try:
-                self._ready[key] = stamps(texts) if key in self._stamped else numbers(texts, self._decimal)
+                self._ready[key] = stamps(texts) if key in self._stamped else numbers(texts, self._notation.signs(key))
+            except Doubt as exc:
+                row, text = exc.args
+                meant = f"{text.strip().replace(',', '').replace('.', '')} or {text.strip().replace(',', '.')}"
+                what = f'channel {key}: "{text.strip()}" may be {meant}, and no other number tells'
+                raise RecordingError(f"{self._place(row)}: {what}; write numbers without signs between thousands") from None
             except NoOffset as exc:
                 row, text = exc.args
                 what = f'channel {key}: "{text.strip()}" has no offset from UTC, other stamps of the channel have one'

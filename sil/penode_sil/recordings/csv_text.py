@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from . import cells, dates, header, layout
+from . import cells, dates, header, layout, notation
 from .decode import read_text
 from .table import Recording
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 def read_csv(path: Path) -> Recording:
@@ -94,7 +95,26 @@ def _fast(body: Sequence[str], found: layout.Layout, width: int) -> Array | None
         values = np.loadtxt(io.StringIO(text), delimiter=delimiter, comments=None, ndmin=2)
     except ValueError:
         return None
-    return values if values.shape == (text.count("\n") + 1, width) else None
+    if values.shape != (text.count("\n") + 1, width):
+        return None
+    return values if all(_is_clear(body, found, k) for k in np.flatnonzero(_may_be_thousands(values))) else None
+
+
+def _may_be_thousands(values: Array) -> Flags:
+    """The columns of numbers [rows, channels] in which none has more than three decimals, or is larger than 999.999, and some have any."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        other = (np.abs(values) >= 1e3) | (np.abs(values * 1e3 - np.rint(values * 1e3)) > 1e-6)
+        found: Flags = ~np.any(other, axis=0) & np.any(np.abs(values - np.rint(values)) > 0.0, axis=0)
+    return found
+
+
+def _is_clear(body: Sequence[str], found: layout.Layout, column: int) -> bool:
+    """Has a column a number that can only be one with a fraction? Looked for up to the first one."""
+    for line in body:
+        row = layout.split(line, found.separator)
+        if column < len(row) and found.decimal in notation.seen(row[column : column + 1]).fractions:
+            return True
+    return False
 
 
 def _slow(path: Path, lines: Sequence[str], found: layout.Layout, named: Sequence[header.Cell], form: str) -> Recording:
