@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from penode_gen.on_demand import names_from
 
 if TYPE_CHECKING:
-    from .csv_text import read_csv
+    from .text.csv_text import read_csv
     from .files import pick, read
     from .named import aliases
     from .resampling import Kernel, on_raster, resample
@@ -30,7 +30,7 @@ _FROM = {  # name -> module that has it
     "on_raster": "resampling",
     "pick": "files",
     "read": "files",
-    "read_csv": "csv_text",
+    "read_csv": "text.csv_text",
     "resample": "resampling",
 }
 __getattr__ = names_from(__name__, _FROM)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import RecordingError, UserError, hint
 from . import mdf, named, similar
-from .csv_text import read_csv
+from .text.csv_text import read_csv
 from .table import Recording
 
 

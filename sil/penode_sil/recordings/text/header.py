@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from . import unit_text
+from .. import unit_text
 
 BRACKET = re.compile(r"^(.*?)(\s*)\[([^\[\]]*)\]?$", re.DOTALL)
 OTHER = re.compile(r"^(.*?)(\s*)(?:\(([^()]*(?:\([^()]*\)[^()]*)?)\)|\{([^{}]*)\}|<([^<>]*)>)$", re.DOTALL)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordingError
+from ...errors import RecordingError
 from .dates import DATE, STAMP, NoOffset, stamps
 from .notation import GROUPED, OTHER, Doubt, File, Signs, seen
 

@@ -11,7 +11,8 @@ from collections import Counter
 from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 
-from . import header, named
+from .. import named
+from . import header
 from .cells import NUMBER, decimal_sign, is_number
 
 BLANKS = " "  # the separator of tables whose columns stand between blanks

@@ -7,7 +7,7 @@ from __future__ import annotations
 import codecs
 from pathlib import Path
 
-from ..errors import RecordingError
+from ...errors import RecordingError
 
 MARKS = (
     (codecs.BOM_UTF8, "utf-8"),

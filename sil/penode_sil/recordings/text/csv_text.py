@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordingError
+from ...errors import RecordingError
 from . import cells, dates, header, layout, notation
 from .decode import read_text
-from .table import Recording
+from ..table import Recording
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
