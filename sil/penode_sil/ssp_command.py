@@ -19,10 +19,10 @@ def play(model: Path | None, ssp: Path, other: bool, given: dict[str, Any]) -> N
     from . import ssp_player
 
     records, output = given["records"], given["output"]
-    foreign = other or any(given[key] for key in ("scenario", "plot", "signal", "set_name", "channel", "start")) or given["how"] != "linear"
+    foreign = other or any(given[key] for key in ("scenario", "plot", "signal", "set_name", "start")) or given["how"] != "linear"
     if model is not None or foreign or len(records) > 1 or output.suffix != ".csv":
-        raise WrongUse("--ssp: it goes with one --input and -o FILE.csv only, and without a model file; leave the others out")
+        raise WrongUse("--ssp: it goes with one --input, --channel and -o FILE.csv only, and without a model file; leave the others out")
     check_writable(output)
-    columns = ssp_player.play(ssp, records[0] if records else None, note)
+    columns = ssp_player.play(ssp, records[0] if records else None, note, given["channel"])
     write_csv(output, columns)
     click.echo(f"{ssp.name}: {columns[0].values.size} samples -> {output}")

@@ -4,11 +4,9 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.util
-import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,30 +14,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import ssp_file
+from . import recordings, ssp_file
 from .errors import ModelError, RecordingError, ToolMissing
 from .output import Column
+from .recordings.order import Ordered, ordered
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]  # gets a line
 
 
-def play(path: Path, record: Path | None, tell: Tell = lambda line: None) -> list[Column]:
+def play(path: Path, record: Path | None, tell: Tell = lambda line: None, channels: Sequence[str] = ()) -> list[Column]:
     """
     Time, inputs and outputs at each sample, as columns. Raises UserError.
 
-    `record`: CSV with `time [s]` and inputs of the system; a value holds from its row to the next. Without it inputs keep their
-    start values until the stop time of the SSP. `tell` takes a line for each warning of the FMU, and for each exchange that is
-    scheduled too late.
+    `record`: a recording of inputs of the system, read as everywhere, in the units of the FMU; a value holds from its row to the next.
+    `channels` are texts like `x=pos_mm`. Without it inputs keep their start values until the stop time of the SSP. `tell` takes a line for
+    each warning of the FMU, and for each exchange that is scheduled too late.
     """
     if importlib.util.find_spec("fmpy") is None:
         raise ToolMissing("--ssp: it needs the Python package FMPy, which is not installed; pip install penode[ssp]")
     system = ssp_file.read(path)
-    table = _record(record, system.inputs) if record else {}
-    stop = float(table["time"][-1]) if table else system.stop
-    if stop is None:
+    if record is None and system.stop is None:
         raise ModelError([f"{path}: it has no stop time; give inputs with --input"])
     with _component(path, system, tell) as fmu:
+        units = {name: fmu.unit(system.wires[name]) for name in system.inputs}
+        table = _record(record, units, channels, tell) if record else {}
+        stop = float(table["time"][0][-1]) if table else float(system.stop or 0.0)
         steps = round(stop / fmu.step_size)
         rows = _run(path, system, fmu, table, steps)
     times = np.arange(steps + 1, dtype=float) * fmu.step_size
@@ -50,14 +50,17 @@ def play(path: Path, record: Path | None, tell: Tell = lambda line: None) -> lis
     ]
 
 
-def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, Array], steps: int) -> Array:
+def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, tuple[Array, Array]], steps: int) -> Array:
     """Rows of inputs and outputs: an output beside the input at its own sample."""
     times = np.arange(steps + 1, dtype=float) * fmu.step_size
     half = fmu.step_size / 2
-    at = np.maximum(np.searchsorted(table["time"], times + half * 1e-3, side="right") - 1, 0) if table else None
-    inputs = np.array(
-        [table[name][at] if name in table else np.full(steps + 1, _start(system, fmu, name)) for name in system.inputs]
-    ).reshape(-1, steps + 1)
+    inputs = np.empty((len(system.inputs), steps + 1))
+    for i, name in enumerate(system.inputs):
+        if name in table:
+            time, values = table[name]
+            inputs[i] = values[np.maximum(np.searchsorted(time, times + half * 1e-3, side="right") - 1, 0)]
+        else:
+            inputs[i] = _start(system, fmu, name)
     outputs = np.empty((steps + 1, len(system.outputs)))
     waiting = list(system.schedule)
     fmu.initialise({**system.start, **{system.wires[n]: (u[0],) for n, u in zip(system.inputs, inputs, strict=True)}}, f"{path}: start")
@@ -81,29 +84,33 @@ def _start(system: ssp_file.System, fmu: _Fmu, name: str) -> float:
     return bound[0] if bound else fmu.get(system.wires[name])
 
 
-def _record(path: Path, known: tuple[str, ...]) -> dict[str, Array]:
-    """Columns of a CSV by name, "time" among them."""
-    try:
-        with open(path, encoding="utf-8", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror}; name a file that can be read") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(f"{path}: no table that can be read: {error}; save it as CSV in UTF-8") from None
-    names = [re.sub(r"\s*\[.*?\]\s*$", "", word).strip() for word in rows[0]] if rows else []
-    if "time" not in names or len(rows) < 2:
-        raise RecordingError(f"{path}: it has no column time, or no rows; write time [s] and the inputs: {', '.join(known)}")
-    try:
-        values = np.array(rows[1:], float)
-    except ValueError as error:
-        raise RecordingError(
-            f"{path}: {' '.join(str(error).split())[:200]}; give every row as many numbers as the header has names"
-        ) from None
-    if values.shape[1] != len(names) or not np.isfinite(values).all() or (np.diff(values[:, names.index("time")]) <= 0).any():
-        raise RecordingError(
-            f"{path}: a row that does not fit the header, a number that is not finite, or times that do not ascend; mend the table"
-        )
-    return {name: values[:, i] for i, name in enumerate(names) if name == "time" or name in known}
+def _record(path: Path, units: dict[str, str], channels: Sequence[str], tell: Tell) -> dict[str, tuple[Array, Array]]:
+    """Times [s] and values (SI) of "time" and of each input, name -> unit, that a recording has, on the clock of its table."""
+    tables = recordings.read(path, [*units, "time"], recordings.aliases(channels, units))
+    found: dict[str, tuple[Array, Array]] = {}
+    for name, unit in units.items():
+        if any(table.find(name, unit) for table in tables):
+            table = recordings.pick(tables, name, unit)
+            values = table.channel(name, unit)
+            rows = _rows(table, tell)
+            found[name] = rows.time, values[rows.rows]
+    shared = min((time[-1] for time, _ in found.values()), default=None) if found else _rows(tables[0], tell).time[-1]
+    return {"time": (np.array([shared]), np.array([shared])), **found}
+
+
+def _rows(table: recordings.Recording, tell: Tell) -> Ordered:
+    """The rows of a table in the order of time, each at a time of its own."""
+    time = table.channel("time", "s")
+    if not time.size:
+        raise RecordingError(f"{table.path}: it has no rows; write time and inputs of the system, a row for each value that they take")
+    rows = ordered(time, table.place)
+    if rows.note:
+        tell(rows.note)
+    again = np.flatnonzero(np.diff(rows.time) == 0.0)
+    if again.size:
+        where = table.place(int(rows.rows[again[0] + 1]))
+        raise RecordingError(f"{where}: channel time has the same value as the row before{recordings.more(again.size)}; remove the duplicate")
+    return rows
 
 
 class _Fmu:

@@ -271,15 +271,38 @@ def test_an_input_without_a_column_keeps_what_the_ssp_binds_to_it(ssp: Path, tmp
     assert columns["z_w"][-1] > 0.0, "the wheel follows it"
 
 
+@needs("fmpy")
+def test_units_of_a_recording_count(ssp: Path, tmp_path: Path) -> None:
+    """The same road in m, in mm under another name with decimal commas, and without a clock of the same rows."""
+    time = np.arange(41) * 5e-3
+    road = np.round(0.01 * np.sin(20.0 * time), 9)
+    forms = {
+        "m.csv": ("time [s],z_road [m]\n" + "".join(f"{t:.9g},{z:.9g}\n" for t, z in zip(time, road, strict=True)), []),
+        "mm.csv": (
+            "Zeit [ms];Weg [mm]\n" + "".join(f"{t:.9g};{z:.9g}\n" for t, z in zip(1e3 * time, 1e3 * road, strict=True)).replace(".", ","),
+            ["--channel", "z_road=Weg"],
+        ),
+    }
+    found = []
+    for name, (text, words) in forms.items():
+        (tmp_path / name).write_text(text)
+        play("--ssp", str(ssp), "--input", str(tmp_path / name), *words, "-o", str(tmp_path / "o.csv"))
+        found.append(np.loadtxt(tmp_path / "o.csv", delimiter=",", skiprows=1))
+    assert np.max(np.abs(found[0][:, 1])) > 5e-3
+    assert found[1] == pytest.approx(found[0], rel=1e-9, abs=1e-12)
+
+
 def test_tables_and_options_that_do_not_fit_are_one_line(ssp: Path, tmp_path: Path) -> None:
     pytest.importorskip("fmpy")
     record, output = tmp_path / "r.csv", tmp_path / "o.csv"
     for text, part in (
-        ("", "no column time"),
-        ("time\n0,1\n", "does not fit"),
-        ("time,z_road\n0,a\n", "could not convert"),
-        ("time,z_road\n0,0\n0,0\n", "do not ascend"),
-        ("time,z_road\n0,1\n1\n", "as many numbers"),
+        ("", "it is empty"),
+        ("time [s],z_road [m]\n0,a\n1,0\n", 'channel z_road: "a" is no number'),
+        ("time [s],z_road [m]\n0,0\n0,0\n", "has the same value as the row before; remove"),
+        ("time [s],z_road [m]\n0,1\n1\n", "1 values for 2 channels"),
+        ("time [s],z_road\n0,1\n1,1\n", 'channel z_road has no unit; write "z_road [m]" in the header'),
+        ("time [s],z_road [kg]\n0,1\n1,1\n", "channel z_road: kg cannot be turned into m"),
+        ("time [s],z_road [m]\n0,1\n1,nan\n", "channel z_road has no finite value there"),
     ):
         record.write_text(text)
         with pytest.raises(UserError) as found:
