@@ -16,7 +16,6 @@ from penode_gen.model import Model
 from . import recordings, scenario as scenarios
 from .errors import Problem, RecordingError, UserError
 from .recordings import Recording
-from .recordings.order import ordered
 from .signals import Samples
 
 Array = NDArray[np.float64]
@@ -81,7 +80,7 @@ def _sensed(tables: list[Recording], signals: dict[str, str], path: Path) -> tup
             time = table.channel("time", "s", finite=False)
             values = table.channel(name, unit, finite=False)
             sound = np.flatnonzero(np.isfinite(time) & np.isfinite(values))
-            rows = ordered(time[sound], lambda k, table=table, sound=sound: table.place(int(sound[k])))
+            rows = table.ordered(sound)
         except UserError as exc:
             broken[name] = exc.problems[0]
             continue

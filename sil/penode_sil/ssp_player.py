@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from . import recordings, ssp_file
 from .errors import ModelError, RecordingError, ToolMissing
 from .output import Column
-from .recordings.order import Ordered, ordered
+from .recordings.order import Ordered
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]  # gets a line
@@ -103,13 +103,15 @@ def _rows(table: recordings.Recording, tell: Tell) -> Ordered:
     time = table.channel("time", "s")
     if not time.size:
         raise RecordingError(f"{table.path}: it has no rows; write time and inputs of the system, a row for each value that they take")
-    rows = ordered(time, table.place)
+    rows = table.ordered(np.arange(time.size))
     if rows.note:
         tell(rows.note)
     again = np.flatnonzero(np.diff(rows.time) == 0.0)
     if again.size:
         where = table.place(int(rows.rows[again[0] + 1]))
-        raise RecordingError(f"{where}: channel time has the same value as the row before{recordings.more(again.size)}; remove the duplicate")
+        raise RecordingError(
+            f"{where}: channel time has the same value as the row before{recordings.more(again.size)}; remove the duplicate"
+        )
     return rows
 
 

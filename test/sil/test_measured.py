@@ -100,8 +100,8 @@ def test_a_gap_of_the_input_alone_parts_the_recording_and_a_short_one_is_bridged
     foot[5000:5004] = np.nan
     first, second = load([record(foot=foot)], oscillator)
     assert first.time.size == 5000 and second.time.size == N - 5004
-    bridge = np.interp(T[1000:1003], T[[999, 1003]], FOOT[[999, 1003]])
-    assert first.u[1000:1003, 0] == pytest.approx(bridge * 1e-3, rel=1e-6)
+    # a curve of third order over a hole of 4 h: (4 h 2 pi 1.5)^4 / 384 of 10 mm are 5e-11 m, digits of the file 1e-11 m
+    assert first.u[1000:1003, 0] == pytest.approx(FOOT[1000:1003] * 1e-3, abs=1e-10)
     assert any("up to 3 in a row are bridged" in line for line in first.quality.problems)
 
 
@@ -197,6 +197,31 @@ def test_a_standstill_is_found_and_no_fault_of_it(record, oscillator):
     assert one.quality.channels["a"].noise.above == 0.0
     # 3 s, 23 stretches of 256 in 100 bins: sqrt(2.08 * 2 / (23 * 100)) / 2 = 2 %; four of them
     assert one.quality.channels["a"].noise.std == pytest.approx(0.01, rel=0.08)
+
+
+def test_a_recording_that_is_too_short_is_left_out_if_others_are_not(record, oscillator):
+    short, none, whole = record("short.csv", slice(50)), record("none.csv", slice(1)), record("whole.csv")
+    (one,) = load([short, whole, none], oscillator)
+    assert one.path == whole and one.whole == N
+    assert one.quality.problems == (
+        f"{short}: its 50 samples of 1 ms are too few; the recording is left out",
+        f"{none}: it has 1 rows with a time of their own; the recording is left out",
+    )
+    assert len(problems([short, none], oscillator)) == 2
+
+
+def test_a_rail_is_at_its_place_in_units_with_another_zero(tmp_path):
+    path = tmp_path / "heater.toml"
+    path.write_text(
+        '[model]\nname = "heater"\nsample_time = "1 ms"\n[parameters]\nC = { value = 9000.0, unit = "J/K" }\n'
+        '[inputs]\nP = { unit = "W" }\n[states]\nT = { unit = "K", start = 293 }\n[equations]\nheat = "der(T)*C = P"\n'
+        '[outputs]\ny = { value = "T", unit = "K" }\n[sensors]\nT_meas = { value = "T", unit = "K", noise = 0.05 }\n'
+    )
+    recording = write(tmp_path / "r.csv", {"time [s]": T, "P [W]": FOOT, "T_meas [°C]": np.minimum(20.0 + Z, 29.0)})
+    (one,) = load([recording], penode_gen.load(path))
+    assert one.z["T_meas"][one.mask["T_meas"]].max() < 302.15
+    assert one.quality.channels["T_meas"].high == pytest.approx(302.15) and any("is cut off at 302.15 K" in p for p in one.quality.problems)
+    assert any("0 of its unit is 273.15 K; it is read as a temperature" in p for p in one.quality.problems)
 
 
 def test_what_cannot_be_used_is_refused(record, oscillator):

@@ -4,17 +4,17 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta, timezone
+from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
 import pytest
 
 from penode_sil.errors import UserError
-from penode_sil.recordings import read
+from penode_sil.recordings import GAP, read
 from penode_sil.recordings.order import ordered
 from penode_sil.recordings.raster import clock_of
 
-BEGIN = datetime(2026, 10, 25, 0, 50, tzinfo=timezone.utc)  # ten minutes before summer time ends in Berlin
+BEGIN = datetime(2026, 10, 25, 0, 50, tzinfo=UTC)  # ten minutes before summer time ends in Berlin
 STEP, COUNT = 2.5, 960  # 40 min
 SUMMER = COUNT // 4  # rows of it
 EXACT = np.arange(COUNT) * STEP
@@ -87,12 +87,14 @@ def test_rows_in_another_order_are_sorted(seed):
     draw = np.random.default_rng(seed)
     late = EXACT + draw.uniform(0.0, 4.0 * STEP, COUNT)  # written when they arrive
     for time in (EXACT[np.argsort(late)], np.concatenate([EXACT[500:], EXACT[:500]]), np.r_[EXACT[:7], EXACT[8:11], EXACT[7], EXACT[11:]]):
-        found = ordered(time, str)
+        found = ordered(time, str, GAP)
         assert found.time == pytest.approx(EXACT) and time[found.rows] == pytest.approx(EXACT) and "sorted by time" in found.note
 
 
-def test_blocks_of_several_sources_are_sorted_and_laps_are_not():
-    blocks = np.concatenate([t for a in range(0, COUNT, 48) for t in (EXACT[a : a + 48], EXACT[a : a + 48] + 0.3 * STEP)])
-    assert np.all(np.diff(ordered(blocks, str).time) > 0.0)
+@pytest.mark.parametrize("jitter", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("laps", [2, 3, 16])
+def test_a_clock_that_starts_anew_is_refused(jitter, laps):
+    draw = np.random.default_rng(laps)
+    lap = [np.cumsum(STEP * (1.0 + jitter * draw.uniform(-0.999, 1.0, 60))) for _ in range(laps)]
     with pytest.raises(UserError, match="starts anew"):
-        ordered(np.tile(EXACT[:60], 16), str)
+        ordered(np.concatenate(lap), str, GAP)

@@ -150,6 +150,21 @@ def test_values_that_a_fine_sensor_froze_at_are_no_steps_of_a_coarse_one():
     assert [np.count_nonzero(found.held[at : at + long]) for at, long in ((2000, 25), (7000, 6), (9000, 33))] == [24, 5, 32]
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_a_vehicle_at_rest_starts_and_stops_without_a_fault(seed):
+    """A tenth of a metre per second as step of a speed, ten rows a second: it stands, starts, drives, stops, stands."""
+    draw = np.random.default_rng(seed)
+    time = np.arange(140) / 10.0
+    top, lag = draw.uniform(1.0, 4.0), draw.uniform(0.3, 2.0)
+    speed = np.where(time > 2.04, top * (1.0 - np.exp(-(time - 2.04) / lag)), 0.0)
+    end = np.searchsorted(time, 9.0)
+    speed[end:] = np.maximum(speed[end] - draw.uniform(0.5, 2.0) * (time[end:] - time[end]), 0.0)
+    faults = examine(np.round((speed + 0.02 * draw.normal(size=time.size) * (speed > 0.0)) / 0.04) * 0.04)
+    assert not faults.held.any() and not faults.spikes.any()
+    speed[60] += 6.0 * top
+    assert np.flatnonzero(examine(speed).spikes).tolist() == [60]
+
+
 def test_constant_and_empty_channels():
     assert examine(np.full(100, 3.0)).constant and not examine(np.full(100, np.nan)).constant
     assert not examine(np.empty(0)).any.size

@@ -289,3 +289,36 @@ def test_a_crash_of_one_recording_is_a_line_too(tmp_path, monkeypatch):
     (path,) = tmp_path.glob("penode-crash-*.txt")
     assert answer is None and "\n" not in line and "ZeroDivisionError" in line and f"send us {path}" in line
     assert "Traceback" in path.read_text()
+
+
+@pytest.mark.parametrize(
+    "given, asked, at_zero, at_ten",
+    [
+        ("°C", "K", 273.15, 283.15),
+        ("degC", "K", 273.15, 283.15),
+        ("deg C", "K", 273.15, 283.15),
+        ("\u2103", "K", 273.15, 283.15),
+        ("Celsius", "K", 273.15, 283.15),
+        ("C", "K", 273.15, 283.15),
+        ("°F", "K", 459.67 / 1.8, 469.67 / 1.8),
+        ("degF", "K", 459.67 / 1.8, 469.67 / 1.8),
+        ("K", "K", 0.0, 10.0),
+        ("°C/s", "K/s", 0.0, 10.0),  # differences
+        ("°F/min", "K/s", 0.0, 10.0 / 1.8 / 60.0),
+        ("W/°C", "W/K", 0.0, 10.0),
+        ("C", "C", 0.0, 10.0),  # coulomb, where a charge is asked for
+        ("ft/s^2", "m/s^2", 0.0, 3.048),
+        ("ft/s/s", "m/s^2", 0.0, 3.048),
+        ("fps", "m/s", 0.0, 3.048),
+        ("in/s", "m/s", 0.0, 0.254),
+        ("mph", "m/s", 0.0, 4.4704),
+    ],
+)
+def test_units_with_another_zero_and_imperial_ones(tmp_path, given, asked, at_zero, at_ten):
+    path = write(tmp_path, f"time [s],x [{given}]\n0,0\n1,10\n")
+    assert channel(path, "x", asked) == pytest.approx([at_zero, at_ten], rel=1e-12)
+
+
+def test_endings_of_names_are_units_too(tmp_path):
+    path = write(tmp_path, "time_s,a_ft_s2,T_degC\n0,10,20\n1,20,30\n")
+    assert channel(path, "a", "m/s^2")[0] == pytest.approx(3.048) and channel(path, "T", "K")[0] == pytest.approx(293.15)

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 from penode_gen.on_demand import names_from
 
 if TYPE_CHECKING:
-    from .text.csv_text import read_csv
     from .files import pick, read
     from .named import aliases
     from .resampling import Kernel, on_raster, resample
     from .table import GAP, Recording, more
+    from .text.csv_text import read_csv
 
 __all__ = ["GAP", "Kernel", "Recording", "aliases", "more", "on_raster", "pick", "read", "read_csv", "resample"]
 

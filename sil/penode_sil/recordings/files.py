@@ -13,8 +13,8 @@ import numpy as np
 
 from ..errors import RecordingError, UserError, hint
 from . import mdf, named, similar
-from .text.csv_text import read_csv
 from .table import Recording
+from .text.csv_text import read_csv
 
 
 def read(path: Path, names: Iterable[str] | None = None, pairs: Mapping[str, str] | None = None) -> list[Recording]:

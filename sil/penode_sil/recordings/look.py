@@ -19,6 +19,7 @@ from .clocks import own_samples
 from .files import pick, read
 from .raster import Clock, clock_of, steadied
 from .table import GAP, Recording
+from .uneven import longest
 from .units import UnitError
 
 Array = NDArray[np.float64]
@@ -103,7 +104,7 @@ def _table(table: Recording) -> Table:
         time = table.find("time", "s")
         clock = clock_of(table, notes)
         start, end, interval = float(clock.time[0]), float(clock.time[-1]), clock.interval
-        gaps = int(np.sum(np.diff(clock.time) > GAP * clock.interval))
+        gaps = int(np.sum(np.diff(clock.time) > max(GAP * clock.interval, longest(np.diff(clock.time), GAP))))
     except UserError as exc:
         notes += exc.problems
     for key in table.columns:
@@ -121,7 +122,10 @@ def _channel(table: Recording, key: str, clock: Clock | None) -> Channel:
     except UserError as exc:
         return Channel(key, unit, exc.problems[0])
     own = None if clock is None else own_samples(steadied(clock, "", [], []).time, values[clock.rows])
-    faults = quality.examine(own.values if own else values if clock is None else values[clock.rows])
+    if own is not None:
+        faults = quality.examine(own.values)
+    else:
+        faults = quality.examine(*((values,) if clock is None else (values[clock.rows], clock.uneven)))
     good = values[np.isfinite(values)]
     low, high = (float(good.min()), float(good.max())) if good.size else (float("nan"), float("nan"))
     return Channel(

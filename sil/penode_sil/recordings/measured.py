@@ -23,7 +23,7 @@ from ..errors import RecordingError, UserError
 from . import noise, quality
 from .files import pick, read
 from .named import aliases
-from .raster import BRIDGE, SHORTEST, Clock, clock_of, filled, held_on_raster, on_raster, stretches
+from .raster import BRIDGE, SHORTEST, Clock, TooShort, clock_of, filled, held_on_raster, on_raster, stretches
 from .sampled import Own, origin, own_of, steady
 from .table import Recording, more
 from .units import factor
@@ -79,6 +79,7 @@ class Measured:
     shown: dict[str, Flags]
     rest: Flags
     quality: Quality
+    whole: int = 0  # samples of the file on the raster, with those in gaps
     smooth: Array | None = None  # [n, inputs] with what the file repeats between samples joined to a band-limited curve; None: nothing
 
     @property
@@ -114,18 +115,24 @@ def load(paths: Iterable[Path], model: Model, channels: Iterable[str] = ()) -> l
     """Read recordings for a model; `channels` are texts like `x=pos_mm` that say what a file calls a signal.
 
     Signals are the model's inputs (required), sensors and outputs (at least one), by name. UserError has one line for
-    each reason why a recording cannot be used.
+    each reason why a recording cannot be used. One that is too short is left out, which is noted, if others are not.
     """
     pairs = aliases(channels, [*(s.name for s in model.inputs), *(s.name for s in (*model.sensors, *model.outputs))])
     found: list[Measured] = []
     problems: list[str] = []
+    short: list[str] = []
     for path in paths:
         try:
             found += _load(Path(path), model, pairs)
+        except TooShort as exc:
+            short += exc.problems
         except UserError as exc:
             problems += exc.problems
-    if problems:
-        raise RecordingError(*problems)
+    if problems or (short and not found):
+        raise RecordingError(*problems, *short)
+    if short:
+        notes = (*found[0].quality.problems, *(f"{line.partition('; ')[0]}; the recording is left out" for line in short))
+        found[0] = replace(found[0], quality=replace(found[0].quality, problems=notes))
     return found
 
 
@@ -158,6 +165,8 @@ def _load(path: Path, model: Model, pairs: dict[str, str]) -> list[Measured]:
         try:
             bases[id(table)] = clock_of(table, notes)
         except UserError as exc:
+            if isinstance(exc, TooShort) and not errors:
+                raise
             errors += exc.problems
     if errors:
         raise RecordingError(*errors)
@@ -168,7 +177,7 @@ def _load(path: Path, model: Model, pairs: dict[str, str]) -> list[Measured]:
     taken: dict[str, _Taken] = {}
     for name, table in where.items():
         try:
-            one = _take(raster, model.sample_time, signals[name], table, own[name], name in inputs, notes)
+            one = _take(raster, model, signals[name], table, own[name], notes)
             taken |= {name: one} if one is not None else {}
         except UserError as exc:
             errors += exc.problems
@@ -183,7 +192,7 @@ class _Taken:
 
     rows: Array
     faults: quality.Faults
-    scale: float  # SI per unit of the file
+    own: Own  # its unit
     clock: Clock
     values: Array
     usable: Flags
@@ -197,16 +206,17 @@ def _raster(path: Path, step: float, clocks: list[Clock]) -> Array:
     first, last = float(max(c.time[0] for c in clocks)), float(min(c.time[-1] for c in clocks))
     count = max(0, int(min((last - first) / step + 1e-3, 1e12)) + 1)
     if count < SHORTEST:
-        raise RecordingError(f"{path}: its {count} samples of {step * 1e3:g} ms are too few; record at least {SHORTEST}")
+        raise TooShort(f"{path}: its {count} samples of {step * 1e3:g} ms are too few; record at least {SHORTEST}")
     if count > 20 * sum(c.time.size * max(1.0, c.interval / step) for c in clocks):
         raise RecordingError(f"{path}: it has far longer gaps than samples; split the recording there")
     return first + np.arange(count, dtype=np.float64) * step
 
 
-def _take(raster: Array, step: float, signal: Input | Signal, table: Recording, own: Own, driving: bool, notes: list[str]) -> _Taken | None:
+def _take(raster: Array, model: Model, signal: Input | Signal, table: Recording, own: Own, notes: list[str]) -> _Taken | None:
     """One channel on the raster; None if it cannot be used, which is noted, or a UserError if it drives the model."""
-    clock, rows, scale = own.clock, own.rows, own.scale
-    faults = quality.examine(own.raw)
+    clock, rows, step = own.clock, own.rows, model.sample_time
+    driving = signal in model.inputs
+    faults = quality.examine(own.raw, clock.uneven)
     bad = faults.missing | faults.spikes if driving else faults.any
     if np.mean(bad) > 0.9 or (faults.constant and not driving):
         what = "does not change" if faults.constant else "has hardly a sound sample"
@@ -216,9 +226,15 @@ def _take(raster: Array, step: float, signal: Input | Signal, table: Recording, 
         notes.append(f"{place}; it is left out")
         return None
     notes += [origin(table, signal.name, own, driving)] if own.how else []
-    _tell(notes, table, clock, signal, faults, scale, driving)
+    if own.zero:
+        notes.append(
+            f"{table.header}: channel {signal.name}: 0 of its unit is {own.zero:.6g} K; it is read as a temperature, not a difference"
+        )
+    _tell(notes, table, clock, signal, faults, own, driving)
     smooth = None
-    if driving and own.how == "held":
+    if driving and model.interpolation == "held" and (own.how or clock.one_by_one(step) or clock.interval > step):
+        values, usable = held_on_raster(raster, step, clock, rows, bad)
+    elif driving and own.how == "held":
         values, usable = held_on_raster(raster, step, clock, rows, bad)
         smooth, curved = on_raster(raster, step, clock, rows, bad, driving, curved=True)
         usable &= curved
@@ -229,7 +245,7 @@ def _take(raster: Array, step: float, signal: Input | Signal, table: Recording, 
         shown = on_raster(raster, step, clock, filled(rows, ~faults.missing), faults.missing, driving)[1]
     if isinstance(signal, Input) and usable.any():
         _check_range(table.path, signal, values[usable], notes)
-    return _Taken(rows, faults, scale, clock, values, usable, shown, own.how, smooth)
+    return _Taken(rows, faults, own, clock, values, usable, shown, own.how, smooth)
 
 
 def _parts(path: Path, step: float, raster: Array, inputs: list[str], taken: dict[str, _Taken], notes: list[str]) -> list[Measured]:
@@ -266,6 +282,7 @@ def _parts(path: Path, step: float, raster: Array, inputs: list[str], taken: dic
             {name: taken[name].shown[a:b] for name in sensors},
             still[a:b],
             info,
+            raster.size,
             None if smooth is None else smooth[a:b],
         )
         for k, (a, b) in enumerate(parts, start=1)
@@ -273,10 +290,10 @@ def _parts(path: Path, step: float, raster: Array, inputs: list[str], taken: dic
 
 
 def _channel(name: str, taken: _Taken, law: noise.Noise | None) -> Channel:
-    f, scale = taken.faults, taken.scale
+    f, own = taken.faults, taken.own
     missing, saturated, held, spikes = (int(np.sum(flags)) for flags in (f.missing, f.saturated, f.held, f.spikes))
-    low, high = (None if edge is None else edge * scale for edge in (f.low, f.high))
-    quantum = f.quantum * abs(scale)
+    low, high = (None if edge is None else edge * own.scale + own.zero for edge in (f.low, f.high))
+    quantum = f.quantum * abs(own.scale)
     interval, rows = taken.clock.interval, taken.rows.size
     return Channel(name, interval, rows, missing, saturated, held, spikes, low, high, quantum, f.constant, law, taken.how)
 
@@ -285,7 +302,7 @@ def _noise(
     name: str, taken: dict[str, _Taken], inputs: list[str], sound: Flags, rest: Flags | None, step: float, kept: noise.Kept
 ) -> noise.Noise | None:
     """Noise of a channel: on the raster together with inputs and other sensors; by itself if its rows are slower."""
-    own, quantum = taken[name], taken[name].faults.quantum * abs(taken[name].scale)
+    own, quantum = taken[name], taken[name].faults.quantum * abs(taken[name].own.scale)
     if name in inputs or own.clock.interval > 1.001 * step:
         clock = own.clock
         count = int((clock.time[-1] - clock.time[0]) / clock.interval + 1e-3) + 1
@@ -299,11 +316,11 @@ def _noise(
 
 
 def _tell(
-    notes: list[str], table: Recording, clock: Clock, signal: Input | Signal, faults: quality.Faults, scale: float, driving: bool
+    notes: list[str], table: Recording, clock: Clock, signal: Input | Signal, faults: quality.Faults, own: Own, driving: bool
 ) -> None:
     """A line for each kind of trouble in a channel."""
     unit, per = signal.unit or "1", factor(signal.unit)
-    edges = " and ".join(f"{e * scale / per:.6g} {unit}" for e in (faults.low, faults.high) if e is not None)
+    edges = " and ".join(f"{(e * own.scale + own.zero) / per:.6g} {unit}" for e in (faults.low, faults.high) if e is not None)
     left = "they are bridged" if driving else "they are left out"
     stays = "it is used as it is: check the sensor" if driving else left
     held = 'it is used as it is: check the sensor; if a controller holds it, write input = "held" in the model file' if driving else left
@@ -320,12 +337,14 @@ def _tell(
 
 def _tell_resampling(path: Path, step: float, clocks: dict[int, Clock], notes: list[str]) -> None:
     for clock in clocks.values():
-        if clock.interval < 0.999 * step:
+        if not clock.even or 0.999 * step <= clock.interval <= 1.001 * step:
+            continue  # uneven rows are noted with their clock
+        if clock.one_by_one(step):
+            how = "a sensor counts at the sample nearest to its row, inputs are joined between rows"
+        elif clock.interval < step:
             how = "low-passed without phase, at 0.4 of the model's rate, inputs and sensors alike"
-        elif clock.interval > 1.001 * step:
-            how = "inputs are joined by straight lines, a sensor counts once per row"
         else:
-            continue
+            how = "inputs are joined by straight lines, a sensor counts once per row"
         notes.append(f"{path}: its rows are {clock.interval * 1e3:.6g} ms apart, the model's samples {step * 1e3:.6g} ms; {how}")
 
 

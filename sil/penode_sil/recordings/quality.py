@@ -39,8 +39,9 @@ class Faults:
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
-def examine(values: Array) -> Faults:
-    """Look at the samples [n] of one channel at a constant interval, in the file's units; NaN where there is none."""
+def examine(values: Array, time: Array | None = None) -> Faults:
+    """Look at the samples [n] of one channel, in the file's units, at a constant interval, or at increasing times [n, s] if these are
+    uneven; NaN where there is none."""
     missing = ~np.isfinite(values)
     good = values[~missing]
     quantum = quantisation(good)
@@ -49,7 +50,7 @@ def examine(values: Array) -> Faults:
         return Faults(missing, none, none, none, quantum, good.size > 0)
     grain = max(quantum, _grain(good))
     x = np.where(missing, np.nan, values)
-    spikes = _spikes(x, grain)
+    spikes = _spikes(x, grain) if time is None else _spikes_at(time, x, grain)
     x[spikes] = np.nan
     first, last, kink, jump = _runs(x, grain)
     saturated, held = none.copy(), none.copy()
@@ -87,12 +88,18 @@ def _edge(x: Array, first: Index, last: Index, kink: Flags, edge: float, grain: 
 def quantisation(values: Array) -> float:
     """The step that all differences of repeated values are multiples of; 0 if there is none, or too few to tell."""
     levels, count = np.unique(values, return_counts=True)
+    luck = max(levels.size, 1) ** 2 * 0.2**levels.size  # that all lie on steps: each does with 0.2, and two of them are the step
+    if luck < CHANCE and (step := _step_of(levels)):
+        return step  # whatever is there often: a standstill repeats one value
     often = count > 1
     often &= count > 0.05 * (np.median(count[often]) if often.any() else 0.0)
     if np.sum(often) > 2 and np.sum(count[often]) > 0.5 * values.size:  # a sensor that holds a few values is no coarse one
         levels = levels[often]  # outliers need not lie on a step
-    if levels.size < 2 or (values.size < 4 * levels.size and levels.size < 32):
-        return 0.0
+    return 0.0 if levels.size < 2 or (values.size < 4 * levels.size and levels.size < 32) else _step_of(levels)
+
+
+def _step_of(levels: Array) -> float:
+    """The step that all differences of values in order are multiples of, 0 if there is none."""
     steps = np.diff(levels)
     for step in np.quantile(steps, (0.0, 0.05)):
         if step > 1e-9 * np.max(np.abs(levels)):
@@ -168,8 +175,22 @@ def _runs(x: Array, quantum: float) -> tuple[Index, Index, Flags, Flags]:
     usual = count / (count - still).clip(1)  # samples to the next step
     jump |= (out > leap) & ((step[first + 1] > leap) | (length > 4.0 * usual))
     fall = np.fmax(step[first + 1], out)
+    rests = _rests(x, first, last, leap, quantum)
     jump |= (x[first] == 0.0) & (fall > 4.0 * quantum) & (fall > 2.0 * largest)  # what a lost sample is mostly set to
-    return first, last, kink, jump
+    return first, last, kink, jump & ~rests
+
+
+def _rests(x: Array, first: Index, last: Index, leap: Array, quantum: float) -> Flags:
+    """Runs of equal samples from which the signal sets off step by step, or, at an end of a recording, in which it rests before it moves
+    or has come to rest: what a sensor missed while it repeated a value comes in one step, or in a `leap` at the beginning."""
+    change = np.concatenate(([np.nan] * 2, np.diff(x), [np.nan] * 4))  # change[i + 1]: from sample i - 1 to i
+    out, on, further = change[last + 2], change[last + 3], change[last + 4]
+    into, before = change[first + 1], change[first]
+    sets_off = (out * on > 0.0) & (on * further > 0.0) & (np.abs(out) <= np.abs(on))
+    begins = (first == 0) & (np.abs(out) <= leap)
+    stops = (last == x.size - 1) & (into * before > 0.0) & (np.abs(into) <= np.abs(before) + HARM * quantum)
+    found: Flags = sets_off | begins | stops
+    return found
 
 
 def _spikes(x: Array, grain: float) -> Flags:
@@ -177,10 +198,27 @@ def _spikes(x: Array, grain: float) -> Flags:
     found = np.zeros(x.size, dtype=bool)
     off = np.full(x.size, np.nan)  # beside what is lost, nothing is known
     off[1:-1] = x[1:-1] - 0.5 * (x[:-2] + x[2:])
+    same = np.diff(x) == 0.0
+    off[1:-1][same[:-1] & same[1:]] = np.nan  # where it rests, nothing shows how it moves
     if np.all(np.isnan(off)):
         return found
     size, sign = np.abs(off), np.sign(off)
     alone = np.minimum(-sign[1:-1] * off[:-2], -sign[1:-1] * off[2:]) > 0.25 * size[1:-1]  # 1/2 if it is one sample
     peak = 1 + np.flatnonzero(alone & (size[1:-1] > max(4.0 * grain, SPIKE * np.nanmedian(size))))
     found[peak[size[peak] > SPIKE * 1.4826 * _median(off, _near(peak, peak, x.size))]] = True
+    return found
+
+
+def _spikes_at(time: Array, x: Array, grain: float) -> Flags:
+    """The same of samples at uneven times: far from the line between their neighbours as others in such intervals are, where lines miss a
+    curve by the product of both."""
+    before, after = np.diff(time)[:-1], np.diff(time)[1:]
+    usual = float(np.median(np.diff(time)))
+    off = np.full(x.size, np.nan)
+    off[1:-1] = x[1:-1] - (x[:-2] * after + x[2:] * before) / (before + after)
+    room = np.ones(x.size)
+    room[1:-1] = np.maximum(1.0, before * after / usual**2)
+    found = _spikes(x, grain)
+    far = SPIKE * 1.4826 * room * _median(off, _near(np.arange(x.size), np.arange(x.size), x.size))
+    found &= np.abs(off) > far
     return found

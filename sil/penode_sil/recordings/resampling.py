@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..errors import RecordingError, UserError
 from .clocks import Samples, own_samples
 from .files import pick
-from .table import Recording
+from .table import GAP, Recording
+from .uneven import joined, mean_interval
 
 Array = NDArray[np.float64]
 STOP_BAND = 60.0  # [dB] what lies above the new raster's Nyquist frequency is damped by this
@@ -86,8 +87,9 @@ def resample(
 ) -> tuple[Array, Array, str]:
     """Put rows [n, channels] on the raster first + k*sample_time <= last; default is all of `time`.
 
-    Rows slower than the raster are joined by straight lines; faster ones are low-passed without phase first. Returns
-    raster, values, and a note that is empty if the rows lay on the raster already (within 1/1000 sample).
+    Rows slower than the raster are joined by straight lines; faster ones are low-passed without phase first; uneven ones are
+    joined by curves where these foretell rows better. Returns raster, values, and a note that is empty if the rows lay on the raster
+    already (within 1/1000 sample).
     """
     first = float(time[0]) if first is None else first
     count = int(((time[-1] if last is None else last) - first) / sample_time + 1e-3) + 1
@@ -97,15 +99,20 @@ def resample(
     if inside.size == count and np.all(np.abs(inside - raster) <= 1e-3 * sample_time):
         return raster, values[begin : begin + count], ""
     usual = float(np.median(np.diff(time)))
-    how = "by straight lines"
-    if usual < 0.999 * sample_time:
-        grid = time[0] + np.arange(round((time[-1] - time[0]) / usual) + 1, dtype=float) * usual
-        even = values
-        if grid.size != time.size or np.max(np.abs(grid - time)) > 1e-2 * usual:
-            even = np.column_stack([np.interp(grid, time, column) for column in values.T])
-        moved = Kernel(raster, float(grid[0]), usual, grid.size, sample_time).apply(even)
+    grid = time[0] + np.arange(round((time[-1] - time[0]) / usual) + 1, dtype=float) * usual
+    even = grid.size == time.size and bool(np.max(np.abs(grid - time)) <= 1e-2 * usual)
+    usual = usual if even else mean_interval(np.diff(time), GAP)
+    if not even and GAP * usual >= sample_time:
+        how = "by curves or straight lines through them"
+        moved = np.column_stack([joined(time, column, raster) for column in values.T])
+    elif usual < 0.999 * sample_time:
+        if not even:
+            values = np.column_stack([np.interp(grid, time, column) for column in values.T])
+        interval = float(grid[1] - grid[0])
+        moved = Kernel(raster, float(grid[0]), interval, grid.size, sample_time).apply(values)
         how = f"by a low-pass without phase ({PASS_BAND * 0.5 / sample_time:.4g} Hz)"
     else:
+        how = "by straight lines"
         moved = np.column_stack([np.interp(raster, time, column) for column in values.T])
     note = f"resampled {how} from {time.size} rows {usual * 1e3:.6g} ms apart to {count} samples {sample_time * 1e3:.6g} ms apart"
     return raster, moved, note

@@ -21,12 +21,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Own:
-    """A channel's samples as they were measured: its clock, values in the file's units and in SI, and SI per unit of the file."""
+    """A channel's samples as they were measured: its clock, values in the file's units and in SI, SI per unit of the file and at its 0."""
 
     clock: Clock
     raw: Array
     rows: Array
     scale: float
+    zero: float = 0.0
     how: str = ""
     every: float = 1.0  # rows per sample
 
@@ -35,17 +36,16 @@ def own_of(signal: Input | Signal, table: Recording, base: Clock, driving: bool)
     """A channel on its own clock, if its table has another one."""
     si = table.channel(signal.name, signal.unit, finite=False)[base.rows]
     raw = table.columns[str(table.find(signal.name, signal.unit))][base.rows]
-    good = np.flatnonzero(np.isfinite(raw) & (raw != 0.0))
-    scale = float(si[good[0]] / raw[good[0]]) if good.size else 1.0
+    scale, zero = table.conversion(signal.name, signal.unit)
     even = steadied(base, "", [], [])
     found = clocks.own_samples(even.time, raw, driving)
     if found is not None:
         clock = parted(base.rows[found.rows], found.time)
-        return Own(clock, found.values, found.values * scale, scale, found.how, found.every)
+        return Own(clock, found.values, found.values * scale + zero, scale, zero, found.how, found.every)
     finite = np.flatnonzero(np.isfinite(raw))
     if even is base and 1 < finite.size < raw.size:  # stamps of several clocks: no cell is missing
-        return Own(parted(base.rows[finite], base.time[finite]), raw[finite], si[finite], scale, "sparse", raw.size / finite.size)
-    return Own(base, raw, si, scale)
+        return Own(parted(base.rows[finite], base.time[finite]), raw[finite], si[finite], scale, zero, "sparse", raw.size / finite.size)
+    return Own(base, raw, si, scale, zero)
 
 
 def steady(own: dict[str, Own], names: list[str], base: Clock, path: Path, notes: list[str]) -> None:

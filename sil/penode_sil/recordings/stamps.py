@@ -205,14 +205,14 @@ def sampled_evenly(time: Array, even: Array, columns: list[Array]) -> bool:
     than five rows, none has two on either side."""
     better, worse = 0, 0
     for values in columns if time.size > 4 else []:
-        own, regular = (np.abs(values[2:-2] - _foretold(t, values)) for t in (time, even))
+        own, regular = (np.abs(values[2:-2] - foretold(t, values)) for t in (time, even))
         better += int(np.sum(regular < own))
         worse += int(np.sum(regular > own))
     # errors of neighbours share rows: a quarter of them count
     return better - worse > RULES.sure * 2.0 * np.sqrt(better + worse) if better + worse else False
 
 
-def _foretold(time: Array, values: Array) -> Array:
+def foretold(time: Array, values: Array) -> Array:
     """Values [n - 4] by Lagrange's cubic through the two rows before and after; NaN beside a row without a value."""
     n = values.size
     index = [slice(k, n - 4 + k) for k in (0, 1, 3, 4)]

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, UserError, hint
 from . import named, unit_text
-from .order import ordered
+from .order import Ordered, ordered
 from .stamps import evened
+from .uneven import longest
 from .units import UnitError
 
 Array = NDArray[np.float64]
@@ -41,7 +42,10 @@ OTHER_TIMES = (
     "tempo",
 )
 # what a column's name may end in; signs between them part or multiply: m_s2 is m/s^2, N_s_m is N*s/m
-PART = r"(?:[mun]?s|[mu]?sec|mps|min|h|[cmuk]?m|[mkM]?N|Nm|Ns|k?g|mg|rad|deg|rpm|dps|kmh|kph|m?V|m?A|[kM]?Pa|bar|K|k?Hz|kW|W|J|pct)\d?"
+PART = (
+    r"(?:[mun]?s|[mu]?sec|mps|min|h|[cmuk]?m"
+    r"|ft|mph|[mkM]?N|lbf|Nm|Ns|k?g|mg|rad|deg[CF]|deg|rpm|dps|kmh|kph|m?V|m?A|[kM]?Pa|psi|bar|K|k?Hz|kW|W|J|pct)\d?"
+)
 SUFFIX = re.compile(rf"(?:[ _]{PART})+$")
 WRITTEN = re.compile(rf"[ _./,:-]+({PART}(?:[/*^]{PART})*)$|\s+(\S*[/^²³°%·*]\S*)$")
 
@@ -143,12 +147,12 @@ class Recording:
             given = next((u for u in (_suffix(e, unit) for e in endings) if u is not None), None)
         return given
 
-    def channel(self, name: str, unit: str, finite: bool = True) -> Array:
-        """One channel in SI, which must measure what `unit` does and be finite; UserError names line and channel."""
+    def conversion(self, name: str, unit: str) -> tuple[float, float]:
+        """How many SI units one unit of a channel of this table is, and how many 0 of it is; UserError names line and channel."""
         column = self.find(name, unit)
-        if column is None:
-            clock = f", or say {named.option('time', '@1ms')} if rows are 1 ms apart" if name == "time" else ""
-            raise RecordingError(f"{self.path}: there is no channel {name}; {hint(name, self.columns)}{clock}", channel=name)
+        return (1.0, 0.0) if column is None else self._conversion(name, column, unit)
+
+    def _conversion(self, name: str, column: str, unit: str) -> tuple[float, float]:
         given = self.unit_of(name, column, unit)
         called = self.aliases.get(name, column)
         option = named.option(name, named.with_unit(called, unit, self.units, self.texts))
@@ -156,9 +160,17 @@ class Recording:
             where = f'"{self.name_of(column)} [{unit or "1"}]" in the header' if self.lines is not None else "it into the file"
             raise RecordingError(f"{self.header}: channel {name} has no unit; write {where}, or say {option}", channel=name)
         try:
-            scale = unit_text.scale(given, unit)
+            return unit_text.conversion(given, unit)
         except UnitError as exc:
             raise RecordingError(f"{self.header}: channel {name}: {exc}, or say its true unit, like {option}", channel=name) from exc
+
+    def channel(self, name: str, unit: str, finite: bool = True) -> Array:
+        """One channel in SI, which must measure what `unit` does and be finite; UserError names line and channel."""
+        column = self.find(name, unit)
+        if column is None:
+            clock = f", or say {named.option('time', '@1ms')} if rows are 1 ms apart" if name == "time" else ""
+            raise RecordingError(f"{self.path}: there is no channel {name}; {hint(name, self.columns)}{clock}", channel=name)
+        scale, zero = self._conversion(name, column, unit)
         values = self.columns[column]
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size and finite:
@@ -167,14 +179,18 @@ class Recording:
                 channel=name,
             )
         with np.errstate(over="ignore"):
-            return values if scale == 1.0 else values * scale
+            return values if (scale, zero) == (1.0, 0.0) else values * scale + zero
+
+    def ordered(self, rows: NDArray[np.int64]) -> Ordered:
+        """These rows in the order of time; UserError where the clock was set back."""
+        return ordered(self.channel("time", "s", finite=False)[rows], lambda k: self.place(int(rows[k])), GAP)
 
     def time(self, notes: list[str] | None = None) -> Array:
         """The times [s], checked: increasing, without gaps; coarse stamps are spread evenly, which goes to the notes. UserError lists
         each kind of trouble once."""
         time = self.channel("time", "s")
         if np.any(np.diff(time) < 0.0):
-            found = ordered(time, self.place)
+            found = self.ordered(np.arange(time.size))
             if np.all(np.diff(found.rows) > 0):
                 time = found.time
                 if notes is not None:
@@ -193,7 +209,7 @@ class Recording:
                 (np.flatnonzero(step < 0.0), "goes back", "sort the rows by time"),
                 (np.flatnonzero(step == 0.0), "has the same value as the row before", "remove the duplicate"),
                 (
-                    np.flatnonzero(step > GAP * usual),
+                    np.flatnonzero(step > max(GAP * usual, longest(step[step > 0.0], GAP))),
                     f"has a gap (rows are usually {usual:.6g} s apart)",
                     "split the recording there or fill the rows in",
                 ),

@@ -9,6 +9,7 @@ acceleration is. The first reading that measures what is asked for counts; if tw
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import islice, product
@@ -53,12 +54,44 @@ for _case in CASES:
 GLUED = ("kN", "MN", "mN", "N", "mm", "cm", "km", "m", "kg", "ms", "s", "rad", "deg", "min", "h", "V", "A", "W")
 
 
+# degrees Celsius [1, 3], Fahrenheit [2, 4] or Kelvin
+_NAMED = r"(?:°\s*|\bdeg(?:rees?|ree)?[ _]?|\bgrad\s+)(?:(c(?:elsius)?|centigrade)|(f(?:ahrenheit)?)|k(?:elvin)?)\b"
+DEGREE = re.compile(rf"{_NAMED}|\b(?:(celsius)|(fahrenheit))\b", re.IGNORECASE)
+
+
 def scale(given: str, asked: str) -> float:
     """How many SI units one `given` is, read as what `asked` measures; UnitError if nothing or more than one thing fits."""
+    return conversion(given, asked)[0]
+
+
+def conversion(given: str, asked: str) -> tuple[float, float]:
+    """How many SI units one `given` is, and how many 0 of it is (0, but for °C and °F where a temperature is asked for); UnitError as for
+    `scale`."""
+    degree = _degree(given) if _known(asked) and _units.same_dimension(asked, "K") else None
+    if degree is not None:
+        return degree
     found = _scale(given, asked)
     if isinstance(found, str):
         raise UnitError(found)
-    return found
+    return found, 0.0
+
+
+def _degree(given: str) -> tuple[float, float] | None:
+    """K per degree of a temperature, and K at 0; None if it is none of Celsius or Fahrenheit."""
+    text = unicodedata.normalize("NFKC", given.replace("º", "°")).strip().strip("[](){}").strip()
+    match = DEGREE.fullmatch(text)
+    letter = text.lower() if match is None else "c" if match[1] or match[3] else "f" if match[2] or match[4] else ""
+    fahrenheit = 5.0 / 9.0
+    return {"c": (1.0, 273.15), "f": (fahrenheit, 459.67 * fahrenheit)}.get(letter)
+
+
+def _per_degree(text: str) -> str:
+    """A unit with K for °C, and with degrees of Rankine, which are as large, for °F: W/°C is W/K."""
+
+    def other(match: re.Match[str]) -> str:
+        return "degR" if match[2] or match[4] else "K"
+
+    return DEGREE.sub(other, unicodedata.normalize("NFKC", text.replace("º", "°")) if re.search("[℃℉º]", text) else text)
 
 
 @cache
@@ -92,7 +125,7 @@ def is_unit(text: str) -> bool:
 
 def _plain(text: str) -> str:
     """One way to write operators and powers: m.s⁻² -> m*s^-2, m/s2 -> m/s^2, N m -> N*m, /min -> 1/min."""
-    text = text.strip().strip("\"'").strip()
+    text = _per_degree(text.strip().strip("\"'").strip())
     if len(text) > 1 and (text[0] + text[-1]) in ("[]", "()", "{}", "<>"):
         inner = text[1:-1]
         text = inner if not set("[](){}<>") & set(inner) else text

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,9 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from ..diagnosis.files import all_or_none
-from ..errors import WrongUse
+from ..errors import RecordingError, WrongUse
 from ..output import whole
-from ..recordings.measured import load
+from ..recordings.measured import Measured, load
 from . import begin, onnx_file, report, resume, threads
 from .engine import compiler
 from .result import Trained
@@ -48,6 +48,7 @@ def run(job: Job, tell: Callable[[float, str], None] = lambda share, doing: None
     check(model)
     known, start = tuple(_known(text, model) for text in job.known), begin.read(job.start, model)
     measured, held = load(job.data, model, job.channels), load(job.holdout, model, job.channels)
+    _check_kept([*measured, *held])
     with resume.journal(job.output, _identity(job, model, start), job.resume) as journal:
         with threads.one():
             after, found = train(model, measured, held, Options(known, job.seed, start, journal), tell)
@@ -55,6 +56,21 @@ def run(job: Job, tell: Callable[[float, str], None] = lambda share, doing: None
             job.output.mkdir(exist_ok=True)
             _write(job, model, after, found)
     return found
+
+
+def _check_kept(measured: Sequence[Measured]) -> None:
+    """UserError if less than half of a recording can be used: what is learnt from the rest is no answer to the recording."""
+    kept: dict[Path, int] = {}
+    for m in measured:
+        kept[m.path] = kept.get(m.path, 0) + len(m.time)
+    problems = [
+        f"{m.path}: {m.whole - kept[m.path]} of its {m.whole} samples lie in or beside gaps of the inputs, more than half; record them "
+        "without gaps, or cut the recording to where they were measured"
+        for m in {m.path: m for m in measured}.values()
+        if m.whole - kept[m.path] > kept[m.path]
+    ]
+    if problems:
+        raise RecordingError(*problems)
 
 
 def _identity(job: Job, model: Model, start: begin.Start) -> dict[str, str]:

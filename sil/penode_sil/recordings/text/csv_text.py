@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import RecordingError
+from ..table import Recording
 from . import cells, dates, header, layout, notation
 from .decode import read_text
-from ..table import Recording
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
@@ -97,14 +97,16 @@ def _fast(body: Sequence[str], found: layout.Layout, width: int) -> Array | None
         return None
     if values.shape != (text.count("\n") + 1, width):
         return None
-    return values if all(_is_clear(body, found, k) for k in np.flatnonzero(_may_be_thousands(values))) else None
+    return values if all(_is_clear(body, found, k) for k in np.flatnonzero(_may_be_thousands(values)).tolist()) else None
 
 
 def _may_be_thousands(values: Array) -> Flags:
     """The columns of numbers [rows, channels] in which none has more than three decimals, or is larger than 999.999, and some have any."""
     with np.errstate(over="ignore", invalid="ignore"):
-        other = (np.abs(values) >= 1e3) | (np.abs(values * 1e3 - np.rint(values * 1e3)) > 1e-6)
-        found: Flags = ~np.any(other, axis=0) & np.any(np.abs(values - np.rint(values)) > 0.0, axis=0)
+        thousandths = values * 1e3
+        fine = np.isclose(thousandths, np.rint(thousandths), rtol=0.0, atol=1e-6) & (np.trunc(thousandths * 1e-6) == 0.0)
+        parted = np.abs(values - np.rint(values)) > 0.0
+    found: Flags = np.all(fine | np.isnan(values), axis=0) & np.any(parted, axis=0)
     return found
 
 

@@ -17,7 +17,6 @@ CLOCK = r"(?P<h>\d{1,2}):(?P<min>\d\d)(?::(?P<s>\d\d))?(?:[.,:](?P<f>\d{1,9}))?\
 ZONE = r"(?:(?P<utc>Z|z|UTC|GMT)?(?P<sign>[-+\u2212])(?P<zh>\d\d?)(?::?(?P<zm>\d\d))?|(?P<zulu>Z|z|UTC|GMT))"
 DATE = re.compile(rf"\s*{DAY}\s*")
 STAMP = re.compile(rf"\s*(?:{DAY}[T_ ,]+)?{CLOCK}\s*{ZONE}?\s*(?:\[[\w/+-]+\])?\s*")
-HALF_A_DAY = 43200.0
 
 
 class NoOffset(ValueError):
@@ -39,7 +38,7 @@ def stamps(texts: Sequence[str | None]) -> Array:
     best: Array = min(spans, key=lambda time: float(np.nanmax(time) - np.nanmin(time)) if np.isfinite(time).any() else 0.0)
     if not any(match is not None and (match["y"] or match["c"]) for match in found):  # past midnight
         known = np.flatnonzero(np.isfinite(best))
-        best[known] += 86400.0 * np.cumsum(np.diff(best[known], prepend=best[known[:1]]) < -HALF_A_DAY)
+        best[known] += 86400.0 * np.cumsum(np.diff(best[known], prepend=best[known[:1]]) < -43200.0)
     return best
 
 

@@ -14,23 +14,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from ..quality import CHANCE
+
 OTHER = {".": ",", ",": "."}
 # [1] what parts thousands, in which of several groups, [2] the sign of a fraction
 GROUPED = re.compile(r"[-+\u2212]?(?!0)\d{1,3}([.,])\d{3}(\1\d{3})*(?:(?!\1)([.,])\d*)?")
 FRACTION = re.compile(r"[-+\u2212]?\d*([.,])\d*(?:[eEdD][-+]?\d+)?")
-WHOLE = re.compile(r"[-+\u2212]?(\d+)")
-
-
-@dataclass(frozen=True)
-class Rules:
-    """What makes thousands of groups of three digits."""
-
-    chance: float = 1e-3  # that as many different fractions of three digits as there are have none that ends in 0
-    ends_in_zero: float = 0.1
-    short: int = 3  # digits of a whole number that needs no separator
-
-
-RULES = Rules()
+WHOLE = re.compile(r"[-+\u2212]?(?:(\d{1,3})|\d+)")  # [1] if it is short enough to need no sign
 
 
 class Doubt(ValueError):
@@ -75,8 +65,8 @@ class Seen:
 
     def surely(self, sign: str) -> bool:
         """Does a sign part thousands here, whatever other columns show?"""
-        many = (1.0 - RULES.ends_in_zero) ** self.unclear.get(sign, 0) < RULES.chance
-        return sign in self.thousands or (self.mixed(sign) and (many or OTHER[sign] in self.fractions))
+        luck = 0.9 ** self.unclear.get(sign, 0)  # that none ends in 0
+        return sign in self.thousands or (self.mixed(sign) and (luck < CHANCE or OTHER[sign] in self.fractions))
 
 
 def seen(texts: Iterable[str | None]) -> Seen:
@@ -85,7 +75,7 @@ def seen(texts: Iterable[str | None]) -> Seen:
     short = long = False
     for text in {text.strip() for text in texts if text}:
         if whole := WHOLE.fullmatch(text):
-            short, long = short or len(whole[1]) <= RULES.short, long or len(whole[1]) > RULES.short
+            short, long = short or bool(whole[1]), long or not whole[1]
         elif match := GROUPED.fullmatch(text):
             if match[2] or match[3]:
                 thousands.add(match[1])
