@@ -131,3 +131,20 @@ def test_standing_still_is_refused(tmp_path: Path) -> None:
         cli, ["train", str(HERE / "quarter.toml"), "--data", str(tmp_path / "still.csv"), "-o", str(tmp_path / "out")]
     )
     assert isinstance(result.exception, UserError) and "no input moves" in result.exception.problems[0]
+
+
+def test_less_than_half_of_a_recording_is_refused(recordings: tuple[Path, Path], tmp_path: Path) -> None:
+    """Four in five rows have no road; the stretches between are long enough to simulate."""
+    head, *rows = recordings[0].read_text().splitlines()
+    at = head.split(",").index(next(name for name in head.split(",") if name.startswith("z_road")))
+    cells = [row.split(",") for row in rows]
+    for k, row in enumerate(cells):
+        row[at] = row[at] if k % 600 < 120 else ""
+    (tmp_path / "gaps.csv").write_text("\n".join([head, *map(",".join, cells)]) + "\n")
+    result = CliRunner().invoke(
+        cli, ["train", str(HERE / "quarter.toml"), "--data", str(tmp_path / "gaps.csv"), "-o", str(tmp_path / "out")]
+    )
+    assert isinstance(result.exception, UserError), result.output
+    (line,) = result.exception.problems
+    assert "samples lie in or beside gaps of the inputs, more than half; record them without gaps" in line
+    assert not (tmp_path / "out").exists()
