@@ -111,6 +111,8 @@ def test_a_row_beside_its_sample_rings_no_more_than_the_signal(tmp_path, oscilla
     jump = np.where(np.sin(2.0 * np.pi * 0.8 * time) > 0.0, 10.0, -10.0)
     (one,) = load([write(tmp_path / "r.csv", time, foot=jump, z=jump)], oscillator)
     assert np.max(np.abs(one.u)) <= 0.010 * (1.0 + 1e-12)
+    raster, u, _ = on_raster(read(one.path), {"foot": "m"}, STEP)  # as a simulation has it
+    assert np.array_equal(raster, one.time) and u == pytest.approx(one.u, abs=1e-12)
     near = np.rint((one.time - time[0]) / 0.9984e-3).astype(int).clip(2, N - 3)
     calm = np.all([jump[near + k] == jump[near] for k in (-2, -1, 1, 2)], axis=0)
     assert 1e3 * one.z["z"][calm] == pytest.approx(jump[near][calm], abs=0.05) and one.mask["z"].mean() > 0.99
