@@ -11,6 +11,7 @@ import pytest
 
 from penode_sil.errors import UserError
 from penode_sil.recordings import on_raster, read
+from penode_sil.recordings.look import look
 from penode_sil.recordings.measured import load
 from penode_sil.recordings.uneven import joined, longest, measured_near
 
@@ -103,6 +104,14 @@ def test_uneven_rows_drive_a_simulation_too(tmp_path):
     gap = time[(time < 3.0) | (time > 3.1)]
     with pytest.raises(UserError, match="has a gap"):
         on_raster(read(write(tmp_path / "r.csv", gap, foot=foot(gap))), {"foot": "m"}, STEP)
+
+
+def test_inspect_says_that_rows_are_uneven(tmp_path):
+    time = CLOCKS["as polled"]
+    (table,) = look(write(tmp_path / "r.csv", time, foot=foot(time))).tables
+    assert table.gaps == 0 and any(re.search(r"rows are unevenly 0\.0\d+ to 4\.\d+ ms apart", note) for note in table.notes)
+    (table,) = look(write(tmp_path / "r.csv", np.arange(N) * STEP, foot=foot(np.arange(N) * STEP))).tables
+    assert not table.notes
 
 
 def test_a_row_beside_its_sample_rings_no_more_than_the_signal(tmp_path, oscillator):

@@ -104,6 +104,8 @@ def _table(table: Recording) -> Table:
         time = table.find("time", "s")
         clock = clock_of(table, notes)
         start, end, interval = float(clock.time[0]), float(clock.time[-1]), clock.interval
+        if not clock.even:
+            steadied(clock, str(table.path), [], notes)
         gaps = int(np.sum(np.diff(clock.time) > max(GAP * clock.interval, longest(np.diff(clock.time), GAP))))
     except UserError as exc:
         notes += exc.problems
