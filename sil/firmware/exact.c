@@ -51,7 +51,7 @@ static double activated(int kind, double z)
 
 double exact_network(const double w[], const double in[])
 {
-    double h[2][EXACT_WIDTH];
+    double h[2][EXACT_WIDTH] = { { 0.0 } };
     const size_t layers = (size_t)w[0];
     const double *from = in;
     w++;
