@@ -14,6 +14,7 @@ from pathlib import Path
 import penode_gen
 
 from ..errors import WrongUse, hint
+from ..recordings.excerpt import excerpted
 from ..recordings.measured import load
 from . import report
 from .engine import diagnose
@@ -48,7 +49,7 @@ def run(
     """Diagnose and write diagnosis.json, model_extended.toml and report.html; all or none. UserError for bad input."""
     compiled = compilers()
     model = load_model(job)
-    train, held = load(job.data, model, job.channels), load(job.holdout, model, job.channels)
+    train, held = excerpted(load(job.data, model, job.channels), load(job.holdout, model, job.channels))
     model = with_noise_at_rest(model, job.still, job.channels, train)
     with all_or_none(job.output):
         found = diagnose(model, train, held, job.output, job.set_name, log, tell)

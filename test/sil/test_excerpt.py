@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What is taken of long recordings: bounded, the stretches that tell most, the rest to test on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from penode_sil.recordings import excerpt
+from penode_sil.recordings.excerpt import LENGTH, MOST, excerpted
+from penode_sil.recordings.measured import Measured, Quality
+
+
+def recording(size: np.ndarray, name: str = "long.csv") -> Measured:
+    """An input and a sensor of these sizes, one for each LENGTH samples."""
+    draw = np.random.default_rng(0)
+    scale = np.repeat(size, LENGTH)
+    n = scale.size
+    u, z = scale * draw.normal(size=n), scale * draw.normal(size=n)
+    good = np.ones(n, dtype=bool)
+    return Measured(Path(name), 0, np.arange(n) * 1e-3, u[:, None], {"z": z}, {"z": good}, {"z": good}, ~good, Quality({}, ()), n)
+
+
+def test_short_recordings_stay_as_they_are():
+    m = recording(np.ones(MOST // LENGTH))
+    train, held = excerpted([m], [m])
+    assert (train[0], held[0]) == (m, m)
+
+
+def test_motion_is_learnt_from_and_the_rest_is_tested_on():
+    """Six stretches among sixty move; learnt from are these, and each sample is used at most once."""
+    moving = np.arange(3, 60, 10)
+    size = np.full(60, 0.01)
+    size[moving] = 1.0
+    m = recording(size)
+    train, held = excerpted([m], [])
+    assert sum(t.time.size for t in train) <= MOST
+    assert sum(h.time.size for h in held) <= MOST
+    begins = {round(float(t.time[0]) * 1e3) // LENGTH for t in train}
+    assert begins <= set(moving)
+    assert len(begins) == (MOST - 1) // LENGTH or len(begins) == MOST // LENGTH
+    learnt = np.concatenate([t.time for t in train])
+    assert not set(np.round(learnt * 1e3)) & set(np.round(np.concatenate([h.time for h in held]) * 1e3))
+    for t in train:
+        first = round(float(t.time[0]) * 1e3)
+        assert np.array_equal(t.z["z"], m.z["z"][first : first + t.time.size])
+        assert t.u.shape == (t.time.size, 1)
+    said = train[0].quality.problems
+    assert len(said) == 2
+    assert f"of {m.time.size} samples are learnt from" in said[0]
+    assert "hold-out" in said[1]
+
+
+def test_a_given_hold_out_is_thinned_over_its_length():
+    m = recording(np.ones(40))
+    train, held = excerpted([recording(np.ones(2), "short.csv")], [m])
+    assert train[0].time.size == 2 * LENGTH
+    assert sum(h.time.size for h in held) <= MOST
+    assert len(held) == MOST // LENGTH
+    assert held[0].time[0] == 0.0
+    assert held[-1].time[-1] > 0.9 * m.time[-1]
+    assert {h.path.name for h in held} == {"long.csv"}
+
+
+def test_sensors_that_only_some_recordings_have():
+    a, b = recording(np.ones(10), "a.csv"), recording(np.ones(10), "b.csv")
+    b = replace(b, z={}, mask={}, shown={})
+    train, _ = excerpted([a, b], [])
+    assert {t.path.name for t in train} == {"a.csv", "b.csv"} or all(t.z for t in train)
+
+
+@pytest.mark.parametrize("n", [LENGTH // 3, LENGTH, 5 * LENGTH + 17])
+def test_stretches_cover_all_samples(n):
+    m = recording(np.ones(6))
+    m = replace(m, time=m.time[:n])
+    cut = excerpt._cut([m])
+    assert [s.begin for s in cut] == [0, *(s.end for s in cut[:-1])]
+    assert cut[-1].end == n
