@@ -98,7 +98,7 @@ def curve(port: Port, network: Network, reach: float) -> Curve:
         else (-reach, reach)
     )
     reach = max(high, -low)
-    knots = grid(port, min(low, -1e-3 * reach), max(high, 1e-3 * reach), port.knots)
+    knots = grid(port, min(low, -1e-3 * reach), max(high, 1e-3 * reach), port.knots) if port.zero else grid(port, low, high, port.knots)
     values = network.evaluate(knots[:, None])[:, 0]
     zero = int(np.flatnonzero(knots == 0.0)[0]) if port.zero else -1
     return Curve(knots, values - values[zero] if port.zero else values, zero)

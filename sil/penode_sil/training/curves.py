@@ -9,9 +9,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from . import data, unknown
-from .curve import Curve, bent, fewer, spaced, three
-from .engine import Shape
+from . import data, lines
+from .curve import Curve, bent, fewer, spaced
 from .port import Port, inputs_of
 from .problem import Point, Problem, replaced
 from .settings import SETTINGS
@@ -23,13 +22,18 @@ POWERS = {"rate": 2.0, "place": 1.2}  # how dense knots are about 0: friction tu
 
 
 def grid(port: Port, low: float, high: float, count: int) -> Array:
-    """Knots over a range."""
+    """Knots over a range: dense about 0 where the network is 0 there, else alike."""
+    if not port.zero:
+        return np.linspace(low, high, count)
     return spaced(low, high, count, POWERS["rate" if port.rate else "place"])
 
 
 def curve_on(port: Port, before: Curve, seen: Sequence[Array], count: int) -> Curve:
     """The curve of before on new knots over the range that is visited now."""
     x = inputs_of(port, seen)[:, 0]
+    if not port.zero:
+        middle, half = 0.5 * float(x.max() + x.min()), 0.5 * SETTINGS.curves_wider * max(float(np.ptp(x)), 1e-12)
+        return before.on(grid(port, middle - half, middle + half, count))
     low, high = SETTINGS.curves_wider * min(float(x.min()), 0.0), SETTINGS.curves_wider * max(float(x.max()), 0.0)
     reach = max(high, -low, 1e-12)
     return before.on(grid(port, min(low, -1e-3 * reach), max(high, 1e-3 * reach), count))
@@ -103,7 +107,7 @@ def train(
     """Curves for all networks of a problem; `start` puts what is known already in place of straight lines."""
     limits = limits_of(problem, bounds)
     tell(0.05, "straight lines")
-    problem, point = lines(problem, [three(1.0, p.zero) for p in ports], limits)
+    problem, point = lines.fitted(problem, ports, limits)
     point = start(problem, point)
     problem = problem.with_(plain=True)
     for share, count, iterations in ((0.15, SETTINGS.curves_coarse, 8), (0.35, SETTINGS.curves_coarse, 4)):
@@ -124,20 +128,6 @@ def train(
     problem = renoised(problem, fit.point)
     tell(0.9, "the curves")
     return problem, solve(problem, fit.point, 6, 1.0, limits, damping=1e-6)
-
-
-def lines(problem: Problem, shapes: Sequence[Shape], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
-    """Parameters, start states and two slopes of each network from the first seconds: everything later leans on it."""
-    samples = max(int(SETTINGS.curves_short / problem.model.sample_time), 100)
-    free = np.full(len(problem.scale), 1e6)  # slopes are free, in the units of the model: how large forces are is not known yet
-    short = problem.with_(records=tuple(r.first(samples) for r in problem.records), scale=free)
-    point = short.begin(shapes)
-    for _ in range(3):  # measured by what lines leave, not by noise: or the priors would count for nothing
-        short = renoised(short, point)
-        fit = solve(short, point, 5, 20.0, limits, damping=1e-2)
-        point = fit.point
-    tied = unknown.invisible(short, fit)
-    return problem.with_(noise=short.noise, tied=tied), solve(short.with_(tied=tied), point, 2, 20.0, limits).point
 
 
 def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:

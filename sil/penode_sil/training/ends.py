@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from penode_gen.networks import Network
 
-from . import begin, curves
-from .curve import Curve, three
+from . import begin, curves, lines
+from .curve import Curve
 from .curves import Tell
 from .dense import Dense, like
 from .engine import Shape
@@ -22,13 +22,6 @@ from .settings import SETTINGS
 from .solve import Fit, Limits, solve
 
 Array = NDArray[np.float64]
-
-
-def straight(port: Port, inputs: int) -> Shape:
-    """A network's place with nothing but slopes."""
-    if port.knots:
-        return three(1.0, port.zero)
-    return Dense((inputs, 1), ("identity",), np.zeros(inputs + 1), np.ones(inputs), 1.0, port.zero)
 
 
 def loud(problem: Problem, point: Point) -> float:
@@ -52,12 +45,12 @@ def train(
     """All networks of a problem; several random starts if one does not come down to the noise. What a `start` knows is tried first."""
     limits = curves.limits_of(problem, bounds)
     tell(0.02, "straight lines")
-    first, lines = curves.lines(problem, [straight(p, n.n_inputs) for p, n in zip(ports, shapes, strict=True)], limits)
-    seen = curves.seen_by(first, lines)
-    first = curves.rescaled(first, lines, seen, ports)
+    first, straight = lines.fitted(problem, ports, limits)
+    seen = curves.seen_by(first, straight)
+    first = curves.rescaled(first, straight, seen, ports)
     best: tuple[Problem, Fit] | None = None
     for k in range(SETTINGS.ends_tries):
-        own = _begin(first, lines, seen, ports, shapes, seed + 1000 * k, start if k == 0 else begin.Start())
+        own = _begin(first, straight, seen, ports, shapes, seed + 1000 * k, start if k == 0 else begin.Start())
         try:
             found = _descend(first, own, limits, _of_try(k, tell))
         except FloatingPointError:
@@ -81,11 +74,11 @@ def _of(found: tuple[Problem, Fit]) -> tuple[Problem, Point]:
 
 
 def _begin(
-    problem: Problem, lines: Point, seen: Sequence[Array], ports: Sequence[Port], shapes: Sequence[Network], seed: int, start: begin.Start
+    problem: Problem, straight: Point, seen: Sequence[Array], ports: Sequence[Port], shapes: Sequence[Network], seed: int, start: begin.Start
 ) -> Point:
     """Random weights in place of the lines, or those of a start."""
     found: list[Shape] = []
-    for k, (port, network, line) in enumerate(zip(ports, shapes, lines.shapes, strict=True)):
+    for k, (port, network, line) in enumerate(zip(ports, shapes, straight.shapes, strict=True)):
         x = inputs_of(port, seen)
         if isinstance(line, Curve):
             line = begin.curve(port, start.networks[port.name], float(np.max(np.abs(x)))) if port.name in start.networks else line
@@ -94,12 +87,12 @@ def _begin(
             scale, size = 2.0 * np.maximum(np.std(x, axis=0), 1e-12), float(np.max(problem.scale))
             known = start.networks.get(port.name)
             found.append(begin.dense(port, known, scale, size) if known is not None else like(network, scale, size, port.zero, seed + k))
-    return Point(begin.ratios(start, problem.engine.free, problem.model, lines.ratios), lines.starts, tuple(found))
+    return Point(begin.ratios(start, problem.engine.free, problem.model, straight.ratios), straight.starts, tuple(found))
 
 
 def _descend(problem: Problem, point: Point, limits: Callable[[Point], Limits], tell: Tell) -> tuple[Problem, Fit]:
     """Start states alone, weights on the first seconds, then on everything."""
-    samples = max(int(SETTINGS.ends_horizon / problem.model.sample_time), 100)
+    samples = lines.rows(problem, SETTINGS.ends_horizon, SETTINGS.ends_rows)
     short = problem.with_(records=tuple(r.first(samples) for r in problem.records))
     tell(0.0, "start states")
     point = solve(short.with_(frozen=True), point, 4, 1.0, damping=1e-3).point

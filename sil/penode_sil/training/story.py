@@ -140,7 +140,7 @@ def ports_of(model: Model, engine: Engine) -> list[Port]:
             at += n
         elements = [e for e in model.elements if e.network == name]
         zero = port.promises.zero_at_zero or bool(elements and len(elements) == len(seen))
-        knots = unfold.capacity(template) if zero else 0
+        knots = max(unfold.capacity(template) - (not zero), 0)
         if port.promises.max_force is not None and model.outside != "clamp":
             raise ModelError(
                 [
@@ -199,7 +199,8 @@ def written(
             if isinstance(shape, Dense):
                 network = dense.network_of(shape, template, low, high)
                 break
-            low, high = (np.array([v]) for v in _envelope(float(low[0]), float(high[0]), model.pieces > 0))
+            if port.zero:
+                low, high = (np.array([v]) for v in _envelope(float(low[0]), float(high[0]), model.pieces > 0))
             network = unfold.unfold(shape, template, float(low[0]), float(high[0]))
             if not given or not promises.broken(given, network, model.outside == "clamp"):
                 break

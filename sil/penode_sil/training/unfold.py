@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A curve written down as a ReLU network of a given shape, exactly: no regression, and 0 at 0 to the bit.
+"""A curve written down as a ReLU network of a given shape, exactly: no regression, and 0 at 0 to the bit where the curve is.
 
-F(x) = a relu(x) - b relu(-x) + sum of c_j relu(x - k_j) for k_j > 0 and of c_j relu(k_j - x) for k_j < 0: all units are 0 at x = 0. The
+F(x) = F(0) + a relu(x) - b relu(-x) + sum of c_j relu(x - k_j) for k_j > 0 and of c_j relu(k_j - x) for k_j < 0: all units are 0 at x = 0. The
 first hidden layer holds x+ and x- and its share of the kinks; those in the middle carry x+ and x- and what is summed up so far as a
 positive and a negative part, and kinks of their own; the last carries the sum only, for relu(y) - relu(-y) = y.
 """
@@ -38,7 +38,8 @@ def rooms(widths: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def capacity(network: Network) -> int:
-    """Knots that a curve may have for the network to hold it: its kinks, and the two outermost, where it has none; 0 for none."""
+    """Knots that a curve with one at 0 may have for the network to hold it: its kinks, and the two outermost, where it has none; 0 for
+    none. One less without a knot at 0."""
     widths = hidden(network)
     if not widths or min(rooms(widths)) < 0:
         return 0
@@ -64,9 +65,7 @@ def _kinks(curve: Curve) -> _Kinks:
 
 
 def unfold(curve: Curve, template: Network, low: float, high: float) -> Network:
-    """The network of the template's shape that is this curve, which is 0 at 0. ValueError where it has no room for the kinks."""
-    if curve.zero < 0:
-        raise ValueError("a curve that is not 0 at 0 has no exact network: its value there is free")
+    """The network of the template's shape that is this curve. ValueError where it has no room for the kinks."""
     found, widths = _kinks(curve), hidden(template)
     if not capacity(template) or len(found.at) > sum(rooms(widths)):
         raise ValueError(
@@ -100,7 +99,8 @@ def unfold(curve: Curve, template: Network, low: float, high: float) -> Network:
             row += 1
         layers.append(Dense(weights, bias, "relu"))
         carried, x_of = new_sum, new_x
-    layers.append(Dense(carried[None, :], np.zeros(1), "identity"))
+    at_zero = np.zeros(1) if curve.zero >= 0 else curve(np.zeros(1)) / size
+    layers.append(Dense(carried[None, :], at_zero, "identity"))
     return Network(_between(template, layers, scale, size), np.array([low]), np.array([high]), "trained")
 
 
