@@ -11,6 +11,7 @@ What can go wrong, by what the caller can do about it. Each class has a `code`, 
         NetworkError         "network": export the network again, or name another file
         RecordingError       "recording": mend the recording, or say by --channel what it means
         ScenarioError        "scenario": mend the scenario file
+        NotConverged         exit 4, "not-converged": no start of a training stayed within bounds; see what it says was tried
         ToolMissing          "tool-missing": install the compiler, the emulator, or the Python package
         TargetError          "target": look after the board, the emulator, the compiler, the controller, or the line to it
         WrongUse             "usage": call the command otherwise: its options, its paths, its environment

@@ -13,6 +13,7 @@ __all__ = [
     "InternalError",
     "ModelError",
     "NetworkError",
+    "NotConverged",
     "PenodeError",
     "Problem",
     "RecordingError",
@@ -35,6 +36,13 @@ class ScenarioError(UserError):
     """A scenario file that cannot be read, or does not fit the model."""
 
     code = "scenario"
+
+
+class NotConverged(UserError):
+    """A training that did not come down to the noise, and has nothing to write."""
+
+    code = "not-converged"
+    exit = 4
 
 
 class ToolMissing(UserError):

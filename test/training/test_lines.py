@@ -51,3 +51,11 @@ def test_a_curve_that_is_not_0_at_0_is_its_network(layers: list[int], low: float
     slope = np.max(np.abs(np.diff(values) / np.diff(knots)))
     assert np.allclose(found.evaluate(x[:, None])[:, 0], expected, rtol=0.0, atol=1e-12 * slope * max(abs(low), abs(high)) * 100.0)
     assert found.architecture == network.architecture
+
+
+def test_a_knot_that_nothing_shows_gives_way() -> None:
+    """A straight force whose outermost knot, beyond what was visited, is anywhere: without its neighbour the force is straight still."""
+    knots, spread = np.linspace(0.0, 1.0, 9), np.diag([*np.full(8, 1e-2), 1e6])
+    values = np.where(knots == 1.0, 500.0, -3.0 * knots)
+    found = curve.without(knots, values, spread, np.arange(9) % 2 == 0)
+    assert np.allclose(found, -3.0 * knots[::2], atol=0.1)

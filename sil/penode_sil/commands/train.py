@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from ..console import FILE, Several, staged
+from ..errors import NotConverged
 
 
 @click.command(cls=Several)
@@ -41,6 +42,9 @@ def train(
 
     DIR gets an ONNX file for each network, model_trained.toml with a set `default` of them (and `before`), the set's serial form for a
     running controller, training.json, and report.html, which also says what the recordings cannot tell.
+
+    Exit codes: 0 trained; 2 wrong use or bad input; 3 a fault of penode; 4 the fit did not come down to the noise that the sensors state,
+    from several starts: what there is is written, and marked.
     """
     from ..diagnosis.files import check_folder
     from ..training import files, result
@@ -49,3 +53,5 @@ def train(
     with staged() as tell:
         found = files.run(files.Job(model, data, holdout, output, channel, known, seed, start, resume), tell)
     click.echo(json.dumps(found.as_json(), indent=2) if as_json else result.sentences(found, output))
+    if not found.converged:
+        click.get_current_context().exit(NotConverged.exit)

@@ -129,6 +129,24 @@ def fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArr
     return _fewer(knots, values, spread, count, regular, fixed) if fixed.sum() + 2 <= count else kept
 
 
+def without(knots: Array, values: Array, spread: Array, keep: NDArray[np.bool_]) -> Array:
+    """Values at the knots that are kept, where all others lie on the lines between them: the most likely ones by the covariance `spread`.
+    What data say little of gives way, such as an outermost knot whose neighbour goes."""
+    at, kept = np.flatnonzero(~keep), np.flatnonzero(keep)
+    if not len(at):
+        return values
+    right = np.searchsorted(kept, at)
+    a, b = kept[right - 1], kept[right]
+    t = (knots[at] - knots[a]) / (knots[b] - knots[a])
+    rows = np.zeros((len(at), len(knots)))
+    rows[np.arange(len(at)), a], rows[np.arange(len(at)), at], rows[np.arange(len(at)), b] = t - 1.0, 1.0, -t
+    variance = rows @ spread @ rows.T
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(variance), 1e-300))
+    pull = scale * np.linalg.solve(variance * np.outer(scale, scale) + 1e-9 * np.eye(len(at)), (rows @ values) * scale)
+    moved: Array = values - spread @ rows.T @ pull
+    return moved[keep]
+
+
 def _fewer(
     knots: Array, values: Array, spread: Array, count: int, regular: NDArray[np.bool_], fixed: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import data, lines
-from .curve import Curve, bent, fewer, spaced
+from .curve import Curve, bent, fewer, spaced, without
 from .port import Port, inputs_of
 from .problem import Point, Problem, replaced
 from .settings import SETTINGS
@@ -103,11 +104,12 @@ def train(
     bounds: Sequence[Callable[[Curve], Limits]],
     tell: Tell,
     start: Callable[[Problem, Point], Point] = lambda problem, point: point,
+    turn: int = 0,
 ) -> tuple[Problem, Fit]:
-    """Curves for all networks of a problem; `start` puts what is known already in place of straight lines."""
+    """Curves for all networks of a problem; `start` puts what is known already in place of straight lines, which are those of a `turn`."""
     limits = limits_of(problem, bounds)
     tell(0.05, "straight lines")
-    problem, point = lines.fitted(problem, ports, limits)
+    problem, point = lines.fitted(problem, ports, limits, turn)
     point = start(problem, point)
     problem = problem.with_(plain=True)
     for share, count, iterations in ((0.15, SETTINGS.curves_coarse, 8), (0.35, SETTINGS.curves_coarse, 4)):
@@ -151,7 +153,8 @@ def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callab
             if bent(shape.knots, shape.values, own, regular)
             else regular
         )
-        shapes.append(shape.on(shape.knots[want]))
+        left = Curve(shape.knots[want], without(shape.knots, shape.values, own, want), -1)
+        shapes.append(left if shape.zero < 0 else replace(left, zero=int(np.flatnonzero(left.knots == 0.0)[0])))
     return problem, Point(fit.point.ratios, fit.point.starts, tuple(shapes))
 
 

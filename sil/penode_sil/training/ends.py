@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Networks of any shape, trained end to end: straight lines, then random small weights, start states, ten seconds, then all."""
+"""Networks of any shape, trained end to end: straight lines, random weights that are taught them, start states, the first rows, then all."""
 
 from __future__ import annotations
 
@@ -24,15 +24,6 @@ from .solve import Fit, Limits, solve
 Array = NDArray[np.float64]
 
 
-def loud(problem: Problem, point: Point) -> float:
-    """How much more the residuals are than the noise that sensors state, at the most; 1 where none states any."""
-    stated = np.array([s.noise for s in (*problem.model.sensors, *problem.model.outputs)])
-    level = curves.renoised(problem, point).noise.level
-    shown = np.array([any(r.good[:, j].any() for r in problem.records) for j in range(len(stated))])
-    some = shown & (stated > 0.0)
-    return float(np.max(level[some] / stated[some], initial=0.0)) if some.any() else 1.0
-
-
 def train(
     problem: Problem,
     ports: Sequence[Port],
@@ -41,40 +32,25 @@ def train(
     seed: int,
     tell: Tell,
     start: begin.Start,
+    turn: int = 0,
 ) -> tuple[Problem, Fit]:
-    """All networks of a problem; several random starts if one does not come down to the noise. What a `start` knows is tried first."""
+    """All networks of a problem, from random weights and the lines of a `turn`, or from what a `start` knows."""
     limits = curves.limits_of(problem, bounds)
     tell(0.02, "straight lines")
-    first, straight = lines.fitted(problem, ports, limits)
+    first, straight = lines.fitted(problem, ports, limits, turn)
     seen = curves.seen_by(first, straight)
     first = curves.rescaled(first, straight, seen, ports)
-    best: tuple[Problem, Fit] | None = None
-    for k in range(SETTINGS.ends_tries):
-        own = _begin(first, straight, seen, ports, shapes, seed + 1000 * k, start if k == 0 else begin.Start())
-        try:
-            found = _descend(first, own, limits, _of_try(k, tell))
-        except FloatingPointError:
-            continue
-        if best is None or loud(*_of(found)) < loud(*_of(best)):
-            best = found
-        if loud(*_of(best)) < SETTINGS.ends_good:
-            break
-    if best is None:
-        raise FloatingPointError("the simulation left all bounds from every start")
-    return best
-
-
-def _of_try(k: int, tell: Tell) -> Tell:
-    """Tells the progress of all tries, during one of them."""
-    return lambda share, doing: tell((k + share) / SETTINGS.ends_tries, f"{doing}, try {k + 1}")
-
-
-def _of(found: tuple[Problem, Fit]) -> tuple[Problem, Point]:
-    return found[0], found[1].point
+    return _descend(first, _begin(first, straight, seen, ports, shapes, seed, start), limits, tell)
 
 
 def _begin(
-    problem: Problem, straight: Point, seen: Sequence[Array], ports: Sequence[Port], shapes: Sequence[Network], seed: int, start: begin.Start
+    problem: Problem,
+    straight: Point,
+    seen: Sequence[Array],
+    ports: Sequence[Port],
+    shapes: Sequence[Network],
+    seed: int,
+    start: begin.Start,
 ) -> Point:
     """Random weights in place of the lines, or those of a start."""
     found: list[Shape] = []
@@ -86,18 +62,29 @@ def _begin(
         else:
             scale, size = 2.0 * np.maximum(np.std(x, axis=0), 1e-12), float(np.max(problem.scale))
             known = start.networks.get(port.name)
-            found.append(begin.dense(port, known, scale, size) if known is not None else like(network, scale, size, port.zero, seed + k))
+            found.append(
+                begin.dense(port, known, scale, size)
+                if known is not None
+                else like(network, scale, size, port.zero, seed + k).taught(*_lesson(line, x))
+            )
     return Point(begin.ratios(start, problem.engine.free, problem.model, straight.ratios), straight.starts, tuple(found))
 
 
+def _lesson(line: Shape, x: Array) -> tuple[Array, Array]:
+    """Places that a line has been to, and beyond, with its values there: a network that gives nothing at first would let a body go that
+    nothing else holds."""
+    places = np.concatenate([x, 2.0 * x - x.mean(axis=0)])
+    return places, line(places)
+
+
 def _descend(problem: Problem, point: Point, limits: Callable[[Point], Limits], tell: Tell) -> tuple[Problem, Fit]:
-    """Start states alone, weights on the first seconds, then on everything."""
-    samples = lines.rows(problem, SETTINGS.ends_horizon, SETTINGS.ends_rows)
+    """Start states alone, weights on the first rows, then on everything."""
+    samples = lines.rows(problem)
     short = problem.with_(records=tuple(r.first(samples) for r in problem.records))
     tell(0.0, "start states")
     point = solve(short.with_(frozen=True), point, 4, 1.0, damping=1e-3).point
     for k, iterations in enumerate((8, 8, 10)):
-        tell(0.1 + 0.15 * k, "weights on the first seconds")
+        tell(0.1 + 0.15 * k, "weights on the first rows")
         short = curves.renoised(short, point)
         point = solve(short, point, iterations, 5.0, limits, damping=1e-2).point
     whole = problem.with_(noise=short.noise)

@@ -110,7 +110,7 @@ def _write(job: Job, model: Model, after: Model, found: Trained) -> None:
     """All files but for what a later step may refuse: the set is read back from them."""
     facts = {
         "penode.seed": str(found.seed),
-        "penode.chi2": f"{found.chi2:.6g}",
+        "penode.chi2": "" if found.chi2 is None else f"{found.chi2:.6g}",
         "penode.converged": str(found.converged).lower(),
         "penode.versions": json.dumps(found.versions),
         "penode.recordings": json.dumps(found.digests),

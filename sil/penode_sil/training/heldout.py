@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from . import left
 from .curve import Curve
 from .problem import Point, Problem
 from .settings import SETTINGS
@@ -35,13 +36,8 @@ class Part:
 
 def loud(problem: Problem, point: Point) -> bool:
     """Is what a sensor leaves louder than the noise that it states? Not where none is stated."""
-    found = problem.residuals(point)
-    if found is None:
-        return False
-    stated = np.array([s.noise for s in (*problem.model.sensors, *problem.model.outputs)])
-    squares = sum(np.sum(np.where(r.good, e, 0.0) ** 2, axis=0) for e, r in zip(found[0], problem.records, strict=True))
-    count = np.maximum(sum(np.sum(r.good, axis=0) for r in problem.records), 1)
-    return bool(np.any((stated > 0.0) & (np.sqrt(squares / count) > SETTINGS.story_loud * stated)))
+    found = left.of(problem, point)
+    return found is not None and bool(found.above(SETTINGS.story_loud))
 
 
 def parts(problem: Problem, point: Point, count: int = 8) -> list[Part]:

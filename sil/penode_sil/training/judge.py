@@ -54,8 +54,18 @@ def errors(
         own = [r[:, j] for r in residuals]
         inside = _rms(own, [g & ~late_ for g, late_ in zip(goods, late, strict=True)])
         floor = signal.noise if signal.noise > 0.0 else float(noise.level[j])
-        rows.append(Error(signal.name, signal.unit, by["before"], _rms(own, goods), by["deployed"], floor, inside))
+        rows.append(Error(signal.name, signal.unit, by["before"], _rms(own, goods), by["deployed"], floor, inside, signal.noise > 0.0))
     return tuple(rows), float(np.mean(np.concatenate(away))), float(np.mean(np.concatenate(late)))
+
+
+def deployed(problem: Problem, model: Model, measured: Sequence[Measured], point: Point) -> dict[str, float]:
+    """RMS errors of the generated C, by signal."""
+    zs, found = _replayed(model, measured, point), {}
+    for j, signal in enumerate((*problem.model.sensors, *problem.model.outputs)):
+        found[signal.name] = _rms(
+            [r.y[:, j] - z[:, j] for r, z in zip(problem.records, zs, strict=True)], [r.good[:, j] for r in problem.records]
+        )
+    return found
 
 
 def _outside(seen: Array, ports: Sequence[Port], ranges: Sequence[tuple[Array, Array]]) -> NDArray[np.bool_]:

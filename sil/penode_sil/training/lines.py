@@ -23,7 +23,6 @@ from .settings import SETTINGS
 from .solve import Fit, Limits, solve
 
 Array = NDArray[np.float64]
-FREE = 1e6  # slopes are free, in the units of the model: how large forces are is not known yet
 
 
 def straight(port: Port) -> Dense:
@@ -40,13 +39,14 @@ def bendable(port: Port, line: Dense) -> Shape:
     return found.with_theta(line.theta[0] * (found.knots if not port.zero else np.delete(found.knots, 1)) + line.theta[1] * (not port.zero))
 
 
-def rows(problem: Problem, seconds: float, most: int) -> int:
-    """How many rows some seconds are; at least `most`, for a slow plant shows little in them."""
-    return max(int(seconds / problem.model.sample_time), most)
+def rows(problem: Problem) -> int:
+    """How many rows of each recording a fit sees at first: some seconds of a fast plant, and enough of a slow one."""
+    return max(int(SETTINGS.lines_short / problem.model.sample_time), SETTINGS.lines_rows)
 
 
 def _first(problem: Problem, samples: int) -> Problem:
-    return problem.with_(records=tuple(r.first(samples) for r in problem.records), scale=np.full(len(problem.scale), FREE))
+    """The problem of the first rows; slopes are free, in the units of the model: how large forces are is not known yet."""
+    return problem.with_(records=tuple(r.first(samples) for r in problem.records), scale=np.full(len(problem.scale), 1e6))
 
 
 def _renoised(problem: Problem, point: Point) -> Problem:
@@ -58,31 +58,40 @@ def _renoised(problem: Problem, point: Point) -> Problem:
 
 def _growing(problem: Problem, point: Point, samples: int) -> Point:
     """Where lines end that see twice as many rows each time."""
-    for doublings in range(SETTINGS.lines_doublings, -1, -1):
-        own = _first(problem, max(samples >> doublings, SETTINGS.lines_least))
+    for doublings in reversed(range(7)):
+        own = _first(problem, max(samples >> doublings, 100))
         for _ in range(2):  # measured by what lines leave, not by noise: or the priors would count for nothing
             own = _renoised(own, point)
             point = solve(own, point, 5, 20.0, damping=1e-2).point
     return point
 
 
-def fitted(problem: Problem, ports: Sequence[Port], limits: Callable[[Point], Limits]) -> tuple[Problem, Point]:
-    """Parameters, start states and lines; two slopes in place of a network that will be a curve. FloatingPointError where the simulation
-    diverges from every start."""
-    samples = min(rows(problem, SETTINGS.lines_short, SETTINGS.lines_rows), max(len(r.y) for r in problem.records))
+def fitted(problem: Problem, ports: Sequence[Port], limits: Callable[[Point], Limits], turn: int = 0) -> tuple[Problem, Point]:
+    """Parameters, start states and lines; two slopes in place of a network that will be a curve. `turn`: 0 for the best, 1 for where lines
+    that see all rows at once end, more for places beside the best. FloatingPointError where the simulation diverges from every start."""
+    samples = min(rows(problem), max(len(r.y) for r in problem.records))
     short = _first(problem, samples)
     nothing = short.begin([straight(p) for p in ports])
     ends: list[tuple[Problem, Fit]] = []
-    for begin in (lambda: _growing(problem, nothing, samples), lambda: nothing):
+    for grows in (True, False):
         try:
-            ends.append(_bent(short, begin(), ports, limits))
+            ends.append(_bent(short, _growing(problem, nothing, samples) if grows else nothing, ports, limits))
         except FloatingPointError:
             continue
     if not ends:
         raise FloatingPointError("the simulation left all bounds from every start")
-    own, fit = min(ends, key=lambda end: left(*end))
+    ends.sort(key=lambda end: left(*end))
+    own, fit = ends[1 if turn == 1 and len(ends) > 1 else 0]
     tied = unknown.invisible(own, fit)
-    return problem.with_(noise=own.noise, tied=tied), solve(own.with_(tied=tied), fit.point, 2, 20.0, limits).point
+    point = solve(own.with_(tied=tied), fit.point, 2, 20.0, limits).point
+    return problem.with_(noise=own.noise, tied=tied), _beside(point, turn) if turn > 1 else point
+
+
+def _beside(point: Point, turn: int, by: float = 0.5) -> Point:
+    """Other slopes, by a deviation of their logarithms: what a fit makes of them is another place where forces bend."""
+    random = np.random.default_rng(turn)
+    shapes = tuple(s.with_theta(s.theta * np.exp(by * random.standard_normal(len(s.theta)))) for s in point.shapes)
+    return Point(point.ratios, point.starts, shapes)
 
 
 def _bent(short: Problem, point: Point, ports: Sequence[Port], limits: Callable[[Point], Limits]) -> tuple[Problem, Fit]:
@@ -100,5 +109,3 @@ def left(problem: Problem, fit: Fit) -> float:
     """What a fit leaves: the sum over the signals of the logarithms of their residuals, which asks for no unit and no stated noise."""
     found = _renoised(problem, fit.point).noise.level
     return float(np.sum(np.log(np.maximum(found, 1e-300))))
-
-

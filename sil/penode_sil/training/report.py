@@ -13,7 +13,7 @@ import numpy as np
 
 from ..output import whole
 from ..plots import COLOURS, STYLE, plt
-from .result import Error, Force, Trained
+from .result import Error, Force, Trained, beside_noise
 
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1"><title>{title}</title>
@@ -30,11 +30,8 @@ img{{max-width:100%}}.warn{{border-left:4px solid #D55E00;padding-left:.8rem}}co
 
 def write(path: Path, t: Trained) -> None:
     """The page, whole or not at all."""
-    verdict = "The fit converged." if t.converged else "The fit did not converge, or the model cannot be what was recorded."
-    parts = [
-        f"<p{'' if t.converged else ' class=warn'}>{verdict} {t.seconds:.1f} s of processor time; chi2 {t.chi2:.3f} a sample (1 is "
-        "noise).</p>"
-    ]
+    verdict = "The fit converged." if t.converged else "The fit did not converge."
+    parts = [f"<p{'' if t.converged else ' class=warn'}>{verdict} {t.seconds:.1f} s of processor time; {html.escape(beside_noise(t))}.</p>"]
     parts += [f"<p class=warn>{html.escape(n)}</p>" for n in t.notes]
     for force in t.forces:
         parts.append(f"<h2>{html.escape(force.name)}</h2>\n<p>{html.escape(_about(force))}</p>\n{_image(force)}")
@@ -73,16 +70,26 @@ def _about(f: Force) -> str:
 
 def _table(errors: tuple[Error, ...]) -> str:
     head = "".join(
-        f"<th>{h}</th>" for h in ("signal", "before", "after", "in the generated C", "noise", "inside the trained range", "gained")
+        f"<th>{h}</th>"
+        for h in (
+            "signal",
+            "before",
+            "after",
+            "in the generated C",
+            "noise",
+            "after over stated noise",
+            "inside the trained range",
+            "gained",
+        )
     )
     rows = []
     for e in errors:
         room = e.before**2 - e.noise**2
         gained = f"{100 * (e.before**2 - e.after**2) / room:.1f} %" if room > 0.0 else ""
-        cells = (e.before, e.after, e.deployed, e.noise, e.inside)
+        cells = (e.before, e.after, e.deployed, e.noise, e.ratio, e.inside)
         rows.append(
             f"<tr><td>{html.escape(e.signal)} [{html.escape(e.unit)}]</td>"
-            + "".join(f"<td>{v:.4g}</td>" for v in cells)
+            + "".join(f"<td>{'' if v is None else f'{v:.4g}'}</td>" for v in cells)
             + f"<td>{gained}</td></tr>"
         )
     return f"<table><tr>{head}</tr>{''.join(rows)}</table>"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from penode_gen.networks import Network
 
+from .tries import Try
 from .unknown import Unknown
 
 Array = NDArray[np.float64]
@@ -48,6 +49,12 @@ class Error:
     deployed: float
     noise: float
     inside: float  # as trained, without samples outside of the trained range and the second after them
+    stated: bool  # does the model file state the noise?
+
+    @property
+    def ratio(self) -> float | None:
+        """As trained, over the stated noise; None where none is stated."""
+        return self.after / self.noise if self.stated else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +71,9 @@ class Trained:
     outside: float  # share of the hold-out's samples outside of the trained range
     masked: float  # and of those left out beside them
     converged: bool
+    tried: tuple[Try, ...]  # the start that was taken, then the others
     notes: tuple[str, ...]
-    chi2: float  # per sample, whitened
+    chi2: float | None  # a sample, by the stated noise; None where no recorded sensor states any
     seconds: float  # processor time from the read recordings to the networks
     seed: int
     digests: dict[str, str]
@@ -78,6 +86,7 @@ class Trained:
             for k in ("model", "known", "outside", "masked", "converged", "notes", "chi2", "seconds", "seed", "digests", "versions")
         }
         found["parameters"] = {n: {"value": v, "sigma": s, "before": b, "unit": u} for n, (v, s, b, u) in self.parameters.items()}
+        found["tried"] = [{k: v if isinstance(v, str) or np.isfinite(v) else None for k, v in asdict(t).items()} for t in self.tried]
         found["not_identifiable"] = [asdict(u) for u in self.unknown]
         found["training"], found["holdout"] = ([asdict(e) for e in errors] for errors in (self.training, self.holdout))
         found["networks"] = {f.name: _force(f) for f in self.forces}
@@ -97,9 +106,19 @@ def _force(f: Force) -> dict[str, object]:
     }
 
 
+def beside_noise(t: Trained) -> str:
+    """What is left beside the noise that the model file states."""
+    stated = [f"{e.signal} {e.ratio:.3f}" for e in t.training if e.ratio is not None]
+    return (
+        f"residuals over the stated noise: {', '.join(stated)}"
+        if stated
+        else "no sensor states its noise, so nothing says whether all is learnt"
+    )
+
+
 def sentences(t: Trained, folder: object) -> str:
     """What the terminal shows."""
-    lines = [f"{t.model}: {'trained' if t.converged else 'NOT CONVERGED'}, {t.seconds:.1f} s of processor time, chi2 {t.chi2:.3f} a sample"]
+    lines = [f"{t.model}: {'trained' if t.converged else 'NOT CONVERGED'}, {t.seconds:.1f} s of processor time; {beside_noise(t)}"]
     for f in t.forces:
         ranges = ", ".join(f"{a:.3g} to {b:.3g} {u}" for a, b, u in zip(f.low, f.high, f.units, strict=True))
         lines.append(f"  {f.name}: {f.way}, trained over {ranges}, {2 * float(np.median(f.sigma[0])):.2g} {f.output} at 2 sigma")
@@ -110,9 +129,12 @@ def sentences(t: Trained, folder: object) -> str:
         lines.append(f"  not identifiable: {u.text}")
     for title, errors in (("training", t.training), ("held-out data", t.holdout)):
         if errors:
-            lines.append(f"  {'RMS error on ' + title:<26}{'before':>10}{'after':>10}{'in the C':>10}{'noise':>10}{'inside':>10}")
+            lines.append(
+                f"  {'RMS error on ' + title:<26}{'before':>10}{'after':>10}{'in the C':>10}{'noise':>10}{'ratio':>10}{'inside':>10}"
+            )
             lines += [
-                f"    {e.signal:<24}{e.before:>10.4g}{e.after:>10.4g}{e.deployed:>10.4g}{e.noise:>10.4g}{e.inside:>10.4g}  {e.unit}"
+                f"    {e.signal:<24}{e.before:>10.4g}{e.after:>10.4g}{e.deployed:>10.4g}{e.noise:>10.4g}"
+                f"{'' if e.ratio is None else f'{e.ratio:.3f}':>10}{e.inside:>10.4g}  {e.unit}"
                 for e in errors
             ]
     if t.holdout:

@@ -15,15 +15,10 @@ class Settings:
     curves_wider: float = 1.05  # of the visited range, that knots span
     data_orders: int = 4  # of the colour of noise: it follows from so many samples before, at most
     data_explained: float = 0.98  # share of the variance that a colour must leave: below it is one
-    ends_horizon: float = 10.0  # [s] of each recording that weights see first, at least
-    ends_rows: int = 10_000  # rows, at least
-    ends_good: float = 1.1  # times the noise that a sensor states: a fit that leaves more is tried again from other weights
-    ends_tries: int = 3
     ends_close: float = 3.0  # gain in chi2 that counts: weights of a network go on gaining little for long
-    lines_doublings: int = 5  # of the rows that straight lines are fitted to, from the first few to all of these
-    lines_least: int = 100  # rows at first
-    lines_rows: int = 8_000  # rows of each recording that straight lines are fitted to, at least
-    lines_short: float = 8.0  # [s] of each recording that they are fitted to, at least
+    left_more: float = 1.03  # times what it should be: a residual, or an error of the generated C, that somebody has to look at
+    lines_rows: int = 8_000  # rows of each recording that straight lines, and weights at first, see at least
+    lines_short: float = 8.0  # [s] of each recording that they see at least
     engine_room: int = 4_000_000  # doubles of derivatives that are held at a time
     judge_after: float = 0.5  # [s] after a sample outside of the trained range that are left out: what happened there dies away
     problem_limit: float = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
@@ -43,7 +38,8 @@ class Settings:
     story_tighter: float = 4.0  # margin of a promise from one try to the next
     story_tries: int = 8
     story_still: float = 1e-9  # a network's input that moves less against 1 has not been excited
-    story_loud: float = 1.25  # times the noise that a sensor states, from which on a fit did not converge, or the model lacks something
+    story_loud: float = 1.25  # times the noise that a sensor states, from which on a fit did not converge
+    tries_most: int = 3
     unknown_invisible: float = (
         0.5  # of its prior deviation: what data leave uncertain by more rests on the model file, not on the recordings
     )

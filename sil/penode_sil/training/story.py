@@ -20,9 +20,27 @@ from penode_gen.model import Model, NetworkPort
 from penode_gen.networks import Network
 from penode_gen.sets import fold, promises
 
-from ..errors import ModelError, RecordingError, WrongUse
+from ..errors import ModelError, NotConverged, RecordingError, WrongUse
 from ..recordings.measured import Measured
-from . import apart, bands, begin, curves, data, dense, ends, held_starts, heldout, judge, kinks, promised, unfold, unknown
+from . import (
+    apart,
+    asked,
+    bands,
+    begin,
+    curves,
+    data,
+    dense,
+    ends,
+    held_starts,
+    heldout,
+    judge,
+    left,
+    notes,
+    promised,
+    tries,
+    unfold,
+    unknown,
+)
 from .curve import Curve
 from .curves import Tell
 from .dense import Dense
@@ -65,25 +83,49 @@ def train(model: Model, train_: Sequence[Measured], held: Sequence[Measured], op
         journal=options.journal,
     )
     bounds = [promised.bound(model.networks[p.name].promises, size=1.0) for p in ports]
-    try:
-        if all(p.knots for p in ports):
-            problem, fit = curves.train(problem, ports, bounds, tell, lambda own, point: _started(own, point, ports, options.start))
-        else:
-            problem, fit = ends.train(problem, ports, templates, bounds, options.seed, tell, options.start)
-    except FloatingPointError as exc:
-        raise ModelError(
-            [
-                f"{model.path}: {exc}, whatever the networks are; check signs, units "
-                "and start states of the model against the recording (penode inspect)"
-            ]
-        ) from exc
+    problem, fit, tried = _tried(problem, ports, templates, bounds, options, tell)
     problem, fit = coloured(problem, fit, bounds)
     seen = curves.seen_by(problem, fit.point)
     visited = judge.visited(ports, seen)
     _check_excited(model, ports, visited)
     networks, fit = written(model, problem, fit, ports, templates, visited)
     spent = time.process_time() - compiled + options.journal.before
-    return _judged(model, problem, fit, ports, networks, visited, train_, held, (options, known, spent), tell)
+    return _judged(model, problem, fit, ports, networks, visited, train_, held, (options, known, spent, tried), tell)
+
+
+def _tried(
+    problem: Problem,
+    ports: Sequence[Port],
+    templates: Sequence[Network],
+    bounds: Sequence[Callable[[Curve], Limits]],
+    options: Options,
+    tell: Tell,
+) -> tuple[Problem, Fit, tuple[tries.Try, ...]]:
+    """The fit, from as many starts as it takes; what is known already is where the first one starts. UserError where none stays within
+    bounds."""
+
+    def one(k: int, tell: Tell) -> tuple[str, tuple[Problem, Fit] | None]:
+        start = options.start if k == 0 else begin.Start()
+        what = "where --from says" if start.parameters or start.networks else "straight lines" if k == 0 else f"start {k + 1}"
+        try:
+            if all(p.knots for p in ports):
+                return what, curves.train(problem, ports, bounds, tell, lambda own, point: _started(own, point, ports, start), k)
+            return what, ends.train(problem, ports, templates, bounds, options.seed + 1000 * k, tell, start, max(k - 1, 0))
+        except FloatingPointError:
+            return what, None
+
+    def doubt() -> None:
+        meant = asked.question(problem, ports)
+        if meant:
+            raise RecordingError(f"{', '.join(r.name for r in problem.records)}: {meant}")
+
+    try:
+        return tries.several(one, doubt, tell)
+    except FloatingPointError as exc:
+        raise NotConverged(
+            f"{problem.model.path}: {exc}; check signs, units and start states of the model against the recording (penode inspect), or begin "
+            "with what is known, by --known and --from"
+        ) from exc
 
 
 def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin.Start) -> Point:
@@ -233,12 +275,14 @@ def _judged(
     visited: Sequence[Array],
     train_: Sequence[Measured],
     held: Sequence[Measured],
-    given: tuple[Options, tuple[str, ...], float],
+    given: tuple[Options, tuple[str, ...], float, tuple[tries.Try, ...]],
     tell: Tell,
 ) -> tuple[Model, Trained]:
     """What is known of a fit."""
     tell(0.97, "what is known of it")
-    options, known, spent = given
+    options, known, spent, tried = given
+    remains = left.of(problem, fit.point)
+    assert remains is not None  # the fit ended there
     band = bands.of(problem, fit)
     values = dict(zip(model.parameters, problem.parameters(fit.point), strict=True))
     after = judge.with_networks(model, {p.name: n for p, n in zip(ports, networks, strict=True)}, values)
@@ -255,8 +299,11 @@ def _judged(
         _force(model, port, shape, network, x, band.deviation(k))
         for k, (port, shape, network, x) in enumerate(zip(ports, fit.point.shapes, networks, visited, strict=True))
     ]
-    loud = _loud(model, training)
-    notes = _notes(problem, fit, ports, loud, train_, held if not holdout else ())
+    said = [
+        *notes.noise(remains, tried),
+        *_deployed(after, train_, fit.point, problem, training),
+        *notes.of(problem, fit, ports, train_, held if not holdout else ()),
+    ]
     sigma = {n: float(band.deviations[i]) * abs(model.parameters[n].value) for i, n in enumerate(problem.engine.free)}
     parameters = {n: (float(values[n]), sigma[n], model.parameters[n].value, model.parameters[n].unit) for n in sigma}
     found = Trained(
@@ -269,9 +316,10 @@ def _judged(
         holdout,
         outside,
         masked,
-        (fit.ended or _all_stated(model, training)) and not loud,
-        tuple(notes),
-        problem.chi2(fit.point) / max(problem.samples, 1),
+        (fit.ended or all(e.stated for e in training)) and not remains.above(SETTINGS.story_loud),
+        tried,
+        tuple(said),
+        remains.chi2,
         spent,
         options.seed,
         {m.path.name: hashlib.sha256(m.path.read_bytes()).hexdigest() for m in (*train_, *held)} | {model.path.name: model.digest},
@@ -280,45 +328,12 @@ def _judged(
     return after, found
 
 
-def _loud(model: Model, training: Sequence[Error]) -> list[str]:
-    """The signals whose residuals are louder than the noise that the model file states."""
-    stated = [s for s in (*model.sensors, *model.outputs) if s.noise > 0.0]
-    return [e.signal for e in training if any(s.name == e.signal and e.after > SETTINGS.story_loud * s.noise for s in stated)]
-
-
-def _notes(
-    problem: Problem, fit: Fit, ports: Sequence[Port], loud: Sequence[str], train_: Sequence[Measured], left: Sequence[Measured]
-) -> list[str]:
-    """What a user must know of a fit; `left` are the held-out recordings, if the trained model leaves all bounds there."""
-    notes = []
-    if loud:
-        notes.append(
-            f"{', '.join(loud)}: residuals are louder than the noise the model file states; "
-            "the model lacks something that networks in their places cannot be"
-        )
-    notes += dict.fromkeys(p for m in train_ for p in m.quality.problems)  # parts of a file have them in common
-    notes += [
-        f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, "
-        "the network takes the rest"
-        for a in problem.apart
-        if ports[a.shape].knots
-    ]
-    notes += kinks.notes(problem, fit, ports)
-    if left:
-        titles = ", ".join(m.title for m in left)
-        notes.append(
-            f"{titles}: the trained model leaves all bounds there, so there is no error on held-out data; "
-            "a recording that goes further must be among --data"
-        )
-    if problem.model.method not in ("euler", "heun", "rk4"):
-        notes.append(f"the deployed method is {problem.model.method}; networks were trained through rk4 with the same steps")
-    return notes
-
-
-def _all_stated(model: Model, training: Sequence[Error]) -> bool:
-    """Does every sensor that was recorded state its noise? Then a fit that came down to it has arrived, whatever it still gains."""
-    stated = {s.name for s in (*model.sensors, *model.outputs) if s.noise > 0.0}
-    return bool(training) and all(e.signal in stated for e in training)
+def _deployed(after: Model, train_: Sequence[Measured], point: Point, problem: Problem, training: Sequence[Error]) -> list[str]:
+    """What the generated C errs more because of how its inputs run between rows."""
+    if after.interpolation != "linear" or not after.inputs or not any(e.deployed > SETTINGS.left_more * e.after for e in training):
+        return []
+    smooth = judge.deployed(problem, replace(after, interpolation="cubic"), train_, point)
+    return notes.deployed(training, [replace(e, deployed=smooth[e.signal]) for e in training])
 
 
 def versions() -> dict[str, str]:

@@ -55,7 +55,12 @@ def _library() -> ctypes.CDLL:
     source = Path(__file__).with_name("plants.c")
     subprocess.run(["gcc", "-std=c99", "-O2", "-fPIC", "-shared", str(source), "-lm", "-o", str(folder / "plants.so")], check=True)
     library, pointer, number = ctypes.CDLL(str(folder / "plants.so")), ctypes.c_void_p, ctypes.c_double
-    for name, given in (("spring", (pointer, number)), ("damper", (pointer, number)), ("both", (pointer, number, number)), ("lost", (pointer, number))):
+    for name, given in (
+        ("spring", (pointer, number)),
+        ("damper", (pointer, number)),
+        ("both", (pointer, number, number)),
+        ("lost", (pointer, number)),
+    ):
         function = getattr(library, name)
         function.argtypes, function.restype = given, number
     library.drive.argtypes = (pointer, pointer, pointer, ctypes.c_int, ctypes.c_int, number, pointer)
@@ -121,7 +126,10 @@ def _car_model(kind: str, car: _Car, loud: float, free: bool) -> str:
         networks = ['spring_net = { inputs = ["m"], output = "N" }', 'damper_net = { inputs = ["m/s"], output = "N" }']
         shapes = ["spring_net = { layers = [16, 16] }", "damper_net = { layers = [16, 16] }"]
         elements += [f'{n}_nn = {{ between = ["wheel", "body"], law = "network", network = "{n}_net" }}' for n in ("spring", "damper")]
-    noise = [f'{n} = {{ value = "der({v})", unit = "m/s^2", noise = {loud * s:g} }}' for n, v, s in zip(("a_body", "a_wheel"), ("v_b", "v_w"), NOISE, strict=True)]
+    noise = [
+        f'{n} = {{ value = "der({v})", unit = "m/s^2", noise = {loud * s:g} }}'
+        for n, v, s in zip(("a_body", "a_wheel"), ("v_b", "v_w"), NOISE, strict=True)
+    ]
     parts = [
         '[model]\nname = "plant"\nsample_time = "1 ms"',
         "[parameters]\n" + "\n".join(parameters),
@@ -186,4 +194,6 @@ def _tank(number: int, random: np.random.Generator) -> Plant:
     table = "time [s],P [W],T_meas [K]\n" + "\n".join(lines) + "\n"
     model = TANK.format(capacity=capacity * u(0.93, 1.07), where="T" if absolute else "T - T0", noise=noise)
     away = 293.0 if absolute else 0.0
-    return Plant("tank", number, model, table, {"loss": (lambda x: np.array([_library().lost(a.ctypes.data, k - away) for k in x]), above + away)})
+    return Plant(
+        "tank", number, model, table, {"loss": (lambda x: np.array([_library().lost(a.ctypes.data, k - away) for k in x]), above + away)}
+    )
