@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 """
-What a command ends with: 0 done, 2 wrong use or bad input with a line for each problem, 3 a fault of ours with one line.
+What a command ends with: 0 done, 2 wrong use or bad input with a line for each problem, 3 a fault of ours with one line,
+4 a training that did not come down to the noise.
 
 The lines go to stderr; where the command line has --json, the same go to stdout, as one JSON object (sil/ERRORS.md).
 """

@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from penode_gen import units
 from penode_gen.model import Model
 
-from . import lines
+from . import left, lines
 from .data import Record, at_first
 from .port import Port
 from .problem import Problem
-from .solve import NONE
 
 Array = NDArray[np.float64]
 OTHERS = {"m": "mm", "m/s": "mm/s", "m/s^2": "g", "rad": "deg", "rad/s": "deg/s"}  # what is mistaken for units of SI
@@ -39,7 +38,7 @@ class Change:
 
 def question(problem: Problem, ports: Sequence[Port]) -> str:
     """What to ask about the recordings; empty where no change makes much more sense of them."""
-    short = tuple(r.first(lines.rows(problem) // 2) for r in problem.records)
+    short = tuple(r.first(lines.rows(problem) // 4) for r in problem.records)
     before, found = _score(problem, ports, short), []
     for change in _changes(problem.model, short):
         score = _score(problem, ports, tuple(change.apply(r) for r in short))
@@ -58,18 +57,11 @@ def _score(problem: Problem, ports: Sequence[Port], records: tuple[Record, ...])
     """What lines leave of the signals: geometric mean of the residuals over the signals' standard deviations, 1 where they diverge."""
     own = problem.with_(records=records, noise=at_first(problem.model, records, problem.engine.signals))
     try:
-        own, point = lines.fitted(own, ports, lambda point: NONE)
+        own, point = lines.simple(own, ports)
     except FloatingPointError:
         return 1.0
-    found = own.residuals(point)
-    if found is None:
-        return 1.0
-    shares = []
-    for j in range(len(problem.engine.signals)):
-        y, e = (np.concatenate([v[r.good[:, j], j] for v, r in zip(vs, records, strict=True)]) for vs in ([r.y for r in records], found[0]))
-        if len(y):
-            shares.append(np.sqrt(np.mean(e**2)) / max(float(np.std(y)), 1e-300))
-    return float(np.exp(np.mean(np.log(np.maximum(shares, 1e-6))))) if shares else 1.0
+    found = left.of(own, point)
+    return 1.0 if found is None else float(np.exp(np.nanmean(np.log(np.maximum(found.share, 1e-6)))))
 
 
 def _changes(model: Model, records: Sequence[Record]) -> list[Change]:

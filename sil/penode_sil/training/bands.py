@@ -83,9 +83,10 @@ def sag(curve: Curve) -> Array:
 
 
 def rest(curve: Curve, x: Array) -> Array:
-    """What is left of a sag at x when the middles are known: a quarter of it."""
+    """What is left of a sag at x when the middles are known: a quarter of it half way to them, nothing there and at the knots."""
     i = np.clip(np.searchsorted(curve.knots, x, side="right") - 1, 0, len(curve.knots) - 2)
-    return sag(curve)[i] / 4.0
+    half = np.clip((x - curve.knots[i]) / np.diff(curve.knots)[i], 0.0, 1.0) * 2.0 % 1.0
+    return sag(curve)[i] * half * (1.0 - half)
 
 
 def _ways(point: Point, fine: Point) -> tuple[Array, Array]:

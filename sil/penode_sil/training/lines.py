@@ -56,6 +56,15 @@ def _renoised(problem: Problem, point: Point) -> Problem:
     return problem.with_(noise=data.of_residuals(found[0], [r.good for r in problem.records], problem.noise))
 
 
+def simple(problem: Problem, ports: Sequence[Port]) -> tuple[Problem, Point]:
+    """One line for each network, from a few rows on to all; the problem has the noise that they leave. FloatingPointError where the
+    simulation diverges."""
+    samples = max(len(r.y) for r in problem.records)
+    own = _first(problem, samples)
+    point = _growing(problem, own.begin([straight(p) for p in ports]), samples)
+    return _renoised(own, point), point
+
+
 def _growing(problem: Problem, point: Point, samples: int) -> Point:
     """Where lines end that see twice as many rows each time."""
     for doublings in reversed(range(7)):

@@ -71,7 +71,7 @@ def _library() -> ctypes.CDLL:
 def draw(kind: str, number: int, seconds: float = SECONDS) -> Plant:
     """The plant of a kind and a number."""
     random = np.random.default_rng([KINDS.index(kind), number, 51])
-    return _tank(number, random) if kind == "tank" else _car(kind, number, random, seconds)
+    return _tank(number, random, seconds / SECONDS) if kind == "tank" else _car(kind, number, random, seconds)
 
 
 def _car(kind: str, number: int, random: np.random.Generator, seconds: float) -> Plant:
@@ -179,9 +179,9 @@ loss = {{ layers = [16, 16] }}
 """
 
 
-def _tank(number: int, random: np.random.Generator) -> Plant:
+def _tank(number: int, random: np.random.Generator, part: float) -> Plant:
     """A network in an equation, of the temperature above the room, or of the absolute one."""
-    u, rows = random.uniform, 90 * 60
+    u, rows = random.uniform, round(90 * 60 * part)
     capacity, a = u(150e3, 400e3), np.array([u(2, 5), u(0.0, 0.08), u(-1, 4), u(10, 30)])
     power = np.repeat(u(0, 500, 1 + rows // 60), np.resize(random.integers(60, 400, 12), 1 + rows // 60))[:rows]
     soft = np.hanning(27)[1:-1] / np.hanning(27).sum()
