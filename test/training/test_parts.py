@@ -195,3 +195,19 @@ def test_colour_of_noise_is_found() -> None:
     good[100, 0] = False
     e = found.white(residual, good)
     assert np.all(e[100:105, 0] == 0.0) and np.all(e[100:105, 1] != 0.0)
+
+
+def test_a_band_holds_95_of_100_about_what_is_known_to_be_away() -> None:
+    """Drawn errors about 0 to 10 deviations away: 1.96 of the band's own hold 95 %, by four deviations of the draw."""
+    random = np.random.default_rng(1)
+    for away in (0.0, 0.3, 1.0, 3.0, 10.0):
+        errors = away + random.standard_normal(20_000)
+        held = np.abs(errors) < bands.HOLDS * float(bands.wide(np.array([away]), np.ones(1))[0])
+        assert abs(held.mean() - 0.95) < 4.0 * np.sqrt(0.05 * 0.95 / 20_000), away
+
+
+def test_what_is_left_of_a_sag_is_nothing_at_knots_and_middles() -> None:
+    knots = np.linspace(-1.0, 1.0, 11)
+    parabola = curve.Curve(knots, 3.0 * knots**2, 5)
+    assert np.allclose(bands.rest(parabola, np.array([0.2, 0.3, 0.4])), 0.0)
+    assert np.allclose(bands.rest(parabola, np.array([0.25, 0.35])), 3.0 * 0.2**2 / 16.0)

@@ -5,7 +5,7 @@
 A force is no chain of straight pieces. Between two knots it may sag, by width^2 * curvature / 8 in the middle, and what it sags there moves
 the knots too, and the constant that two curves share. So the band is taken on curves with a knot more in the middle of each piece: its sag
 has a prior deviation as its neighbours bend, and no more. The error of what was trained is then that of the best such curve, and the way to
-it: E (trained - true)^2 = (trained - best)^2 + covariance of the best, whatever was left out."""
+it, which is known, and the covariance of the best, which is not."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
 
 from .curve import Curve
 from .dense import Dense
@@ -21,6 +22,7 @@ from .problem import Point, Problem
 from .solve import Fit
 
 Array = NDArray[np.float64]
+HOLDS = float(ndtri(0.975))  # deviations to both sides that hold 95 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +41,7 @@ class Band:
         return np.sqrt(np.maximum(np.diag(self.spread), 0.0) + self.away**2)
 
     def deviation(self, k: int) -> Callable[[Array], Array]:
-        """The standard deviation of the k-th shape's force at places [n, inputs]."""
+        """The standard deviation of the k-th shape's force at places [n, inputs]: 1.96 of them hold 95 %."""
         before = sum(len(s.theta) for s in self.fine.shapes[:k])
         first = len(self.fine.ratios) + self.fine.starts.size + before
         own = slice(first, first + len(self.fine.shapes[k].theta))
@@ -49,10 +51,23 @@ class Band:
             rows = fine.hats(x[:, 0]) if isinstance(fine, Curve) else _slopes(fine, x)
             noise = np.maximum(np.einsum("ij,jk,ik->i", rows, self.spread[own, own], rows), 0.0)
             left = rest(shape, x[:, 0]) if isinstance(shape, Curve) else 0.0
-            deviation: Array = np.sqrt(noise + (rows @ self.away[own]) ** 2 + left**2)
-            return deviation
+            return wide(rows @ self.away[own], np.sqrt(noise + left**2))
 
         return found
+
+
+def wide(away: Array, deviation: Array) -> Array:
+    """The deviation of a normal error about 0 that is as likely within 1.96 of it as one about `away` is within the same place: what is
+    known to be away is no noise, of which as much again would have to be held."""
+    far, spread = np.abs(away), np.maximum(deviation, 1e-300)
+    share = ndtr(HOLDS) - ndtr(-HOLDS)
+    low, high = np.zeros_like(far), far + HOLDS * spread
+    for _ in range(50):  # halvings: to the last bit
+        middle = 0.5 * (low + high)
+        holds = ndtr((middle - far) / spread) - ndtr((-middle - far) / spread) >= share
+        low, high = np.where(holds, low, middle), np.where(holds, middle, high)
+    found: Array = high / HOLDS
+    return found
 
 
 def of(problem: Problem, fit: Fit) -> Band:
