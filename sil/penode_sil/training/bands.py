@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr
 
 from .curve import Curve
 from .dense import Dense
@@ -22,7 +22,6 @@ from .problem import Point, Problem
 from .solve import Fit
 
 Array = NDArray[np.float64]
-HOLDS = float(ndtri(0.975))  # deviations to both sides that hold 95 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +55,17 @@ class Band:
         return found
 
 
-def wide(away: Array, deviation: Array) -> Array:
-    """The deviation of a normal error about 0 that is as likely within 1.96 of it as one about `away` is within the same place: what is
-    known to be away is no noise, of which as much again would have to be held."""
+def wide(away: Array, deviation: Array, holds: float = 1.96) -> Array:
+    """The deviation of which `holds` to both sides hold 95 % of a normal error about `away`, as they do of one about 0: what is known to be
+    away is no noise, of which as much again would have to be held."""
     far, spread = np.abs(away), np.maximum(deviation, 1e-300)
-    share = ndtr(HOLDS) - ndtr(-HOLDS)
-    low, high = np.zeros_like(far), far + HOLDS * spread
+    share = ndtr(holds) - ndtr(-holds)
+    low, high = np.zeros_like(far), far + holds * spread
     for _ in range(50):  # halvings: to the last bit
         middle = 0.5 * (low + high)
-        holds = ndtr((middle - far) / spread) - ndtr((-middle - far) / spread) >= share
-        low, high = np.where(holds, low, middle), np.where(holds, middle, high)
-    found: Array = high / HOLDS
+        inside = ndtr((middle - far) / spread) - ndtr((-middle - far) / spread) >= share
+        low, high = np.where(inside, low, middle), np.where(inside, middle, high)
+    found: Array = high / holds
     return found
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Networks of any shape, trained end to end: straight lines, random weights that are taught them, start states, the first rows, then all."""
+"""Networks of any shape, trained end to end: straight lines, random weights that are taught them, start states, first rows, all rows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from penode_gen.networks import Network
 from . import begin, curves, lines
 from .curve import Curve
 from .curves import Tell
-from .dense import Dense, like
+from .dense import like
 from .engine import Shape
 from .port import Port, inputs_of
 from .problem import Point, Problem

@@ -49,23 +49,19 @@ def noise(remains: Left, tried: Sequence[Try]) -> list[str]:
         ratio, alike = remains.ratio[j], remains.alike[j] > 0.0
         if ratio * SETTINGS.story_loud < 1.0:
             found.append(
-                f"{name}: residuals are {ratio:.2g} times the noise that the model file states, so a fit that misses by less than that noise "
-                f"passes; state what the sensor has, {_level(remains, j)}"
+                f"{name}: residuals are {ratio:.2g} times the noise that the model file states, so a fit that misses by less than that "
+                "passes; state the noise that the sensor has"
             )
         elif j in loud and not alike:
             found.append(
-                f"{name}: what is left has no memory, as noise has none: the stated noise may be too small; state {_level(remains, j)}"
+                f"{name}: what is left has no memory, as noise has none: the stated noise may be too small, by a factor of {ratio:.3g}"
             )
         elif SETTINGS.left_more < ratio <= SETTINGS.story_loud and alike:
             found.append(
-                f"{name}: residuals are {ratio:.3f} times the stated noise and alike from row to row: {_starts(tried)} left something that is "
-                "smaller than the noise, and is none"
+                f"{name}: residuals are {ratio:.3f} times the stated noise and alike from row to row: {_starts(tried)} left something that "
+                "is smaller than the noise, and is none"
             )
     return found
-
-
-def _level(remains: Left, j: int) -> str:
-    return f"{remains.ratio[j]:.2g} of the stated one"
 
 
 def _not_down(remains: Left, loud: Sequence[int], tried: Sequence[Try]) -> str:

@@ -123,8 +123,8 @@ def _tried(
         return tries.several(one, doubt, tell)
     except FloatingPointError as exc:
         raise NotConverged(
-            f"{problem.model.path}: {exc}; check signs, units and start states of the model against the recording (penode inspect), or begin "
-            "with what is known, by --known and --from"
+            f"{problem.model.path}: {exc}; check signs, units and start states of the model against the recording (penode inspect), or "
+            "begin with what is known, by --known and --from"
         ) from exc
 
 

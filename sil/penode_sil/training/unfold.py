@@ -2,7 +2,7 @@
 # Copyright (c) 2026 the penode authors
 """A curve written down as a ReLU network of a given shape, exactly: no regression, and 0 at 0 to the bit where the curve is.
 
-F(x) = F(0) + a relu(x) - b relu(-x) + sum of c_j relu(x - k_j) for k_j > 0 and of c_j relu(k_j - x) for k_j < 0: all units are 0 at x = 0. The
+F(x) = F(0) + a relu(x) - b relu(-x) + sum of c_j relu(x - k_j) for k_j > 0 and of c_j relu(k_j - x) for k_j < 0: all units are 0 at 0. The
 first hidden layer holds x+ and x- and its share of the kinks; those in the middle carry x+ and x- and what is summed up so far as a
 positive and a negative part, and kinks of their own; the last carries the sum only, for relu(y) - relu(-y) = y.
 """
