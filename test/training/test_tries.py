@@ -17,7 +17,7 @@ import pytest
 from click.testing import CliRunner
 
 import penode_gen
-from penode_sil.cli import cli
+from penode_sil.cli import cli, main
 from penode_sil.errors import NotConverged, RecordingError
 from penode_sil.recordings.measured import load
 from penode_sil.training import asked, data, heldout, left, notes, story, threads, tries
@@ -85,13 +85,20 @@ def test_the_remedy_for_how_inputs_run_is_named_where_it_helps() -> None:
 @pytest.mark.parametrize(
     ("factor", "code", "said"), [(0.01, 4, "may be too small"), (1.0, 0, ""), (10.0, 0, "times the noise that the model")]
 )
-def test_residuals_are_judged_by_the_stated_noise(factor: float, code: int, said: str, tmp_path: Path) -> None:
+def test_residuals_are_judged_by_the_stated_noise(
+    factor: float, code: int, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     plant = plants.draw("tank", 1, 14.0)
     model, table = plant.write(tmp_path)
     model.write_text(re.sub(r"noise = ([\d.]+)", lambda m: f"noise = {float(m[1]) * factor:g}", plant.model))
-    result = CliRunner().invoke(cli, ["train", str(model), "--data", str(table), "-o", str(tmp_path / "out"), "--json"])
-    assert result.exit_code == code, result.output
-    found = json.loads(result.output)
+    monkeypatch.setattr(sys, "argv", ["penode", "train", str(model), "--data", str(table), "-o", str(tmp_path / "out"), "--json"])
+    try:
+        main()
+        ended = 0
+    except SystemExit as exc:
+        ended = exc.code
+    found = json.loads(capsys.readouterr().out)
+    assert ended == code, found["notes"]
     assert found["converged"] == (code == 0) and found["chi2"] == pytest.approx(factor**-2.0, rel=0.1)
     assert found["training"][0]["stated"] and any(said in n for n in [*found["notes"], ""])
     assert (tmp_path / "out" / "model_trained.toml").exists() and found["tried"][0]["ratio"] > 0.0

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import click
@@ -54,4 +55,4 @@ def train(
         found = files.run(files.Job(model, data, holdout, output, channel, known, seed, start, resume), tell)
     click.echo(json.dumps(found.as_json(), indent=2) if as_json else result.sentences(found, output))
     if not found.converged:
-        click.get_current_context().exit(NotConverged.exit)
+        sys.exit(NotConverged.exit)

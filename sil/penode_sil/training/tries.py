@@ -30,8 +30,8 @@ def several(
     train: Callable[[int, Tell], tuple[str, tuple[Problem, Fit] | None]], doubt: Callable[[], None], tell: Tell
 ) -> tuple[Problem, Fit, tuple[Try, ...]]:
     """The best of the starts that are needed; `train` takes the number of a start, and gives it in words and where it ended, None if it
-    left all bounds. `doubt` is called once where the first start explains little: it may raise. FloatingPointError where all of them leave all
-    bounds."""
+    left all bounds. `doubt` is called once where the first start explains little: it may raise. FloatingPointError where all of them leave
+    all bounds."""
     ended: list[tuple[str, Problem, Fit, left.Left]] = []
     lost: list[Try] = []
     for k in range(SETTINGS.tries_most):
