@@ -514,6 +514,28 @@ def test_extends(folder):
     (folder / "good.toml").write_text(GOOD)
 
 
+LATE = GOOD.replace('start = 0.5 }', 'start = 0.5 }\nq_late = { unit = "m" }').replace('loop =', 'late = "der(q_late)*tau = q - q_late"\nloop =')
+
+
+@pytest.mark.parametrize(
+    "sensor, right",
+    [
+        ('q = { value = "q_late", unit = "mm" }', True),  # what measures q may follow it by a state of its own
+        ('q = { value = "2*q_late", unit = "mm" }', True),
+        ('q_late = { value = "q", unit = "mm" }', False),  # q does not follow q_late
+        ('F_lag = { value = "q_late", unit = "mm" }', False),
+    ],
+)
+def test_a_sensor_called_as_a_state_measures_it(folder, sensor, right):
+    text = LATE.replace('q = { value = "q", unit = "mm" }\n', "").replace("[sensors]\n", f"[sensors]\n{sensor}\n")
+    (folder / "late.toml").write_text(text)
+    if right:
+        assert penode_gen.load(folder / "late.toml").sensors[0].name == "q"
+        return
+    with pytest.raises(penode_gen.ModelError, match="is already the name of another quantity"):
+        penode_gen.load(folder / "late.toml")
+
+
 def test_lines_are_found_in_any_layout(folder):
     """Keys in lists over several lines, strings that look like headers, quoted keys, dotted keys, sub-tables, CRLF."""
     text = (

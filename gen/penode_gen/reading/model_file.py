@@ -18,6 +18,7 @@ from ..laws import LAWS
 from ..sets import promises
 from ..sets.fold import room
 from .ends import EndTables
+from .followers import measures
 from .network_tables import ROOM, UNKNOWN
 from .places import one_line, show
 from .tables import C_PATTERN, MACROS, SECTIONS
@@ -83,7 +84,7 @@ class _Reader(EndTables):
         promises.check(networks, sets, head["outside"], self.problem)
         self.unique(parameters, inputs, bodies, points, elements, (*states, *sampled), variables, networks)
         moving = {*(s.name for s in states), *(s.name for s in sampled), *(b.position for b in bodies), *(b.velocity for b in bodies)}
-        self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs))
+        self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs), equations)
         self.macros(parameters, networks, name)
         if not outputs and not self.data.get("outputs"):
             self.problem(("outputs",), "the model has no outputs", "add [outputs]: the C needs at least one")
@@ -315,11 +316,13 @@ class _Reader(EndTables):
             if name in {b.name for b in bodies}:
                 self.problem((section, name), f"'{name}' is taken by the body of that name", "rename one: an element could mean either")
 
-    def shown(self, signals: tuple[m.Signal, ...], inputs: set[str], states: set[str], n_outputs: int) -> None:
+    def shown(
+        self, signals: tuple[m.Signal, ...], inputs: set[str], states: set[str], n_outputs: int, equations: tuple[m.Equation, ...]
+    ) -> None:
         """In tables of results, a name stands for one quantity; that of a state also for what measures it, however well."""
         first: dict[str, str] = {name: name for name in inputs}
         for n, s in enumerate(signals):
-            other = s.name in states and not re.search(rf"\b{s.name}\b", s.expression)
+            other = s.name in states and not measures(s.name, s.expression, equations)
             if s.expression and (other or first.setdefault(s.name, s.expression.strip()) != s.expression.strip()):
                 self.problem(
                     ("outputs" if n < n_outputs else "sensors", s.name), f"'{s.name}' is already the name of another quantity", "rename one"
