@@ -514,7 +514,9 @@ def test_extends(folder):
     (folder / "good.toml").write_text(GOOD)
 
 
-LATE = GOOD.replace('start = 0.5 }', 'start = 0.5 }\nq_late = { unit = "m" }').replace('loop =', 'late = "der(q_late)*tau = q - q_late"\nloop =')
+LATE = GOOD.replace("start = 0.5 }", 'start = 0.5 }\nq_late = { unit = "m" }').replace(
+    "loop =", 'late = "der(q_late)*tau = q - q_late"\nloop ='
+)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 
 from penode_sil.diagnosis.advice import advice, doubts, likely
 from penode_sil.diagnosis.catalogue import MEANING, OTHERWISE, RIVALS, separating
+from penode_sil.diagnosis.report_words import headline
 from penode_sil.diagnosis.result import OUTSIDE, Cause, Diagnosis, Gain, Named, Recorded, Value
 from penode_sil.diagnosis.terminal import sentences
 
@@ -23,9 +24,9 @@ def cause(kind="coulomb_friction", where="damper", confidence=0.9, alternatives=
     return replace(c, separate=separating(kind, [a.kind for a in alternatives]))
 
 
-def said(verdict="explained", *causes, posteriors=None, gain=GAIN, notes=(), residual=None, explained=0.99, data=()):
+def said(verdict="explained", *causes, posteriors=None, gain=GAIN, notes=(), residual=None, explained=0.99, data=(), **more):
     sets = tuple({"causes": [{"kind": n.kind, "where": n.where}], "posterior": p} for n, p in (posteriors or {}).items())
-    d = Diagnosis(verdict, causes, gain, {}, explained, 512.0, 0.0, tuple(notes), data, residual or {}, explanations=sets)
+    d = Diagnosis(verdict, causes, gain, {}, explained, 512.0, 0.0, tuple(notes), data, residual or {}, explanations=sets, **more)
     return replace(d, advice=advice(d))
 
 
@@ -90,8 +91,8 @@ def test_pairs_of_the_catalogue_are_of_its_kinds():
         (said("explained", cause()), ["use model_extended.toml"]),
         (said("explained", cause(), gain={}), ["use model_extended.toml", "--holdout"]),
         (
-            said("explained", cause(), gain={"a": replace(GAIN["a"], after_rmse=0.11)}),
-            ["do not use model_extended.toml yet: on the hold-out its error of a is larger"],
+            said("partly_explained", cause(), model_file="model_rejected.toml"),
+            ["keep the nominal model: model_rejected.toml predicts worse"],
         ),
         (
             said("explained", cause(), gain={"a": replace(GAIN["a"], outside=0.3)}),
@@ -112,6 +113,12 @@ def test_advice_for_each_verdict(d, parts):
     assert len(d.advice) == len(parts) and all(part in text for part, text in zip(parts, d.advice, strict=True)), d.advice
     text = screen(d)
     assert all(part in text for part in parts)
+
+
+def test_the_first_line_says_whether_to_keep_the_nominal_model():
+    kept = said("partly_explained", cause(), model_file="model_rejected.toml")
+    assert screen(kept).startswith("car: keep the nominal model; partly explained")
+    assert headline(kept).startswith("Keep the nominal model: ") and not headline(said("explained", cause())).startswith("Keep")
 
 
 def test_what_has_no_name_has_no_confidence_on_the_screen():

@@ -87,6 +87,8 @@ def advice(d: Diagnosis) -> tuple[str, ...]:
 
 
 def _of_verdict(d: Diagnosis) -> list[str]:
+    if d.rejected:
+        return [f"keep the nominal model: {d.model_file} predicts worse"] + (_where_to_look(d) if d.verdict == "unexplained" else [])
     if d.verdict == "no_discrepancy" and any(
         g.before_rmse > UNSEEN * g.noise_floor and g.after_rmse < g.before_rmse for g in d.gain.values()
     ):
@@ -97,12 +99,7 @@ def _of_verdict(d: Diagnosis) -> list[str]:
         return ["record again with more excitation: larger motion, more frequencies, all sensors of the model file"]
     if d.verdict == "unexplained":
         return _where_to_look(d)
-    worse = [name for name, g in d.gain.items() if g.worsened]
-    found = (
-        [f"do not use model_extended.toml yet: on the hold-out its error of {', '.join(worse)} is larger than that of the model as it is"]
-        if worse
-        else _take_over(d)
-    )
+    found = _take_over(d)
     if d.verdict == "partly_explained":
         found.append(
             f"look for the rest: {1.0 - d.explained:.0%} of the avoidable residual is unexplained; "

@@ -4,29 +4,16 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 
-import penode_gen
-from penode_gen.model import Model
-
 from ..recordings.measured import Measured
-from . import explanation, plausible, residual, weighed
-from .entries import extends
+from . import explanation, plausible, weighed
+from .checks.case import Case, End
+from .checks.written import write_extended
 from .explanation import Explanation
 from .result import OUTSIDE, Cause, Diagnosis, Recorded
-
-
-def write_extended(text: str, model: Model, output: Path) -> Model:
-    """Writes model_extended.toml beside the rest, with a path to the nominal one such that both can be moved together; the model of it."""
-    output.mkdir(parents=True, exist_ok=True)
-    nominal = model.path.resolve()
-    beside = Path(os.path.relpath(nominal, output.resolve()))
-    (output / "model_extended.toml").write_text(text.replace(extends(nominal), extends(beside), 1))
-    return penode_gen.load(output / "model_extended.toml")
 
 
 def recorded(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[Recorded, ...]:
@@ -49,20 +36,15 @@ def alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
     return tuple(sets)
 
 
-def by_innovations(
-    w: weighed.Weighed, best: Explanation | None, output: Path | None, remarks: Sequence[str], tell: Callable[[float, str], None]
-) -> Diagnosis:
+def by_innovations(case: Case, w: weighed.Weighed, best: Explanation | None) -> End:
     """The diagnosis of recordings that sensor noise alone cannot judge, from what was weighed, and of which `best` is what sensor noise
-    would say; without recordings and time, which the caller has."""
+    would say; without pictures, recordings and time."""
     study = w.study
-    extended = w.model if output is None else write_extended(w.text, study.model, output)
-    tell(0.9, "showing what is wrong")
-    shown = residual.show(study, w.fit, extended, w.held, w.verdict == "unexplained")
     rows = explanation.rows(study)
     evidence = (study.null.cost - rows) / np.sqrt(2.0 * rows)
     doubt = plausible.doubt(study, best, w.verdict) if w.verdict == "unexplained" else ""
     causes = w.causes or ((Cause(OUTSIDE, "", {}, 0.5),) if w.verdict == "unexplained" else ())
-    return Diagnosis(
+    answer = Diagnosis(
         w.verdict,
         causes,
         w.gain,
@@ -70,8 +52,7 @@ def by_innovations(
         w.explained,
         evidence,
         0.0,
-        (*[doubt] * bool(doubt), *remarks, *w.notes),
-        residual=shown.numbers(),
+        (*[doubt] * bool(doubt), *case.remarks, *w.notes),
         explanations=w.explanations,
-        shown=shown,
     )
+    return End(answer, study, write_extended(w.text, case), w.fit, w.held, w.withheld)

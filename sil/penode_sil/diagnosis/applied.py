@@ -33,7 +33,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     """The nominal model with the values of a fit and the terms of it; `offsets`: sensors whose
     offset goes into it."""
     forces = [t for t in terms if t.form.how == "force"]
-    taken = _names(model)
+    taken = names(model)
     rename: dict[str, str] = {}
     for t in forces:
         for name in t.elements:
@@ -45,7 +45,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     values = fit.values
     parameters, elements = _forces(model, bench, values, forces, named)
     driven = _driven(model, fit, terms, {*taken, *rename.values()})
-    redirected = _redirected(model, driven)
+    moved = redirected(model, driven)
     own = [(e, bench.places[t.form.index]) for t in forces for e in bench.model.elements if e.name in t.elements]
     grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
     limits = {t.form.index: values[t.free[0].target] for t in terms if t.form.how == "clip"}
@@ -59,15 +59,15 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
         for s, x in zip(model.sensors, sensors, strict=True)
         if x and s.name in units_of
     ]
-    outputs += [x for x in redirected["outputs"] if x.split(" = ")[0] not in {o.split(" = ")[0] for o in outputs}]
+    outputs += [x for x in moved["outputs"] if x.split(" = ")[0] not in {o.split(" = ")[0] for o in outputs}]
     substeps = max((late.substeps(d, 0.0, model.sample_time) for d in delays.values()), default=1)
     lines = _head(model, terms, substeps)
     for title, entries in (
         ("parameters", [*parameters, *driven.parameters]),
         ("actuators", driven.actuators),
-        ("elements", [*redirected["elements"], *elements]),
+        ("elements", [*moved["elements"], *elements]),
         ("states", driven.states),
-        ("equations", [*redirected["equations"], *driven.equations]),
+        ("equations", [*moved["equations"], *driven.equations]),
         ("outputs", outputs),
         (
             "sensors",
@@ -117,7 +117,7 @@ def _forces(
     return parameters, elements
 
 
-def _names(model: Model) -> set[str]:
+def names(model: Model) -> set[str]:
     """All names of a model file."""
     lists = (model.inputs, model.bodies, model.points, model.sampled, model.elements, model.variables, model.outputs, model.sensors)
     return {*model.parameters, *model.states, *(x.name for some in lists for x in some)}
@@ -199,10 +199,10 @@ class Driven:
 
     def through(self, text: str) -> str:
         """An expression with what stands for its inputs now; an offset has no rate."""
-        for name, acts in self.acts.items():
-            text = re.sub(rf"\b{name}\b", acts, text)
-            if name in self.offsets:
-                text = re.sub(rf"(?<!der\()\b{acts}\b", f"({acts} + {self.offsets[name]})", text)
+        if self.acts:
+            text = re.sub(rf"\b({'|'.join(self.acts)})\b", lambda m: self.acts[m[1]], text)
+        for name, offset in self.offsets.items():
+            text = re.sub(rf"(?<!der\()\b{self.acts[name]}\b", f"({self.acts[name]} + {offset})", text)
         return text
 
 
@@ -212,7 +212,7 @@ def _driven(model: Model, fit: Fit, terms: Sequence[Term], taken: set[str]) -> D
     own = sorted((t for t in terms if t.form.how.startswith("input_")), key=lambda t: t.form.how not in SAMPLED)
     for name in dict.fromkeys(t.form.where for t in own):
         mine = [t for t in own if t.form.where == name]
-        if _bound(model, name):
+        if bound(model, name):
             found.left += [_uncorrected(t) for t in mine]
             continue
         found.acts[name] = name
@@ -227,7 +227,7 @@ def _driven(model: Model, fit: Fit, terms: Sequence[Term], taken: set[str]) -> D
     return found
 
 
-def _bound(model: Model, name: str) -> bool:
+def bound(model: Model, name: str) -> bool:
     """Does an actuator or a point of the file take an input, which a file that extends it cannot take elsewhere?"""
     actuated = [q.text for q in model.equations if q.text.startswith(f"der({q.name})*")] + [p.text for p in model.points]
     return any(s.source == name for s in model.sampled) or any(re.search(rf"\b{name}\b", text) for text in actuated)
@@ -260,7 +260,7 @@ def _uncorrected(t: Term) -> str:
     return f"{t.form.how} of {t.form.where}: a recording has to be corrected, the model file has no law for it"
 
 
-def _redirected(model: Model, driven: Driven) -> dict[str, list[str]]:
+def redirected(model: Model, driven: Driven) -> dict[str, list[str]]:
     """Elements, equations and outputs on which inputs act, with what stands for these now."""
     found: dict[str, list[str]] = {"elements": [], "equations": [], "outputs": []}
     for e in model.elements:

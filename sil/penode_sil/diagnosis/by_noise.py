@@ -6,17 +6,14 @@ and changes with time, written into the extended model and measured on the hold-
 from __future__ import annotations
 
 import os
-import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 import penode_gen
-from penode_gen.model import Model
 
-from ..recordings.measured import Measured
 from . import (
     absorb,
     echo,
@@ -35,12 +32,14 @@ from . import (
     straight,
     tones,
 )
-from .answers import alternatives, write_extended
+from .answers import alternatives
 from .broken import broken_sensors, still_wild
+from .checks.case import Case, End
+from .checks.written import write_extended
 from .explanation import Explanation
 from .hypotheses import CLOCK
 from .judging import cause, damped, judge, pitching, resized, worth
-from .noise import UNSEEN, Experiment
+from .noise import UNSEEN
 from .result import MAY_BE_NOTHING, OUTSIDE, Cause, Diagnosis, Gain, Named, place
 from .study import Study, look
 
@@ -48,21 +47,6 @@ CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 w
 FARTHER = 0.02  # share of samples outside of what was trained, from which a hold-out says little about a name
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 SURELY_NOT = (Cause(OUTSIDE, "", {}, 0.5),)  # named by nothing on the list
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """What is diagnosed: the model as its file has it, recordings for training and hold-out, these as experiments (`unused`), notes on
-    them, where files go; `log` gets what is tried, `tell` which share of the work is done."""
-
-    model: Model
-    train: Sequence[Measured]
-    holdout: Sequence[Measured]
-    unused: Sequence[Experiment]
-    remarks: Sequence[str]
-    output: Path | None
-    log: Callable[[str], None]
-    tell: Callable[[float, str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,21 +85,18 @@ def judge_explanations(
     return study, _weighed(case, study, explanations, faults)
 
 
-def by_noise(case: Case, study: Study, best: Explanation | None, judged: Judged) -> Diagnosis:
-    """The diagnosis with sizes, extended model, gain and pictures; without recordings and time, which the caller has."""
+def by_noise(case: Case, study: Study, best: Explanation | None, judged: Judged) -> End:
+    """The diagnosis with sizes, extended model and gain; without pictures, recordings and time."""
     judged = _sized(case, study, best, judged)
     study = replace(study, model=case.model)  # what the file does not state is not written down
-    judged, text, extended, gain, held = _measured(case, study, judged)
-    if case.output is not None:
-        extended = write_extended(text, case.model, case.output)
+    judged, text, gain, held = _measured(case, study, judged)
+    extended = write_extended(text, case)
     absorbed: dict[str, object] = {}
     if learnt := absorb.taught(study, judged.named) if judged.named is not None and judged.named.terms else []:
-        absorbed, more = absorbing(study, judged.named, learnt, case.unused, case.output)
+        absorbed, more = absorbing(case, study, judged.named, learnt)
         judged = replace(judged, notes=(*judged.notes, *more))
-    case.tell(0.9, "showing what is wrong")
     whole = judged.named is not None and (judged.named is judged.unnamed or (best is not None and bool(judged.causes)))
-    shown = residual.show(study, judged.named.fit if whole else None, extended if whole else None, held, judged.verdict == "unexplained")
-    return Diagnosis(
+    answer = Diagnosis(
         judged.verdict,
         judged.causes,
         gain,
@@ -124,11 +105,10 @@ def by_noise(case: Case, study: Study, best: Explanation | None, judged: Judged)
         judged.evidence,
         judged.alike,
         tuple([judged.doubt] * bool(judged.doubt)) + judged.notes,
-        residual=shown.numbers(),
         absorbed=absorbed,
         explanations=alternatives(judged.causes),
-        shown=shown,
     )
+    return End(answer, study, extended, judged.named.fit if whole else None, held)
 
 
 def _still_broken(case: Case, study: Study, best: Explanation, faults: list[Cause], bursts: Sequence[np.ndarray]) -> list[Cause]:
@@ -205,11 +185,11 @@ def _with_a_size(study: Study, best: Explanation | None, causes: tuple[Cause, ..
     return (kept, nothing) if kept else (causes, [])
 
 
-def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, Model, dict[str, Gain], list[residual.Channel]]:
-    """What the hold-out says: the judgement after it, text and model of the extended file, gain, and channels of the hold-out."""
+def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, dict[str, Gain], list[residual.Channel]]:
+    """What the hold-out says: the judgement after it, text of the extended file, gain, and channels of the hold-out."""
     text, extended = extension.extend_file(study, judged.named, judged.causes)
     if not case.holdout:
-        return judged, text, extended, {}, []
+        return judged, text, {}, []
     case.tell(0.85, "measuring the gain")
     lost = {c.where for c in judged.causes if c.kind == "sensor_dropout"}
     gain, more, held = measuring.measure(study, extended, case.unused, lost)
@@ -233,7 +213,7 @@ def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, Mo
     if unseen:
         note = f"{', '.join(unseen)}: the hold-out shows what the training does not: train with recordings like it"
         judged = replace(judged, causes=SURELY_NOT, verdict="unexplained", explained=0.0, notes=(*judged.notes, note))
-    return judged, text, extended, gain, held
+    return judged, text, gain, held
 
 
 def hints(
@@ -262,15 +242,11 @@ def hints(
     return notes
 
 
-def absorbing(
-    study: Study, e: Explanation, learnt: list[absorb.Taught], unused: Sequence[Experiment], output: Path | None
-) -> tuple[dict[str, object], list[str]]:
+def absorbing(case: Case, study: Study, e: Explanation, learnt: list[absorb.Taught]) -> tuple[dict[str, object], list[str]]:
     """The same effect as a parameter set: what goes into diagnosis.json, and a note."""
-    with tempfile.TemporaryDirectory() as folder:
-        place = output or Path(folder)
-        beside = Path(os.path.relpath(study.model.path.resolve(), place.resolve()))
-        model = penode_gen.load(absorb.write(study, e, learnt, beside, place))
-        gain = measuring.measure(study, model, unused, (), absorb.SET)[0] if unused else {}
+    beside = Path(os.path.relpath(case.nominal.path.resolve(), case.output.resolve()))
+    model = penode_gen.load(absorb.write(study, e, learnt, beside, case.output))
+    gain = measuring.measure(study, model, case.unused, (), absorb.SET)[0] if case.unused else {}
     names = ", ".join(t.element for t in learnt)
     entry = {"file": absorb.FILE, "set": absorb.SET, "networks": {t.port: {"missing": t.missing} for t in learnt}, "gain": gain}
     after = ", ".join(f"{k} {g.after_rmse:.3g} {g.unit}" for k, g in gain.items())

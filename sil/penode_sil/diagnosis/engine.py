@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +22,9 @@ from . import dropouts, plausible, search, weighed
 from .advice import advised
 from .answers import by_innovations, recorded
 from .broken import broken_sensors
-from .by_noise import SEARCH, Case, by_noise, judge_explanations
+from .by_noise import SEARCH, by_noise, judge_explanations
+from .checks import channels as mix_ups, final
+from .checks.case import Case, End
 from .driven import settled
 from .evidence.bench import with_tolerances
 from .explanation import Explanation
@@ -43,25 +47,30 @@ def diagnose(
     set_name: str = "default",
     log: Callable[[str], None] = lambda text: None,
     tell: Callable[[float, str], None] = lambda share, doing: None,
+    channels: Sequence[str] = (),
 ) -> Diagnosis:
-    """Name what the model gets wrong in `train`, and measure on `holdout` what knowing it gains; with `output`, write
-    model_extended.toml there. `log` gets what is tried, `tell` which share of the work is done and what comes next."""
+    """Name what the model gets wrong in `train`, and measure on `holdout` what knowing it gains; with `output`, write the model file with
+    it there. `log` gets what is tried, `tell` which share of the work is done and what comes next; `channels`: what the recordings' files
+    call signals, as `load` was given it."""
     started = time.perf_counter()
     log = advancing(log, tell)
     tell(0.0, "fitting the model as it is")
     both = with_shared_rails([*train, *holdout])
     train, holdout = both[: len(train)], both[len(train) :]
-    model, noisy = with_noise_of_inputs(model, train, set_name)
-    widened = with_tolerances(model)
-    experiments, unused, remarks = settled(widened, train, holdout, set_name)
-    if problems := plausible.misfits(widened, [*experiments, *unused], set_name):
-        raise RecordingError(*problems)
-    case = Case(model, train, holdout, unused, [*noisy, *remarks], output, log, tell)
-    answer = _answer(case, *unburst(widened, experiments, set_name))
-    return advised(replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started), model)
+    nominal, noisy = with_noise_of_inputs(model, train, set_name)
+    experiments, unused, remarks = settled(with_tolerances(nominal), train, holdout, set_name)
+    mixes = mix_ups.mixed(with_tolerances(nominal), experiments, set_name)
+    with nullcontext(output) if output else tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as aside:
+        model = mix_ups.mending(nominal, mixes, Path(aside)) if mixes else nominal
+        if problems := plausible.misfits(with_tolerances(model), [*experiments, *unused], set_name):
+            raise RecordingError(*problems)
+        case = Case(model, nominal, train, holdout, unused, [*noisy, *remarks], Path(folder), log, tell, channels)
+        end = _searched(case, *unburst(with_tolerances(model), experiments, set_name))
+        answer = final.checked(case, end, mixes)
+    return advised(replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started), nominal)
 
 
-def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> Diagnosis:
+def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> End:
     """Innovations answer where the file only guesses a parameter, on a free motion that the model misses, or where `_decides`. They are
     asked first if more than UNMODELLED acts beside the best single cause, and answer at once if they explain it and little still wanders;
     else the search by sensor noise goes on as long as it gets below UNMODELLED. If that search explains nothing, innovations answer where
@@ -70,7 +79,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     better stay."""
     vague = weighed.supports(study.model) and bool(guessed(study.model))
     if vague or (not study.model.inputs and weighed.misfit(study, study.null, case.log).size):
-        return _by_innovations(case, None, _weighed(case, study))
+        return by_innovations(case, _weighed(case, study), None)
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
     case.tell(SEARCH[0], "looking for causes")
     study, beam = search.first(study, case.log)
@@ -78,7 +87,7 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     if beam and weighed.misfit(study, beam[0].fit, case.log).size > weighed.UNMODELLED:
         w = _weighed(case, study)
         if w.verdict == "explained" and weighed.UNMODELLED < w.level < 2.0 * WORTH:
-            return _by_innovations(case, beam[0], w)
+            return by_innovations(case, w, beam[0])
 
     def hopeless(study: Study, e: Explanation) -> bool:
         return w is not None and weighed.misfit(study, e.fit, case.log).size > weighed.UNMODELLED
@@ -91,26 +100,27 @@ def _answer(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool
     if beside.size:
         w = w or _weighed(case, study)
         if _decides(w, beside.size, study, best, bool(faults)):
-            return _by_innovations(case, best, w)
+            return by_innovations(case, w, best)
     study, judged = judge_explanations(case, study, explanations, faults, bursts)
     sure = w if w and (w.verdict == "explained" or (w.causes and w.level > weighed.UNMODELLED)) else None
     if sure and judged.verdict == "unexplained":  # before an extended model is made that nobody would see
-        return _by_innovations(case, best, sure)
-    answer = by_noise(case, study, best, judged)
+        return by_innovations(case, sure, best)
+    end = by_noise(case, study, best, judged)
+    answer = end.answer
     if answer.verdict in ("unexplained", "partly_explained") and w is None and weighed.supports(study.model):
         w = _weighed(case, study)
         same = {(c.kind, c.where) for c in w.causes} == set(best.groups if best else ()) != set()
         if (same or w.follows_better(beside) or w.of_inputs) and not w.worsens():
-            return _by_innovations(case, best, w)
+            return by_innovations(case, w, best)
         if answer.verdict == "unexplained" and not answer.explained and w.mends():  # nothing has a name, but parameters are nearer
-            return _by_innovations(case, best, replace(w, verdict="unexplained", causes=(), explanations=(), explained=0.0))
-        return answer
-    return _by_innovations(case, best, sure) if sure and answer.verdict == "unexplained" else answer
+            return by_innovations(case, replace(w, verdict="unexplained", causes=(), explanations=(), explained=0.0), best)
+        return end
+    return by_innovations(case, sure, best) if sure and answer.verdict == "unexplained" else end
 
 
 def _decides(w: weighed.Weighed, level: float, study: Study, best: Explanation | None, faulty: bool) -> bool:
     """Do innovations decide, where `level` acts beside the `best` explanation? Not where they explain only a part, unless `best` explains
-    enough: `_answer` may still take that part. Nor where a sensor is `faulty` and neither search has a cause: they would judge samples that
+    enough: it may still be taken. Nor where a sensor is `faulty` and neither search has a cause: they would judge samples that
     are no measurements. Where `level` is small, they decide only with fewer causes, or as many with fewer laws: many laws together fit any
     single swing."""
     if w.verdict == "partly_explained" and not (best and share(study, best) > ENOUGH):
@@ -129,10 +139,6 @@ def _simpler(w: weighed.Weighed, best: Explanation) -> bool:
 def _weighed(case: Case, study: Study) -> weighed.Weighed:
     case.tell(0.3, "weighing what is missed everywhere")
     return weighed.weigh(replace(study, model=case.model), case.unused, case.log)
-
-
-def _by_innovations(case: Case, best: Explanation | None, w: weighed.Weighed) -> Diagnosis:
-    return by_innovations(w, best, case.output, case.remarks, case.tell)
 
 
 def unburst(model: Model, experiments: Sequence[Experiment], set_name: str) -> tuple[Study, Study, list[NDArray[np.bool_]]]:

@@ -46,14 +46,14 @@ def load_model(job: Job) -> penode_gen.Model:
 def run(
     job: Job, log: Callable[[str], None] = lambda text: None, tell: Callable[[float, str], None] = lambda share, doing: None
 ) -> tuple[penode_gen.Model, Diagnosis]:
-    """Diagnose and write diagnosis.json, model_extended.toml and report.html; all or none. UserError for bad input."""
+    """Diagnose and write diagnosis.json, the model file with what was learnt and report.html; all or none. UserError for bad input."""
     compiled = compilers()
     model = load_model(job)
     train, held = excerpted(load(job.data, model, job.channels), load(job.holdout, model, job.channels))
     model = with_noise_at_rest(model, job.still, job.channels, train)
     with all_or_none(job.output):
-        found = diagnose(model, train, held, job.output, job.set_name, log, tell)
-        report.write(job.output / "report.html", model, found, job.output / "model_extended.toml")
+        found = diagnose(model, train, held, job.output, job.set_name, log, tell, job.channels)
+        report.write(job.output / "report.html", model, found, job.output / found.model_file)
         found = replace(found, compile_seconds=compilers() - compiled)
         (job.output / "diagnosis.json").write_text(json.dumps(found.as_json(), indent=2) + "\n", encoding="utf-8")
     return model, found

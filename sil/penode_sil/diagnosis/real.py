@@ -30,11 +30,9 @@ from .propose import FREE_RUN, SMALL, motions
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
 from .rounds import MIN_TAKEN, name_of, terms_of
 from .terms import Term, Trial
-from .worth import SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, undetermined
+from .worth import RIGHT, SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, undetermined
 
 Array = NDArray[np.float64]
-# share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
-RIGHT = 0.93
 RIVAL = (
     1.0 - RIGHT
 ) / RIGHT  # posterior, RIGHT of which is as much as what is not in the catalogue has: from there on an explanation is listed
@@ -42,11 +40,13 @@ RIVAL = (
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Causes; notes on what is small; the sets of explanations that held-out blocks cannot tell apart, with their posterior; where the
-    search ended; the free `run` that fits best, and sensors whose `offsets` it has; and the share `taken` of what the file's own model
-    leaves: by the free run, or of the power of the innovations, whichever is more, for a free run that drifts shows little else."""
+    """Causes; those `withheld`, for they are small; notes on them; the sets of explanations that held-out blocks cannot tell apart, with
+    their posterior; where the search ended; the free `run` that fits best, sensors whose `offsets` it has; and the share `taken` of what
+    the file's own model leaves: by the free run, or of the power of the innovations, whichever is more, for a free run that drifts shows
+    little else."""
 
     causes: tuple[Cause, ...]
+    withheld: tuple[Cause, ...]
     notes: tuple[str, ...]
     explanations: tuple[tuple[tuple[Named, ...], float], ...]
     found: Found
@@ -68,7 +68,7 @@ def answer(
     found, moved, judged = _searched(model, bench, log)
     plain, after = found.plain, found.bench
     causes: list[Cause] = []
-    notes = []
+    withheld, notes = [], []
     named = terms_of(found.named)
     names = {name_of(a.trial) for a in found.named}
     chances = {a.trial: _weighed([t for t in a.trials if name_of(t) not in names - {name_of(a.trial)}]) for a in found.named}
@@ -81,6 +81,7 @@ def answer(
         if size >= enough and not cause.may_be_nothing:
             causes = _merged(causes, cause)
         elif first:
+            withheld.append(cause)
             notes.append(_small(term, f"{size:.1%} of what acts there") if size < enough else f"{place(*name_of(term))} {MAY_BE_NOTHING}")
     for a in found.small:
         what = (
@@ -89,6 +90,7 @@ def answer(
             else f"{a.trial.share:.1%} of what acts there"
         )
         notes.append(_small(a.terms[0], what))
+        withheld.append(_cause(model, after, a.terms[0], a.trial.share, (), _sure(_weighed(a.trials), a.trial.form)))
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
     biased, remarks = _offsets(model, after, Probe.of(after), any(c.kind in (*loads.KINDS, *stopped) for c in causes))
     notes += [*judged.notes, *remarks]
@@ -99,7 +101,7 @@ def answer(
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
     taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken_whole(after.fit, bench.problem().floor))
     sets = _explanations([(a.terms[0], chances[a.trial]) for a in found.named])
-    return Answer((*judged.causes, *causes, *biased), tuple(notes), sets, found, run, tuple(offsets), taken, after.model)
+    return Answer((*judged.causes, *causes, *biased), tuple(withheld), tuple(notes), sets, found, run, tuple(offsets), taken, after.model)
 
 
 def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[Found, list[Motion], parameters.Judged]:

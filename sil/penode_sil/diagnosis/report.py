@@ -32,7 +32,7 @@ from .advice import doubts
 from .reliability import line
 from .report_figure import Axis, Figure, pretty, readable
 from .report_price import difference, price
-from .report_words import LIKE_NOISE, gains, headline, key_figures, lead, percent, relative, sentence, sure, value, where
+from .report_words import LIKE_NOISE, command, gains, headline, key_figures, lead, percent, relative, sentence, sure, value, where
 from .residual import Channel, Residual, Shown
 from .restoring import LEAST, Surface, averages, cells, rms
 from .result import VERDICTS, Diagnosis, place, plain
@@ -44,7 +44,7 @@ BUDGET = 60_000  # points of all lines over time together, so that the page stay
 
 
 def write(path: Path, model: Model, d: Diagnosis, extended: Path) -> None:
-    """The page for a diagnosis whose `shown` is there; `extended`: model_extended.toml."""
+    """The page for a diagnosis whose `shown` is there; `extended`: the model file with what was learnt."""
     text = render(model, d, extended)
     with whole(path) as part:
         part.write_text(text, encoding="utf-8")
@@ -82,6 +82,7 @@ def render(model: Model, d: Diagnosis, extended: Path) -> str:
         relative=relative,
         surfaces=[surface(s) for s in shown.surfaces],
         gains=gains(d),
+        command=command(d),
         diff=difference(model.path, extended),
         price=price(model, extended),
         legend=fig.legend,

@@ -60,7 +60,11 @@ def known(d: Diagnosis) -> list[Cause]:
 
 
 def headline(d: Diagnosis) -> str:
-    """The answer in one sentence."""
+    """The answer in one sentence; before it, whether to keep the nominal model."""
+    return f"{'Keep the nominal model: the one that was learnt predicts worse. ' * d.rejected}{_named(d)}"
+
+
+def _named(d: Diagnosis) -> str:
     named = known(d)
     match d.verdict:
         case "no_discrepancy":
@@ -144,6 +148,11 @@ def cost(d: Diagnosis) -> tuple[str, str, str]:
     before, after, noise = (value(x, g.unit) for x in (g.before_rmse, g.after_rmse, g.noise_floor))
     gained = f", {percent(min(shares[name], 1.0))} of what can be gained" if name in shares and before != after else ""
     return what, before if before == after else f"{before} → {after}", f"RMS of {name}; noise {noise}{gained}"
+
+
+def command(d: Diagnosis) -> str:
+    """What gives the figures of the written model."""
+    return f"penode simulate {d.model_file} --input RECORDING {d.simulated}".rstrip()
 
 
 def gains(d: Diagnosis) -> list[dict[str, Any]]:

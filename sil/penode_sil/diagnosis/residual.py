@@ -9,7 +9,6 @@ All is SI. `before` is the model as its file says, parameters within their toler
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,10 +20,9 @@ from scipy.fft import rfft, rfftfreq
 from penode_gen import units
 from penode_gen.model import Model
 
-from .fit import Fit
-from .missing import Missing, missing_forces
+from .missing import Missing
 from .noise import Experiment
-from .restoring import Surface, rms, short, surface_numbers, surfaces
+from .restoring import Surface, rms, short, surface_numbers
 from .study import Study
 
 Array = NDArray[np.float64]
@@ -242,9 +240,20 @@ def noise_rms(study: Study) -> Array:
     """
     e, level = study.experiments[0], study.levels[0]
     beyond = np.where(np.isfinite(e.quiet), e.quiet, level[-1])[e.band :]
+    return np.sqrt(np.mean(np.concatenate([level, beyond]), axis=0) + _driven(study))
+
+
+def stated_noise(study: Study) -> Array:
+    """The same with noise of sensors as the model file states it, where it does: slow noise, or more of it, may be what a model lacks."""
+    stated = np.array([s.noise for s in study.model.sensors])
+    return np.where(stated > 0.0, np.minimum(np.sqrt(stated**2 + _driven(study)), noise_rms(study)), noise_rms(study))
+
+
+def _driven(study: Study) -> Array:
+    """Mean power [n_z] that noise of the inputs has in the sensors."""
+    e = study.experiments[0]
     through = study.linear.transfer(e.frequencies)[:, : len(study.model.sensors), : len(study.model.inputs)]
-    driven = np.sum(np.abs(through * np.array([i.noise for i in study.model.inputs])) ** 2, axis=2)
-    return np.sqrt(np.mean(np.concatenate([level, beyond]), axis=0) + np.mean(driven, axis=0))
+    return np.mean(np.sum(np.abs(through * np.array([i.noise for i in study.model.inputs])) ** 2, axis=2), axis=0)
 
 
 # -- numbers ----------------------------------------------------------------------------------------------------------
@@ -312,12 +321,3 @@ class Shown:
             "state_space": [surface_numbers(s) for s in self.surfaces],
             "places": [m.numbers() for m in self.missing],
         }
-
-
-def show(study: Study, fit: Fit | None, extended: Model | None, holdout: Sequence[Channel], nameless: bool = False) -> Shown:
-    """What the model gets wrong in training; `fit` and `extended`: the model with the named causes, if there are
-    any; `nameless`: what has no name is shown as the force that is missing at each place."""
-    train: list[Channel] = []
-    for k, e in enumerate(study.experiments):
-        train += channels(e, study.model, study.null.simulated[k], fit.simulated[k] if fit else None, noise_floor(study, k))
-    return Shown(tuple(train), tuple(holdout), tuple(surfaces(study, extended, fit)), missing_forces(study) if nameless else ())

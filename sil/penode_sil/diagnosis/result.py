@@ -4,12 +4,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from ..recordings.measured import Measured
 
 OUTSIDE = "outside_taxonomy"  # kind of what has no name
+EXTENDED = "model_extended.toml"
+REJECTED = "model_rejected.toml"  # the same where it predicts worse than the nominal model
+SIZES = {"force", "stiffness", "damping", "mass", "bias", "offset", "delay", "lag", "coefficient", "cubic", "difference", "scale", "gain"}
 NOTHING = {"scale": 1.0, "gain": 1.0}  # sizes without any effect; 0 for others
 MAY_BE_NOTHING = "may be nothing, by the 95 % interval of its size; not named, but in model_extended.toml"
 
@@ -43,10 +47,20 @@ class Cause:
     alternatives: tuple[Named, ...] = ()
     separate: str = ""
 
+    def neutral(self, nominal: Mapping[str, float]) -> bool:
+        """Does the interval of one of its sizes include what has no effect: 0, 1 of a scale, the `nominal` value of a parameter?"""
+        none = {k: nominal.get(k, NOTHING.get(k, 0.0)) for k in self.parameters if k in nominal or k in SIZES or len(self.parameters) == 1}
+        return any(self.parameters[k].ci95[0] <= x <= self.parameters[k].ci95[1] for k, x in none.items())
+
     @property
     def may_be_nothing(self) -> bool:
         """Does the interval of its only size include no effect at all?"""
         return len(self.parameters) == 1 and all(v.ci95[0] <= NOTHING.get(k, 0.0) <= v.ci95[1] for k, v in self.parameters.items())
+
+
+def worsened(before: float, after: float) -> bool:
+    """Is an error larger than before, or none at all? Less than 5 % may be chance."""
+    return not after <= 1.05 * before
 
 
 @dataclass(frozen=True)
@@ -64,8 +78,25 @@ class Gain:
 
     @property
     def worsened(self) -> bool:
-        """Is the extended model worse? Less than 5 % may be chance."""
-        return self.after_rmse > 1.05 * self.before_rmse
+        """Is the extended model worse?"""
+        return worsened(self.before_rmse, self.after_rmse)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """RMS errors of a sensor over all `samples` of a recording, in the unit that the model file has for it: of the nominal model and of the
+    written one as `penode simulate` gives them; of the nominal one with parameters within stated tolerances, start and offset as they fit
+    best; and the noise. `role`: training or hold-out."""
+
+    recording: str
+    role: str
+    signal: str
+    unit: str
+    samples: int
+    nominal: float
+    refitted: float
+    extended: float
+    noise: float
 
 
 @dataclass(frozen=True)
@@ -102,9 +133,17 @@ class Diagnosis:
     explanations: tuple[dict[str, Any], ...] = ()  # sets of causes that the recordings cannot tell apart, each with its posterior
     reliability: dict[str, Any] | None = None  # how often causes that were named as surely were right, see reliability.py
     advice: tuple[str, ...] = ()  # what to do next, the most useful first
+    figures: tuple[Figure, ...] = ()  # of the written model, see checks
+    simulated: str = ""  # options of `penode simulate` that give these figures
+    model_file: str = EXTENDED  # what was learnt, in the folder of the answer
     seconds: float = field(default=0.0, compare=False)
     compile_seconds: float = field(default=0.0, compare=False)  # processor time of compilers, which the next call of its like needs not
     shown: Any = field(default=None, compare=False, repr=False)
+
+    @property
+    def rejected(self) -> bool:
+        """Does what was learnt predict worse than the nominal model?"""
+        return self.model_file == REJECTED
 
     def as_json(self) -> dict[str, Any]:
         """All but `shown`, as plain data."""

@@ -17,7 +17,7 @@ WIDTH, HEIGHT = 80, 24
 
 def sentences(model: Any, d: Diagnosis, output: Path) -> str:
     """One screen: at most HEIGHT lines of WIDTH columns; files that are named may stand out. What has no room there is in the report."""
-    head = [f"{model.name}: {plain(d.verdict)}", f"  {VERDICTS[d.verdict]}"]
+    head = [f"{model.name}: {'keep the nominal model; ' * d.rejected}{plain(d.verdict)}", f"  {VERDICTS[d.verdict]}"]
     steps = [f"  next: {text}" for text in d.advice]
     rest = [*steps[1:], *(f"  note: {n}" for n in d.notes), *(f"  {r.name}: {p}" for r in d.data for p in r.problems)]
     room = HEIGHT - len(head) - 2

@@ -69,6 +69,7 @@ class Weighed:
     numerics: dict[str, object]  # error of the deployed step; parameters that the file only guesses are at their fitted values
     likelihood: float  # log likelihood of the innovations with the named causes
     update: int  # samples for each innovation
+    withheld: tuple[Cause, ...] = ()  # causes that are small, which the extended model has
 
     @property
     def of_inputs(self) -> bool:
@@ -187,6 +188,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
         numbers,
         likelihood,
         bench.update,
+        found.withheld,
     )
 
 

@@ -41,6 +41,8 @@ def read(paths: Sequence[Path], model: Model) -> Start:
     networks: dict[str, Network] = {}
     for given in paths:
         path = given.with_name(BESIDE[given.name]) if given.name in BESIDE else given
+        if path != given and not path.exists() and path.with_name("model_rejected.toml").exists():
+            raise WrongUse(f"--from {given}: its model was rejected, for it predicts worse than the nominal one; leave --from out")
         if path.suffix.lower() == ".toml":
             other = penode_gen.load(path)
             found = {n: p.value for n, p in other.parameters.items() if n in model.parameters}

@@ -4,13 +4,15 @@
 
 from collections.abc import Iterable
 
-from . import aerated, bushings, dampers, drives, friction, loads, masses, others, plays, springs, tyres
+from . import aerated, bushings, channels, dampers, drives, friction, loads, masses, others, plays, springs, tyres
 
 FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aerated)
-MEANING = {kind: text for file in (*FILES, drives, others) for kind, text in file.MEANING.items()}
+MEANING = {kind: text for file in (*FILES, drives, channels, others) for kind, text in file.MEANING.items()}
 OF = {kind: file for file in FILES for kind in file.KINDS}
 
-RIVALS = {frozenset(pair): how for file in (*FILES, drives, others) for pair, how in getattr(file, "RIVALS", {}).items()}
+REVERSING = {kind for file in FILES for kind in getattr(file, "REVERSING", ())}  # of what happens where a rate turns
+
+RIVALS = {frozenset(pair): how for file in (*FILES, drives, channels, others) for pair, how in getattr(file, "RIVALS", {}).items()}
 OTHERWISE = "broadband excitation at two amplitudes, with all sensors of the model file; chirps of constant amplitude tell least"
 
 

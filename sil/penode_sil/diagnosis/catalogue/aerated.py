@@ -21,7 +21,7 @@ RIVALS = {
         "maxwell_bushing",
     ): "several amplitudes at one frequency: gas loses a smaller share of the force at large amplitudes, rubber the same share",
 }
-STRAIGHT = KINDS
+STRAIGHT = REVERSING = KINDS
 POCKETS = (0.1, 0.3, 0.8)  # of the rms deflection
 
 

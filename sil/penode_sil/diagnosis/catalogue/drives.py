@@ -32,6 +32,7 @@ RIVALS = {
 
 
 ALIKE = {"input_delay": "sensor_delay", "sensor_delay": "input_delay", "input_gain": "sensor_scale", "sensor_scale": "input_gain"}
+ALIKE |= {"input_sign": "sensor_sign", "sensor_sign": "input_sign"}
 
 
 def alike(model: Model, kind: str, where: str) -> tuple[str, str] | None:

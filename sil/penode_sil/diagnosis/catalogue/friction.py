@@ -13,6 +13,7 @@ from . import loads
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("coulomb_friction", "stribeck_friction", "bouc_wen")
+REVERSING = KINDS[2:]
 MEANING = {
     "coulomb_friction": "Friction: a force against the motion that hardly depends on how fast it is.",
     "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",

@@ -12,7 +12,7 @@ from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("backlash",)
 MEANING = {"backlash": "Play: within a gap the element transmits no force."}
-STRAIGHT = KINDS
+STRAIGHT = REVERSING = KINDS
 GAPS = (0.05, 0.2, 0.6)  # of the rms deflection
 
 

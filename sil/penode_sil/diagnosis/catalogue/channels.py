@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Channels that are not what they are called: their sign is the other one, or two of them are exchanged. `checks` finds them."""
+
+KINDS = ("input_sign", "sensor_sign", "swapped_channels")
+MEANING = {
+    "input_sign": "The input acts the other way round than the recording says: a sign, the sense of a drive.",
+    "sensor_sign": "The sensor counts the other way round than the model says.",
+    "swapped_channels": "Two channels are exchanged: each shows what the other is called.",
+}
+RIVALS = {("input_sign", "sensor_sign"): "push it by hand to the side that the sensor calls positive"}

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What is diagnosed, and where a search for causes has ended: what its answer is checked with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from penode_gen.model import Model
+
+from ...recordings.measured import Measured
+from ..fit import Fit
+from ..noise import Experiment
+from ..residual import Channel
+from ..result import Cause, Diagnosis
+from ..study import Study
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is diagnosed: the `model` as its file has it, or mended for channels that are mixed up, and the `nominal` one; recordings for
+    training and hold-out, these as experiments (`unused`), notes on them, where files go; `log` gets what is tried, `tell` which share of
+    the work is done. `channels`: what files call signals."""
+
+    model: Model
+    nominal: Model
+    train: Sequence[Measured]
+    holdout: Sequence[Measured]
+    unused: Sequence[Experiment]
+    remarks: Sequence[str]
+    output: Path
+    log: Callable[[str], None]
+    tell: Callable[[float, str], None]
+    channels: Sequence[str] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Where a search has ended: its `answer`, without pictures; the study, with the noise that it found; the `extended` model as its file
+    in the case's folder has it; `fit`: the training with the named causes, None without any; `held`: the hold-out sample by sample;
+    `withheld`: causes that the extended model has, and that are too small to be named."""
+
+    answer: Diagnosis
+    study: Study
+    extended: Model
+    fit: Fit | None
+    held: Sequence[Channel]
+    withheld: Sequence[Cause] = ()

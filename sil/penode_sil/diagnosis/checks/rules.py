@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What no answer may say, as one table of rules: each with a condition on an end and the table of its figures, and a consequence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .. import catalogue
+from ..noise import UNSEEN
+from ..report_figure import number
+from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, REJECTED, Cause, place, worsened
+from . import values
+from .case import Case, End
+from .figures import ROLES, Table, misses
+from .written import write_extended
+
+KEEP = f"# Keep the nominal model: this one predicts worse. It would be {EXTENDED} if it did not.\n"
+NOT_NAMED = f"not named, but in {EXTENDED}"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """`broken` says what breaks it: names of sensors, or causes with why; nothing if it holds. `consequence` is the end after that."""
+
+    name: str
+    broken: Callable[[Case, End, Table], Sequence[Any]]
+    consequence: Callable[[Case, End, Table, Sequence[Any]], End]
+
+
+# -- names ------------------------------------------------------------------------------------------------------------
+
+
+def neutral(case: Case, end: End, table: Table) -> list[tuple[Cause, str]]:
+    """Causes whose interval holds what has no effect: 0, 1 of a scale, the nominal value of a parameter."""
+    nominal = {p.name: p.value for p in case.model.parameters.values()}
+    return [(c, MAY_BE_NOTHING) for c in _named(end) if c.neutral(nominal)]
+
+
+def larger(case: Case, end: End, table: Table) -> list[tuple[Cause, str]]:
+    """Causes with a force larger than everything measured at their place."""
+    found = []
+    for c in _named(end):
+        own = next((s for s in table.surfaces if c.where in (*s.elements, s.place)), None)
+        forces = {k: v.value for k, v in c.parameters.items() if own is not None and v.unit == own.unit("N")}
+        if own is not None and (too := [x for x in forces.values() if abs(x) > float(np.max(np.abs(own.measured)))]):
+            most = number(float(f"{np.max(np.abs(own.measured)):.3g}"))
+            found.append((c, f"would have {too[0]:.3g} {own.unit('N')}, and no more than {most} is measured there; {NOT_NAMED}"))
+    return found
+
+
+def unturned(case: Case, end: End, table: Table) -> list[tuple[Cause, str]]:
+    """Causes that are about reversals, where the rate keeps its sign."""
+    found = []
+    for c in _named(end):
+        at = [k for k, p in enumerate(end.study.places) if c.where in (p.name, *(n for n, _ in p.elements))]
+        if c.kind in catalogue.REVERSING and at and end.study.seen:
+            rates = np.concatenate([seen.motions[at[0]].v for seen in end.study.seen])
+            low, high = np.quantile(rates, (0.005, 0.995))
+            if low * high > 0.0:
+                found.append((c, f"is about reversals, and the rate there keeps its sign; {NOT_NAMED}"))
+    return found
+
+
+def nameless(case: Case, end: End, table: Table, broken: Sequence[tuple[Cause, str]]) -> End:
+    """The end without names. Without any left nothing is explained, if there is anything to explain."""
+    gone = [c for c, _ in broken]
+    d = end.answer
+    causes = tuple(c for c in d.causes if all(c is not x for x in gone))
+    names = [{"kind": c.kind, "where": c.where} for c in gone]
+    sets = [{**s, "causes": [c for c in s["causes"] if c not in names]} for s in d.explanations]
+    notes = (*d.notes, *(f"{place(c.kind, c.where)} {why}" for c, why in broken))
+    d = replace(d, causes=causes, explanations=tuple(s for s in sets if s["causes"]), notes=notes)
+    if not causes:
+        off = misses(table.rows, "refitted", table.noise)
+        d = replace(d, causes=(Cause(OUTSIDE, "", {}, 0.5),) * bool(off), verdict="unexplained" if off else "no_discrepancy", explained=0.0)
+    return replace(end, answer=d)
+
+
+def _named(end: End) -> list[Cause]:
+    return [c for c in end.answer.causes if c.kind != OUTSIDE]
+
+
+# -- what the written model predicts ----------------------------------------------------------------------------------
+
+
+def mended(case: Case, end: End, table: Table) -> list[str]:
+    """Sensors that the nominal model misses by more than noise, however its file allows to fit it, and that the written one mends."""
+    if end.answer.verdict != "no_discrepancy":
+        return []
+    rows = [r for r in table.rows if r.sensor in misses([r], "refitted", table.noise) and UNSEEN * r.rms("extended") < r.rms("refitted")]
+    return list(dict.fromkeys(r.figure.signal for r in rows))
+
+
+def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
+    """Explained: by causes that were withheld, for they are small beside what acts, or else by the value of one parameter."""
+    d = end.answer
+    taken = 1.0 - max((r.rms("extended") / max(r.rms("refitted"), 1e-300)) ** 2 for r in table.rows if r.figure.signal in sensors)
+    d = replace(d, verdict="explained", explained=max(taken, 0.0))
+    if end.withheld:
+        names = [place(c.kind, c.where) for c in end.withheld]
+        notes = tuple(n for n in d.notes if not any(n.startswith(f"{name} is real but small") for name in names))
+        sets = (
+            {"causes": [{"kind": c.kind, "where": c.where} for c in end.withheld], "posterior": min(c.confidence for c in end.withheld)},
+        )
+        return replace(end, answer=replace(d, causes=tuple(end.withheld), explanations=sets, notes=notes))
+    if found := values.lone(case, end, table):
+        cause = values.caused(case, found)
+        extended = write_extended(values.text(case, found[0]), case)
+        sets = tuple(
+            {"causes": [{"kind": "wrong_parameter", "where": x.name}], "posterior": p}
+            for x, p in zip(found, values.posterior(found), strict=True)
+        )
+        fit = replace(end.study.null, simulated=found[0].fit.simulated)
+        return replace(end, answer=replace(d, causes=(cause,), explanations=sets), extended=extended, fit=fit)
+    note = f"the model misses {', '.join(sensors)} by more than noise, {EXTENDED} does not: no single one of its values explains that"
+    unsure = (Cause(OUTSIDE, "", {}, 0.5),)
+    return replace(end, answer=replace(d, verdict="unexplained", causes=unsure, explained=0.0, notes=(*d.notes, note)))
+
+
+def worse(case: Case, end: End, table: Table) -> list[str]:
+    """Sensors that the written model predicts worse than the nominal one: on the hold-out, or else in training."""
+    rows = table.of(ROLES[bool(case.holdout)])
+    return list(dict.fromkeys(r.figure.signal for r in rows if worsened(r.rms("nominal"), r.rms("extended"))))
+
+
+def reject(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
+    """The written model under another name, and no more than a part explained."""
+    written = case.output / EXTENDED
+    (case.output / REJECTED).write_text(KEEP + written.read_text())
+    written.unlink()
+    d = end.answer
+    verdict = "partly_explained" if d.verdict == "explained" else d.verdict
+    note = f"{REJECTED} makes the prediction of {', '.join(sensors)} worse"
+    notes = (*(n.replace(EXTENDED, REJECTED) for n in d.notes), note)
+    return replace(end, answer=replace(d, verdict=verdict, model_file=REJECTED, notes=notes))
+
+
+RULES = (
+    Rule("no name whose interval holds what has no effect", neutral, nameless),
+    Rule("no force larger than everything measured at its place", larger, nameless),
+    Rule("no law about reversals where a rate keeps its sign", unturned, nameless),
+    Rule("no agreement where the nominal model misses what the written one mends", mended, explained),
+    Rule("no model that predicts worse than the nominal one", worse, reject),
+)
