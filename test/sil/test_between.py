@@ -22,7 +22,7 @@ from penode_sil.diagnosis.between import joined, parts, straight
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence import gain, samples
 from penode_sil.diagnosis.evidence.fit import Fit
-from penode_sil.diagnosis.evidence.observer import Filter, Predictor, Record, augmented, scale
+from penode_sil.diagnosis.evidence.observer import Filter, Predictor, Record, augmented, lagging, scale
 from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.terms import Term
 
@@ -203,3 +203,13 @@ def test_a_share_of_what_is_noise_already_is_none():
     """A sensor 2 % above its noise, of 200 updates: all of that is within three deviations, 0.3, of an estimate."""
     before, after = (SimpleNamespace(variance=np.array(v), used=np.ones((200, 2), bool)) for v in ([1.02, 100.0], [1.0, 100.0]))
     assert np.all(Fit.taken(before, after, np.ones(2)) < 0.1)
+
+
+@pytest.mark.parametrize("tau", [1e-4, 3e-3, 0.03, 2.0])
+def test_a_lag_of_an_input_is_that_of_straight_lines(tau):
+    """As the actuator of the written model has it; half a sample off, it would need a delay to make up for it, which no model file wants."""
+    step, n = 4e-3, 500
+    x = np.cumsum(np.random.default_rng(1).standard_normal(n))
+    time = np.arange(n) * step
+    exact = signal.lsim(([1.0], [tau, 1.0]), x - x[0], time)[1]
+    assert lagging(x - x[0], tau, step) == pytest.approx(exact, abs=1e-9 * np.ptp(x))
