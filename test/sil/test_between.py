@@ -207,7 +207,7 @@ def test_a_share_of_what_is_noise_already_is_none():
 
 @pytest.mark.parametrize("tau", [1e-4, 3e-3, 0.03, 2.0])
 def test_a_lag_of_an_input_is_that_of_straight_lines(tau):
-    """As the actuator of the written model has it; half a sample off, it would need a delay to make up for it, which no model file wants."""
+    """As the actuator of the written model has it; half a sample off, a delay of a sensor would have to make up for it."""
     step, n = 4e-3, 500
     x = np.cumsum(np.random.default_rng(1).standard_normal(n))
     time = np.arange(n) * step

@@ -16,9 +16,9 @@ from one_mass import STEP, model
 import penode_gen
 from penode_sil.cli import cli
 from penode_sil.diagnosis import study
-from penode_sil.diagnosis.answers import write_extended
 from penode_sil.diagnosis.checks import final
 from penode_sil.diagnosis.checks.case import Case, End
+from penode_sil.diagnosis.checks.written import write_extended
 from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.entries import extends
 from penode_sil.diagnosis.result import Cause, Diagnosis, Gain, Value
@@ -76,11 +76,12 @@ def ended(folder, force, moving=False):
     one = study.replace(one, seen=study.look(one, one.null))
     (folder / "out").mkdir()
     text = LEARNT.format(extends=extends(nominal.path.resolve()), force=force)
-    extended = write_extended(text, nominal, folder / "out")
+    unused = [experiment(m, nominal) for m in held]
+    case = Case(nominal, nominal, train, held, unused, (), folder / "out", lambda text: None, lambda share, doing: None)
+    extended = write_extended(text, case)
     cause = Cause("coulomb_friction", "damper", {"force": Value(force, "N", (0.9 * force, 1.1 * force))}, 0.9)
     gain = {s.name: Gain(1.0, 0.1, 0.1, 1.0, "m", 0.0) for s in nominal.sensors}
     answer = Diagnosis("explained", (cause,), gain, {}, 0.99, 100.0, 0.0)
-    case = Case(nominal, train, held, [experiment(m, nominal) for m in held], (), folder / "out", print, lambda share, doing: None)
     return case, End(answer, one, extended, one.null, [])
 
 
@@ -173,3 +174,32 @@ def test_a_model_does_not_agree_where_the_written_one_mends_it(tmp_path):
     found = final.checked(case, replace(said(end, verdict="no_discrepancy", notes=(note,)), withheld=end.answer.causes))
     assert found.verdict == "explained" and [c.kind for c in found.causes] == ["coulomb_friction"] and found.explained > 0.9
     assert note not in found.notes and found.explanations[0]["causes"] == [{"kind": "coulomb_friction", "where": "damper"}]
+
+
+def test_what_makes_a_sensor_worse_than_without_it_goes(tmp_path):
+    """An offset and a delay of a sensor that has neither, beside a law that is right: both go, and what is left is written."""
+    case, end = ended(tmp_path, FRICTION)
+    plain = (tmp_path / "out" / "model_extended.toml").read_text()
+    more = LEARNT.format(extends=extends(case.model.path.resolve()), force=FRICTION).replace(
+        "[elements", 'bias_speed = { value = 0.05, unit = "m/s" }\n\n[elements'
+    )
+    burdened = write_extended(more + '\n[sensors]\nspeed = { value = "v + bias_speed", unit = "m/s", noise = 0.001 }\n', case)
+    asked = []
+
+    def without(gone):
+        asked.append(gone)
+        return replace(end, extended=write_extended(plain, case))
+
+    found = final.checked(case, replace(end, extended=burdened, without=without))
+    assert asked == [[("sensor_bias", "speed")]] and found.verdict == "explained"
+    assert "bias_speed" not in (tmp_path / "out" / "model_extended.toml").read_text()
+    assert all(f.extended < 2.0 * f.noise for f in found.figures)
+
+
+def test_a_recording_that_penode_simulate_does_not_read_has_figures_too(tmp_path):
+    """And a note on why."""
+    case, end = ended(tmp_path, FRICTION)
+    lines = (tmp_path / "later.csv").read_text().splitlines()
+    (tmp_path / "later.csv").write_text("\n".join([*lines[:500], lines[499], *lines[500:]]) + "\n")
+    found = final.checked(case, end)
+    assert len(found.figures) == 4 and "penode simulate does not take later.csv" in found.notes[-1]

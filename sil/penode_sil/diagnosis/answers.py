@@ -55,4 +55,5 @@ def by_innovations(case: Case, w: weighed.Weighed, best: Explanation | None) -> 
         (*[doubt] * bool(doubt), *case.remarks, *w.notes),
         explanations=w.explanations,
     )
-    return End(answer, study, write_extended(w.text, case), w.fit, w.held, w.withheld)
+    again = None if w.without is None else lambda gone: by_innovations(case, w.without(gone), best)
+    return End(answer, study, write_extended(w.text, case), w.fit, w.held, w.withheld, again)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,9 +41,9 @@ RIVAL = (
 @dataclass(frozen=True, eq=False)
 class Answer:
     """Causes; those `withheld`, for they are small; notes on them; the sets of explanations that held-out blocks cannot tell apart, with
-    their posterior; where the search ended; the free `run` that fits best, sensors whose `offsets` it has; and the share `taken` of what
-    the file's own model leaves: by the free run, or of the power of the innovations, whichever is more, for a free run that drifts shows
-    little else."""
+    their posterior; where the search ended; the free `run` that fits best, and sensors whose `offsets` it has; the share `taken` of what
+    the file's own model leaves: by the free run, or of the power of the innovations, whichever is more, for one that drifts shows little;
+    and laws and offsets that are `gone` again, by kind and place."""
 
     causes: tuple[Cause, ...]
     withheld: tuple[Cause, ...]
@@ -54,6 +54,26 @@ class Answer:
     offsets: tuple[str, ...]
     taken: float
     model: Model
+    gone: frozenset[tuple[str, str]] = frozenset()
+
+    @property
+    def terms(self) -> list[Term]:
+        """All that was found and is written."""
+        return [t for t in self.found.terms if name_of(t) not in self.gone]
+
+    def without(self, gone: Collection[tuple[str, str]]) -> Answer:
+        """The same without some laws or offsets, by kind and place, and with the rest fitted again."""
+        bench, gone = self.found.bench, {*self.gone, *gone}
+        targets = {f.target for t in self.found.terms if name_of(t) in gone for f in t.free} | {
+            bias(w) for k, w in gone if k == "sensor_bias"
+        }
+        free = [f for f in self.run.free if f.target not in targets]
+        run = bench.problem().solve(free, Filter.none(*bench.fit.by.gain.shape), FREE_RUN)
+        causes = tuple(c for c in self.causes if (c.kind, c.where) not in gone)
+        offsets = tuple(s for s in self.offsets if ("sensor_bias", s) not in gone)
+        withheld = tuple(c for c in self.withheld if (c.kind, c.where) not in gone)
+        notes = tuple(n for n in self.notes if not any(n.startswith(place(*name)) for name in gone))
+        return replace(self, causes=causes, withheld=withheld, notes=notes, run=run, offsets=offsets, gone=frozenset(gone))
 
 
 def answer(

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -70,6 +70,7 @@ class Weighed:
     likelihood: float  # log likelihood of the innovations with the named causes
     update: int  # samples for each innovation
     withheld: tuple[Cause, ...] = ()  # causes that are small, which the extended model has
+    without: Callable[[Collection[tuple[str, str]]], Weighed] | None = None  # the same without laws or offsets, the rest fitted again
 
     @property
     def of_inputs(self) -> bool:
@@ -140,9 +141,13 @@ def _within(study: Study, fit: Fit, noise: Array) -> bool:
 def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]) -> Weighed:
     """Causes by innovations, the model with them, and what it gains."""
     model, study = study.model, replace(study, seen=look(study, study.null))
-    found = real.answer(model, study.places, study.experiments, study.linear.fastest, study.set_name, log)
-    bench = found.found.bench
-    made = applied.apply(model, bench, found.run, found.found.terms, found.offsets)
+    return _written(study, unused, real.answer(model, study.places, study.experiments, study.linear.fastest, study.set_name, log))
+
+
+def _written(study: Study, unused: Sequence[Experiment], found: real.Answer) -> Weighed:
+    """An answer in a model file, and what that is worth."""
+    model, bench = study.model, found.found.bench
+    made = applied.apply(model, bench, found.run, found.terms, found.offsets)
     text, extended = resolved(study, made.text)
     measured = _measured(study, bench.noise)
     gain, more, held = measuring.measure(measured, extended, unused) if unused else ({}, [], [])
@@ -189,6 +194,7 @@ def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]
         likelihood,
         bench.update,
         found.withheld,
+        lambda gone: _written(study, unused, found.without(gone)),
     )
 
 
@@ -219,7 +225,7 @@ def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: 
     noise is all that is left."""
     if causes:
         return "explained" if share > ENOUGH else "partly_explained"
-    return "no_discrepancy" if not found.causes and (quiet or (left < WORTH and found.found.terms)) else "unexplained"
+    return "no_discrepancy" if not found.causes and (quiet or (left < WORTH and found.terms)) else "unexplained"
 
 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,7 +40,8 @@ class Case:
 class End:
     """Where a search has ended: its `answer`, without pictures; the study, with the noise that it found; the `extended` model as its file
     in the case's folder has it; `fit`: the training with the named causes, None without any; `held`: the hold-out sample by sample;
-    `withheld`: causes that the extended model has, and that are too small to be named."""
+    `withheld`: causes that the extended model has, and that are too small to be named; `without`: the end of the same search without
+    laws or offsets, by kind and place, and with the rest fitted again."""
 
     answer: Diagnosis
     study: Study
@@ -48,3 +49,4 @@ class End:
     fit: Fit | None
     held: Sequence[Channel]
     withheld: Sequence[Cause] = ()
+    without: Callable[[Collection[tuple[str, str]]], End] | None = None

@@ -93,10 +93,13 @@ def _all(model: Model, experiments: Sequence[Experiment]) -> list[Mix]:
 
 
 def _explains(m: Mix, before: Array, after: Array) -> bool:
-    """Does it leave less than half of the power of each sensor that it is about, and a quarter of what was missed there?"""
+    """Does it leave less than half of the power of each sensor that it is about, and a quarter of what was missed there? An input is about
+    all sensors: a quarter of what was missed of that which shows it most, and no more of any."""
     own = np.isfinite(before) if m.driving else np.isin(np.arange(len(before)), m.numbers)
     before, after = before[own] + LITTLE * LITTLE, after[own] + LITTLE * LITTLE
-    return bool(np.all(after < np.minimum(UNLIKE, UNLIKE * UNLIKE * before)))
+    most = [np.argmax(before)] if m.driving else slice(None)
+    enough = np.all(after[most] < UNLIKE * UNLIKE * before[most])
+    return bool(enough and np.all(after < UNLIKE) and np.all(after <= before))
 
 
 def _metric(model: Model, e: Experiment) -> object:

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from penode_gen import units
 
+from ...errors import UserError
+from ...replay import Replay
 from ..fit import Free, Problem
 from ..measuring import achieved
 from ..noise import UNSEEN, Experiment, metric
@@ -21,7 +23,7 @@ from ..restoring import Surface, surfaces
 from ..result import Diagnosis, Figure, Gain
 from ..study import Study, fitted, uncertain
 from .case import Case, End
-from .predicted import Options, Predicted, both, read
+from .predicted import Options, Predicted, both, known, read
 
 Array = NDArray[np.float64]
 ROLES = ("training", "hold-out")
@@ -29,15 +31,22 @@ ROLES = ("training", "hold-out")
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A sensor in a recording: its number and errors [samples that are sound] of the three models."""
+    """A sensor in a recording: its number, sound samples [n] of the recording and their times in its file, and errors [n] of the three
+    models."""
 
     figure: Figure
     sensor: int
+    time: Array
+    measured: Array
     errors: dict[str, Array]
 
     def rms(self, model: str) -> float:
         """Error of a model over sound samples, in SI."""
         return rms(self.errors[model])
+
+    def rms_of(self, time: Array, z: Array) -> float:
+        """Error of another prediction, at its own times."""
+        return rms(self.measured - np.interp(self.time, time, z))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +58,7 @@ class Table:
     options: Options
     noise: Array  # [n_z] RMS, as the model file states it
     surfaces: tuple[Surface, ...]  # forces at all places with elements
+    notes: tuple[str, ...]  # on recordings that `penode simulate` does not read
 
     def of(self, role: str) -> list[Row]:
         """Its rows of training or hold-out."""
@@ -56,12 +66,11 @@ class Table:
 
 
 def tabled(case: Case, end: End) -> Table:
-    """The table of an end. Raises UserError where `penode simulate` does not take a recording."""
+    """The table of an end. Raises UserError."""
     study = end.study
     held = study.experiments[0].held is not None
     options = Options(study.set_name, case.channels, study.moving and bool(case.model.states), held)
-    files = {m.path: m for m in (*case.train, *case.holdout)}
-    recordings = {path: read(m, case.model, options) for path, m in files.items()}
+    recordings, notes = _read(case, options)
     options, pairs = both((case.nominal, end.extended), list(recordings.values()), options)
     of_path = dict(zip(recordings, pairs, strict=True))
     floor, noise = noise_rms(study), stated_noise(study)
@@ -69,10 +78,26 @@ def tabled(case: Case, end: End) -> Table:
     refitted = _refitted(case, study)
     for role, ms, es in zip(ROLES, (case.train, case.holdout), (study.experiments, case.unused), strict=True):
         for m, e in zip(ms, es, strict=True):
-            predicted[e.name] = of_path[m.path]
-            rows += _rows(case, end, role, e, of_path[m.path], refitted[e.name], floor)
+            predicted[e.name] = of_path.get(str(m.path)) or of_path[m.title]
+            rows += _rows(case, end, role, e, predicted[e.name], refitted[e.name], floor)
     found = surfaces(study, end.extended if end.fit is not None else None, end.fit)
-    return Table(tuple(rows), predicted, options, noise, tuple(found))
+    return Table(tuple(rows), predicted, options, noise, tuple(found), tuple(notes))
+
+
+def _read(case: Case, options: Options) -> tuple[dict[str, Replay], list[str]]:
+    """All recordings, a file once, and notes on those that `penode simulate` does not read as they are: gaps, repeated times."""
+    found: dict[str, Replay] = {}
+    notes = []
+    for m in (*case.train, *case.holdout):
+        if str(m.path) in found:
+            continue
+        try:
+            found[str(m.path)] = read(m, case.model, options)
+        except UserError as exc:
+            found[m.title] = known(m, case.model, options)
+            if m.path.is_file():
+                notes.append(f"penode simulate does not take {m.title}, whose errors are those of the diagnosis: {exc.problems[0]}")
+    return found, list(dict.fromkeys(notes))
 
 
 def _rows(case: Case, end: End, role: str, e: Experiment, pair: tuple[Predicted, Predicted], refitted: Array, floor: Array) -> list[Row]:
@@ -97,18 +122,18 @@ def _rows(case: Case, end: End, role: str, e: Experiment, pair: tuple[Predicted,
             pair[1].errors[name]["value"],
             float(floor[j]) / per,
         )
-        rows.append(Row(figure, j, errors))
+        rows.append(Row(figure, j, e.time[good], e.y[good, j], errors))
     return rows
 
 
 def _refitted(case: Case, study: Study) -> dict[str, Array]:
     """Sensors [n, n_z] of every recording by the nominal model with parameters within the tolerances that its file states, fitted to the
     training, and with starts and offsets of sensors as each recording has them."""
-    known = {f.target: f.value for f in study.null.free}
+    fitted_to = {f.target: f.value for f in study.null.free}
     stated = [uncertain(p) for p in case.model.parameters.values() if p.tolerance > 0.0 and p.value]
-    free = [replace(f, value=float(np.clip(known.get(f.target, f.value), f.low, f.high))) for f in stated]
+    free = [replace(f, value=float(np.clip(fitted_to.get(f.target, f.value), f.low, f.high))) for f in stated]
     problem = Problem(case.model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
-    fit = problem.solve([*free, *_starts(case, study, len(study.experiments), known)])
+    fit = problem.solve([*free, *_starts(case, study, len(study.experiments), fitted_to)])
     found = dict(zip((e.name for e in study.experiments), fit.simulated, strict=True))
     model = fitted(case.model, fit)
     for e in case.unused:
@@ -118,12 +143,12 @@ def _refitted(case: Case, study: Study) -> dict[str, Array]:
     return found
 
 
-def _starts(case: Case, study: Study, count: int, known: dict[object, float]) -> list[Free]:
+def _starts(case: Case, study: Study, count: int, fitted_to: dict[object, float]) -> list[Free]:
     """Free starts of `count` recordings, and offsets of all sensors."""
     model = case.model
     free = [Free(("bias", j), 0.0, float(level)) for j, level in enumerate(noise_rms(study))]
     for e in range(count):
-        free += [Free(("start", e, i), known.get(("start", e, i), x), 1e-3) for i, x in enumerate(model.start)]
+        free += [Free(("start", e, i), fitted_to.get(("start", e, i), x), 1e-3) for i, x in enumerate(model.start)]
     return free
 
 
@@ -145,7 +170,17 @@ def with_figures(case: Case, end: End, table: Table) -> tuple[Diagnosis, list[Ch
         beyond = next((c.beyond for c in own.values()), None)
         held += channels(replace(e, good=good), model, before, after, noise_floor(study, 0), beyond)
     gain = {name: _gain(table, name, g) for name, g in end.answer.gain.items()}
-    return replace(end.answer, gain=gain, figures=tuple(r.figure for r in table.rows), simulated=str(table.options)), train, held
+    return (
+        replace(
+            end.answer,
+            gain=gain,
+            figures=tuple(r.figure for r in table.rows),
+            simulated=str(table.options),
+            notes=(*end.answer.notes, *table.notes),
+        ),
+        train,
+        held,
+    )
 
 
 def _gain(table: Table, name: str, g: Gain) -> Gain:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from penode_gen.model import Model
 
 from ... import replay, results, scenario, starts
-from ...errors import UserError
+from ...errors import RecordingError, UserError
 from ...recordings.measured import Measured
 from ...schedule import instance_calls
 from ...signals import Samples
@@ -56,18 +56,26 @@ class Predicted:
 
 
 def read(m: Measured, model: Model, options: Options) -> replay.Replay:
-    """A recording as `penode simulate --input` reads it; of one that is no file, what is known of it. Raises UserError."""
+    """A recording as `penode simulate --input` reads it. Raises UserError, also for one that is no file."""
+    if not m.path.is_file():
+        raise RecordingError(f"{m.path}: there is no such file")
     how = "held" if options.held else "linear"
-    set_name = options.set_name if options.set_name in model.sets else None
-    if m.path.is_file():
-        return replay.load(m.path, model, set_name, options.channels, how, lambda text: None)
+    return replay.load(m.path, model, _set(model, options), options.channels, how, lambda text: None)
+
+
+def known(m: Measured, model: Model, options: Options) -> replay.Replay:
+    """A recording that `penode simulate` does not read, as far as it is known."""
     times = m.time - m.time[0]
     inputs = {s.name: Samples(times, u) for s, u in zip(model.inputs, m.u.T, strict=True)}
-    instance = scenario.Instance(model.name, set_name or next(iter(model.sets)))
+    instance = scenario.Instance(model.name, _set(model, options) or next(iter(model.sets)))
     plan = scenario.Scenario(m.title, float(times[-1]), inputs, {}, (instance,), m.path)
     units = {s.name: s.unit for s in (*model.sensors, *model.outputs)}
     sensed = {k: replay.Sensed(units[k], m.time[m.shown[k]], z[m.shown[k]]) for k, z in m.z.items() if k in units and m.shown[k].any()}
     return replay.Replay(plan, times, float(m.time[0]), m.u, sensed)
+
+
+def _set(model: Model, options: Options) -> str | None:
+    return options.set_name if options.set_name in model.sets else None
 
 
 def predict(model: Model, recording: replay.Replay, options: Options) -> Predicted:

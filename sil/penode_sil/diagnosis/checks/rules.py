@@ -16,7 +16,7 @@ from ..report_figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, REJECTED, Cause, place, worsened
 from . import values
 from .case import Case, End
-from .figures import ROLES, Table, misses
+from .figures import ROLES, Table, misses, tabled
 from .written import write_extended
 
 KEEP = f"# Keep the nominal model: this one predicts worse. It would be {EXTENDED} if it did not.\n"
@@ -88,6 +88,34 @@ def _named(end: End) -> list[Cause]:
 # -- what the written model predicts ----------------------------------------------------------------------------------
 
 
+def burdens(case: Case, end: End, table: Table) -> list[tuple[str, str]]:
+    """Offsets, scales and delays of sensors that make what the written model predicts in training worse than it is without them."""
+    found = []
+    for r in table.of(ROLES[0]) if end.without is not None else ():
+        sizes = {k: end.extended.parameters.get(f"{k}_{r.figure.signal}") for k in ("bias", "gain", "delay")}
+        predicted = table.predicted[r.figure.recording][1]
+        z, time = predicted.z[:, r.sensor], predicted.time
+        plain = {
+            "sensor_bias": z - sizes["bias"].value if sizes["bias"] else z,
+            "sensor_scale": z / sizes["gain"].value if sizes["gain"] and not sizes["bias"] else z,
+            "sensor_delay": np.interp(time + sizes["delay"].value, time, z) if sizes["delay"] else z,
+        }
+        found += [(kind, r.figure.signal) for kind, x in plain.items() if x is not z and worsened(r.rms_of(time, x), r.rms("extended"))]
+    return list(dict.fromkeys(found))
+
+
+def relieved(case: Case, end: End, table: Table, gone: Sequence[tuple[str, str]]) -> End:
+    """The end without them, if it is not worse for any sensor in training."""
+    written = case.output / EXTENDED
+    before, lighter = written.read_text(), end.without(gone)
+    again = tabled(case, lighter)
+    pairs = zip(table.of(ROLES[0]), again.of(ROLES[0]), strict=True)
+    if any(worsened(old.rms("extended"), new.rms("extended")) for old, new in pairs):
+        written.write_text(before)
+        return end
+    return lighter
+
+
 def mended(case: Case, end: End, table: Table) -> list[str]:
     """Sensors that the nominal model misses by more than noise, however its file allows to fit it, and that the written one mends."""
     if end.answer.verdict != "no_discrepancy":
@@ -144,6 +172,7 @@ RULES = (
     Rule("no name whose interval holds what has no effect", neutral, nameless),
     Rule("no force larger than everything measured at its place", larger, nameless),
     Rule("no law about reversals where a rate keeps its sign", unturned, nameless),
+    Rule("nothing that makes a sensor worse than without it", burdens, relieved),
     Rule("no agreement where the nominal model misses what the written one mends", mended, explained),
     Rule("no model that predicts worse than the nominal one", worse, reject),
 )
