@@ -12,12 +12,14 @@ import pytest
 from click.testing import CliRunner
 from curves import curve, integrate
 from one_mass import STEP, model
+from scipy.signal import butter, lfilter
 
 import penode_gen
 from penode_sil.cli import cli
-from penode_sil.diagnosis import study
+from penode_sil.diagnosis import diagnose, study
 from penode_sil.diagnosis.checks import final
 from penode_sil.diagnosis.checks.case import Case, End
+from penode_sil.diagnosis.checks.differing import different
 from penode_sil.diagnosis.checks.written import write_extended
 from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.entries import extends
@@ -30,8 +32,8 @@ SAMPLES = 2000
 FRICTION = 4.0  # N
 
 
-def record(path, seed, moving=False, friction=FRICTION):
-    """A CSV of the rig with friction, at rest at first, or `moving`."""
+def record(path, seed, moving=False, friction=FRICTION, mass=MASS, corner=0.0):
+    """A CSV of the rig with friction, at rest at first, or `moving`; of a speed sensor behind a high-pass [Hz]."""
     rng = np.random.default_rng(seed)
     f = np.fft.rfftfreq(SAMPLES, STEP)
     push = np.fft.irfft(np.where((f > 0.3) & (f < 12.0), np.exp(2j * np.pi * rng.random(f.size)), 0.0), SAMPLES)
@@ -39,11 +41,12 @@ def record(path, seed, moving=False, friction=FRICTION):
     force = curve(push, STEP)
 
     def rates(time, x):
-        return [x[1], (force(time) - STIFFNESS * x[0] - DAMPING * x[1] - friction * np.tanh(x[1] / 0.01)) / MASS]
+        return [x[1], (force(time) - STIFFNESS * x[0] - DAMPING * x[1] - friction * np.tanh(x[1] / 0.01)) / mass]
 
     x, _ = integrate(rates, [0.02, -0.3] if moving else [0.0, 0.0], STEP, SAMPLES)
     columns = [np.arange(SAMPLES) * STEP, push, 1e3 * (x[0] + NOISE * rng.standard_normal(SAMPLES))]
-    columns.append(x[1] + 1e-3 * rng.standard_normal(SAMPLES))
+    speed = lfilter(*butter(1, 2.0 * corner * STEP, "high"), x[1]) if corner else x[1]
+    columns.append(speed + 1e-3 * rng.standard_normal(SAMPLES))
     head = "time [s],push [N],way [mm],speed [m/s]"
     np.savetxt(path, np.stack(columns, axis=1), delimiter=",", header=head, comments="", fmt="%.9g")
     return path
@@ -203,3 +206,38 @@ def test_a_recording_that_penode_simulate_does_not_read_has_figures_too(tmp_path
     (tmp_path / "later.csv").write_text("\n".join([*lines[:500], lines[499], *lines[500:]]) + "\n")
     found = final.checked(case, end)
     assert len(found.figures) == 4 and "penode simulate does not take later.csv" in found.notes[-1]
+
+
+def test_recordings_that_differ_by_a_parameter_have_a_set_each(tmp_path):
+    """A mass of 2 kg in one recording and 2.6 kg in the other, which no common value explains; each figure is that of its own set. With a
+    friction beside it, nothing is said: each recording is beyond the model then."""
+    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS))
+    nominal = penode_gen.load(tmp_path / "rig.toml")
+    paths = [
+        record(tmp_path / f"{name}.csv", seed, False, 0.0, mass) for name, seed, mass in (("empty", 1, MASS), ("input", 2, 1.3 * MASS))
+    ]
+    found = diagnose(nominal, load(paths, nominal), (), tmp_path / "out")
+    (cause,) = found.causes
+    assert (cause.kind, cause.where, found.verdict) == ("differs_between_recordings", "m", "explained")
+    assert {k: v.value for k, v in cause.parameters.items()} == pytest.approx({"of_empty": MASS, "of_input": 1.3 * MASS}, rel=0.01)
+    for f in found.figures:
+        errors = simulated(tmp_path / "out" / "model_extended.toml", tmp_path / f.recording, f"{found.simulated} --set {f.set}")
+        assert f.extended == errors[f.signal]["value"] and f.extended < 1.2 * f.noise
+    train = load([record(path, seed, False, FRICTION, MASS) for seed, path in enumerate(paths)], nominal)
+    one = study.begin(nominal, [experiment(m, nominal) for m in train])[0]
+    case = Case(nominal, nominal, train, (), (), (), tmp_path / "out", lambda text: None, lambda share, doing: None)
+    assert different(case, one) is None
+
+
+def test_a_high_pass_of_a_sensor_is_no_agreement(tmp_path):
+    """Nothing else is wrong, and the written model is as far off."""
+    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS))
+    nominal = penode_gen.load(tmp_path / "rig.toml")
+    train = load([record(tmp_path / "train.csv", 1, False, 0.0, MASS, 0.3)], nominal)
+    one = study.begin(nominal, [experiment(m, nominal) for m in train])[0]
+    one = study.replace(one, seen=study.look(one, one.null))
+    case = Case(nominal, nominal, train, (), (), (), tmp_path / "out", lambda text: None, lambda share, doing: None)
+    same = f'[model]\n{extends(nominal.path.resolve())}\nname = "rig_extended"\n'
+    end = End(Diagnosis("no_discrepancy", (), {}, {}, 1.0, 0.0, 0.0), one, write_extended(same, case), None, [])
+    found = final.checked(case, end)
+    assert found.verdict == "not_identifiable" and found.notes[0].startswith("speed (0.")

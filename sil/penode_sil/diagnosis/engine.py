@@ -23,7 +23,7 @@ from .advice import advised
 from .answers import by_innovations, recorded
 from .broken import broken_sensors
 from .by_noise import SEARCH, by_noise, judge_explanations
-from .checks import channels as mix_ups, final
+from .checks import channels as mix_ups, differing, final
 from .checks.case import Case, End
 from .driven import settled
 from .evidence.bench import with_tolerances
@@ -65,7 +65,8 @@ def diagnose(
         if problems := plausible.misfits(with_tolerances(model), [*experiments, *unused], set_name):
             raise RecordingError(*problems)
         case = Case(model, nominal, train, holdout, unused, [*noisy, *remarks], Path(folder), log, tell, channels)
-        end = _searched(case, *unburst(with_tolerances(model), experiments, set_name))
+        study, other, bursts = unburst(with_tolerances(model), experiments, set_name)
+        end = differing.different(case, study) or _searched(case, study, other, bursts)
         answer = final.checked(case, end, mixes)
     return advised(replace(answer, data=recorded(train, holdout), seconds=time.perf_counter() - started), nominal)
 

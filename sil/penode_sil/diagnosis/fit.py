@@ -37,10 +37,10 @@ DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps,
 @dataclass(frozen=True)
 class Free:
     """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "roll_off" | "rail" | "sharpness" | "skew",
-    sensor index), ("fault", its number), or ("start", recording, state index). `unit` steps of it are natural; a `log` one stays positive.
-    `sigma`: its prior."""
+    sensor index), ("fault", its number), ("start", recording, state index), or ("own", recording, parameter). `unit` steps of it are
+    natural; a `log` one stays positive. `sigma`: its prior."""
 
-    target: str | tuple[str, int] | tuple[str, int, int]
+    target: str | tuple[str, int] | tuple[str, int, int] | tuple[str, int, str]
     value: float
     unit: float
     log: bool = False
@@ -53,6 +53,10 @@ class Free:
     def offset(self) -> float:
         """How far it is from its prior, in deviations of that."""
         return (self.value - self.origin) / self.sigma
+
+    def of(self, what: str, recording: int) -> bool:
+        """Is it a start state, or an own value, of a recording?"""
+        return self.target[0] == what and self.target[1] == recording
 
     def at(self, shift: Array | float) -> Array:
         """Values after shifts by so many units."""
@@ -195,12 +199,11 @@ class Problem:
         parameters, faults = {}, []
         for f, shift in zip(free, shifts.T, strict=True):
             values = f.at(shift)
-            if isinstance(f.target, str):
-                parameters[f.target] = values
-            elif f.target[0] == "start":
-                if f.target[1] == e:
-                    start[:, f.target[2]] = values
-            else:
+            if isinstance(f.target, str) or f.of("own", e):
+                parameters[f.target if isinstance(f.target, str) else f.target[2]] = values
+            elif f.of("start", e):
+                start[:, f.target[2]] = values
+            elif f.target[0] not in ("start", "own"):  # of another recording
                 faults.append((f.target[0], f.target[1], values))
         run = self.batch.run(self.inputs[e], x0=start, parameters=parameters, set_name=self.set_name, states=states, every=self.fine)
         z = run.z.transpose(1, 2, 0)  # [n, n_z, runs], as they lie in memory
@@ -328,11 +331,7 @@ class Problem:
         """Whitened residual [rows], minus its derivatives [rows, free], and the sensors simulated, at the free values."""
         blocks, rows, simulated = [], [], []
         for e in range(len(self.experiments)):
-            own = [
-                i
-                for i, f in enumerate(free)
-                if i not in known and not (isinstance(f.target, tuple) and f.target[0] == "start" and f.target[1] != e)
-            ]
+            own = [i for i, f in enumerate(free) if i not in known and not (f.target[0] in ("start", "own") and f.target[1] != e)]
             step = 1e-3
             lanes = self.batch.lanes
             shifts = np.zeros((-(-(len(own) + 1) // lanes) * lanes, len(free)))  # whole vectors lie closely in memory

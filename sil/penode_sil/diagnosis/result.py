@@ -86,7 +86,7 @@ class Gain:
 class Figure:
     """RMS errors of a sensor over all `samples` of a recording, in the unit that the model file has for it: of the nominal model and of the
     written one as `penode simulate` gives them; of the nominal one with parameters within stated tolerances, start and offset as they fit
-    best; and the noise. `role`: training or hold-out."""
+    best; and the noise. `role`: training or hold-out; `set`: parameter set of the written model."""
 
     recording: str
     role: str
@@ -97,6 +97,7 @@ class Figure:
     refitted: float
     extended: float
     noise: float
+    set: str = "default"
 
 
 @dataclass(frozen=True)

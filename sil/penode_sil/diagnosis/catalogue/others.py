@@ -4,6 +4,7 @@
 
 MEANING = {
     "wrong_parameter": "A parameter of the model file is off by more than its tolerance.",
+    "differs_between_recordings": "The parameter has another value in each recording: another load, another setting.",
     "sensor_bias": "The sensor reads a constant or slowly drifting amount too much.",
     "sensor_clipping": "The sensor is cut off beyond a limit.",
     "sensor_dropout": "The sensor lost samples.",

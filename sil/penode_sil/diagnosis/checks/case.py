@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from penode_gen.model import Model
@@ -41,7 +41,8 @@ class End:
     """Where a search has ended: its `answer`, without pictures; the study, with the noise that it found; the `extended` model as its file
     in the case's folder has it; `fit`: the training with the named causes, None without any; `held`: the hold-out sample by sample;
     `withheld`: causes that the extended model has, and that are too small to be named; `without`: the end of the same search without
-    laws or offsets, by kind and place, and with the rest fitted again."""
+    laws or offsets, by kind and place, and with the rest fitted again; `sets`: parameter sets of the extended model by names of recordings,
+    where these have their own."""
 
     answer: Diagnosis
     study: Study
@@ -50,3 +51,4 @@ class End:
     held: Sequence[Channel]
     withheld: Sequence[Cause] = ()
     without: Callable[[Collection[tuple[str, str]]], End] | None = None
+    sets: Mapping[str, str] = field(default_factory=dict)

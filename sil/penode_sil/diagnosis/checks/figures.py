@@ -69,7 +69,7 @@ def tabled(case: Case, end: End) -> Table:
     """The table of an end. Raises UserError."""
     study = end.study
     held = study.experiments[0].held is not None
-    options = Options(study.set_name, case.channels, study.moving and bool(case.model.states), held)
+    options = Options(study.set_name, case.channels, study.moving and bool(case.model.states), held, end.sets)
     recordings, notes = _read(case, options)
     options, pairs = both((case.nominal, end.extended), list(recordings.values()), options)
     of_path = dict(zip(recordings, pairs, strict=True))
@@ -104,7 +104,7 @@ def _rows(case: Case, end: End, role: str, e: Experiment, pair: tuple[Predicted,
     """All sensors of a recording; `floor` [n_z]: noise."""
     nominal, extended = (p.at(e) for p in pair)
     dropped = {c.sensor: c.good for c in end.held if c.recording == e.name}
-    rows = []
+    rows, study_set = [], end.study.set_name
     for j, s in enumerate(case.model.sensors):
         good, name = dropped.get(s.name, e.good[:, j]), s.name
         if name not in pair[0].errors or not good.any():
@@ -121,6 +121,7 @@ def _rows(case: Case, end: End, role: str, e: Experiment, pair: tuple[Predicted,
             rms(errors["refitted"]) / per,
             pair[1].errors[name]["value"],
             float(floor[j]) / per,
+            end.sets.get(e.name, study_set),
         )
         rows.append(Row(figure, j, e.time[good], e.y[good, j], errors))
     return rows

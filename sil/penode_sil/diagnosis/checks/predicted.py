@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -28,12 +28,13 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Options:
     """Options of `penode simulate`: parameter set, names of channels, whether start states are fitted to the first samples, and whether
-    inputs are held between rows."""
+    inputs are held between rows; `sets`: other parameter sets by files of recordings, for models that have them."""
 
     set_name: str
     channels: Sequence[str] = ()
     measured: bool = False
     held: bool = False
+    sets: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
         given = [f"--set {self.set_name}"] if self.set_name != "default" else []
@@ -81,6 +82,8 @@ def _set(model: Model, options: Options) -> str | None:
 def predict(model: Model, recording: replay.Replay, options: Options) -> Predicted:
     """What `penode simulate` gives for a recording. Raises UserError."""
     instance = recording.plan.instances[0]
+    own = options.sets.get(recording.plan.path.name, "")
+    instance = replace(instance, set=own) if own in model.sets else instance
     initial = starts.fit(model, instance.set, recording, starts.Start({}, True))[0] if options.measured else {}
     compiled = Sil(model)
     run = compiled.run(recording.u, instance_calls(model, instance, initial, compiled.dtype), instance.set)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.signal import butter, lfilter
 
 from .. import catalogue
 from ..noise import UNSEEN
@@ -16,9 +17,10 @@ from ..report_figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, REJECTED, Cause, place, worsened
 from . import values
 from .case import Case, End
-from .figures import ROLES, Table, misses, tabled
+from .figures import ROLES, Row, Table, misses, tabled
 from .written import write_extended
 
+NOMINAL = ("nominal", "refitted")
 KEEP = f"# Keep the nominal model: this one predicts worse. It would be {EXTENDED} if it did not.\n"
 NOT_NAMED = f"not named, but in {EXTENDED}"
 
@@ -120,15 +122,20 @@ def mended(case: Case, end: End, table: Table) -> list[str]:
     """Sensors that the nominal model misses by more than noise, however its file allows to fit it, and that the written one mends."""
     if end.answer.verdict != "no_discrepancy":
         return []
-    rows = [r for r in table.rows if r.sensor in misses([r], "refitted", table.noise) and UNSEEN * r.rms("extended") < r.rms("refitted")]
-    return list(dict.fromkeys(r.figure.signal for r in rows))
+    return list(dict.fromkeys(r.figure.signal for r in _missed(table) if UNSEEN * r.rms("extended") < min(map(r.rms, NOMINAL))))
+
+
+def _missed(table: Table) -> list[Row]:
+    """Of which the nominal model is off by more than noise, as it is and refitted."""
+    return [r for r in table.rows if all(r.sensor in misses([r], model, table.noise) for model in NOMINAL)]
 
 
 def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
     """Explained: by causes that were withheld, for they are small beside what acts, or else by the value of one parameter."""
     d = end.answer
     taken = 1.0 - max((r.rms("extended") / max(r.rms("refitted"), 1e-300)) ** 2 for r in table.rows if r.figure.signal in sensors)
-    d = replace(d, verdict="explained", explained=max(taken, 0.0))
+    whole = not misses(table.rows, "extended", table.noise)
+    d = replace(d, verdict="explained" if whole else "partly_explained", explained=max(taken, 0.0))
     if end.withheld:
         names = [place(c.kind, c.where) for c in end.withheld]
         notes = tuple(n for n in d.notes if not any(n.startswith(f"{name} is real but small") for name in names))
@@ -148,6 +155,32 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
     note = f"the model misses {', '.join(sensors)} by more than noise, {EXTENDED} does not: no single one of its values explains that"
     unsure = (Cause(OUTSIDE, "", {}, 0.5),)
     return replace(end, answer=replace(d, verdict="unexplained", causes=unsure, explained=0.0, notes=(*d.notes, note)))
+
+
+def coupled(case: Case, end: End, table: Table) -> list[tuple[str, float]]:
+    """Sensors that are off by more than noise in a model that is said to agree, and that a high-pass explains; and its corner [Hz]."""
+    found: dict[str, float] = {}
+    for r in _missed(table) if end.answer.verdict == "no_discrepancy" else ():
+        predicted = table.predicted[r.figure.recording][0]
+        step = case.model.sample_time
+        corners = np.geomspace(1.0 / np.ptp(predicted.time), 0.1 / step, 40)
+        left = [r.rms_of(predicted.time, _high_pass(predicted.z[:, r.sensor], f * step)) for f in corners]
+        if UNSEEN * min(left) < min(map(r.rms, NOMINAL)):
+            found[r.figure.signal] = float(corners[int(np.argmin(left))])
+    return list(found.items())
+
+
+def _high_pass(x: np.ndarray, corner: float) -> np.ndarray:
+    """A signal [n] behind a first-order high-pass with this corner [of a sample's rate]."""
+    return lfilter(*butter(1, 2.0 * corner, "high"), x)
+
+
+def unsure(case: Case, end: End, table: Table, sensors: Sequence[tuple[str, float]]) -> End:
+    """No agreement: the sensors do not show slow motion."""
+    d = end.answer
+    corners = ", ".join(f"{name} ({corner:.2g} Hz)" for name, corner in sensors)
+    note = f"{corners}: off by more than noise, as behind a high-pass: is the sensor AC-coupled, as piezoelectric ones are?"
+    return replace(end, answer=replace(d, verdict="not_identifiable", notes=(note, *d.notes)))
 
 
 def worse(case: Case, end: End, table: Table) -> list[str]:
@@ -174,5 +207,6 @@ RULES = (
     Rule("no law about reversals where a rate keeps its sign", unturned, nameless),
     Rule("nothing that makes a sensor worse than without it", burdens, relieved),
     Rule("no agreement where the nominal model misses what the written one mends", mended, explained),
+    Rule("no agreement where a sensor is off as behind a high-pass", coupled, unsure),
     Rule("no model that predicts worse than the nominal one", worse, reject),
 )

@@ -101,11 +101,12 @@ def text(case: Case, x: Lone) -> str:
     ]
     for p in model.parameters.values():
         if p.name in values and values[p.name] != p.value:
-            lines.append(f"{p.name} = {table(_entry(p, values[p.name]))}")
+            lines.append(f"{p.name} = {table(entry(p, values[p.name]))}")
     return "\n".join([*lines, ""])
 
 
-def _entry(p: Parameter, value: float) -> dict[str, object]:
+def entry(p: Parameter, value: float) -> dict[str, object]:
+    """A parameter of the model file with another value [SI]."""
     entry: dict[str, object] = {"value": value / units.factor(p.unit), "unit": p.unit}
     entry |= {"tolerance": p.tolerance if np.isfinite(p.tolerance) else "unknown"} if p.tolerance else {}
     entry |= {"tunable": True} if p.tunable else {}

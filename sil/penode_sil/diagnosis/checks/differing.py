@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Before a search: is each recording of a study explained by a value of its own of one parameter, and by no common one?"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from penode_gen import units
+from penode_gen.model import Parameter
+
+from .. import measuring, numerics
+from ..entries import extends, table, toml, unlike
+from ..explanation import CHANCE, rows
+from ..fit import Fit, Free, Problem
+from ..noise import UNSEEN
+from ..residual import rms, stated_noise
+from ..result import Cause, Diagnosis, Named, Value
+from ..study import Study, look
+from ..worth import RIGHT, Z_95
+from .case import Case, End
+from .values import entry
+from .written import write_extended
+
+KIND = "differs_between_recordings"
+
+
+@dataclass(frozen=True, eq=False)
+class Own:
+    """A parameter with a value for each recording, and the fit in which it has."""
+
+    name: str
+    fit: Fit
+
+    def values(self) -> list[tuple[float, float]]:
+        """Value and standard deviation in each recording."""
+        at = [i for i, f in enumerate(self.fit.free) if f.target[0] == "own"]
+        sd = np.sqrt(np.maximum(np.diag(self.fit.covariance())[at], 0.0))
+        return [(self.fit.free[i].value, abs(self.fit.free[i].value) * float(s)) for i, s in zip(at, sd, strict=True)]
+
+    def differs(self) -> bool:
+        """Are two of its values surely not the same?"""
+        found = self.values()
+        return any(abs(a - b) > CHANCE * float(np.hypot(x, y)) for a, x in found for b, y in found)
+
+
+def different(case: Case, study: Study) -> End | None:
+    """The end of a diagnosis of recordings that differ by a parameter, and by nothing else: with it all sensors are within their noise, and
+    with a common value of it, whatever that is, they are not."""
+    count, noise = len(study.experiments), stated_noise(study)
+    if count == 1 or study.model.networks or not _missed(study, study.null, noise):
+        return None
+    if any(_beyond(study, k, noise) for k in range(count)):
+        return None
+    problem = Problem(study.model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
+    good: list[Own] = []
+    for p in study.model.parameters.values():
+        if p.exact or not p.value:
+            continue
+        others = [f for f in study.null.free if f.target != p.name]
+        own = [Free(("own", e, p.name), p.value, abs(p.value), log=True, origin=p.value) for e in range(count)]
+        found = Own(p.name, problem.solve([*others, *own]))
+        if _missed(study, found.fit, noise) or not found.differs():
+            continue
+        if not _missed(study, problem.solve([*others, _free(p)]), noise):
+            return None
+        good.append(found)
+    return _end(case, study, sorted(good, key=lambda x: x.fit.cost)) if good else None
+
+
+def _beyond(study: Study, k: int, noise: np.ndarray) -> bool:
+    """Is recording k beyond the model, whatever the values of its parameters are?"""
+    one = replace(study, experiments=study.experiments[k : k + 1])
+    problem = Problem(study.model, one.experiments, study.metrics[k : k + 1], study.set_name, study.linear.fastest)
+    starts = [replace(f, target=("start", 0, f.target[2])) for f in study.null.free if f.of("start", k)]
+    free = [_free(p) for p in study.model.parameters.values() if not p.exact and p.value]
+    return _missed(one, problem.solve([*free, *starts]), noise)
+
+
+def _free(p: Parameter) -> Free:
+    """A parameter of any size, of its own sign."""
+    return Free(p.name, p.value, abs(p.value), log=True, sigma=abs(p.value), origin=p.value)
+
+
+def _missed(study: Study, fit: Fit, noise: np.ndarray) -> bool:
+    """Is a sensor of a recording off by more than its noise?"""
+    return any(
+        not rms((e.y - z)[e.good[:, j], j]) <= UNSEEN * level
+        for e, z in zip(study.experiments, fit.simulated, strict=True)
+        for j, level in enumerate(noise)
+        if e.good[:, j].any()
+    )
+
+
+def _end(case: Case, study: Study, good: Sequence[Own]) -> End:
+    """The answer with the best of them; the others are its alternatives where they are as good."""
+    best = good[0]
+    p, sets = study.model.parameters[best.name], _sets(study)
+    values = {
+        s: Value(v, units.si(p.unit), (v - Z_95 * sd, v + Z_95 * sd)) for s, (v, sd) in zip(sets.values(), best.values(), strict=True)
+    }
+    others = tuple(Named(KIND, x.name) for x in good[1:] if x.fit.cost - best.fit.cost < CHANCE * CHANCE)
+    cause = Cause(KIND, best.name, values, RIGHT / (1 + len(others)), others)
+    extended = write_extended(_text(case, best, sets), case)
+    seen = replace(study, model=case.model, seen=look(study, study.null))
+    gain, notes, held = measuring.measure(seen, extended, case.unused) if case.unused else ({}, [], [])
+    noise = rows(study)
+    taken = (study.null.cost - best.fit.cost) / max(study.null.cost - noise, 1.0)
+    evidence = (study.null.cost - noise) / float(np.sqrt(2.0 * noise))
+    sure = ({"causes": [{"kind": KIND, "where": best.name}], "posterior": cause.confidence},)
+    notes = [*case.remarks, *notes, f"each recording has a parameter set of its own in the extended model: {', '.join(sets.values())}"]
+    found = numerics.numerics(seen)[0]
+    answer = Diagnosis("explained", (cause,), gain, found, min(taken, 1.0), evidence, 0.0, tuple(notes), explanations=sure)
+    return End(answer, seen, extended, best.fit, held, sets=sets)
+
+
+def _sets(study: Study) -> dict[str, str]:
+    """Names of parameter sets by those of recordings."""
+    found: dict[str, str] = {}
+    for e in study.experiments:
+        stem = re.sub(r"\W", "_", e.name.rsplit(".", 1)[0]).lower()
+        found[e.name] = unlike(f"of_{stem}", found.values())  # by itself it might be a word of the C
+    return found
+
+
+def _text(case: Case, best: Own, sets: dict[str, str]) -> str:
+    """The model file with what was fitted in common, and a set for each recording."""
+    model, p = case.model, case.model.parameters[best.name]
+    per = units.factor(p.unit)
+    lines = [
+        f"# What the recordings taught about {model.path.name}: {KIND} at {best.name}.",
+        "",
+        "[model]",
+        extends(model.path.resolve()),
+        f"name = {toml(model.name + '_extended')}",
+        f"sample_time = {toml(f'{model.sample_time:.12g} s')}",
+        "",
+        "[parameters]",
+        f"{best.name} = {table(entry(p, p.value) | {'tunable': True})}",
+    ]
+    for f in best.fit.free:
+        known = model.parameters.get(f.target) if isinstance(f.target, str) else None
+        if known is not None and f.value != known.value:
+            lines.append(f"{f.target} = {table(entry(known, f.value))}")
+    lines += ["", "[sets.default]", ""] if "default" not in model.sets or not model.sets["default"].parameters else [""]
+    for name, (value, _) in zip(sets.values(), best.values(), strict=True):
+        lines += [f"[sets.{name}]", f"{best.name} = {toml(f'{value / per:.7g} {p.unit}')}", ""]
+    return "\n".join(lines)
