@@ -49,6 +49,8 @@ def test_motion_is_learnt_from_and_the_rest_is_tested_on():
         first = round(float(t.time[0]) * 1e3)
         assert np.array_equal(t.z["z"], m.z["z"][first : first + t.time.size])
         assert t.u.shape == (t.time.size, 1)
+    parts = [m.part for m in (*train, *held)]
+    assert parts == list(range(1, len(parts) + 1))  # their titles are keys
     said = train[0].quality.problems
     assert len(said) == 2
     assert f"of {m.time.size} samples are learnt from" in said[0]

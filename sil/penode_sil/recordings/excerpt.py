@@ -43,12 +43,12 @@ def excerpted(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[l
             f"{_samples(kept)} of {total} samples are learnt from: the stretches whose motion tells most, spread over the recording"
         )
         if not holdout:
-            held = _joined(train, [s for s in stretches if s not in best])
+            held = _joined(train, [s for s in stretches if s not in best], len(kept))
     tested = sum(m.time.size for m in held)
     if tested > MOST:
         spread = _cut(held)
         places = np.linspace(0, len(spread) - 1, MOST // LENGTH).round().astype(int)
-        held = _joined(held, [spread[i] for i in np.unique(places)])
+        held = _joined(held, [spread[i] for i in np.unique(places)], len(kept))
     if held and (total > MOST or tested > MOST):
         notes.append(f"{_samples(held)} of {tested} others are the hold-out, evenly spread")
     if notes:
@@ -102,15 +102,15 @@ def _features(channels: Sequence[Array], s: _Stretch) -> Array:
     return np.column_stack([*rows, *(c * np.abs(c) for c in rows)])
 
 
-def _joined(recordings: Sequence[Measured], stretches: Sequence[_Stretch]) -> list[Measured]:
-    """The samples of stretches; neighbours are one."""
+def _joined(recordings: Sequence[Measured], stretches: Sequence[_Stretch], before: int = 0) -> list[Measured]:
+    """The samples of stretches; neighbours are one. They are numbered on from the part `before`."""
     runs: list[_Stretch] = []
     for s in stretches:
         if runs and (runs[-1].recording, runs[-1].end) == (s.recording, s.begin):
             runs[-1] = replace(runs[-1], end=s.end)
         else:
             runs.append(s)
-    return [_part(recordings[s.recording], s.begin, s.end, k) for k, s in enumerate(runs, start=1)]
+    return [_part(recordings[s.recording], s.begin, s.end, k) for k, s in enumerate(runs, start=before + 1)]
 
 
 def _part(m: Measured, begin: int, end: int, number: int) -> Measured:
