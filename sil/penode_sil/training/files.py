@@ -19,6 +19,7 @@ from penode_gen.model import Model
 from ..diagnosis.files import all_or_none
 from ..errors import RecordingError, WrongUse
 from ..output import whole
+from ..recordings.excerpt import excerpted
 from ..recordings.measured import Measured, load
 from . import begin, onnx_file, report, resume, threads
 from .engine import compiler
@@ -49,6 +50,7 @@ def run(job: Job, tell: Callable[[float, str], None] = lambda share, doing: None
     known, start = tuple(_known(text, model) for text in job.known), begin.read(job.start, model)
     measured, held = load(job.data, model, job.channels), load(job.holdout, model, job.channels)
     _check_kept([*measured, *held])
+    measured, held = excerpted(measured, held)
     with resume.journal(job.output, _identity(job, model, start), job.resume) as journal:
         with threads.one():
             after, found = train(model, measured, held, Options(known, job.seed, start, journal), tell)
