@@ -19,8 +19,10 @@ LEAST     := single_common=161 single_foreign=88 pair=48 triple=16 null=100 null
 export PENODE_BUILD ?= $(CURDIR)/build/sil
 unexport PYTHONDONTWRITEBYTECODE # else every command translates all of its modules anew, for half a second
 
+##@ Every day
+
 help: ## Show this text
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^##@ / { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-23s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 setup: $(addprefix build/setup/,tools python unity cmock packages) ## Install what is missing; every other target that needs it calls it
 
@@ -43,6 +45,8 @@ nightly: setup ## What `make test` takes a sample of: 24 fresh recordings with s
 
 prove: setup build/setup/proof ## The proofs: all values, all orders, all statements; each also has to find seeded faults
 	$(Q)$(PYTHON) test/tally.py $(PROVE_STATIC) $(PROVE_DYNAMIC)
+
+##@ Figures and campaigns
 
 figures: setup ## Measure what our steps cost; rewrite the tables of README.md and test/bench/
 	$(Q)$(PYTHON) test/bench/bench.py --ours
@@ -99,6 +103,8 @@ ablate: setup ## Which thresholds of the diagnosis decide something, and which g
 
 rigs: setup ## Real rigs in RIGS_DIR: names, hold-out before and after, what a plain expert fit reaches, time; build/rigs/RIGS.md
 	$(Q)$(PYTHON) test/diagnosis/rigs_table.py --rigs $(RIGS_DIR) --command $(PENODE) --page build/rigs/RIGS.md
+
+##@ Packages and upkeep
 
 dist: ## Packages for firmware, into build/dist: CMake, pkg-config, PlatformIO, Zephyr, CMSIS-Pack, one .c and one .h; no Python
 	$(Q)port/packages/dist.sh build/dist

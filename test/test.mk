@@ -4,6 +4,8 @@
 # The suites of `make test`, each also a target of its own. What a suite prints is what test/tally.py counts. It runs the gates of
 # a suite (GATES.suite; else the suite is one) and the Python tests as they come, not one suite after the other.
 
+##@ Suites of make test
+
 SUITES   := check hidden-fixed hidden-fresh figures-check accuracy misra builds unit symbols warnings board gen-check cmock \
             python-sil python-gen python-training python-tools python-diagnosis python-exports python-install
 PYTHONS   = $(filter python-%,$(SUITES))

@@ -3,6 +3,8 @@
 #
 # The gates of `make prove`, each also a target of its own; README.md beside this file says what each shows.
 
+##@ Proofs
+
 PROVE_STATIC  := prove-rules prove-eva prove-coverage
 PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-xcp-fuzz prove-xcp-preempt prove-xcp-cost prove-xcp-size prove-readers prove-flip prove-longrun prove-stack prove-bits \
                  prove-accuracy prove-cost prove-kernels prove-promise prove-promises

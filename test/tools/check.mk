@@ -3,6 +3,8 @@
 #
 # `make check`: all that can be said about the sources without running the project; seconds. `make format` mends layout.
 
+##@ Checks in seconds
+
 GATES.check := check-types check-c check-lint check-pages check-structure check-format # the longest begin
 RUFF := $(PYTHON) -m ruff
 
