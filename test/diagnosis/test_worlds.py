@@ -233,7 +233,7 @@ def test_rigs_without_data(tmp_path, capsys, monkeypatch):
 
 def test_small_causes_that_are_kept_count_as_reported():
     notes = [
-        "Maxwell bushing at spring is real but small: 2.6% of what acts there; not named, but in model_extended.toml",
+        "Maxwell bushing at spring is real but small: 2.6% of the force there; not named, but in model_extended.toml",
         "x has an offset of 1 m: gravity?",
     ]
     assert small(notes) == ["maxwell_bushing"]

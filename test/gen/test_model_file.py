@@ -462,7 +462,7 @@ def test_no_states(folder):
     (folder / "bare.toml").write_text(models.BARE.format(outside="clamp", inputs="u = { unit = '1' }", units="['1']", names="u"))
     assert penode_gen.load(folder / "bare.toml").states == ()
     (folder / "bad.toml").write_text("# nothing\n")
-    assert problems(folder / "bad.toml") == [f"{folder}/bad.toml:1: says nothing; write a model with [model], [inputs] and [outputs]"]
+    assert problems(folder / "bad.toml") == [f"{folder}/bad.toml:1: is empty; write a model with [model], [inputs] and [outputs]"]
 
 
 def test_files_that_are_none(folder):

@@ -142,7 +142,7 @@ def converters(seeds, noise: float):
 
 
 def test_a_converter_that_holds_its_output_is_a_delay(tmp_path, penode):
-    """Half a sample of delay, which is 2 % of what acts and all that is missed. No bushing, of which a third of the force would be needed
+    """Half a sample of delay, 2 % of the force there and all that is missed. No bushing, of which a third of the force would be needed
     for the like of it."""
     records, model = converters((7, 8), 1e-3)
     found = diagnosed(tmp_path, penode, model, records)

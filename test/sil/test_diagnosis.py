@@ -755,7 +755,7 @@ def test_hidden_cause(tmp_path, model, case, show):
 
 
 def test_a_play_off_the_middle_has_two_halves(tmp_path, model):
-    """3 mm to one side and 1 mm to the other, of all of the spring: the gap is both together, and the law foretells."""
+    """3 mm to one side and 1 mm to the other, of all of the spring: the gap is both together, and the law predicts."""
     paths = [record(tmp_path / f"{n}.csv", road(n), drive(road(n), lambda s, v: -C * min(max(s, -1e-3), 3e-3)), n + 10) for n in (5, 6)]
     found = diagnosis.diagnose(model, load(paths[:1], model), load(paths[1:], model), tmp_path / "out")
     (cause,) = found.causes
@@ -767,7 +767,7 @@ def test_a_play_off_the_middle_has_two_halves(tmp_path, model):
         assert gain.after_rmse < 1.05 * NOISE[name], name
 
 
-def test_what_is_foretold_is_as_good_as_the_true_law(tmp_path, model):
+def test_what_is_predicted_is_as_good_as_the_true_law(tmp_path, model):
     """A damping force that grows like no law on the list, large against the noise: its name needs fewer laws than its
     curve. Measure is the same C with the law that the plant has. The laws that name it leave 14 % more than that in a_wheel: 8 % are
     about half."""
@@ -832,7 +832,7 @@ def test_inputs_are_joined_as_well_as_their_noise_allows(tmp_path, hiss, way):
     assert extended.interpolation == way and (way == "linear" or f'input = "{way}"' in text)
 
 
-def test_a_mass_on_rubber_is_foretold(tmp_path, model):
+def test_a_mass_on_rubber_is_predicted(tmp_path, model):
     """40 kg on the body, on a spring beside a spring in series with a damper. One resonance of the list leaves 9 % more than the noise
     in a_body; a second one under the same name takes half of it."""
     m, k, branch, tau = 40.0, 40.0 * (2 * np.pi * 5.0) ** 2, 1.0, 0.03

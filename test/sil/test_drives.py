@@ -131,7 +131,7 @@ def shaken(friction, rough, seconds=8.0):
 
 @pytest.mark.parametrize("rough, force", sample([(0.02, 0.015), (0.015, 0.012)], (0.015, 0.012)))
 def test_damping_does_not_stand_for_friction(tmp_path, rough, force, show):
-    """Friction of a seventh of what acts in a bearing that is shaken by more than that: a damping that the file does not vouch for takes
+    """Friction of a seventh of the force in a bearing that is shaken by more than that: a damping that the file does not vouch for takes
     most of it, and leaves a fifth of the misfit to friction. With friction in the model the damping is as the file has it, so friction is
     the cause."""
     model, experiments = drive(tmp_path, lambda s: K * s, shaken(lambda v: force * 2.0 / math.pi * math.atan(v / 0.005), rough))
@@ -202,7 +202,7 @@ def test_every_place_is_tried():
 
 
 def test_what_a_small_form_hides():
-    """A force of 20 % of what acts elsewhere is looked at again once a small form is in the model, however little it takes before."""
+    """A force of 20 % of the force elsewhere is looked at again once a small form is in the model, however little it takes before."""
 
     def trial(where, share, taken):
         return Trial(_form("k", where), None, None, 50.0, None, share, taken)

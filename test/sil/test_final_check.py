@@ -171,9 +171,9 @@ def test_a_name_about_reversals_needs_reversals(tmp_path):
 
 
 def test_a_model_does_not_agree_where_the_written_one_mends_it(tmp_path):
-    """A friction that is small beside what acts, found and withheld, of which the nominal model misses ten times the noise: it is named."""
+    """A small friction, found and withheld, without which the nominal model is off by ten times the noise: it is named."""
     case, end = ended(tmp_path, FRICTION)
-    note = "Coulomb friction at damper is real but small: 3% of what acts there; not named, but in model_extended.toml"
+    note = "Coulomb friction at damper is real but small: 3% of the force there; not named, but in model_extended.toml"
     found = final.checked(case, replace(said(end, verdict="no_discrepancy", notes=(note,)), withheld=end.answer.causes))
     assert found.verdict == "explained" and [c.kind for c in found.causes] == ["coulomb_friction"] and found.explained > 0.9
     assert note not in found.notes and found.explanations[0]["causes"] == [{"kind": "coulomb_friction", "where": "damper"}]

@@ -229,7 +229,7 @@ def test_sensor_noise_does_not_judge_what_is_bent_everywhere(tmp_path):
     assert weighed.misfit(study, study.null).size
 
 
-BENT = 0.03 * 0.64 * 0.5  # a spring of waves, 3 % of what acts: no law of the catalogue
+BENT = 0.03 * 0.64 * 0.5  # a spring of waves, 3 % of the force there: no law of the catalogue
 
 
 @pytest.mark.parametrize("seed", sample((1, 2), 1))

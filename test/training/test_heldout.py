@@ -34,9 +34,9 @@ def fitted(folder: Path, spring: tuple[float, ...], sway: float) -> tuple[Proble
     return problem, fit.point
 
 
-def test_a_network_that_foretells_nothing_is_zero(tmp_path: Path) -> None:
+def test_a_network_that_predicts_nothing_is_zero(tmp_path: Path) -> None:
     """No force is missing, but there is a disturbance twenty times as loud as the noise, which curves follow; held-out parts show that they
-    foretell nothing. A spring that is missing is kept."""
+    predict nothing. A spring that is missing is kept."""
     problem, point = fitted(tmp_path, (0.0, 0.03, 0.0, 0.0), 0.4)
     assert heldout.loud(problem, point)
     left = problem.scale * heldout.sizes(problem, point)
@@ -53,12 +53,12 @@ def test_noise_alone_is_not_loud(tmp_path: Path) -> None:
     assert not heldout.loud(*fitted(tmp_path, (500.0, 0.03, 0.0, 0.0), 0.0))
 
 
-def test_parts_are_foretold_from_the_others() -> None:
-    """A mean of four parts: each is foretold by the mean of the other three, by hand."""
+def test_parts_are_predicted_from_the_others() -> None:
+    """A mean of four parts: each is predicted by the mean of the other three, by hand."""
     values, weight = np.array([1.0, 3.0, 2.0, 6.0]), 5.0
     found = [heldout.Part(np.array([[weight]]), np.array([weight * v]), weight * v * v) for v in values]
     others = (values.sum() - values) / 3.0
-    assert np.allclose(heldout.foretold(found, np.zeros((1, 1)), np.zeros(1)), weight * (values - others) ** 2, rtol=1e-9)
+    assert np.allclose(heldout.predicted(found, np.zeros((1, 1)), np.zeros(1)), weight * (values - others) ** 2, rtol=1e-9)
 
 
 def test_first_knots_on_both_sides_of_zero_stay_or_go_together() -> None:

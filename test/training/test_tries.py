@@ -48,12 +48,12 @@ def test_another_start_is_tried_where_one_may_lead_further(ratio: float, alike: 
     assert remains(ratio, alike).unfinished == unfinished
 
 
-def test_of_several_starts_the_one_that_foretells_best_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first leaves all bounds, so the recording is doubted; the second leaves least, and the third foretells best."""
+def test_of_several_starts_the_one_that_predicts_best_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first leaves all bounds, so the recording is doubted; the second leaves least, and the third predicts best."""
     ends, asked_for = {1: (1.2, 5.0), 2: (1.3, 4.0)}, []
     fits = {k: (SimpleNamespace(with_=lambda noise, k=k: k, noise=None), SimpleNamespace(point=k)) for k in ends}
     monkeypatch.setattr(left, "of", lambda problem, point: remains(ends[point][0], 0.1))
-    monkeypatch.setattr(tries, "_foretold", lambda problem, fit: ends[fit.point][1])
+    monkeypatch.setattr(tries, "_predicted", lambda problem, fit: ends[fit.point][1])
     _, fit, tried = tries.several(lambda k, tell: (f"start {k}", fits.get(k)), lambda: asked_for.append(1), lambda share, doing: None)
     assert fit.point == 2 and asked_for == [1]
     assert [(t.start, t.heldout) for t in tried[:2]] == [("start 2", 4.0), ("start 1", 5.0)] and tried[2].start == "start 0"

@@ -63,7 +63,7 @@ class _Reader(EndTables):
 
     def read(self) -> m.Model:
         if not self.data:
-            raise m.ModelError([one_line(f"{self.path}:1: says nothing; write a model with [model], [inputs] and [outputs]")])
+            raise m.ModelError([one_line(f"{self.path}:1: is empty; write a model with [model], [inputs] and [outputs]")])
         self.sections()
         head, sample_time = self.head()
         name = head.get("name", "model")

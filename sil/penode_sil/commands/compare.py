@@ -16,7 +16,7 @@ from ..console import FILE
 @click.command()
 @click.argument("model", type=FILE)
 @click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
-@click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
+@click.option("--a2l", type=FILE, help="A2L file of the controller (default: the one it uploads).")
 @click.option("--list", "listed", type=click.IntRange(min=0), default=20, show_default=True, help="How many differing values to print.")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 def compare(model: Path, to: str, a2l: Path | None, listed: int, as_json: bool) -> None:

@@ -24,7 +24,7 @@ from ..errors import RecordingError, WrongUse
 @click.option("-o", "--output", type=FILE, required=True, help="Directory for what is found; created if need be.")
 @click.option("--set", "set_name", default="default", show_default=True, help="Parameter set to start from.")
 @click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
-@click.option("--jobs", type=click.IntRange(1), help="Processes for a folder; as many as cores if not given.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes for a folder (default: one per core).")
 @click.option("--scheduler", help="Address of a Dask scheduler for a folder, like tcp://host:8786.")
 @click.option("--resume", is_flag=True, help="Keep what DIR has of the same model, recordings and options.")
 @click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json, or diagnoses.json for a table.")

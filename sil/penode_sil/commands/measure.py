@@ -15,8 +15,8 @@ from ..console import FILE
 @click.command()
 @click.option("--signals", required=True, help="Names of the A2L, with commas between; units and types come from there.")
 @click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
-@click.option("--a2l", type=FILE, help="Its A2L; that which it offers if not given.")
-@click.option("--duration", help='How long, like "10 s"; until Ctrl-C if not given.')
+@click.option("--a2l", type=FILE, help="A2L file of the controller (default: the one it uploads).")
+@click.option("--duration", help='How long, like "10 s"; default: until Ctrl-C.')
 @click.option(
     "--stage", "staged", metavar="SET", help="Write this set meanwhile, as penode stage does: MODEL.toml:NAME, or a file in serial form."
 )

@@ -16,7 +16,7 @@ from ..console import FILE
 @click.option("--tcp", type=click.IntRange(0, 65535), help="Port to listen at; 0: any that is free.")
 @click.option("--udp", type=click.IntRange(0, 65535), help="The same over UDP.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0: every one of this machine.")
-@click.option("--scenario", type=FILE, help="Scenario file whose inputs drive it, again and again; zeros if not given.")
+@click.option("--scenario", type=FILE, help="Scenario file whose inputs drive the model, repeated (default: zeros).")
 @click.option(
     "--on", "target", default="sil", show_default=True, metavar="sil|pil[:machine]", help="On this machine, or on an emulated Cortex-M."
 )
@@ -25,10 +25,10 @@ from ..console import FILE
     type=click.IntRange(0, 60000),
     default=0,
     show_default=True,
-    help="Milliseconds after the last edit until it is in force, while the working page runs; 0: by page switch only.",
+    help="Commit edits after so many ms without further writes; 0: on page switch only.",
 )
-@click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), help="Seconds; until Ctrl-C if not given.")
-@click.option("--a2l", type=FILE, help="File to write its A2L to, for tools that do not ask the controller.")
+@click.option("--duration", type=click.FloatRange(min=0.0, min_open=True), help="Seconds to run (default: until Ctrl-C).")
+@click.option("--a2l", type=FILE, help="Write the A2L file here, for tools that do not upload it.")
 @click.option("--json", "as_json", is_flag=True, help="Print the address and the end as JSON.")
 def serve(
     model: Path,

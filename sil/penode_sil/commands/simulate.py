@@ -34,7 +34,7 @@ from ..console import FILE, Several
     help="File to write (.csv, .mf4); for several recordings a folder, or a name with {name}. Folders are made.",
 )
 @click.option("--plot", type=FILE, help="Picture to write as well (.png, .svg, .pdf).")
-@click.option("--signal", help="Signal to plot; the first output if not given.")
+@click.option("--signal", help="Signal to plot (default: the first output).")
 @click.option("--set", "set_name", help="Parameter set for --input.")
 @click.option("--channel", multiple=True, help="What the recording calls a signal: x=pos_mm, or x=Weg [mm].")
 @click.option("--start", multiple=True, help='Start: "state=0.01 m", or measured[:K], fitted to the first K samples of the sensors.')

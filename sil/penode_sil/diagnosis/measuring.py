@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 def started(model: Model, e: Experiment, study: Study) -> tuple[Array, Array]:
-    """The start state with which a model fits a recording best, all else given, and the sensors [n, n_z] it then foretells."""
+    """The start state with which a model fits a recording best, all else given, and the sensors [n, n_z] it then predicts."""
     metrics = [metric(e, study.levels[0][:1].repeat(e.band, 0), np.zeros((e.band, len(model.sensors), len(model.inputs))))]
     problem = Problem(model, [e], metrics, study.set_name, study.linear.fastest)
     spread = [1.0] * (2 * len(model.bodies)) + [SPREAD.get(s.unit, 1.0) for s in model.extra_states]

@@ -101,7 +101,7 @@ class Walk:
         return Walk(step, gain, h, p, precision, root, 2.0 * float(np.sum(np.log(np.diag(low)))))
 
     def predictions(self, y: Array) -> Array:
-        """States [n, x, any] foretold before each sample of y [n, sensors, any]."""
+        """States [n, x, any] predicted before each sample of y [n, sensors, any]."""
         drive = np.einsum("xs,ns...->nx...", self.gain, y[:-1])
         return recursion(self.step, np.concatenate([np.zeros_like(drive[:1]), drive]))
 

@@ -47,14 +47,14 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
             continue
         size, value, beside, unit = shift(model, found.plain, moved, p.name), plain.value(p.name), whole[p.name], units.si(p.unit)
         sd = float(np.hypot(plain.deviation(p.name), SYSTEMATIC / max(size, SYSTEMATIC) * abs(value - p.value)))
-        log(f"{p.name}: {value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of what acts there")
+        log(f"{p.name}: {value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of the force there")
         if abs(value - p.value) <= _limit(p) * abs(p.value) + Z_95 * sd:
             continue
         if p.name in shared and not straight.off(p.value, value, shared[p.name], _limit(p)):
             notes.append(f"{p.name} is {value:.4g} {unit} beside what was found at its place, which shares its straight part")
         elif size < WORTH:
             notes.append(
-                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of what acts there: "
+                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: "
                 "as much as anything that the model leaves out might"
             )
         elif not straight.off(p.value, beside, shared_by_all.get(p.name, (0.0, 0.0)), _limit(p)):

@@ -153,7 +153,7 @@ def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
     same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
     level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
-    most = float(np.max(bench.fit.taken(best, problem.floor)))  # what acts at one place is seen by few sensors
+    most = float(np.max(bench.fit.taken(best, problem.floor)))  # the force at one place is seen by few sensors
     whole = bench.fit.taken_whole(best, problem.floor)
     return Trial(
         term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved), most, whole

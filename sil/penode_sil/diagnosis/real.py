@@ -97,17 +97,17 @@ def answer(
         size = share(plain, [t for t in named if name_of(t) == name_of(term)], plain.fit, moved)
         rivals = _rivals(chance, term) if first else _loads(model, bench.places[term.form.index])
         cause = _cause(model, plain, term, size, rivals, _sure(chance, a.trial.form))
-        log(f"{cause.kind} at {cause.where}: {size:.1%} of what acts there")
+        log(f"{cause.kind} at {cause.where}: {size:.1%} of the force there")
         if size >= enough and not cause.may_be_nothing:
             causes = _merged(causes, cause)
         elif first:
             withheld.append(cause)
-            notes.append(_small(term, f"{size:.1%} of what acts there") if size < enough else f"{place(*name_of(term))} {MAY_BE_NOTHING}")
+            notes.append(_small(term, f"{size:.1%} of the force there") if size < enough else f"{place(*name_of(term))} {MAY_BE_NOTHING}")
     for a in found.small:
         what = (
             f"{a.trial.taken:.0%} of the power of prediction errors"
             if a.trial.taken < MIN_TAKEN
-            else f"{a.trial.share:.1%} of what acts there"
+            else f"{a.trial.share:.1%} of the force there"
         )
         notes.append(_small(a.terms[0], what))
         withheld.append(_cause(model, after, a.terms[0], a.trial.share, (), _sure(_weighed(a.trials), a.trial.form)))
@@ -126,7 +126,7 @@ def answer(
 
 def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[Found, list[Motion], parameters.Judged]:
     """What the search finds, the motion with it, and its parameters. Where one of these only makes up for a form that is small beside it,
-    small forms of at least WORTH of what acts are named too: they took little of the misfit because the parameter had taken the rest."""
+    small forms of at least WORTH of the force there are named too: they took little because the parameter had taken the rest."""
 
     def judged(found: Found) -> tuple[Found, list[Motion], parameters.Judged]:
         moved = motions(Probe.of(found.plain))
@@ -246,7 +246,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
 
 
 def _wider(bench: Bench, term: Term, size: float) -> float:
-    """Factor of the deviations of a term of this share of what acts: noise alone makes less of them than what the model leaves out."""
+    """Factor of the deviations of a term of this share of the force there: noise alone makes less of them than unmodelled forces."""
     cut = term.form.how == "clip"  # the size of which is its limit itself
     ratios = undetermined(bench.model, bench.fit)
     known = min(

@@ -68,7 +68,7 @@ def filtered(study: Study, e: Explanation, r: Regression) -> Explanation | None:
 def mended(study: Study, e: Explanation, log) -> tuple[Explanation, Explanation]:
     """The explanation with as many more laws of its causes as are worth their numbers, under the same names: with laws of the sign of
     their kinds, from which its causes have their sizes; and then of any sign. A name is what a curve does in the large; what the
-    extended model foretells depends on all of the curve, and may need less of a law as well as more."""
+    extended model predicts depends on all of the curve, and may need less of a law as well as more."""
     study, sized, r = formed(study, e, None, log)
     more = r is not None and not heavy(sized)
     return sized, formed(study, sized, r.unsigned(), log)[1] if more else sized

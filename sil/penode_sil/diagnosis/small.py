@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Notes on named laws that are small beside what acts at their place. Where sensor noise is all that limits a fit, it shows deviations of
+"""Notes on named laws that are small beside the force at their place. Where sensor noise is all that limits a fit, it shows deviations of
 less than a per cent, as any model has somewhere; whether these matter is for the reader to say."""
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from .worth import BENT, WORTH
 
 
 def notes(study: Study, e: Explanation, causes: Sequence[Cause]) -> list[str]:
-    """A line on each cause whose law takes less than WORTH of what acts there already."""
+    """A line on each cause whose law takes less than WORTH of the force there already."""
     shares = [(c, share(study, e, (c.kind, c.where))) for c in causes]
-    return [f"{place(c.kind, c.where)} is small: {x:.1%} of what acts there" for c, x in shares if 0.0 < x < WORTH]
+    return [f"{place(c.kind, c.where)} is small: {x:.1%} of the force there" for c, x in shares if 0.0 < x < WORTH]
 
 
 def share(study: Study, e: Explanation, group: tuple[str, str]) -> float:

@@ -45,9 +45,9 @@ class Term:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A form beside what was accepted already, fitted: `gain` of the criterion, its `share` of what acts (see `worth`), the share `taken`
-    of the power that the innovations of a sensor have beyond its noise, of that which shows it most, that share over all sensors together
-    (`whole`), `blocks` [blocks] of predictive density."""
+    """A form beside those accepted, fitted: `gain` of the criterion; `share` of the force there (see `worth`); `taken`, the share of
+    a sensor's innovation power beyond its noise that it explains, of the sensor that shows it most; `whole`, that share over all sensors
+    together; `blocks` [blocks] of predictive density."""
 
     form: Form
     term: Term

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""How much a term matters: its force beside what acts at its place already, or the change of its input or sensor beside their motion."""
+"""How much a term matters: its force beside the force at its place already, or the change of its input or sensor beside their motion."""
 
 from __future__ import annotations
 
@@ -19,15 +19,13 @@ from .evidence.fit import Fit
 from .terms import Term
 
 Array = NDArray[np.float64]
-WORTH = 0.07  # of what acts: less is a small deviation. Any model is 2 to 5 % wrong, a name is worth it from 10 % on; the middle
+WORTH = 0.07  # of the force there: less is a small deviation. Any model is 2 to 5 % wrong, a name is worth it from 10 % on; the middle
 # share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
 RIGHT = 0.93
 BENT = 0.6  # of a friction or a cube along a Gaussian motion is beside a straight line, in rms: sqrt(1 - 2/pi), sqrt(1 - 9/15)
 Z_95 = 1.96  # standard deviations that hold 95 %
-RATIO = 3.0  # times what wanders beside all that was found: where that is little, a name is worth it from less on
-SYSTEMATIC = (
-    0.007  # of what acts: what mis-modelling of 3.5 % does to the size of a form, for it is like it to 0.2 in rms, one direction of 25
-)
+RATIO = 3.0  # times the unmodelled force that remains beside all causes: where that is little, a name is worth it from less on
+SYSTEMATIC = 0.007  # of the force there: what mis-modelling of 3.5 % does to a form's size, like it to 0.2 in rms, one direction of 25
 LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of their parameter makes as large as they have to be
 ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
@@ -52,7 +50,7 @@ def alone(taken: float) -> bool:
 
 
 def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]) -> float:
-    """Rms of terms of one name as a share of what acts at their place, of their input, or of their sensor: as much of it as nothing else
+    """Rms of terms of one name as a share of the force at their place, of their input, or of their sensor: as much of it as nothing else
     that is free could do as well, a parameter, an offset, a start: in forces, and in what sensors show. How much of a line is whose is a
     matter of writing it down, so a force counts by what is left of it beside lines, that of a bent curve over BENT."""
     form, targets = terms[0].form, [f.target for t in terms for f in t.free]
@@ -129,7 +127,7 @@ def _columns(model: Model, fit: Fit, targets: Collection[object]) -> tuple[Array
 
 
 def shift(model: Model, bench: Bench, moved: Sequence[Motion], name: str) -> float:
-    """How much of what acts changes with a parameter as it is fitted instead of as the file has it, and nothing else could do as well:
+    """The share of the force there that changes with a parameter as fitted instead of as in the file, which nothing else explains:
     of a linear law, as a share of the force at its place; of others, of the parameter itself."""
     off = bench.fit.value(name) - model.parameters[name].value
     shares = []

@@ -88,7 +88,7 @@ def resample(
     """Put rows [n, channels] on the raster first + k*sample_time <= last; default is all of `time`.
 
     Rows slower than the raster are joined by straight lines; faster ones are low-passed without phase first; uneven ones, and those within
-    5 % of it, are joined by curves where these foretell rows better. Returns raster, values, and a note that is empty if the rows lay on
+    5 % of it, are joined by curves where these predict rows better. Returns raster, values, and a note that is empty if the rows lay on
     the raster already (within 1/1000 sample).
     """
     first = float(time[0]) if first is None else first

@@ -200,19 +200,19 @@ def _multiples(values: Array, step: Array, usual: float) -> bool:
 
 
 def sampled_evenly(time: Array, even: Array, columns: list[Array]) -> bool:
-    """Were rows whose stamps [n, s] scatter around a regular clock [n, s] sampled by it? Each row is foretold by a cubic through the
+    """Were rows whose stamps [n, s] scatter around a regular clock [n, s] sampled by it? Each row is predicted by a cubic through the
     two before and after it, by either time: where stamps are only late, the regular one is nearer more often than by chance. Of fewer
     than five rows, none has two on either side."""
     better, worse = 0, 0
     for values in columns if time.size > 4 else []:
-        own, regular = (np.abs(values[2:-2] - foretold(t, values)) for t in (time, even))
+        own, regular = (np.abs(values[2:-2] - predicted(t, values)) for t in (time, even))
         better += int(np.sum(regular < own))
         worse += int(np.sum(regular > own))
     # errors of neighbours share rows: a quarter of them count
     return better - worse > RULES.sure * 2.0 * np.sqrt(better + worse) if better + worse else False
 
 
-def foretold(time: Array, values: Array) -> Array:
+def predicted(time: Array, values: Array) -> Array:
     """Values [n - 4] by Lagrange's cubic through the two rows before and after; NaN beside a row without a value."""
     n = values.size
     index = [slice(k, n - 4 + k) for k in (0, 1, 3, 4)]

@@ -4,7 +4,7 @@
 
 A sensor counts where it was measured: at the instant nearest to a row, moved there along the signal's own course. So its noise stays
 that of a row, and neighbours share none of it. An input, which has to be known everywhere, is joined between its rows, by a smooth curve
-or straight lines, whichever foretells rows better from those around them.
+or straight lines, whichever predicts rows better from those around them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from .stamps import foretold
+from .stamps import predicted
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -44,7 +44,7 @@ def joined(time: Array, values: Array, at: Array) -> Array:
     inner = means[2:-2]
     if inner.size <= 1 or size == 0.0:
         return np.interp(at, time, values)
-    by_curve = (inner - foretold(nodes, means)) / size
+    by_curve = (inner - predicted(nodes, means)) / size
     share = (nodes[2:-2] - nodes[1:-3]) / (nodes[3:-1] - nodes[1:-3])
     by_lines = (inner - (means[1:-3] * (1.0 - share) + means[3:-1] * share)) / size
     if float(by_curve @ by_curve) >= float(by_lines @ by_lines):

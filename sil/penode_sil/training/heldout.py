@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""How much a curve may bend where a fit leaves more than noise: as much as foretells parts of the recordings that it was not fitted to.
+"""How much a curve may bend where a fit leaves more than noise: as much as predicts parts of the recordings that it was not fitted to.
 
 What a model lacks is no noise: it is alike from sample to sample, and a fit that counts each sample as news follows it with every knot. So
 the size of a network's force, by which its bends are measured, is chosen by held-out parts, each some consecutive samples of a recording:
-the part's error as foretold from all others, by the normal equations of each part where the fit ended (cross-validation with one standard
-error; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 7.10). 0 is among the sizes: a network that foretells nothing
+the part's error as predicted from all others, by the normal equations of each part where the fit ended (cross-validation with one standard
+error; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 7.10). 0 is among the sizes: a network that predicts nothing
 is 0."""
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def parts(problem: Problem, point: Point, count: int = 8) -> list[Part]:
     return found
 
 
-def foretold(found: list[Part], precision: Array, pull: Array) -> Array:
+def predicted(found: list[Part], precision: Array, pull: Array) -> Array:
     """chi2 of each part [parts] with what all others say; `precision` [n, n] and `pull` [n]: of the prior, and the way that it pulls."""
     curvature, slope = sum(p.curvature for p in found) + precision, sum(p.slope for p in found) + pull
     scores = []
@@ -70,7 +70,7 @@ def foretold(found: list[Part], precision: Array, pull: Array) -> Array:
 
 
 def sizes(problem: Problem, point: Point) -> Array:
-    """Of each network's force, over that of the problem: the smallest that foretells no worse than the best by more than a standard
+    """Of each network's force, over that of the problem: the smallest that predicts no worse than the best by more than a standard
     error."""
     found, factors = parts(problem, point), np.ones(len(problem.scale))
     if len(found) < 2:
@@ -84,7 +84,7 @@ def sizes(problem: Problem, point: Point) -> Array:
             for factor in tried:
                 by = np.where(np.arange(len(factors)) == k, factor, factors)
                 precision, origin = problem.with_(scale=problem.scale * by).prior(point)
-                scores.append(foretold(found, precision, -precision @ (point.vector - origin)))
+                scores.append(predicted(found, precision, -precision @ (point.vector - origin)))
             best = min(scores, key=lambda s: float(s.sum()))
             more = [s - best for s in scores]
             fine = [i for i, m in enumerate(more) if m.mean() <= m.std(ddof=1) / np.sqrt(len(m))]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Several starts of one fit: another one where what is left looks as if it led further, and of all the one that foretells best."""
+"""Several starts of one fit: another one where what is left looks as if it led further, and of all the one that predicts best."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .solve import Fit
 @dataclass(frozen=True)
 class Try:
     """A start and where it ended: the largest residual over the stated noise (NaN: it left all bounds), and what blocks of the recordings
-    leave as foretold from the others, in chi2 a sample (NaN: it was the only one)."""
+    leave as predicted from the others, in chi2 a sample (NaN: it was the only one)."""
 
     start: str
     ratio: float
@@ -51,16 +51,16 @@ def several(
         what, problem, fit, remains = ended[0]
         return problem, fit, (Try(what, remains.most), *lost)
     noise = min(ended, key=lambda e: e[3].most)[1].noise  # one for all: that of the one that leaves least
-    scores = [_foretold(problem.with_(noise=noise), fit) for _, problem, fit, _ in ended]
+    scores = [_predicted(problem.with_(noise=noise), fit) for _, problem, fit, _ in ended]
     best = int(np.argmin(scores))
     tried = tuple(Try(what, remains.most, score) for (what, _, _, remains), score in zip(ended, scores, strict=True))
     return ended[best][1], ended[best][2], (tried[best], *tried[:best], *tried[best + 1 :], *lost)
 
 
-def _foretold(problem: Problem, fit: Fit) -> float:
-    """chi2 a sample of blocks of the recordings as foretold from the others."""
+def _predicted(problem: Problem, fit: Fit) -> float:
+    """chi2 a sample of blocks of the recordings as predicted from the others."""
     precision, origin = problem.prior(fit.point)
-    scores = heldout.foretold(heldout.parts(problem, fit.point), precision, -precision @ (fit.point.vector - origin))
+    scores = heldout.predicted(heldout.parts(problem, fit.point), precision, -precision @ (fit.point.vector - origin))
     found = float(scores.sum()) / max(problem.samples, 1)
     return found if np.isfinite(found) else np.inf
 

@@ -175,8 +175,8 @@ EXPORTER = Exporter(
     _build,
     (
         Option("elf", "Linked program, compiled with -g: where everything lies.", "file"),
-        Option("instance", "Variable that is the model's instance; the only one of its type if not given."),
-        Option("measure", "More variables to measure, with commas between; the sensors' if not given."),
+        Option("instance", "Variable that is the model's instance (default: the only one of its type)."),
+        Option("measure", "More variables to measure, separated by commas (default: those of the sensors)."),
         Option("transport", f"How XCP gets there: {_TRANSPORTS}.", default="tcp:127.0.0.1:5555"),
         Option("max_cto", "Bytes of the longest XCP packet; 8 on CAN, 64 on CAN FD, else 252.", "number"),
         Option("epk", "Variable with the text that identifies the program; penode_epk if not given and there."),

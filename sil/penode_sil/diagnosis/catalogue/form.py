@@ -37,7 +37,7 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A place along all recordings; `force`: rms of what acts there already, about its mean."""
+    """A place along all recordings; `force`: rms of the force there already, about its mean."""
 
     parts: tuple[Moved, ...]
     s_rms: float

@@ -131,7 +131,7 @@ def _missed(table: Table) -> list[Row]:
 
 
 def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
-    """Explained: by causes that were withheld, for they are small beside what acts, or else by the value of one parameter."""
+    """Explained: by causes that were withheld, for they are small beside the force there, or else by the value of one parameter."""
     d = end.answer
     taken = 1.0 - max((r.rms("extended") / max(r.rms("refitted"), 1e-300)) ** 2 for r in table.rows if r.figure.signal in sensors)
     whole = not misses(table.rows, "extended", table.noise)

@@ -93,7 +93,7 @@ def augmented(model: Model, places: Sequence[Place]) -> Model:
 
 
 def with_probes(model: Model, places: Sequence[Place]) -> Model:
-    """An augmented model with a force at_k as a further input at each place, and its deflection, its rate and what acts there already as
+    """An augmented model with a force at_k as a further input at each place, and its deflection, its rate and the force there already as
     further sensors."""
     forces = [Element(f"probe{k}", p.ends, "expression", expression=f"at{k}") for k, p in enumerate(places)]
     wide = replace(model, inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(places))))
