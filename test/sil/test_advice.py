@@ -101,6 +101,11 @@ def test_pairs_of_the_catalogue_are_of_its_kinds():
         (said("explained", cause("sensor_scale", "a")), ["check a: the sensor is at fault"]),
         (said("explained", cause("sensor_scale", "a"), cause()), ["check a: the sensor is at fault", "use model_extended.toml"]),
         (said("explained", cause("input_delay", "u")), ["check actuator and channel of u", "use model_extended.toml"]),
+        (said("explained", cause("sensor_sign", "a")), ["correct the sign of a in the recordings"]),
+        (
+            said("explained", cause("swapped_channels", "a,b"), cause()),
+            ["exchange a and b (--channel a=b --channel b=a)", "use model_extended"],
+        ),
         (said("partly_explained", cause(), explained=0.7), ["use model_extended.toml", "look for the rest: 30%"]),
         (said("unexplained", Cause(OUTSIDE, "", {}, 0.5)), ["compare signals"]),
         (

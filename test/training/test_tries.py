@@ -125,7 +125,7 @@ def vehicle(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, list[sto
     ("change", "says"),
     [
         (None, ""),
-        (asked._times(asked._INPUT, (0,), -1.0), "is z_road counted the other way? "),
+        (asked._times(asked._INPUT, (0,), -1.0), "has z_road the wrong sign? "),
         (asked._times(asked._SIGNAL, (0, 1), 1.0 / 9.80665), "are a_body and a_wheel in g? "),
         (asked._exchanged(asked._SIGNAL, 0, 1), "are a_body and a_wheel exchanged? "),
     ],

@@ -16,6 +16,7 @@ import numpy as np
 
 from penode_gen.model import Model
 
+from ..errors import ModelError
 from ..recordings.measured import Measured
 from . import noise
 from .compiling import moving
@@ -27,6 +28,8 @@ def experiment(m: Measured, model: Model, smooth: bool = False) -> Experiment:
     """A recording as the diagnosis sees it; sensors that it does not have count as not good. `smooth`: no input is held, unless the model
     file says so."""
     n, names = len(m.time), [s.name for s in model.sensors]
+    if not names:
+        raise ModelError([f"{model.path}: no sensor to compare with a recording; describe what was measured in [sensors]"])
     y = np.column_stack([m.z.get(k, np.zeros(n)) for k in names])
     good = np.column_stack([m.mask.get(k, np.zeros(n, bool)) for k in names])
     channels = m.quality.channels

@@ -15,7 +15,7 @@ from penode_gen.model import Model
 
 from ..targets import Sil
 from . import stepped
-from .beginning import start_of
+from .beginning import begins_at_rest, start_of
 from .build import SPREAD
 from .compiling import moving
 from .dropouts import bursts
@@ -68,7 +68,8 @@ def measure(
     outside, notes = [], []
     for e in holdout:
         both = (study, replace(study, set_name=set_name or study.set_name))
-        starts = [start_of(m, e, study, s.set_name) for m, s in zip((model, extended), both, strict=True)]
+        rest = begins_at_rest(extended, e, study, both[1].set_name)
+        starts = [start_of(m, e, study, s.set_name, rest) for m, s in zip((model, extended), both, strict=True)]
         before, after = (deployed(m, e, x, s.set_name) for m, x, s in zip((model, extended), starts, both, strict=True))
         dropped = bursts([e], [after])[0] & [s.name in lost for s in model.sensors]
         e = replace(e, good=e.good & ~dropped)

@@ -30,10 +30,10 @@ class _Stretch:
 
 
 def excerpted(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[list[Measured], list[Measured]]:
-    """What to learn from and what to test on, at most MOST samples each, noted in the quality of the first. All of it if there are no
+    """What to learn from and what to test on, about MOST samples each at most, noted in the quality of the first. All of it if there are no
     more. Where no hold-out is given, it is taken from what is not learnt from."""
     total = sum(m.time.size for m in train)
-    notes = []
+    notes: list[str] = []
     kept, held = list(train), list(holdout)
     if total > MOST:
         stretches = _cut(train)
@@ -50,7 +50,9 @@ def excerpted(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[l
         places = np.linspace(0, len(spread) - 1, MOST // LENGTH).round().astype(int)
         held = _joined(held, [spread[i] for i in np.unique(places)], len(kept))
     if held and (total > MOST or tested > MOST):
-        notes.append(f"{_samples(held)} of {tested} others are the hold-out, evenly spread")
+        notes.append(
+            f"{_samples(held)} of {tested} samples {'not learnt from' if not holdout else 'of the hold-out'} are tested on, evenly spread"
+        )
     if notes:
         problems = (*kept[0].quality.problems, *(f"{kept[0].path}: {note}" for note in notes))
         kept[0] = replace(kept[0], quality=replace(kept[0].quality, problems=problems))

@@ -48,7 +48,7 @@ def question(problem: Problem, ports: Sequence[Port]) -> str:
         return ""
     score, change = min(found, key=lambda f: f[0])
     return (
-        f"{change.what}? so straight lines in place of the networks leave {100.0 * score:.2g} % of what was recorded; as it is, "
+        f"{change.what}? so changed, a linear model leaves {100.0 * score:.2g} % of the recorded signals unexplained, as recorded "
         f"{100.0 * min(before, 1.0):.3g} %; {change.remedy}"
     )
 
@@ -71,8 +71,8 @@ def _changes(model: Model, records: Sequence[Record]) -> list[Change]:
     found = []
     for group, where in ((inputs, _INPUT), (shown, _SIGNAL)):
         for name, _, k in group:
-            remedy = "turn its sign in the recording, or where the model file uses it"
-            found.append(Change(f"is {name} counted the other way", remedy, _times(where, (k,), -1.0)))
+            remedy = "reverse its sign in the recording, or where the model file uses it"
+            found.append(Change(f"has {name} the wrong sign", remedy, _times(where, (k,), -1.0)))
         for unit, other in OTHERS.items():
             alike, factor = [(name, k) for name, own, k in group if own == unit], _factor(other)
             for some in (*((a,) for a in alike), *([tuple(alike)] if len(alike) > 1 else [])):

@@ -69,10 +69,11 @@ def _not_down(remains: Left, loud: Sequence[int], tried: Sequence[Try]) -> str:
     by = ", ".join(f"{remains.names[j]} {remains.ratio[j]:.3g}" for j in loud)
     ends = [t.ratio for t in tried if np.isfinite(t.ratio)]
     alike = len(ends) > 1 and max(ends) < SETTINGS.left_more * min(ends)
+    apart = "they end apart, so another one" if len(ends) > 1 else "another one"
     further = (
         "they all end alike, so another start is not likely to lead further: penode diagnose on these recordings names what a model lacks"
         if alike
-        else "they end apart, so another one may lead further: try --seed, --known for what was measured, --from for what is known"
+        else f"{apart} may lead further: try --seed, --known for what was measured, --from for what is known"
     )
     return f"did not come down to the stated noise: times that noise are left {by}; tried: {', '.join(_told(t) for t in tried)}; {further}"
 

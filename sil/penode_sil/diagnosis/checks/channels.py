@@ -28,6 +28,7 @@ from ..study import guessed, uncertain
 from ..worth import RIGHT
 
 Array = NDArray[np.float64]
+MIXES = ("input_sign", "sensor_sign", "swapped_channels")
 
 
 @dataclass(frozen=True)

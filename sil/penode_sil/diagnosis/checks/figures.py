@@ -15,6 +15,7 @@ from penode_gen import units
 
 from ...errors import UserError
 from ...replay import Replay
+from ..beginning import begins_at_rest
 from ..fit import Free, Problem
 from ..measuring import achieved
 from ..noise import UNSEEN, Experiment, metric
@@ -69,7 +70,8 @@ def tabled(case: Case, end: End) -> Table:
     """The table of an end. Raises UserError."""
     study = end.study
     held = study.experiments[0].held is not None
-    options = Options(study.set_name, case.channels, study.moving and bool(case.model.states), held, end.sets)
+    moving = study.moving or not all(begins_at_rest(end.extended, e, study) for e in case.unused)
+    options = Options(study.set_name, case.channels, moving and bool(case.model.states), held, end.sets)
     recordings, notes = _read(case, options)
     options, pairs = both((case.nominal, end.extended), list(recordings.values()), options)
     of_path = dict(zip(recordings, pairs, strict=True))
