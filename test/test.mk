@@ -35,10 +35,10 @@ $(foreach m,$(MACHINES),$(eval CC.$m := port/cortex-m/cc $m))
 WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wdouble-promotion -Wmissing-prototypes \
             -Wstrict-prototypes -Wfloat-equal -Wcast-qual -Wcast-align -Wundef -Wswitch-enum -Wvla -Wredundant-decls \
             -Wwrite-strings -Werror
-FIRMWARE := $(if $(MODEL),$(wildcard sil/firmware/*.c))
+FIRMWARE := $(if $(MODEL),$(filter-out %/exact.c,$(wildcard sil/firmware/*.c)))
 TOLD     := '-DMODEL_HEADER="nqvm.h"' '-DMODEL(name)=nqvm_\#\#name' '-DMODEL_SIZE(name)=NQVM_\#\#name' \
-            '-DMODEL_SETS=&nqvm_set_default' -DBOARD_TICK_MHZ=25U -Iport/xcp -Iport/cortex-m
-BOARD.gcc   := $(wildcard port/host/*.c)
+            '-DMODEL_SETS=&nqvm_set_default' -DBOARD_TICK_MHZ=25U -DEXACT_WIDTH=16U -Iport/xcp -Iport/cortex-m
+BOARD.gcc   := $(wildcard port/host/*.c) sil/firmware/exact.c # which no target runs
 BOARD.clang := $(BOARD.gcc)
 $(foreach m,$(MACHINES),$(eval BOARD.$m := $(wildcard port/cortex-m/*.c)))
 REAL.float  :=

@@ -130,7 +130,7 @@ def stiff(tmp_path_factory):
 
 def test_forces_of_elements_are_their_laws(stiff):
     """C s + D v, parameters as the null fit has them, along the smoothed motion."""
-    surface = residual.surfaces(stiff, None, None)[0]
+    surface = restoring.surfaces(stiff, None, None)[0]
     known = {f.target: f.value for f in stiff.null.free}
     want = known["c"] * surface.s + known["d"] * surface.v
     # rates at samples are those of a line over a quarter of an interval: off by h/8 of the acceleration, which is below
@@ -141,21 +141,22 @@ def test_forces_of_elements_are_their_laws(stiff):
 
 def test_missing_force_is_the_one_that_was_hidden(stiff):
     """Measured minus nominal force against the cubic one, at the deflections where there are samples."""
-    surface = residual.surfaces(stiff, None, None)[0]
+    surface = restoring.surfaces(stiff, None, None)[0]
     hidden = 3e8 * surface.s**3
     assert residual.rms(hidden) > 0.1 * residual.rms(surface.nominal)  # it is no small one
     # nominal parameters within 1.5 tolerances of 1 % of true ones: up to 1.5 % of the force of spring and damper, times
     # the share that parameters can take of a cubic force at all; sensors of 0.02 m/s^2 on 400 kg add 8 N
     bound = 0.015 * (C * residual.rms(surface.s) + D * residual.rms(surface.v)) + 8.0
     assert residual.rms(surface.measured - surface.nominal - hidden) < bound
-    numbers = residual.surface_numbers(surface)
+    numbers = restoring.surface_numbers(surface)
     worst = numbers["worst"]
     assert worst["missing"] * worst["deflection"] > 0.0 and abs(worst["missing"]) > residual.rms(hidden)
 
 
 def test_channels_say_where_and_how_much(stiff):
     e = stiff.experiments[0]
-    found = residual.show(stiff, None, None, []).numbers()
+    before = residual.channels(e, stiff.model, stiff.null.simulated[0], None, residual.noise_floor(stiff, 0))
+    found = residual.Shown(tuple(before), (), ()).numbers()
     assert [s["signal"] for s in found["signals"]] == ["a_body", "a_wheel", "deflection"] and not found["holdout"]
     for j, s in enumerate(found["signals"]):
         r = e.y[:, j] - stiff.null.simulated[0][:, j]
