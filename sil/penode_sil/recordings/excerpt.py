@@ -39,9 +39,7 @@ def excerpted(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[l
         stretches = _cut(train)
         best = _most_telling(train, stretches)
         kept = _joined(train, best)
-        notes.append(
-            f"{_samples(kept)} of {total} samples are learnt from: the stretches whose motion tells most, spread over the recording"
-        )
+        notes.append(f"{train[0].path}: {_samples(kept)} of {total} samples are learnt from: the stretches whose motion tells most")
         if not holdout:
             held = _joined(train, [s for s in stretches if s not in best], len(kept))
     tested = sum(m.time.size for m in held)
@@ -50,11 +48,10 @@ def excerpted(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[l
         places = np.linspace(0, len(spread) - 1, MOST // LENGTH).round().astype(int)
         held = _joined(held, [spread[i] for i in np.unique(places)], len(kept))
     if held and (total > MOST or tested > MOST):
-        notes.append(
-            f"{_samples(held)} of {tested} samples {'not learnt from' if not holdout else 'of the hold-out'} are tested on, evenly spread"
-        )
+        what = "of the hold-out" if holdout else "not learnt from"
+        notes.append(f"{held[0].path}: {_samples(held)} of {tested} samples {what} are tested on, evenly spread")
     if notes:
-        problems = (*kept[0].quality.problems, *(f"{kept[0].path}: {note}" for note in notes))
+        problems = (*kept[0].quality.problems, *notes)
         kept[0] = replace(kept[0], quality=replace(kept[0].quality, problems=problems))
     return kept, held
 

@@ -98,7 +98,7 @@ def _read(case: Case, options: Options) -> tuple[dict[str, Replay], list[str]]:
         except UserError as exc:
             found[m.title] = known(m, case.model, options)
             if m.path.is_file():
-                notes.append(f"penode simulate does not take {m.title}, whose errors are those of the diagnosis: {exc.problems[0]}")
+                notes.append(f"penode simulate does not take {m.path.name}, whose errors are those of the diagnosis: {exc.problems[0]}")
     return found, list(dict.fromkeys(notes))
 
 
