@@ -16,7 +16,7 @@ from .accuracy import RTOL
 
 Array = NDArray[np.float64]
 TERMS = 16  # of a series, twice the samples a segment at most, and halvings of one: a kink that is no knot leaves 1e-5 of it in doubt
-CLOSE = 10.0 * RTOL  # of the largest value: what the last terms of a series may be
+CLOSE = RTOL  # of the largest value: what the last terms of a series may be
 
 
 @dataclass(frozen=True, eq=False)
