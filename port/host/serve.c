@@ -65,18 +65,18 @@ static void *stepping(void *unused)
     return unused;
 }
 
-/* Prints steps and late ones, if there are more of these than it has told, and a second has passed. */
-static void tell(void)
+/* Prints the numbers of steps and of late ones, at most once a second, if there are more late ones than were printed. */
+static void print_late(void)
 {
-    static int64_t told;
+    static int64_t printed;
     static uint32_t before;
     const uint32_t late = controller_late();
     const int64_t now = nanoseconds();
 
-    if ((late != before) && ((now - told) >= SECOND)) {
+    if ((late != before) && ((now - printed) >= SECOND)) {
         printf("%u %u\n", (unsigned)controller_samples(), (unsigned)late);
         (void)fflush(stdout);
-        told = now;
+        printed = now;
         before = late;
     }
 }
@@ -148,7 +148,7 @@ int main(int count, char *word[])
     }
     printf("%u %s\n", (unsigned)port, first ? "fifo" : "shared");
     (void)fflush(stdout);
-    line_serve(tell);
+    line_serve(print_late);
     printf("%u %u\n", (unsigned)controller_samples(), (unsigned)controller_late());
     return 0;
 }

@@ -4,9 +4,9 @@
 /**
  * The line between a virtual controller and its XCP master: TCP, UDP, or UDP with a CAN frame a datagram, without header.
  *
- * TCP: whoever sends CONNECT while there is no session is the master. Connections that have not sent it wait, and keep nobody out; where
- * CALLS of them are open, the one that has waited longest, and for SILENT seconds, is closed for a new one. A CONNECT during the session
- * of another is answered with ERR_RESOURCE_TEMPORARY_NOT_ACCESSIBLE, which asks to try again later; its connection stays. A master that
+ * TCP: whoever sends CONNECT while none is connected is the master. Connections that have not sent it wait, and keep nobody out; where
+ * CALLS of them are open, the one that has waited longest, and for SILENT seconds, is closed for a new one. While a master is
+ * connected, the CONNECT of another is answered with ERR_RESOURCE_TEMPORARY_NOT_ACCESSIBLE; its connection stays, and it may try again. A master that
  * is gone without a word (its machine is off, its cable out) is noticed within GONE seconds, and others can connect again.
  *
  * UDP has no connections: answers go to the master that was the last to send CONNECT, packets of others are dropped.

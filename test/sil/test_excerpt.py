@@ -4,15 +4,20 @@
 
 from __future__ import annotations
 
+import csv
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+import penode_gen
+from penode_sil.cli import cli
 from penode_sil.recordings import excerpt
 from penode_sil.recordings.excerpt import LENGTH, MOST, excerpted
-from penode_sil.recordings.measured import Measured, Quality
+from penode_sil.recordings.measured import Measured, Quality, load
 
 
 def recording(size: np.ndarray, name: str = "long.csv") -> Measured:
@@ -82,3 +87,30 @@ def test_stretches_cover_all_samples(n):
     cut = excerpt._cut([m])
     assert [s.begin for s in cut] == [0, *(s.end for s in cut[:-1])]
     assert cut[-1].end == n
+
+
+def test_figures_of_a_part_are_those_of_its_own_samples(tmp_path, monkeypatch):
+    """What is learnt from does not count as hold-out: errors of the rows that `penode simulate` writes, over the times of each part."""
+    monkeypatch.setattr(excerpt, "LENGTH", 400)
+    monkeypatch.setattr(excerpt, "MOST", 2000)
+    folder = Path(__file__).resolve().parents[2] / "sil" / "recordings" / "friction"
+    data, out = folder / "train.csv", tmp_path / "out"
+
+    def call(*words: object) -> str:
+        return CliRunner().invoke(cli, [str(w) for w in words], catch_exceptions=False).stdout
+
+    found = json.loads(call("diagnose", folder / "model.toml", "--data", data, "-o", out, "--json"))
+    options = found["simulated"].split() if isinstance(found["simulated"], str) else []
+    call("simulate", out / "model_extended.toml", "--input", data, "-o", tmp_path / "p.csv", *options)
+    with (tmp_path / "p.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    time = np.array([float(r["time [s]"]) for r in rows])
+    parts = excerpted(load([data], penode_gen.load(folder / "model.toml")), [])
+    title = {m.title: m for some in parts for m in some}
+    assert {f["recording"] for f in found["figures"]} == set(title) and len(parts[1]) > 0
+    for f in found["figures"]:
+        m, own = title[f["recording"]], next(k for k in rows[0] if k.startswith(f"{f['signal']} ["))
+        predicted = np.interp(m.time, time, [float(r[own]) for r in rows])
+        error = (m.z[f["signal"]] - predicted)[m.mask[f["signal"]]]
+        assert f["extended"] == pytest.approx(float(np.sqrt(np.mean(error**2))), rel=1e-4)  # of nine digits, and samples beside a burst
+        assert f["samples"] == error.size

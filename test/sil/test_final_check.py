@@ -210,7 +210,7 @@ def test_a_recording_that_penode_simulate_does_not_read_has_figures_too(tmp_path
 
 def test_recordings_that_differ_by_a_parameter_have_a_set_each(tmp_path):
     """A mass of 2 kg in one recording and 2.6 kg in the other, which no common value explains; each figure is that of its own set. With a
-    friction beside it, nothing is said: each recording is beyond the model then."""
+    friction beside it the parameter is not named: the model then follows neither recording."""
     (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS))
     nominal = penode_gen.load(tmp_path / "rig.toml")
     paths = [

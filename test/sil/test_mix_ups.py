@@ -191,7 +191,7 @@ def test_what_is_mixed_up_is_found_and_nothing_else(tmp_path, rig):
 
 def test_two_of_them_are_found_one_after_the_other(tmp_path):
     model, experiments = drawn(tmp_path, "car", 7, ("swapped_channels", ("a_body", "a_wheel")))
-    both = [Mix("sensor_sign", False, (2,)).mended(e) for e in experiments]
+    both = [Mix(False, (2,)).mended(e) for e in experiments]
     found = sorted(named(model, mixed(model, both, "default")))
     assert found == [("sensor_sign", ("deflection",)), ("swapped_channels", ("a_body", "a_wheel"))]
 
@@ -204,7 +204,7 @@ def test_the_mended_model_follows_the_recording_as_it_is(tmp_path, rig):
     for kind, names in mixes(model):
         driving = names[0] in {i.name for i in model.inputs}
         numbers = tuple(k for k, s in enumerate(model.inputs if driving else model.sensors) if s.name in names)
-        mended = mending(model, [Mix(kind, driving, numbers)], tmp_path)
+        mended = mending(model, [Mix(driving, numbers)], tmp_path)
         one, experiments = drawn(tmp_path, rig, 3, (kind, names))
         assert not mixed(mended, experiments, "default") and mixed(one, experiments, "default")
         assert [s.noise for s in mended.sensors] == [model.sensors[k].noise for k in _order(model, kind, driving, numbers)]
@@ -222,7 +222,7 @@ def test_what_a_file_cannot_have_is_refused_with_the_remedy(tmp_path):
     text = DRIVE.replace("motor_angle =", "q_m =").replace("table_angle =", "q_l =")
     (tmp_path / "drive.toml").write_text(text)
     with pytest.raises(RecordingError, match="q_m and q_l are exchanged; say --channel q_m=q_l --channel q_l=q_m"):
-        mending(penode_gen.load(tmp_path / "drive.toml"), [Mix("swapped_channels", False, (0, 1))], tmp_path)
+        mending(penode_gen.load(tmp_path / "drive.toml"), [Mix(False, (0, 1))], tmp_path)
 
 
 def test_entries_of_a_mended_file_stay_but_where_more_was_learnt():

@@ -11,9 +11,8 @@ from typing import Any
 from penode_gen.model import Model
 
 from .by_noise import FARTHER
-from .catalogue import separating
+from .catalogue import channels, separating
 from .catalogue.drives import alike
-from .checks.channels import MIXES
 from .noise import UNSEEN
 from .reliability import reliability
 from .result import OUTSIDE, Cause, Diagnosis, Named, place
@@ -111,15 +110,15 @@ def _of_verdict(d: Diagnosis) -> list[str]:
 
 def _take_over(d: Diagnosis) -> list[str]:
     """Mend what is not the model's, and take over what is."""
-    mixes = [c for c in d.causes if c.kind in MIXES]
+    mixes = [c for c in d.causes if c.kind in channels.KINDS]
     faults = [c for c in d.causes if c.kind.startswith("sensor_") and c not in mixes]
     doubtful = [(c, a.where) for c in faults for a in c.alternatives if a.kind.startswith("input_")]
     sure = [c for c in faults if all(c is not x for x, _ in doubtful)]
-    channels = [c for c in d.causes if c.kind.startswith("input_") and c not in mixes]
+    driving = [c for c in d.causes if c.kind.startswith("input_") and c not in mixes]
     found = [f"{_corrected(c)} in the recordings; if the plant is wired so, model_extended.toml follows it" for c in mixes]
     found += [f"check {', '.join(dict.fromkeys(c.where for c in sure))}: the sensor is at fault, not the model"] if sure else []
     found += [f"check {c.where} and the channel of {where}: the recordings do not tell which of them is at fault" for c, where in doubtful]
-    found += [f"check actuator and channel of {', '.join(dict.fromkeys(c.where for c in channels))}"] if channels else []
+    found += [f"check actuator and channel of {', '.join(dict.fromkeys(c.where for c in driving))}"] if driving else []
     if len(faults) + len(mixes) < len([c for c in d.causes if c.kind != OUTSIDE]):
         found.append("use model_extended.toml; penode generate makes its C")
     return found

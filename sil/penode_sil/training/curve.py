@@ -131,7 +131,7 @@ def fewer(knots: Array, values: Array, spread: Array, count: int, regular: NDArr
 
 def without(knots: Array, values: Array, spread: Array, keep: NDArray[np.bool_]) -> Array:
     """Values at the knots that are kept, where all others lie on the lines between them: the most likely ones by the covariance `spread`.
-    What data say little of gives way, such as an outermost knot whose neighbour goes."""
+    Poorly known values move most, such as that of an outermost knot whose neighbour is dropped."""
     at, kept = np.flatnonzero(~keep), np.flatnonzero(keep)
     if not len(at):
         return values

@@ -8,4 +8,11 @@ MEANING = {
     "sensor_sign": "The sensor counts the other way round than the model says.",
     "swapped_channels": "Two channels are exchanged: each shows what the other is called.",
 }
+
+
+def kind(driving: bool, count: int) -> str:
+    """What is wrong with one channel, or two: an input if it is `driving`, else a sensor."""
+    return KINDS[2] if count > 1 else KINDS[0 if driving else 1]
+
+
 RIVALS = {("input_sign", "sensor_sign"): "push it by hand to the side that the sensor calls positive"}

@@ -4,10 +4,14 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from penode_gen.model import Model
 
 from .form import Form, Sizes
 
+Array = NDArray[np.float64]
 KINDS = ("input_gain", "input_offset", "input_delay", "input_lag", "input_hold", "sensor_scale", "sensor_delay")
 INPUTS = KINDS[:5]
 MEANING = {
@@ -56,6 +60,15 @@ def sensors(model: Model, count: int) -> Iterable[Form]:
         yield Form("sensor_scale", s.name, "scale", j)
         if count > 1 or model.inputs:  # there is something to be late against
             yield Form("sensor_delay", s.name, "late", j)
+
+
+def plain(model: Model, sensor: str, time: Array, z: Array) -> dict[str, Array]:
+    """Of each thing that an extended model says is wrong with a sensor, by kind: what the sensor would show [n] without it at `time` [n], z
+    [n] being what it shows."""
+    bias, gain, delay = (model.parameters.get(f"{key}_{sensor}") for key in ("bias", "gain", "delay"))
+    found = {"sensor_bias": z - bias.value} if bias else {}
+    found |= {"sensor_scale": z / gain.value} if gain and not bias else {}
+    return found | ({"sensor_delay": np.interp(time + delay.value, time, z)} if delay else {})
 
 
 def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:

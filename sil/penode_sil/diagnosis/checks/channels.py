@@ -19,6 +19,7 @@ from penode_gen.model import Model
 
 from ...errors import RecordingError
 from .. import applied
+from ..catalogue import channels
 from ..entries import extends, table
 from ..fit import Free, Problem
 from ..noise import Experiment, metric
@@ -28,16 +29,19 @@ from ..study import guessed, uncertain
 from ..worth import RIGHT
 
 Array = NDArray[np.float64]
-MIXES = ("input_sign", "sensor_sign", "swapped_channels")
 
 
 @dataclass(frozen=True)
 class Mix:
     """What may be wrong with inputs or sensors (`numbers`): the sign of one, or two are exchanged."""
 
-    kind: str
     driving: bool
     numbers: tuple[int, ...]
+
+    @property
+    def kind(self) -> str:
+        """What the catalogue calls it."""
+        return channels.kind(self.driving, len(self.numbers))
 
     def names(self, model: Model) -> list[str]:
         """The channels that are wrong."""
@@ -84,12 +88,12 @@ def mixed(model: Model, experiments: Sequence[Experiment], set_name: str) -> lis
 def _all(model: Model, experiments: Sequence[Experiment]) -> list[Mix]:
     """Signs of inputs and sensors, and alike pairs; a single sensor has the sign of its input."""
     shown = [j for j in range(len(model.sensors)) if all(e.good[:, j].any() for e in experiments)]
-    found = [Mix("input_sign", True, (k,)) for k in range(len(model.inputs))]
+    found = [Mix(True, (k,)) for k in range(len(model.inputs))]
     if len(shown) > 1 or not model.inputs:
-        found += [Mix("sensor_sign", False, (j,)) for j in shown]
+        found += [Mix(False, (j,)) for j in shown]
     for driving, signals, own in ((True, model.inputs, range(len(model.inputs))), (False, model.sensors, shown)):
         alike = [p for p in combinations(own, 2) if units.same_dimension(signals[p[0]].unit, signals[p[1]].unit)]
-        found += [Mix("swapped_channels", driving, p) for p in alike]
+        found += [Mix(driving, p) for p in alike]
     return found
 
 
@@ -173,14 +177,15 @@ def _sections(model: Model, found: Sequence[Mix]) -> dict[str, list[str]]:
         names = m.names(model)
         if m.driving and any(applied.bound(model, name) for name in names):
             raise RecordingError(_refused(m, model))
-        if m.kind == "input_sign":
+        alone = len(names) == 1
+        if m.driving and alone:
             acts, sign = driven.name(f"{names[0]}_acts"), driven.name(f"{names[0]}_sign")
             driven.parameters.append(f"{sign} = {table({'value': -1, 'unit': '1', 'exact': True})}")
             driven.actuators.append(f"{acts} = {table({'input': names[0], 'law': 'gain', 'gain': sign})}")
             driven.acts[names[0]] = acts
         elif m.driving:
             driven.acts |= {names[0]: names[1], names[1]: names[0]}
-        elif m.kind == "sensor_sign":
+        elif alone:
             shown[names[0]] = (f"-({shown[names[0]][0]})", shown[names[0]][1])
         else:
             shown[names[0]], shown[names[1]] = shown[names[1]], shown[names[0]]

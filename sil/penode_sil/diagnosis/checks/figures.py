@@ -81,7 +81,7 @@ def tabled(case: Case, end: End) -> Table:
     for role, ms, es in zip(ROLES, (case.train, case.holdout), (study.experiments, case.unused), strict=True):
         for m, e in zip(ms, es, strict=True):
             predicted[e.name] = of_path.get(str(m.path)) or of_path[m.title]
-            rows += _rows(case, end, role, e, predicted[e.name], refitted[e.name], floor)
+            rows += _rows(case, end, role, e, predicted[e.name], refitted[e.name], floor, m.part > 0)
     found = surfaces(study, end.extended if end.fit is not None else None, end.fit)
     return Table(tuple(rows), predicted, options, noise, tuple(found), tuple(notes))
 
@@ -102,8 +102,11 @@ def _read(case: Case, options: Options) -> tuple[dict[str, Replay], list[str]]:
     return found, list(dict.fromkeys(notes))
 
 
-def _rows(case: Case, end: End, role: str, e: Experiment, pair: tuple[Predicted, Predicted], refitted: Array, floor: Array) -> list[Row]:
-    """All sensors of a recording; `floor` [n_z]: noise."""
+def _rows(
+    case: Case, end: End, role: str, e: Experiment, pair: tuple[Predicted, Predicted], refitted: Array, floor: Array, part: bool
+) -> list[Row]:
+    """All sensors of a recording; `floor` [n_z]: noise. Of a `part` of a file, figures are errors of the same prediction over its own sound
+    samples, for other parts may be learnt from."""
     nominal, extended = (p.at(e) for p in pair)
     dropped = {c.sensor: c.good for c in end.held if c.recording == e.name}
     rows, study_set = [], end.study.set_name
@@ -113,15 +116,17 @@ def _rows(case: Case, end: End, role: str, e: Experiment, pair: tuple[Predicted,
             continue
         errors = {k: (e.y - z)[good, j] for k, z in (("nominal", nominal), ("refitted", refitted), ("extended", extended))}
         per = units.factor(s.unit)
+        whole = {k: p.errors[name]["value"] for k, p in zip(("nominal", "extended"), pair, strict=True)}
+        shown = {k: rms(errors[k]) / per for k in whole} if part else whole
         figure = Figure(
             e.name,
             role,
             name,
             s.unit,
-            pair[0].errors[name]["samples"],
-            pair[0].errors[name]["value"],
+            int(good.sum()) if part else pair[0].errors[name]["samples"],
+            shown["nominal"],
             rms(errors["refitted"]) / per,
-            pair[1].errors[name]["value"],
+            shown["extended"],
             float(floor[j]) / per,
             end.sets.get(e.name, study_set),
         )
@@ -198,11 +203,11 @@ def _gain(table: Table, name: str, g: Gain) -> Gain:
 
 
 def _together(rows: Sequence[Row], what: str) -> float:
-    """RMS error over all samples of several recordings, in SI; parts of one recording have the figures of the whole."""
-    per, files = units.factor(rows[0].figure.unit), {(r.figure.samples, getattr(r.figure, what)) for r in rows}
-    if len(files) == 1:
-        return next(iter(files))[1] * per
-    return per * float(np.sqrt(sum(n * x**2 for n, x in files) / sum(n for n, _ in files)))
+    """RMS error over all samples of several recordings, in SI."""
+    per, found = units.factor(rows[0].figure.unit), [(r.figure.samples, getattr(r.figure, what)) for r in rows]
+    if len(found) == 1:
+        return found[0][1] * per  # to the digit
+    return per * float(np.sqrt(sum(n * x**2 for n, x in found) / sum(n for n, _ in found)))
 
 
 def misses(rows: Sequence[Row], model: str, noise: Array) -> set[int]:

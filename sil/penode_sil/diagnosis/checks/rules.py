@@ -12,6 +12,7 @@ import numpy as np
 from scipy.signal import butter, lfilter
 
 from .. import catalogue
+from ..catalogue import drives
 from ..noise import UNSEEN
 from ..report_figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, REJECTED, Cause, place, worsened
@@ -94,15 +95,9 @@ def burdens(case: Case, end: End, table: Table) -> list[tuple[str, str]]:
     """Offsets, scales and delays of sensors that make what the written model predicts in training worse than it is without them."""
     found = []
     for r in table.of(ROLES[0]) if end.without is not None else ():
-        sizes = {k: end.extended.parameters.get(f"{k}_{r.figure.signal}") for k in ("bias", "gain", "delay")}
         predicted = table.predicted[r.figure.recording][1]
-        z, time = predicted.z[:, r.sensor], predicted.time
-        plain = {
-            "sensor_bias": z - sizes["bias"].value if sizes["bias"] else z,
-            "sensor_scale": z / sizes["gain"].value if sizes["gain"] and not sizes["bias"] else z,
-            "sensor_delay": np.interp(time + sizes["delay"].value, time, z) if sizes["delay"] else z,
-        }
-        found += [(kind, r.figure.signal) for kind, x in plain.items() if x is not z and worsened(r.rms_of(time, x), r.rms("extended"))]
+        lighter = drives.plain(end.extended, r.figure.signal, predicted.time, predicted.z[:, r.sensor])
+        found += [(k, r.figure.signal) for k, z in lighter.items() if worsened(r.rms_of(predicted.time, z), r.rms("extended"))]
     return list(dict.fromkeys(found))
 
 
@@ -158,7 +153,7 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
 
 
 def coupled(case: Case, end: End, table: Table) -> list[tuple[str, float]]:
-    """Sensors that are off by more than noise in a model that is said to agree, and that a high-pass explains; and its corner [Hz]."""
+    """Sensors that a model without discrepancy misses by more than noise, as a high-pass explains; and the corner of that [Hz]."""
     found: dict[str, float] = {}
     for r in _missed(table) if end.answer.verdict == "no_discrepancy" else ():
         predicted = table.predicted[r.figure.recording][0]
