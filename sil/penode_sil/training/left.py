@@ -45,15 +45,15 @@ class Left:
         return [int(j) for j in np.flatnonzero(np.nan_to_num(self.ratio) > limit)]
 
     @property
-    def little(self) -> bool:
+    def doubtful(self) -> bool:
         """Is so much left that the recording may mean something else than the model file takes it for?"""
         return bool(self.above(SETTINGS.story_loud)) or bool(np.nanmax(np.log2(self.share)) > -1.0)  # half of a signal, or more
 
     @property
     def unfinished(self) -> bool:
         """Does it look as if another start led further? More is left than noise, and it is no noise; or much more; or half of a signal."""
-        alike = np.nan_to_num(self.ratio) > SETTINGS.left_more
-        return self.little or bool(np.any(alike & (self.alike > 0.0)))
+        more = np.nan_to_num(self.ratio) > SETTINGS.left_more
+        return self.doubtful or bool(np.any(more & (self.alike > 0.0)))
 
 
 def of(problem: Problem, point: Point) -> Left | None:

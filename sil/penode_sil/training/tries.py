@@ -37,7 +37,7 @@ def several(
     for k in range(SETTINGS.tries_most):
         what, found = train(k, _of_try(k, tell))
         remains = left.of(found[0], found[1].point) if found else None
-        if k == 0 and (remains is None or remains.little):
+        if k == 0 and (remains is None or remains.doubtful):
             doubt()
         if found is None or remains is None:
             lost.append(Try(what, float("nan")))

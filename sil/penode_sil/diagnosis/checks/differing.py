@@ -14,7 +14,7 @@ from penode_gen import units
 from penode_gen.model import Parameter
 
 from .. import measuring, numerics
-from ..entries import extends, table, toml, unlike
+from ..entries import table, toml, unlike
 from ..explanation import CHANCE, rows
 from ..fit import Fit, Free, Problem
 from ..noise import UNSEEN
@@ -24,7 +24,7 @@ from ..study import Study, look
 from ..worth import RIGHT, Z_95
 from .case import Case, End
 from .values import entry
-from .written import write_extended
+from .written import heading, write_extended
 
 KIND = "differs_between_recordings"
 
@@ -131,17 +131,7 @@ def _text(case: Case, best: Own, sets: dict[str, str]) -> str:
     """The model file with what was fitted in common, and a set for each recording."""
     model, p = case.model, case.model.parameters[best.name]
     per = units.factor(p.unit)
-    lines = [
-        f"# What the recordings taught about {model.path.name}: {KIND} at {best.name}.",
-        "",
-        "[model]",
-        extends(model.path.resolve()),
-        f"name = {toml(model.name + '_extended')}",
-        f"sample_time = {toml(f'{model.sample_time:.12g} s')}",
-        "",
-        "[parameters]",
-        f"{best.name} = {table(entry(p, p.value) | {'tunable': True})}",
-    ]
+    lines = [*heading(model, KIND, best.name), f"{best.name} = {table(entry(p, p.value) | {'tunable': True})}"]
     for f in best.fit.free:
         known = model.parameters.get(f.target) if isinstance(f.target, str) else None
         if known is not None and f.value != known.value:

@@ -11,7 +11,7 @@ import numpy as np
 from penode_gen import units
 from penode_gen.model import Parameter
 
-from ..entries import extends, table, toml
+from ..entries import table
 from ..explanation import CHANCE
 from ..fit import Fit, Free, Problem
 from ..result import Cause, Named, Value, worsened
@@ -19,6 +19,7 @@ from ..study import uncertain
 from ..worth import RIGHT, Z_95
 from .case import Case, End
 from .figures import Table
+from .written import heading
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,16 +90,7 @@ def text(case: Case, x: Lone) -> str:
     """The model file with the values of a fit in it."""
     model = case.model
     values = {f.target: f.value for f in x.fit.free if isinstance(f.target, str)}
-    lines = [
-        f"# What the recordings taught about {model.path.name}: wrong_parameter at {x.name}.",
-        "",
-        "[model]",
-        extends(model.path.resolve()),
-        f"name = {toml(model.name + '_extended')}",
-        f"sample_time = {toml(f'{model.sample_time:.12g} s')}",
-        "",
-        "[parameters]",
-    ]
+    lines = heading(model, "wrong_parameter", x.name)
     for p in model.parameters.values():
         if p.name in values and values[p.name] != p.value:
             lines.append(f"{p.name} = {table(entry(p, values[p.name]))}")

@@ -10,7 +10,7 @@ from pathlib import Path
 import penode_gen
 from penode_gen.model import Model
 
-from ..entries import extends
+from ..entries import extends, toml
 from ..result import EXTENDED
 from .case import Case
 
@@ -27,6 +27,20 @@ def write_extended(text: str, case: Case) -> Model:
     beside = Path(os.path.relpath(nominal, case.output.resolve()))
     (case.output / EXTENDED).write_text(text.replace(extends(nominal), extends(beside), 1))
     return penode_gen.load(case.output / EXTENDED)
+
+
+def heading(model: Model, kind: str, where: str) -> list[str]:
+    """The first lines of a model file that extends another one by a cause, down to its parameters."""
+    return [
+        f"# What the recordings taught about {model.path.name}: {kind} at {where}.",
+        "",
+        "[model]",
+        extends(model.path.resolve()),
+        f"name = {toml(model.name + '_extended')}",
+        f"sample_time = {toml(f'{model.sample_time:.12g} s')}",
+        "",
+        "[parameters]",
+    ]
 
 
 def joined(base: str, text: str) -> str:
