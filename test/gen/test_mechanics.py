@@ -232,7 +232,11 @@ def test_actuators(load):
 @pytest.mark.parametrize(
     "old, new, what",
     [
-        ('law = "gain", gain = "k_t"', 'law = "spring", gain = "k_t"', "law 'spring' is unknown; known are gain, lag, delay, held"),
+        (
+            'law = "gain", gain = "k_t"',
+            'law = "spring", gain = "k_t"',
+            "law 'spring' is unknown; known are gain, lag, dead_zone, saturation, slew_limit, delay, held",
+        ),
         ('law = "gain", gain = "k_t"', 'law = "gain"', "'gain' is missing"),
         ('law = "gain", gain = "k_t"', 'law = "gain", gain = "k_t", time = "1 s"', "the law 'gain' has no time"),
         ('input = "behind"', 'input = "nothing"', "'nothing' is no input or earlier actuator"),

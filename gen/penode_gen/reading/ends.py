@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a model file says of mechanisms: bodies that move or turn, points, actuators, and what elements may act between."""
+"""What a model file says of mechanisms: bodies that move or turn, points, and what elements may act between."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from .. import model as m, units
-from ..algebra import expressions as ex, sampled
+from ..algebra import expressions as ex
 from ..algebra.mechanics import combination
 from ..laws import LAWS, for_angles
 from .network_tables import UNKNOWN, NetworkTables
@@ -17,12 +17,11 @@ from .places import show
 from .tables import NAME, same
 
 INERTIA = {"mass": ("kg", "z", "v", "m"), "inertia": ("kg*m^2", "phi", "omega", "rad")}  # key: unit, names and unit of the states
-ACTUATORS = {"gain": {"gain": "1"}, "lag": {"time": "s"}}  # laws and the units of their arguments
 LEVER = 'write a point with the lever arm in [points], such as tip = "arm*phi", and let the element act on it'
 
 
 class EndTables(NetworkTables):
-    """Reads [bodies], [points] and [actuators], and the ends of elements."""
+    """Reads [bodies] and [points], and the ends of elements."""
 
     made: dict[str, tuple[str, ...]]  # parameters made from quantities, and where
     kinds: dict[str, str]  # what elements may act on -> its unit, "m" or "rad"
@@ -85,53 +84,11 @@ class EndTables(NetworkTables):
                 name, mass, entry.get("position", f"{z}_{name}"), entry.get("velocity", f"{v}_{name}"), (start, speed), key == "inertia"
             )
 
-    def actuators(
-        self, inputs: tuple[m.Input, ...], parameters: dict[str, m.Parameter], sample_time: float
-    ) -> tuple[list[m.Point], list[m.State], list[m.Equation], list[m.Sampled]]:
-        """Actuated signals: a gain is a combination of its input, a lag is a state with an equation, others work on samples."""
-        of: dict[str, str] = {i.name: i.unit for i in inputs}
-        made_by: dict[str, str] = {}
-        points, states, equations, late = [], [], [], []
-        for name, entry in self.section("actuators").items():
-            where = ("actuators", name)
-            law, source = entry.get("law", ""), entry.get("input", "")
-            if source not in of:
-                if source:
-                    self.problem((*where, "input"), f"'{source}' is no input or earlier actuator", f"known are {', '.join(of) or 'none'}")
-                continue
-            if law in sampled.LAWS:
-                found = sampled.read(where, entry, of[source], made_by.get(source, ""), sample_time, self.problem)
-                late += [found] if found else []
-                of[name], made_by[name] = of[source], law
-                continue
-            if law not in ACTUATORS:
-                if law:
-                    self.problem((*where, "law"), f"law '{law}' is unknown", f"known are {', '.join((*ACTUATORS, *sampled.LAWS))}")
-                continue
-            arguments = {}
-            for key, unit in ACTUATORS[law].items():
-                if key in entry:
-                    arguments[key] = self.argument(where, key, entry[key], unit, f"{name}_{key}", parameters)
-                else:
-                    self.problem(where, f"'{key}' is missing", f"add {key} = ...")
-            for key in sorted({"samples", "gain", "time", *(("start",) if law == "gain" else ())} & set(entry) - set(arguments)):
-                self.problem((*where, key), f"the law '{law}' has no {key}", "remove it")
-            if len(arguments) < len(ACTUATORS[law]):
-                continue
-            of[name], made_by[name] = of[source], law
-            if law == "gain":
-                points.append(m.Point(name, f"{arguments['gain']}*{source}", of[source]))
-            else:
-                value = parameters[arguments["time"]].value if arguments["time"] in parameters else 1.0
-                if value <= 0.0:
-                    self.problem((*where, "time"), "is not above zero", 'give a positive time, or write law = "gain"')
-                start = self.quantity((*where, "start"), entry["start"], of[source]) if "start" in entry else 0.0
-                states.append(m.State(name, of[source], start, f"{source} behind a lag"))
-                equations.append(m.Equation(name, f"der({name})*{arguments['time']} = {source} - {name}"))
-        for name in of:
-            if (same(of[name], "m") and of[name] != UNKNOWN) or _angle(of[name]):
-                self.kinds[name] = "rad" if _angle(of[name]) else "m"
-        return points, states, equations, late
+    def measured(self, unit_of: Mapping[str, str]) -> None:
+        """Signals that elements may act on, of those with these units: positions and angles."""
+        for name, unit in unit_of.items():
+            if (same(unit, "m") and unit != UNKNOWN) or _angle(unit):
+                self.kinds[name] = "rad" if _angle(unit) else "m"
 
     def points(
         self,

@@ -17,7 +17,7 @@ from ..algebra.causalise import check
 from ..laws import LAWS
 from ..sets import promises
 from ..sets.fold import room
-from .ends import EndTables
+from .actuators import ActuatorTables
 from .followers import measures
 from .network_tables import ROOM, UNKNOWN
 from .places import one_line, show
@@ -54,7 +54,7 @@ class _All(frozenset[str]):
         return True
 
 
-class _Reader(EndTables):
+class _Reader(ActuatorTables):
     """Reads the whole model."""
 
     def __init__(self, path: Path):
@@ -71,19 +71,19 @@ class _Reader(EndTables):
         inputs = tuple(self.inputs())
         bodies = tuple(self.bodies(parameters))
         networks = dict(self.networks())
-        gains, lags, lagging, sampled = self.actuators(inputs, parameters, sample_time)
-        points = (*gains, *self.points(bodies, inputs, (*lags, *sampled), gains, parameters))
+        acts = self.actuators(inputs, parameters, sample_time)
+        points = (*acts.points, *self.points(bodies, inputs, (*acts.states, *acts.sampled), acts.points, parameters))
         elements = tuple(self.elements(parameters, inputs, networks))
-        states = (*self.states(), *lags, *self.law_states(elements))
-        variables = tuple(self.variables())
-        equations = (*self.equations(), *lagging)
+        states = (*self.states(), *acts.states, *self.law_states(elements))
+        variables = (*self.variables(), *acts.variables)
+        equations = (*self.equations(), *acts.equations)
         outputs = tuple(self.signals("outputs"))
         sensors = tuple(self.signals("sensors"))
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
         self.folds(head, sets)
         promises.check(networks, sets, head["outside"], self.problem)
-        self.unique(parameters, inputs, bodies, points, elements, (*states, *sampled), variables, networks)
-        moving = {*(s.name for s in states), *(s.name for s in sampled), *(b.position for b in bodies), *(b.velocity for b in bodies)}
+        self.unique(parameters, inputs, bodies, points, elements, (*states, *acts.sampled), variables, networks)
+        moving = {*(s.name for s in states), *(s.name for s in acts.sampled), *(b.position for b in bodies), *(b.velocity for b in bodies)}
         self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs), equations)
         self.macros(parameters, networks, name)
         if not outputs and not self.data.get("outputs"):
@@ -118,7 +118,7 @@ class _Reader(EndTables):
             guard=m.Guard(head["out_of_range"], head["on_damage"], head["trial"]),
             set_owner=self.set_owner,
             points=points,
-            sampled=tuple(sampled),
+            sampled=tuple(acts.sampled),
         )
 
     def sections(self) -> None:
@@ -300,7 +300,7 @@ class _Reader(EndTables):
         named += [("point", p.name, ("actuators" if p.name in actuators else "points", p.name)) for p in points]
         of_laws = {s.name: ("elements", e.name) for e in elements for s in self.law_states([e])} | {n: ("actuators", n) for n in actuators}
         named += [("state", s.name, of_laws.get(s.name, ("states", s.name))) for s in states] + [
-            ("variable", v.name, ("variables", v.name)) for v in variables
+            ("variable", v.name, ("actuators" if v.name in actuators else "variables", v.name)) for v in variables
         ]
         named += [("network", n, ("networks", n)) for n in networks]
         for e in elements:

@@ -55,7 +55,7 @@ SECTIONS: dict[str, dict[str, type | tuple[type, ...]]] = {
     "parameters": {"value": (int, float), "unit": str, "tolerance": (int, float, str), "exact": bool, "tunable": bool, "description": str},
     "inputs": {"unit": str, "min": (int, float), "max": (int, float), "noise": (int, float), "description": str},
     "bodies": {"mass": str, "inertia": str, "position": str, "velocity": str, "start_position": str, "start_velocity": str},
-    "actuators": {"input": str, "law": str, "gain": str, "time": str, "start": str, "samples": int, "description": str},
+    "actuators": {**dict.fromkeys(("input", "law", "gain", "time", "width", "limit", "rate", "start", "description"), str), "samples": int},
     "states": {"unit": str, "start": (int, float), "description": str},
     "variables": {"unit": str},
     "networks": {"inputs": list, "output": str, "description": str} | promises.KEYS,
