@@ -19,10 +19,11 @@ from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
 from penode_sil.diagnosis import adopting, applied, clipping, plant
 from penode_sil.diagnosis.between import joined, parts, straight
+from penode_sil.diagnosis.catalogue.acting import lagging
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence import gain, samples
 from penode_sil.diagnosis.evidence.fit import Fit
-from penode_sil.diagnosis.evidence.observer import Filter, Predictor, Record, augmented, lagging, scale
+from penode_sil.diagnosis.evidence.observer import Filter, Predictor, Record, augmented, scale
 from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.terms import Term
 
@@ -167,7 +168,7 @@ def test_what_is_wrong_with_one_input_stands_in_a_row(tmp_path):
         'tau_acts_2 = { input = "tau", law = "delay", samples = 3 }',
         'tau_acts_3 = { input = "tau_acts_2", law = "gain", gain = "tau_gain" }',
     ]
-    assert [x.split(" = ")[0] for x in found.parameters] == ["tau_offset_2", "tau_gain"]
+    assert [x.split(" = ")[0] for x in found.parameters] == ["tau_gain", "tau_offset_2"]
     assert found.through(seen.expression) == "phi + 0.1*(tau_acts_3 + tau_offset_2) + 0.01*der(tau_acts_3)"
     (motor,) = applied.redirected(model, found)["elements"]
     assert motor.startswith("motor = ") and '"-(tau_acts_3 + tau_offset_2)"' in motor

@@ -13,6 +13,8 @@ from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 
 from . import late
+from .catalogue import drives
+from .catalogue.acting import ACTING
 from .entries import extends, table, toml, unlike
 from .evidence.bench import Bench
 from .evidence.fit import Fit
@@ -209,7 +211,7 @@ class Driven:
 def _driven(model: Model, fit: Fit, terms: Sequence[Term], taken: set[str]) -> Driven:
     """What terms of inputs add to a model file, several of one input in a row."""
     found = Driven(taken)
-    own = sorted((t for t in terms if t.form.how.startswith("input_")), key=lambda t: t.form.how not in SAMPLED)
+    own = sorted((t for t in terms if t.form.how.startswith("input_")), key=_order)
     for name in dict.fromkeys(t.form.where for t in own):
         mine = [t for t in own if t.form.where == name]
         if bound(model, name):
@@ -227,6 +229,11 @@ def _driven(model: Model, fit: Fit, terms: Sequence[Term], taken: set[str]) -> D
     return found
 
 
+def _order(t: Term) -> int:
+    """Place of a term in the row in which those of an input act, as they were fitted."""
+    return ACTING[t.form.how].order if t.form.how in ACTING else 0
+
+
 def bound(model: Model, name: str) -> bool:
     """Does an actuator or a point of the file take an input, which a file that extends it cannot take elsewhere?"""
     actuated = [q.text for q in model.equations if q.text.startswith(f"der({q.name})*")] + [p.text for p in model.points]
@@ -236,21 +243,21 @@ def bound(model: Model, name: str) -> bool:
 def _actuator(model: Model, t: Term, value: float, source: str, found: Driven) -> str:
     """Adds what a term makes of a signal; the name of that, or of the signal itself where the model file has no law for it."""
     name, samples = t.form.where, (t.form.series.period if t.form.series else value) / model.sample_time
+    own = ACTING.get(t.form.how)
     law: dict[str, object] = {}
-    match t.form.how:
-        case "input_gain":
-            law = {"law": "gain", "gain": found.name(f"{name}_gain")}
-            found.parameters.append(f"{law['gain']} = {table({'value': 1.0 + value, 'unit': '1'})}")
-        case "input_lag":
-            law = {"law": "lag", "time": found.name(f"{name}_lag")}
-            found.parameters.append(f"{law['time']} = {table({'value': value, 'unit': 's'})}")
-        case "input_delay" | "input_added" if round(samples) >= 1:
-            law = {"law": "held" if t.form.series else "delay", "samples": round(samples)}
-            if abs(samples - round(samples)) > 0.1:
-                found.left.append(f"{t.form.how} of {name} is {samples:.2f} samples; the model file has {round(samples)}")
-        case _:
-            found.left.append(_uncorrected(t))
-            return source
+    if own and own.law:
+        unit = units.si(next(i.unit for i in model.inputs if i.name == name))
+        law["law"] = own.law
+        for key, (stem, size, of) in own.entry(value, model.sample_time).items():
+            law[key] = found.name(f"{name}_{stem}")
+            found.parameters.append(f"{law[key]} = {table({'value': size, 'unit': drives.of_input(of, unit)})}")
+    elif t.form.how in SAMPLED and round(samples) >= 1:
+        law = {"law": "held" if t.form.series else "delay", "samples": round(samples)}
+        if abs(samples - round(samples)) > 0.1:
+            found.left.append(f"{t.form.how} of {name} is {samples:.2f} samples; the model file has {round(samples)}")
+    else:
+        found.left.append(_uncorrected(t))
+        return source
     acts = found.name(f"{name}_acts")
     found.actuators.append(f"{acts} = {table({'input': source, **law})}")
     return acts

@@ -50,9 +50,13 @@ def held(u: Array, period: float, phase: float) -> Array:
 
 
 def propose(bench: Bench, index: int, delay: float) -> Form | None:
-    """The likeliest hold of an input that seems late by `delay` [s]; None if it cannot be longer than two samples."""
+    """The likeliest hold of an input that seems late by `delay` [s]; None if it cannot be longer than two samples, or the input moves in
+    fewer steps than two for each value that is fitted: each of these may come late by itself."""
     about = 2.0 * delay / bench.step
-    if about * SPREAD[1] <= 2.0:
+    steps = [np.diff(r.u[:, index]) for r in bench.records]
+    moves = [np.count_nonzero(np.abs(s) > np.sqrt(np.mean(np.square(s)))) for s in steps]
+    fitted = 1 + len(bench.records)  # the period, and a phase for each recording
+    if about * SPREAD[1] <= 2.0 or sum(moves) < fitted + fitted:
         return None
     steps = _likeliest(_finer(bench, about), index, about)
     return Form(KIND, bench.model.inputs[index].name, "input_added", index, series=steps)

@@ -5,13 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .evidence.bench import Bench
 from .evidence.blocks import Blocks
+from .evidence.observer import Filter
+from .propose import FREE_RUN
 from .reconsider import reconsidered
-from .rounds import Accepted, Grown, Rounds, terms_of
+from .rounds import Accepted, Grown, Rounds, name_of, terms_of
 from .terms import Term
+from .worth import least, mostly
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +47,31 @@ class Found:
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own."""
     rounds = Rounds(bench, Blocks.of([len(r) // bench.update for r in bench.records]), log)
-    end = reconsidered(rounds, rounds.grow())
+    end = _run_free(reconsidered(rounds, rounds.grow()), log)
     return _found(rounds, end, end.large)
+
+
+def _run_free(end: Grown, log: Callable[[str], None]) -> Grown:
+    """The end of a search, with those small forms large that take most of what a free run misses beside all others: what changes slowly the
+    observer follows, so that innovations show little of it."""
+    bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
+    if all(end.large):
+        return end
+    problem = bench.problem()
+    whole = problem.solve(bench.fit.free, still, FREE_RUN)
+    accepted, large = list(end.accepted), list(end.large)
+    for k, a in enumerate(end.accepted):
+        if large[k]:
+            continue
+        own = {f.target for t in a.terms for f in t.free}
+        starts = [[f for f in fit.free if f.target not in own] for fit in (bench.fit, whole)]
+        without = max((problem.solve(free, still, FREE_RUN) for free in starts), key=lambda f: f.cost)
+        taken = without.taken_whole(whole, problem.floor)
+        log(f"{name_of(a.trial)} takes {taken:.1%} of what a free run misses without it")
+        if mostly(taken):
+            accepted[k] = replace(a, trial=replace(a.trial, whole=max(taken, a.trial.whole)))
+            large[k] = a.trial.share >= least(bench.level.size, taken)
+    return replace(end, accepted=tuple(accepted), large=tuple(large))
 
 
 def _found(rounds: Rounds, end: Grown, worth_naming: Sequence[bool]) -> Found:

@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen.model import Model
+from penode_gen.model import GROUND, Model
 
 from . import catalogue, clipping, holding
-from .catalogue import drives
+from .catalogue import drives, friction
 from .catalogue.form import Form, Motion, Moved
 from .evidence.bench import Bench, fit_level
-from .evidence.observer import Filter
-from .evidence.screening import Probe, Score, scores
+from .evidence.observer import Filter, force_at
+from .evidence.screening import AT_ONCE, Probe, Score, as_they_are, scores
 from .fit import Free
-from .terms import Term, Trial, free_of, with_forms
+from .terms import Term, Trial, drive, free_of, with_forms
 from .worth import share
 
 Array = NDArray[np.float64]
@@ -35,7 +35,11 @@ def motions(probe: Probe) -> list[Motion]:
     """Of every place. What acts on a body where nothing of the model does is what moves it."""
     found, bench = [], probe.bench
     for k, place in enumerate(bench.places):
-        parts = [Moved(m[:, 3 * k], m[:, 3 * k + 1], np.arange(len(m)) * bench.step) for m in probe.motions]
+        loads = {force_at(p): 3 * i + 2 for i, p in enumerate(bench.places) if p.elements and {*p.ends} & {*place.ends} - {GROUND}}
+        parts = [
+            Moved(m[:, 3 * k], m[:, 3 * k + 1], np.arange(len(m)) * bench.step, {f: np.abs(m[:, i]) for f, i in loads.items()})
+            for m in probe.motions
+        ]
         acts = float(np.std(np.concatenate([m[:, 3 * k + 2] for m in probe.motions])))
         found.append(Motion.of(parts, acts if place.elements else _inertia(bench, place.ends[0])))
     return found
@@ -55,8 +59,9 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     forms: list[Form] = []
     for k, (place, motion) in enumerate(zip(bench.places, moved, strict=True)):
         if motion.s_rms > 0.0 and motion.v_rms > 0.0 and motion.force > 0.0:
+            turning = friction.turns(motion.rates)
             for file in catalogue.FILES:
-                forms += file.forms(bench.model, k, place, motion)
+                forms += (f for f in file.forms(bench.model, k, place, motion) if turning or f.kind not in catalogue.REVERSING)
     forms += drives.inputs(bench.model, n_u)
     forms += drives.sensors(bench.model, len(bench.noise))
     forms = [f for f in forms if not _taken(f, terms)]
@@ -64,7 +69,8 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     cut = {t.form.where for t in terms if t.form.how == "clip"}
     seen = bench.problem().predictor.sensors(bench.fit.free)
     limits = [clipping.propose(bench, j, seen) for j, s in enumerate(bench.model.sensors) if s.name not in cut]
-    ranked = sorted([*ranked, *filter(None, limits)], key=lambda pair: -pair[0].gain)
+    acting = [pair for j in range(n_u) for pair in _bent(bench, j, terms)]
+    ranked = sorted([*ranked, *filter(None, limits), *acting], key=lambda pair: -pair[0].gain)
     chosen = _chosen(ranked)
     wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
@@ -76,7 +82,7 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
 def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
     """The forms that are fitted: of each kind, place and note the best; of these the TRIED with the largest gain beyond PROMISE for each of
     their sizes, the best force of every place that is not among them, for small improvements where much acts would crowd out the cause
-    where little does, and what is a part of one of them."""
+    where little does, what is a part of one of them, and the best limit of every other input and sensor: little else does what they do."""
     best: dict[tuple[str, str, str], tuple[Score, Form]] = {}
     for score, form in ranked:
         if score.gain > PROMISE:
@@ -84,7 +90,8 @@ def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
     plainest = sorted(best.values(), key=lambda pair: PROMISE * len(pair[0].sizes) - pair[0].gain)
     chosen = plainest[:TRIED]
     for score, form in plainest[TRIED:]:
-        if form.how == "force" and (all(form.where != f.where for _, f in chosen) or any(is_part(form, f) for _, f in chosen)):
+        own = [f for _, f in chosen if f.where == form.where and (f.limit or not form.limit)]
+        if (form.how == "force" and (not own or any(is_part(form, f) for f in own))) or (form.limit and not own):
             chosen.append((score, form))
     return chosen
 
@@ -115,6 +122,30 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
     return sorted(zip(scores(bench.fit, hypotheses), forms, strict=True), key=lambda pair: -pair[0].gain)
 
 
+def _bent(bench: Bench, index: int, terms: Sequence[Term]) -> list[tuple[Score, Form]]:
+    """Of an input, each kind whose effect is not proportional to its value, at the best of the values that are tried."""
+    forms = [f for f in drives.bent(bench.model, index, drive(bench, index)) if not _taken(f, terms)]
+    if not forms:
+        return []
+    kinds = list(dict.fromkeys(f.kind for f in forms))
+    free = (*bench.fit.free, *(replace(free_of(bench, Form(k, forms[0].where, k, index))[0], value=0.0) for k in kinds))
+    shifts = np.zeros((1 + len(forms), len(free)))
+    for row, f in zip(shifts[1:], forms, strict=True):
+        at = len(bench.fit.free) + kinds.index(f.kind)
+        row[at] = f.limit / free[at].unit
+    nu = np.concatenate([bench.problem().nu(free, rows, bench.fit.by) for rows in np.array_split(shifts, -(-len(shifts) // AT_ONCE))])
+    scored = list(zip(as_they_are(bench.fit, nu[1:] - nu[0]), forms, strict=True))
+    best = [max((p for p in scored if p[1].kind == k), key=lambda p: p[0].gain)[1] for k in kinds]
+    return [(Score(_moved_gain(bench, form), np.zeros(1)), form) for form in best]
+
+
+def _moved_gain(bench: Bench, form: Form) -> float:
+    """Log likelihood that a form gains within a few steps of a fit: what else is free may have to move far with it, as a gain beside a dead
+    zone does."""
+    fit = bench.problem().solve((*bench.fit.free, *free_of(bench, form)), bench.fit.by, FREE_RUN)
+    return max(fit.likelihood - bench.fit.likelihood, 0.0)
+
+
 def _holds(bench: Bench, trials: Sequence[Trial], terms: Sequence[Term]) -> list[Term]:
     """Hold terms for inputs of which a delay gained at least half as much as the best trial: the delay is the main effect of a hold."""
     taken = [t.form.where for t in terms if t.form.kind == holding.KIND]
@@ -142,7 +173,7 @@ def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[
     problem = bench.problem(wide)
     n_x = len(wide.states)
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
-    starts = [(*bench.fit.free, *_sized(term, sizes))]
+    starts, runs = [(*bench.fit.free, *_sized(term, sizes))], []
     if term.form.how == "clip" or any(f.log and f.sigma > VAGUE for f in bench.nominal):
         little = np.clip(sizes, *np.outer((-1.0, 1.0), [LITTLE * f.unit for f in term.free if not f.log]))
         own = {f.target for f in bench.nominal}
@@ -155,9 +186,8 @@ def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[
     level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
     most = float(np.max(bench.fit.taken(best, problem.floor)))  # the force at one place is seen by few sensors
     whole = bench.fit.taken_whole(best, problem.floor)
-    return Trial(
-        term.form, term, best, best.criterion() - bench.fit.criterion(), level, share(bench, [*same, term], best, moved), most, whole
-    )
+    gain, free = best.criterion() - bench.fit.criterion(), max((r.likelihood for r in runs), default=-np.inf)
+    return Trial(term.form, term, best, gain, level, share(bench, [*same, term], best, moved), most, whole, free)
 
 
 def _sized(term: Term, sizes: Array) -> list[Free]:

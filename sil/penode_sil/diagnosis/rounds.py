@@ -23,7 +23,7 @@ from .terms import Term, Trial
 from .worth import WORTH, Z_95, alone, least, mostly, share, undetermined
 
 Array = NDArray[np.float64]
-SCORED = 4  # of the promising trials, how many are scored on held-out blocks
+SCORED = 4  # of the promising trials, how many are scored on held-out blocks, beside the one with the best free run
 MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
 MIN_FORM = (
     0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
@@ -107,7 +107,9 @@ class Rounds:
         best, to MIN_GAIN, only large ones; otherwise the large form only imitates a smaller one."""
         trials, wide = propose(bench, terms_of(accepted), self.log)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
-        trials = holding.told_apart(bench, wide, [_scored(bench, bench.problem(wide), self.blocks, t) for t in trials[:SCORED]])
+        freest = sorted(trials, key=lambda t: -t.run)[:1]
+        trials = [t for t in trials if t in trials[:SCORED] or t in freest]
+        trials = holding.told_apart(bench, wide, [_scored(bench, bench.problem(wide), self.blocks, t) for t in trials])
         better = [t.blocks - scores for t in trials]
         for t, b in zip(trials, better, strict=True):
             self.log(

@@ -15,8 +15,9 @@ from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 
 from . import clipping
+from .catalogue.acting import ACTING, Drive
 from .catalogue.form import Form, Motion, Part
-from .evidence.bench import Bench
+from .evidence.bench import UPDATES, Bench
 from .evidence.fit import Fit
 from .evidence.gain import Level
 from .evidence.observer import scale
@@ -47,7 +48,7 @@ class Term:
 class Trial:
     """A form beside those accepted, fitted: `gain` of the criterion; `share` of the force there (see `worth`); `taken`, the share of
     a sensor's innovation power beyond its noise that it explains, of the sensor that shows it most; `whole`, that share over all sensors
-    together; `blocks` [blocks] of predictive density."""
+    together; `run`: log likelihood of its free run, where one was made; `blocks` [blocks] of predictive density."""
 
     form: Form
     term: Term
@@ -57,27 +58,28 @@ class Trial:
     share: float = 0.0
     taken: float = 0.0
     whole: float = 0.0
+    run: float = -np.inf
     blocks: Array | None = None
+
+
+def drive(bench: Bench, index: int) -> Drive:
+    """An input as the bench's recordings have it."""
+    update = bench.update * bench.step
+    return Drive([r.u[:, index] for r in bench.records], bench.step, update, UPDATES * update)
 
 
 def free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
     """The value of a form of an input or a sensor."""
     step = bench.update * bench.step
     match form.how:
-        case "input_gain":
-            return (Free((form.how, form.index), 0.0, 0.01, sigma=0.3),)
-        case "input_offset":
-            size = max(float(np.std(np.concatenate([r.u[:, form.index] for r in bench.records]))), 1e-12)
-            return (Free((form.how, form.index), 0.0, 0.01 * size, sigma=size),)
-        case "input_delay" | "input_lag":
-            return (Free((form.how, form.index), 0.2 * bench.step, 0.2 * step, sigma=2.0 * step, low=0.0),)
         case "input_added":
             return (Free((form.how, form.index, form.series), 0.0, 0.1, sigma=1.0, low=0.0, high=1.2),)
         case "scale":
             return (Free(scale(form.where), 1.0, 0.01, sigma=0.3, origin=1.0),)
         case "late":
             return (Free((form.how, form.index), 0.2 * bench.step, 0.1 * step, sigma=step, low=0.0),)
-    raise ValueError(form.how)
+    v = ACTING[form.how].fitted(drive(bench, form.index))
+    return (Free((form.how, form.index), form.limit or v.start, v.unit, sigma=v.sigma, low=v.low, high=v.high),)
 
 
 def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], first: int) -> tuple[Model, list[Term]]:
@@ -119,7 +121,8 @@ def _element(name: str, ends: tuple[str, str], part: Part) -> Element:
         return Element(name, ends, part.law, {a: f"{name}_{a}" for a in LAWS[part.law].arguments})
     keys = [part.gain[0], *part.shapes]
     text = re.sub(r"\b(" + "|".join(keys) + r")\b", lambda m: f"{name}_{m[1]}", part.law)
-    return Element(name, ends, "expression", expression=re.sub(r"\b([sv])\b", lambda m: f"{m[1]}_{name}", text))
+    text = re.sub(r"\b([sv])\b", lambda m: f"{m[1]}_{name}", text)
+    return Element(name, ends, "expression", expression=re.sub(r"\bload\b", f"abs({part.load})", text))
 
 
 def rms(series: Sequence[Array]) -> float:

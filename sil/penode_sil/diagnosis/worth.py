@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from penode_gen.model import GROUND, Model
 
 from . import clipping
+from .catalogue.acting import ACTING
 from .catalogue.form import Motion
 from .evidence.bench import UPDATES, Bench
 from .evidence.fit import Fit
-from .terms import Term
+from .terms import Term, drive
 
 Array = NDArray[np.float64]
 WORTH = 0.07  # of the force there: less is a small deviation. Any model is 2 to 5 % wrong, a name is worth it from 10 % on; the middle
@@ -168,14 +169,16 @@ def _linear(term: Term, fit: Fit, motion: Motion) -> bool:
 def _of_signal(bench: Bench, term: Term, fit: Fit) -> float:
     value = fit.value(term.free[0].target)
     turn = 2.0 * np.pi / (UPDATES * bench.update * bench.step)  # of the motion [rad/s]
+    own = ACTING.get(term.form.how)
+    if own and own.tried:
+        return own.change(drive(bench, term.form.index), value)
     match term.form.how:
         case "input_offset":
-            return abs(value) / max(float(np.std(np.concatenate([r.u[:, term.form.index] for r in bench.records]))), 1e-300)
+            return abs(value) / drive(bench, term.form.index).spread
         case "scale":
             return abs(value - 1.0)
         case "input_gain":
             return abs(value)
         case "input_added" if term.form.series:
-            signals = [np.concatenate(x) for x in (term.form.series.signals, [r.u[:, term.form.index] for r in bench.records])]
-            return abs(value) * _rms(signals[0]) / max(float(np.std(signals[1])), 1e-300)
+            return abs(value) * _rms(np.concatenate(list(term.form.series.signals))) / drive(bench, term.form.index).spread
     return abs(value) * turn

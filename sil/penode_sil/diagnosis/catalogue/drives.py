@@ -9,17 +9,21 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
+from .acting import ACTING, Drive
 from .form import Form, Sizes
 
 Array = NDArray[np.float64]
-KINDS = ("input_gain", "input_offset", "input_delay", "input_lag", "input_hold", "sensor_scale", "sensor_delay")
-INPUTS = KINDS[:5]
+INPUTS = (*ACTING, "input_hold")
+KINDS = (*INPUTS, "sensor_scale", "sensor_delay")
 MEANING = {
     "input_gain": "The plant is driven by more, or less, than the recording of the input says.",
     "input_offset": "A constant acts on top of the recorded input.",
     "input_delay": "The input acts later than the recording says.",
     "input_lag": "The input acts with a lag: an actuator that the model does not have.",
     "input_hold": "The input acts in steps: its controller is slower than the recorder, and holds it in between.",
+    "input_dead_zone": "Small inputs do nothing: the plant is driven by what the input is beyond a width.",
+    "input_saturation": "The actuator gives no more than a limit, whatever the recorded input asks for.",
+    "input_slew_limit": "The actuator follows the recorded input at a limited rate.",
     "sensor_scale": "The sensor's scale is off.",
     "sensor_delay": "The sensor is late.",
 }
@@ -27,6 +31,12 @@ RIVALS = {
     ("sensor_scale", "wrong_parameter"): "record acceleration and deflection of other parts too, or weigh a body",
     ("input_delay", "sensor_delay"): "a second sensor, of another make: a late input makes both late",
     ("input_gain", "sensor_scale"): "measure the force of the actuator, or show the sensor a known size",
+    (
+        "input_dead_zone",
+        "coulomb_friction",
+    ): "let it coast, or drive it through zero while it moves: friction brakes it there, a dead zone does not",
+    ("input_saturation", "input_gain"): "small inputs as well as large ones",
+    ("input_slew_limit", "input_lag"): "steps of two sizes: a lag takes the same time for both",
     ("sensor_delay", "sensor_scale"): "excitation up to higher frequencies: a delay turns the phase, a scale does not",
     (
         "input_gain",
@@ -48,10 +58,22 @@ def alike(model: Model, kind: str, where: str) -> tuple[str, str] | None:
 
 
 def inputs(model: Model, count: int) -> Iterable[Form]:
-    """Forms of the first `count` inputs. That of a hold is for `holding`, which has to look for its period."""
+    """Forms of the first `count` inputs whose effect is proportional to their value: others are compared at several values, see `bent`.
+    That of a hold is for `holding`, which has to look for its period."""
     for j, i in enumerate(model.inputs[:count]):
-        for kind in INPUTS[:4]:
-            yield Form(kind, i.name, kind, j)
+        for kind, acting in ACTING.items():
+            if acting.tried is None:
+                yield Form(kind, i.name, kind, j)
+
+
+def bent(model: Model, index: int, drive: Drive) -> Iterable[Form]:
+    """Forms of an input at all values that are tried; none of a position that elements act on, which no actuator can cut off."""
+    own = model.inputs[index].name
+    if any(own in e.ends for e in model.elements):
+        return
+    for kind, acting in ACTING.items():
+        for value in acting.tried(drive) if acting.tried else ():
+            yield Form(kind, own, kind, index, limit=value)
 
 
 def sensors(model: Model, count: int) -> Iterable[Form]:
@@ -73,15 +95,19 @@ def plain(model: Model, sensor: str, time: Array, z: Array) -> dict[str, Array]:
 
 def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:
     """What a report gives of a form; `unit` of its input or sensor."""
+    if form.how in ACTING:
+        acting = ACTING[form.how]
+        return {acting.size[0]: (of_input(acting.size[1], unit), acting.shown(v.alone))}
     match form.how:
-        case "input_gain":
-            return {"gain": ("1", 1.0 + v.alone)}
-        case "input_offset":
-            return {"offset": (unit, v.alone)}
         case "input_added":
             return {"period": ("s", form.series.period)} if form.series else {}
         case "clip":
             return {"limit": (unit, v.alone)}
         case "scale":
             return {"scale": ("1", v.alone)}
-    return {"lag" if form.how == "input_lag" else "delay": ("s", v.alone)}
+    return {"delay": ("s", v.alone)}
+
+
+def of_input(unit: str, own: str) -> str:
+    """A unit of ACTING for an input in `own` units."""
+    return own + unit if unit in ("", "/s") else unit

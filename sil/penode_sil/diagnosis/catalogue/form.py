@@ -23,12 +23,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """Deflection s, rate v [n] of a place along one recording, at times t [s] from 0 on; rms of both over all recordings, and what they
-    reach but for a thousandth of the time."""
+    """Deflection s, rate v [n] of a place along one recording, at times t [s] from 0 on; magnitudes of the `loads` [n] there and at places
+    beside it, by their expressions."""
 
     s: Array
     v: Array
     t: Array
+    loads: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def step(self) -> float:
@@ -37,7 +38,8 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A place along all recordings; `force`: rms of the force there already, about its mean."""
+    """A place along all recordings: rms of deflection and rate, and what they reach but for a thousandth of the time; `force`: rms of the
+    force there already, about its mean."""
 
     parts: tuple[Moved, ...]
     s_rms: float
@@ -55,6 +57,11 @@ class Motion:
         return Motion(parts, *rms, *reach, force)
 
     @property
+    def rates(self) -> Array:
+        """Of all recordings [n]."""
+        return np.concatenate([p.v for p in self.parts])
+
+    @property
     def longest(self) -> float:
         """Of the recordings [s]."""
         return float(max(p.t[-1] for p in self.parts))
@@ -66,7 +73,8 @@ class Part:
     it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values.
     `force(motion, **shapes)` returns the force [n] for gain 1; given where that is faster than a simulation. A shape stays within a factor
     of `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump, and may become as
-    small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another cause."""
+    small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another cause. `load`: the
+    expression whose magnitude an expression calls `load`."""
 
     law: str
     gain: tuple[str, str]
@@ -77,6 +85,7 @@ class Part:
     span: float = 30.0
     edge: str = ""
     kind: str = ""
+    load: str = ""
 
     def along(self, m: Moved) -> Array:
         """Force [n] for gain 1."""
@@ -87,7 +96,7 @@ class Part:
         if known and known.states:
             return memory.force(self.law, {self.gain[0]: 1.0, **shapes}, m.s, m.step)
         text = known.force if known else self.law
-        values = {self.gain[0]: 1.0, **shapes, "s": m.s, "v": m.v}
+        values = {self.gain[0]: 1.0, **shapes, "s": m.s, "v": m.v, **({"load": m.loads[self.load]} if self.load else {})}
         return np.broadcast_to(along(text, tuple(values))(*values.values()), m.s.shape)
 
 
@@ -102,8 +111,8 @@ class Series:
 @dataclass(frozen=True, eq=False)
 class Form:
     """A form of a kind at a place of the model (its index), an input or a sensor (its index): `how` is "force", or what is wrong with the
-    input ("input_gain", ..., "input_added": a `series`) or sensor ("scale", "late", "clip": beyond a `limit`). Of one family, forms stand
-    for the same name."""
+    input (a key of ACTING, or "input_added": a `series`) or sensor ("scale", "late", "clip": beyond a `limit`). `limit`: where the fit of a
+    value begins whose effect is not proportional to it. Of one family, forms stand for the same name."""
 
     kind: str
     where: str

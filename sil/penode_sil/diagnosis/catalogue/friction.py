@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Dry friction: of Coulomb, with a constant force beside it or a peak at low rates, and with memory of the way."""
+"""Dry friction: of Coulomb, with a constant force beside it or a peak at low rates, with memory of the way, other at each place or load."""
 
 from collections.abc import Iterable
 from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from penode_gen.model import GROUND, Model
 
@@ -12,14 +15,20 @@ from ..plant import Place
 from . import loads
 from .form import Form, Motion, Moved, Part, Sizes
 
-KINDS = ("coulomb_friction", "stribeck_friction", "bouc_wen")
-REVERSING = KINDS[2:]
+Array = NDArray[np.float64]
+KINDS = ("coulomb_friction", "stribeck_friction", "bouc_wen", "position_dependent_friction", "load_dependent_friction")
+REVERSING = KINDS[2:3]
 MEANING = {
     "coulomb_friction": "Friction: a force against the motion that hardly depends on how fast it is.",
     "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",
     "bouc_wen": "Hysteresis: the force depends on the way since the last reversal, elastic at first, then yielding.",
+    "position_dependent_friction": "Friction that is larger at one end of the travel than at the other, or at both than between.",
+    "load_dependent_friction": "Friction that grows with the force that a bearing, a guide or a gear transmits.",
 }
 RIVALS = {
+    ("position_dependent_friction", "coulomb_friction"): "the same stroke about two places of the travel",
+    ("load_dependent_friction", "coulomb_friction"): "the same motion under two loads",
+    ("load_dependent_friction", "position_dependent_friction"): "the same place under two loads: another weight, another preload",
     ("coulomb_friction", "stribeck_friction"): "slow motion with many reversals, and fast motion too: the lowest rates tell",
     (
         "coulomb_friction",
@@ -34,6 +43,12 @@ EDGES, SPAN = (
 WIDEST = EDGES[-1] * SPAN  # what bends slower is a damper
 PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway
 WAYS = (0.06, 0.25, 0.8)  # of the rms deflection: how far a hysteresis is bent before it slides
+
+
+def turns(rates: Array) -> bool:
+    """Do rates [n] change sign? One that goes back slower than a friction's sharpest transition shows nothing of reversals."""
+    low, high = np.quantile(rates, (0.005, 0.995))
+    return bool(min(-low, high) > EDGES[0] * np.sqrt(np.mean(np.square(rates))))
 
 
 def coulomb(motion: Motion, edge: float) -> Part:
@@ -53,11 +68,23 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         for share in PEAKS if place.role != "body" else ():
             peak = Part("2.3316439815971242*rise*exp(-(v/width)^2)*v/width", ("rise", "N"), {"width": (share * motion.v_rms, "m/s")}, 1)
             yield Form(KINDS[1], place.name, "force", index, (slides, peak))
+        if place.role != "body":
+            for grows, kind, note in _growing(motion, edge):
+                yield Form(kind, place.name, "force", index, (slides, grows), note)
     if place.role == "body":
         return
     for share in WAYS:
         way = share * motion.s_rms
         yield Form(KINDS[2], place.name, "force", index, (Part("bouc_wen", ("force", "N"), {"presliding": (way, "m")}, 1, (), _slip),))
+
+
+def _growing(motion: Motion, edge: float) -> Iterable[tuple[Part, str, str]]:
+    """What a friction has more at another deflection or load, its kind, and a note on the form."""
+    shapes = {"width": (edge * motion.v_rms, "m/s")}
+    for where, note in (("s", "along the travel"), ("abs(s)", "to both ends")):
+        yield Part(f"slope*{where}*tanh(v/width)", ("slope", "N/m"), shapes, fixed=("width",)), KINDS[3], note
+    for load in motion.parts[0].loads:
+        yield Part("share*load*tanh(v/width)", ("share", "1"), shapes, 1, ("width",), load=load), KINDS[4], f"of {load}"
 
 
 def _slip(m: Moved, presliding: float):
@@ -66,8 +93,14 @@ def _slip(m: Moved, presliding: float):
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind."""
-    if form.kind == KINDS[1]:
-        return {"breakaway": ("N", v(0, "force") + v(1, "rise")), "coulomb": ("N", v(0, "force")), "stribeck_rate": ("m/s", v(1, "width"))}
-    if form.kind == KINDS[2]:
-        return {"force": ("N", v(0, "force")), "yield_deflection": ("m", v(0, "presliding"))}
-    return {"force": ("N", v(0, "force"))}
+    force = ("N", v(0, "force"))
+    match form.kind:
+        case "stribeck_friction":
+            return {"breakaway": ("N", v(0, "force") + v(1, "rise")), "coulomb": force, "stribeck_rate": ("m/s", v(1, "width"))}
+        case "bouc_wen":
+            return {"force": force, "yield_deflection": ("m", v(0, "presliding"))}
+        case "position_dependent_friction":
+            return {"force": force, "slope": ("N/m", v(1, "slope"))}
+        case "load_dependent_friction":
+            return {"force": force, "share": ("1", v(1, "share"))}
+    return {"force": force}

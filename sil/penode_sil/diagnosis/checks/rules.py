@@ -13,6 +13,7 @@ from scipy.signal import butter, lfilter
 
 from .. import catalogue
 from ..catalogue import drives
+from ..catalogue.friction import turns
 from ..noise import UNSEEN
 from ..report_figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, REJECTED, Cause, place, worsened
@@ -63,8 +64,7 @@ def unturned(case: Case, end: End, table: Table) -> list[tuple[Cause, str]]:
         at = [k for k, p in enumerate(end.study.places) if c.where in (p.name, *(n for n, _ in p.elements))]
         if c.kind in catalogue.REVERSING and at and end.study.seen:
             rates = np.concatenate([seen.motions[at[0]].v for seen in end.study.seen])
-            low, high = np.quantile(rates, (0.005, 0.995))
-            if low * high > 0.0:
+            if not turns(rates):
                 found.append((c, f"is about reversals, and the rate there keeps its sign; {NOT_NAMED}"))
     return found
 

@@ -15,9 +15,9 @@ from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter,
 
 from ...batch import Observer
 from ..between import far, finer, joined, straight
+from ..catalogue.acting import ACTING
 from ..compiling import compiled, ordered
 from ..fit import Free
-from ..hypotheses import lag
 from ..noise import Experiment
 from ..plant import Place, anonymous, extend, rotational_unit
 from . import samples
@@ -100,10 +100,14 @@ def with_probes(model: Model, places: Sequence[Place]) -> Model:
     wide = extend(wide, forces, {}, places)
     seen = []
     for k, p in enumerate(places):
-        force = " ".join(f"{'+' if sense > 0 else '-'} F_{name}" for name, sense in p.elements) or "0"
-        signals = (("s", f"s_probe{k}", "m"), ("v", f"v_probe{k}", "m/s"), ("F", force, "N"))
+        signals = (("s", f"s_probe{k}", "m"), ("v", f"v_probe{k}", "m/s"), ("F", force_at(p), "N"))
         seen += [Signal(f"{q}_of_probe{k}", text, p.unit(unit)) for q, text, unit in signals]
     return replace(wide, sensors=(*wide.sensors, *seen))
+
+
+def force_at(p: Place) -> str:
+    """The force of the elements at a place, as an expression."""
+    return " ".join(f"{'+' if sense > 0 else '-'} F_{name}" for name, sense in p.elements) or "0"
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +261,7 @@ class Predictor:
         start = np.tile(np.array(self.model.start, dtype=float), (runs, 1))
         parameters: dict[str, Array] = {}
         u, y = record.u, record.y
-        for f, shift in zip(free, shifts.T, strict=True):
+        for f, shift in sorted(zip(free, shifts.T, strict=True), key=lambda pair: _order(pair[0])):
             values = f.at(shift)
             if isinstance(f.target, str):
                 parameters[f.target] = values
@@ -272,7 +276,7 @@ class Predictor:
                 u[:, :, f.target[1]] += values[:, None] * f.target[2].signals[e]
             else:
                 u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
-                u[:, :, f.target[1]] = driven(f.target[0], u[:, :, f.target[1]], values, record.step)
+                u[:, :, f.target[1]] = ACTING[f.target[0]].acts(u[:, :, f.target[1]], values, record.step)
         return np.clip(np.nan_to_num(start), -MAX_INNOVATION, MAX_INNOVATION), parameters, u, y
 
 
@@ -282,31 +286,14 @@ def moved(x: Array, samples: Array) -> Array:
     return np.array([np.interp(at - d, at, x) for d in samples])
 
 
+def _order(f: Free) -> int:
+    """Place of a free value in the row in which those of one input act."""
+    return ACTING[f.target[0]].order if f.target[0] in ACTING else 0
+
+
 def earlier(y: Array, samples: Array) -> Array:
     """A signal [n] as it was so many samples [runs] before it was seen: [runs, n]; what was not seen is NaN."""
     seen = np.arange(len(y)) + samples[:, None] <= len(y) - 1
     good = np.isfinite(y)
     near = moved(good.astype(float), -samples) == 1.0  # both neighbours were measured
     return np.where(seen & near, moved(np.where(good, y, 0.0), -samples), np.nan)
-
-
-def driven(how: str, u: Array, values: Array, step: float) -> Array:
-    """An input [runs, n] with a gain of 1 + values [runs], an offset, a delay or a lag [s]."""
-    match how:
-        case "input_gain":
-            return u * (1.0 + values[:, None])
-        case "input_offset":
-            return u + values[:, None]
-        case "input_delay":
-            return moved(u[0], values / step)
-        case "input_lag":
-            return np.array([x[0] + lagging(x - x[0], max(tau, 1e-3 * step), step) for x, tau in zip(u, values, strict=True)])
-    raise ValueError(how)
-
-
-def lagging(x: Array, tau: float, step: float) -> Array:
-    """A signal [n] from 0, joined by straight lines, behind a first-order lag: exact, as the model file's own, so that no delay of half a
-    sample has to make up for it."""
-    a = np.exp(-step / tau)
-    before = tau / step - a / (1.0 - a)  # weight of the sample before
-    return lag(x + before * (np.concatenate([x[:1], x[:-1]]) - x), tau, step)

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What acts on a plant instead of its recorded input: an actuator that the model does not have. One row a kind.
+
+The value of a kind is what is fitted, 0 where the input acts as recorded. A limit is fitted as its inverse: an infinite one is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..hypotheses import lag
+
+Array = NDArray[np.float64]
+TINY = np.finfo(float).tiny
+Entry = Mapping[str, tuple[str, float, str]]  # of each argument of a law: end of a parameter's name, value, unit
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """An input as recorded: its `series` [n] by recording, `step` [s] apart; `update` [s] between innovations, `period` [s] of the
+    motion."""
+
+    series: Sequence[Array]
+    step: float
+    update: float
+    period: float
+
+    @cached_property
+    def spread(self) -> float:
+        return float(np.maximum(np.std(np.concatenate(list(self.series))), TINY))
+
+    @cached_property
+    def largest(self) -> float:
+        """But for a thousandth of the time: one spike does not count."""
+        return float(np.maximum(np.quantile(np.abs(np.concatenate(list(self.series))), 0.999), TINY))
+
+
+@dataclass(frozen=True, eq=False)
+class Value:
+    """How the value of a kind is fitted: where that begins, its natural unit, the deviation of its prior, and its bounds."""
+
+    start: float
+    unit: float
+    sigma: float
+    low: float = -np.inf
+    high: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Acting:
+    """A kind of actuator. `acts(u, values, step)`: what acts [runs, n] for the recorded u [runs, n] and a value for each run [runs];
+    `fitted`: how its value is fitted, and `tried`: values that a score test compares, for where the effect is not proportional to it;
+    `size`: name and unit of what a report gives ("": the unit of the input, "/s" behind it), and `shown` that for a value;
+    `law` of [actuators] that does the same, empty if there is none, and its `entry` for a value and a sample time; `order`: which comes
+    first where several act in a row, as in the model file."""
+
+    acts: Callable[[Array, Array, float], Array]
+    fitted: Callable[[Drive], Value]
+    size: tuple[str, str]
+    shown: Callable[[float], float] = float
+    law: str = ""
+    entry: Callable[[float, float], Entry] = lambda value, step: {}
+    tried: Callable[[Drive], Sequence[float]] | None = None
+    order: int = 0
+
+    def change(self, drive: Drive, value: float) -> float:
+        """Rms of what acts less what was recorded, as a share of the input's standard deviation."""
+        values = np.array([value])
+        moved = np.concatenate([self.acts(u[None, :], values, drive.step)[0] - u for u in drive.series])
+        return float(np.sqrt(np.mean(moved**2))) / drive.spread
+
+
+def lagging(x: Array, tau: float, step: float) -> Array:
+    """A signal [n] from 0, joined by straight lines, behind a first-order lag: exact, as the model file's own, so that no delay of half a
+    sample has to make up for it."""
+    a = np.exp(-step / tau)
+    before = tau / step - a / (1.0 - a)  # weight of the sample before
+    return lag(x + before * (np.concatenate([x[:1], x[:-1]]) - x), tau, step)
+
+
+def _amplified(u: Array, values: Array, step: float) -> Array:
+    return u * (1.0 + values[:, None])
+
+
+def _shifted(u: Array, values: Array, step: float) -> Array:
+    return u + values[:, None]
+
+
+def _lag(u: Array, values: Array, step: float) -> Array:
+    return np.array([x[0] + lagging(x - x[0], max(tau, 1e-3 * step), step) for x, tau in zip(u, values, strict=True)])
+
+
+def _dead(u: Array, values: Array, step: float) -> Array:
+    width = values[:, None]
+    return np.maximum(u - width, 0.0) + np.minimum(u + width, 0.0)
+
+
+def _saturated(u: Array, values: Array, step: float) -> Array:
+    limit = 1.0 / np.maximum(values[:, None], TINY)
+    return np.clip(u, -limit, limit)
+
+
+def _late(u: Array, values: Array, step: float) -> Array:
+    at = np.arange(u.shape[-1])
+    return np.array([np.interp(at - d, at, x) for x, d in zip(u, values / step, strict=True)])
+
+
+def _limited(u: Array, values: Array, step: float) -> Array:
+    """Behind a limit of the rate, and half a sample late as behind the lag that the model file has with it. Lanes that are alike, as most
+    are in finite differences, are computed once."""
+    known: dict[tuple[float, bytes], Array] = {}
+    for value, x in zip(values, u, strict=True):
+        if (key := (float(value), x.tobytes())) not in known:
+            known[key] = _followed(x, step * _inverse(float(value)))
+    return np.array([known[float(value), x.tobytes()] for value, x in zip(values, u, strict=True)])
+
+
+def _followed(x: Array, most: float) -> Array:
+    """A signal [n] that moves to the middle of each pair of samples of `x`, by `most` at most."""
+    now, found = float(x[0]), [float(x[0])]
+    for middle in (0.5 * (x[1:] + x[:-1])).tolist():
+        now += min(max(middle - now, -most), most)
+        found.append(now)
+    return np.array(found)
+
+
+def _inverse(value: float) -> float:
+    return float(1.0 / np.maximum(value, TINY))
+
+
+def _halves(most: float) -> list[float]:
+    """Values that are tried: the most, and by halves less."""
+    return [most * 0.5**k for k in range(5)]
+
+
+def _gain() -> Acting:
+    def entry(value: float, step: float) -> Entry:
+        return {"gain": ("gain", 1.0 + value, "1")}
+
+    return Acting(_amplified, lambda d: Value(0.0, 0.01, 0.3), ("gain", "1"), lambda v: 1.0 + v, "gain", entry, order=3)
+
+
+def _offset() -> Acting:
+    return Acting(_shifted, lambda d: Value(0.0, 0.01 * d.spread, d.spread), ("offset", ""), order=5)
+
+
+def _time(d: Drive) -> Value:
+    return Value(0.2 * d.step, 0.2 * d.update, 2.0 * d.update, 0.0)
+
+
+def _behind() -> Acting:
+    return Acting(_lag, _time, ("lag", "s"), law="lag", entry=lambda v, step: {"time": ("lag", v, "s")}, order=4)
+
+
+def _dead_zone() -> Acting:
+    def fitted(d: Drive) -> Value:
+        return Value(0.0, 0.05 * d.largest, 0.5 * d.largest, 0.0, d.largest)
+
+    def entry(value: float, step: float) -> Entry:
+        return {"width": ("width", value, "")}
+
+    return Acting(_dead, fitted, ("width", ""), law="dead_zone", entry=entry, tried=lambda d: _halves(0.5 * d.largest), order=1)
+
+
+def _saturation() -> Acting:
+    def fitted(d: Drive) -> Value:
+        return Value(0.0, 0.05 / d.largest, 2.0 / d.largest, 0.0)
+
+    def entry(value: float, step: float) -> Entry:
+        return {"limit": ("limit", _inverse(value), "")}
+
+    def tried(d: Drive) -> list[float]:
+        return [1.0 / (d.largest * (1.0 - cut)) for cut in _halves(0.75)]
+
+    return Acting(_saturated, fitted, ("limit", ""), _inverse, "saturation", entry, tried, order=1)
+
+
+def _slew_limit() -> Acting:
+    def fitted(d: Drive) -> Value:
+        return Value(0.0, 0.05 * d.period / d.largest, 2.0 * d.period / d.largest, 0.0)
+
+    def entry(value: float, step: float) -> Entry:
+        return {"rate": ("rate", _inverse(value), "/s"), "time": ("time", 0.5 * step, "s")}
+
+    def tried(d: Drive) -> list[float]:
+        return [max(time, d.step) / d.largest for time in _halves(2.0 * d.period)]
+
+    return Acting(_limited, fitted, ("rate", "/s"), _inverse, "slew_limit", entry, tried, order=2)
+
+
+ACTING: dict[str, Acting] = {
+    "input_gain": _gain(),
+    "input_offset": _offset(),
+    "input_delay": Acting(_late, _time, ("delay", "s")),
+    "input_lag": _behind(),
+    "input_dead_zone": _dead_zone(),
+    "input_saturation": _saturation(),
+    "input_slew_limit": _slew_limit(),
+}
