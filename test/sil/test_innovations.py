@@ -20,6 +20,7 @@ from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
 from penode_sil.diagnosis import driven, holding, plant, real, weighed
 from penode_sil.diagnosis.catalogue import FILES, drives
+from penode_sil.diagnosis.catalogue.acting import Drive
 from penode_sil.diagnosis.catalogue.form import Motion, Moved
 from penode_sil.diagnosis.evidence import bench, blocks
 from penode_sil.diagnosis.evidence.bench import with_tolerances
@@ -174,7 +175,7 @@ def test_forms_are_linear_in_their_gains(tmp_path):
     model, _ = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
     t = np.arange(4000) * 0.004
     s = 0.4 * np.sin(3.0 * t) + 0.1 * np.sin(11.0 * t)
-    motion = Motion.of([Moved(s, np.gradient(s, t), t)], 1.0)
+    motion = Motion.of([Moved(s, np.gradient(s, t), t, {"+ F_spring": np.abs(s)})], 1.0)
     kinds = set()
     for role, ends in (("force", ("arm", "ground")), ("body", ("arm", "ground")), ("tyre", ("arm", "z_road"))):
         place = plant.Place(ends, (("spring", 1),) if role != "body" else (), role)
@@ -185,7 +186,9 @@ def test_forms_are_linear_in_their_gains(tmp_path):
                     force = part.along(motion.parts[0])
                     assert force.shape == t.shape and np.isfinite(force).all() and np.any(force != 0.0), form
     assert kinds == {k for file in FILES for k in file.KINDS}
-    assert {f.kind for f in drives.inputs(model, 1)} | {f.kind for f in drives.sensors(model, 1)} == set(drives.KINDS) - {holding.KIND}
+    drive = Drive([s], 0.004, 0.04, 1.0)
+    channels = [*drives.inputs(model, 1), *drives.bent(model, 0, drive), *drives.sensors(model, 1)]
+    assert {f.kind for f in channels} == set(drives.KINDS) - {holding.KIND}
 
 
 def test_forces_follow_their_shapes(tmp_path):
