@@ -106,6 +106,13 @@ rigs: setup ## Real rigs in RIGS_DIR: names, hold-out before and after, what a p
 
 ##@ Packages and upkeep
 
+site: setup build/setup/docs ## The manual as HTML, into build/site; warnings are errors
+	$(Q)$(PYTHON) sil/manual/assemble.py build/manual
+	$(Q)rm -rf build/site
+	$(Q)build/docs/bin/python -m sphinx -q -W --keep-going -b html -d build/docs/doctrees build/manual build/site
+	$(Q)cp sil/manual/start.html build/site/index.html
+	@echo "build/site/index.html"
+
 dist: ## Packages for firmware, into build/dist: CMake, pkg-config, PlatformIO, Zephyr, CMSIS-Pack, one .c and one .h; no Python
 	$(Q)port/packages/dist.sh build/dist
 
@@ -115,7 +122,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run pythons test nightly prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table ablate rigs hidden-mechanisms dist structure clean
+.PHONY: help setup run pythons test nightly prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools
@@ -124,6 +131,7 @@ build/setup/pythons: requirements.txt pyproject.toml build/setup/python
 build/setup/rivals: test/diagnosis/rivals/requirements.txt build/setup/tools
 build/setup/rival_training: test/training/rivals/requirements.txt build/setup/tools
 build/setup/packages: test/packages/requirements.txt build/setup/tools
+build/setup/docs: sil/manual/requirements.txt build/setup/tools
 build/setup/%:
 	$(Q)test/setup.sh $*
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 #
-# setup.sh tools|python|pythons|unity|cmock|packages|proof|rivals|rival_training: one part of the set-up each; the Makefile calls it, once. All goes into build/
+# setup.sh tools|python|pythons|unity|cmock|packages|docs|proof|rivals|rival_training: one part of the set-up each; the Makefile calls it, once. All goes into build/
 # but the Debian packages of `tools` and `proof`. Quiet where there is nothing to do; one line that names the remedy where it cannot.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -123,6 +123,15 @@ packages() # what reads manifests of packages, in a place of its own
     python3 -m venv build/packages
     build/packages/bin/python -m pip install --quiet --disable-pip-version-check -r test/packages/requirements.txt \
         >build/setup/packages.log 2>&1 || give_up "pip failed, see build/setup/packages.log; is the package index reachable?"
+}
+
+docs() # Sphinx, in a place of its own, for `make site` only
+{
+    echo "setup: Sphinx into build/docs"
+    rm -rf build/docs
+    python3 -m venv build/docs
+    build/docs/bin/python -m pip install --quiet --disable-pip-version-check -r sil/manual/requirements.txt \
+        >build/setup/docs.log 2>&1 || give_up "pip failed, see build/setup/docs.log; is the package index reachable?"
 }
 
 rivals() # of the diagnosis, for `make campaign` only

@@ -11,6 +11,9 @@ from .form import Form, Motion, Part, Sizes
 
 KINDS = ("aerated_damper",)
 MEANING = {"aerated_damper": "A damper that has lost oil: after each reversal it has no force until the gas in it is pressed together."}
+PARAMETERS = {  # what each number of a report means
+    "aerated_damper": {"pocket": "travel from one end of the gas to the other, at the RMS rate"}
+}
 RIVALS = {
     (
         "aerated_damper",

@@ -12,6 +12,9 @@ from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("maxwell_bushing",)
 MEANING = {"maxwell_bushing": "Relaxation: an elastic force that a damper in series lets decay."}
+PARAMETERS = {  # what each number of a report means
+    "maxwell_bushing": {"stiffness": "of the spring in series", "relaxation_time": "damping over stiffness of the series"}
+}
 RIVALS = {("bouc_wen", "maxwell_bushing"): "several amplitudes at one frequency: hysteresis changes with amplitude, relaxation does not"}
 STRAIGHT = KINDS
 TIMES = (0.15, 0.6, 2.5)  # of s_rms/v_rms, which is the time of a radian

@@ -16,3 +16,4 @@ def kind(driving: bool, count: int) -> str:
 
 
 RIVALS = {("input_sign", "sensor_sign"): "push it by hand to the side that the sensor calls positive"}
+WHERE = {"swapped_channels": "two channels, their names joined by a comma"}

@@ -19,6 +19,16 @@ MEANING = {
     "quadratic_damper": "A damper whose damping grows with the rate.",
     "damper_fading": "A damper that loses damping while the recording goes on, as with heat.",
 }
+PARAMETERS = {  # what each number of a report means
+    "asymmetric_damper": {"rebound": "slope of the whole damper in rebound", "compression": "slope of the whole damper in compression"},
+    "degressive_damper": {
+        "knee": "rate of the bend",
+        "low_rate_damping": "slope of the whole damper below the knee",
+        "high_rate_damping": "slope of the whole damper above the knee",
+    },
+    "quadratic_damper": {"coefficient": "extra force coefficient v abs(v)"},
+    "damper_fading": {"loss": "share of the damping that is lost at the end of the first training recording"},
+}
 RIVALS = {
     ("degressive_damper", "quadratic_damper"): "rates over more than a decade",
     (

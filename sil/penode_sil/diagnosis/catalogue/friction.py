@@ -25,6 +25,15 @@ MEANING = {
     "position_dependent_friction": "Friction that is larger at one end of the travel than at the other, or at both than between.",
     "load_dependent_friction": "Friction that grows with the force that a bearing, a guide or a gear transmits.",
 }
+PARAMETERS = {  # what each number of a report means
+    "coulomb_friction": {"force": "level at high rate"},
+    "stribeck_friction": {
+        "breakaway": "level as the rate goes to 0",
+        "coulomb": "level at high rate",
+        "stribeck_rate": "rate at which the difference has fallen to 1/e",
+    },
+    "bouc_wen": {"force": "largest hysteretic force", "yield_deflection": "force over the stiffness of small loops"},
+}
 RIVALS = {
     ("position_dependent_friction", "coulomb_friction"): "the same stroke about two places of the travel",
     ("load_dependent_friction", "coulomb_friction"): "the same motion under two loads",

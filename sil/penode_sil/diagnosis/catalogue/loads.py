@@ -11,6 +11,11 @@ from .form import Form, Motion, Part, Sizes
 
 KINDS = ("constant_force",)
 MEANING = {"constant_force": "A constant force that the model does not have."}
+PARAMETERS = {  # what each number of a report means
+    "constant_force": {
+        "force": "on the body, in the direction of its position; under prescribed motion: what is added to the measured force"
+    }
+}
 RIVALS = {
     ("constant_force", "sensor_bias"): "put the load on or take it off during the recording: only that transient tells them apart",
     ("constant_force", "input_offset"): "switch the actuator off: a load remains, an offset of the input does not",

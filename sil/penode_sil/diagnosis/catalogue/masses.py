@@ -14,6 +14,13 @@ from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("hidden_resonance",)
 MEANING = {"hidden_resonance": "A mass on a spring of its own that the model does not have."}
+PARAMETERS = {  # what each number of a report means
+    "hidden_resonance": {
+        "mass": "of the hidden body",
+        "frequency": "of the hidden body while its support is held still",
+        "damping_ratio": "of the hidden body",
+    }
+}
 RATIOS = (0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.2, 3.2, 5.0)  # of v_rms/s_rms, to which its frequency is tried
 LOSS = 0.1  # damping ratio at first
 

@@ -12,3 +12,18 @@ MEANING = {
     "integration_error": "The physics is right; the deployed step integrates it too coarsely.",
     "outside_taxonomy": "Something is left that noise cannot make and that no kind on the list explains.",
 }
+PARAMETERS = {  # what each number of a report means
+    "wrong_parameter": {"its name": "value in the recordings, in its own unit"},
+    "differs_between_recordings": {"its name": "a value for each recording, in its own unit"},
+    "sensor_bias": {"bias": "added to the signal, in the sensor's unit"},
+    "sensor_clipping": {"limit": "largest magnitude, in the sensor's unit"},
+    "sensor_dropout": {"share": "of the samples that are lost"},
+    "integration_error": {"rms_error_SENSOR": "of each sensor that the step misses"},
+}
+WHERE = {
+    "wrong_parameter": "a parameter",
+    "differs_between_recordings": "a parameter",
+    "network_extrapolation": "an element with a network",
+    "integration_error": "the model",
+    "outside_taxonomy": "none",
+}

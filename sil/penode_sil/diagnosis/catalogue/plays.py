@@ -12,6 +12,9 @@ from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("backlash",)
 MEANING = {"backlash": "Play: within a gap the element transmits no force."}
+PARAMETERS = {  # what each number of a report means
+    "backlash": {"gap": "the whole play, from contact to contact"}
+}
 STRAIGHT = REVERSING = KINDS
 GAPS = (0.05, 0.2, 0.6)  # of the rms deflection
 

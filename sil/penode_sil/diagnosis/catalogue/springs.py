@@ -15,6 +15,11 @@ MEANING = {
     "asymmetric_spring": "A spring that is stiffer on one side than on the other.",
     "bump_stop": "A stop: beyond a gap an extra spring comes into contact.",
 }
+PARAMETERS = {  # what each number of a report means
+    "cubic_spring": {"cubic": "extra force cubic s^3", "bend": "extra force bend s abs(s)"},
+    "asymmetric_spring": {"difference": "stiffness in compression less that in rebound"},
+    "bump_stop": {"gap": "travel to the contact, positive on either side", "stiffness": "in contact, in addition to the spring"},
+}
 RIVALS = {
     ("cubic_spring", "bump_stop"): "broadband excitation, which has small and large amplitudes, instead of a chirp of constant amplitude"
 }

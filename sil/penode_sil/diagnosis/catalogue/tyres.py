@@ -17,6 +17,11 @@ MEANING = {
     "tyre_liftoff": "The tyre leaves the road: it cannot pull.",
     "tyre_nonlinear": "The tyre's stiffness changes with its load.",
 }
+PARAMETERS = {  # what each number of a report means
+    "tyre_damping": {"damping": "of the tyre"},
+    "tyre_liftoff": {"preload": "load of the tyre at zero deflection, the most that it can lose"},
+    "tyre_nonlinear": {"quadratic": "extra load quadratic s^2 when pressed in by s"},
+}
 RIVALS = {
     ("tyre_nonlinear", "wrong_parameter"): "two amplitudes of a rough road, up to large tyre loads; no chirp",
     ("tyre_nonlinear", "tyre_liftoff"): "a rough road that unloads the tyre for moments, and a smooth one that does not",

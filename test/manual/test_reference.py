@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The generated reference has every cause, make target and C function; those are counted by other means than the pages are made by."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from pathlib import Path
+
+import c_api
+import causes
+import jsonschema
+import pytest
+import schemas
+import targets
+
+from penode_sil.diagnosis import catalogue
+from penode_sil.errors import RecordingError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def of_causes() -> str:
+    return causes.page()
+
+
+@pytest.mark.parametrize("kind", catalogue.MEANING)
+def test_every_cause(kind: str, of_causes: str) -> None:
+    section = re.search(rf"^## {kind}\n(.*?)(?=^## |\Z)", of_causes, re.MULTILINE | re.DOTALL)
+    assert section and catalogue.MEANING[kind] in section[1]
+    assert re.search(r"^Where it can be: \w.*\.$", section[1], re.MULTILINE), "nothing says where it can be: WHERE of its file"
+    assert f"| [`{kind}`](#{kind}) | {catalogue.MEANING[kind]} |" in of_causes
+    for pair in catalogue.RIVALS:
+        assert kind not in pair or all(f"](#{other})" in section[1] for other in pair - {kind})
+
+
+@pytest.mark.parametrize("kind", catalogue.OF)
+def test_every_parameter_is_explained(kind: str) -> None:
+    means, known = causes.meanings(), causes.known()[kind]
+    assert known.units and set(means.get(kind, {})) == set(known.units), "say what each means in PARAMETERS of its file"
+
+
+def test_kinds_of_the_campaigns_are_kinds() -> None:
+    found = causes.rates()
+    assert len(found) >= 20 and set(found) <= set(catalogue.MEANING)
+    assert all(0 <= right <= of for right, of in found.values())
+
+
+def test_every_make_target() -> None:
+    files = [ROOT / "Makefile", *ROOT.glob("test/**/*.mk")]
+    documented = {m for f in files for m in re.findall(r"^([a-z][a-z-]*):[^=\n]*## ", f.read_text(encoding="utf-8"), re.MULTILINE)}
+    page = targets.page()
+    assert len(documented) > 30
+    assert documented == set(re.findall(r"^\| `make ([a-z-]+)` \| \S", page, re.MULTILINE))
+
+
+def test_every_function_of_the_headers(tmp_path: Path) -> None:
+    """As gcc lists them."""
+    own = sorted(p.name for p in (ROOT / "inc/penode").glob("*.h"))
+    (tmp_path / "all.c").write_text("".join(f'#include "penode/{name}"\n' for name in own) + '#include "nqvm.h"\n')
+    include = [f"-I{ROOT / name}" for name in ("inc", "port/gnu", "gen/nqvm/c")]
+    subprocess.run(["gcc", "-std=c99", *include, "-fsyntax-only", "-aux-info", tmp_path / "list", tmp_path / "all.c"], check=True)
+    line = re.compile(r"^/\* \S*?((?:inc/penode|nqvm/c)/\w+\.h):\d+:\w+ \*/ [^(]*?(\w+) \(", re.MULTILINE)
+    listed = {(Path(m[1]).name, m[2]) for m in line.finditer((tmp_path / "list").read_text())}
+    page = c_api.page()
+    shown = set()
+    for part in re.split(r"^## ", page, flags=re.MULTILINE)[1:]:
+        shown |= {(Path(part.split("\n")[0]).name, name) for name in re.findall(r"^### (\w+)$", part, re.MULTILINE)}
+    assert len(listed) > 150
+    assert shown == listed
+
+
+@pytest.mark.parametrize("name", schemas.NAMES)
+def test_schemas_are_schemas(name: str) -> None:
+    found = schemas.schema(name)
+    jsonschema.Draft202012Validator.check_schema(found)
+    assert re.fullmatch(rf"penode:{name}:\d+\.\d+\.\d+", found["$id"])
+    assert found["$id"] in schemas.page()
+
+
+def test_an_error_fits_its_schema() -> None:
+    written = json.loads(json.dumps(RecordingError("r.csv:3: channel foot is empty; cut it", channel="foot").as_json()))
+    jsonschema.validate(written, schemas.schema("error"))
+    del written["error"]["code"]
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(written, schemas.schema("error"))

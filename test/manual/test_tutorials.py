@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The tutorials, command by command: each prints what the page says, each file begins as the page says."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import jsonschema
+import pytest
+import schemas
+from replay import ROOT, STEP, Step, replay
+
+TUTORIALS = ROOT / "sil/manual/tutorials"
+MOST_COMMANDS = 8  # from a folder with a recording to a named cause
+
+
+@pytest.fixture(scope="module", params=sorted(p.stem for p in TUTORIALS.glob("*.md")))
+def done(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Step]]:
+    """A tutorial that was followed: its folder, and its steps."""
+    folder = tmp_path_factory.mktemp(request.param)
+    return folder, list(replay((TUTORIALS / f"{request.param}.md").read_text(encoding="utf-8"), folder))
+
+
+def test_all_is_as_the_page_says(done: tuple[Path, list[Step]]) -> None:
+    assert len(done[1]) >= 4
+    for step in done[1]:
+        assert step.same, f"{step.what}: the page has\n{step.expected}\nbut there is\n{step.found}\nreplay.py --take-over rewrites the page"
+
+
+def test_what_was_written_fits_the_schema(done: tuple[Path, list[Step]]) -> None:
+    file = done[0] / "answer/diagnosis.json"
+    if not file.exists():
+        pytest.skip("this tutorial has no diagnosis")
+    jsonschema.validate(json.loads(file.read_text(encoding="utf-8")), schemas.schema("diagnosis"))
+
+
+@pytest.mark.parametrize("page", sorted(p.name for p in TUTORIALS.glob("*.md")))
+def test_nothing_is_left_out(page: str) -> None:
+    """Each command and each fence of a page is a step, and the way to the cause is short."""
+    text = (TUTORIALS / page).read_text(encoding="utf-8")
+    steps = list(STEP.finditer(text))
+    assert sum(bool(m["command"]) for m in steps) == len(re.findall(r"^    (?:penode|python3) ", text, re.MULTILINE))
+    assert sum(bool(m["name"] or m["printed"] or m["holds"]) for m in steps) == text.count("\n```\n") == text.count("```") / 2
+    before = text.split("The cause is named")[0]
+    assert len(re.findall(r"^    (?:penode|python3|pip) ", before, re.MULTILINE)) <= MOST_COMMANDS
+
+
+def test_a_changed_output_is_noticed() -> None:
+    step = Step("penode x", (0, 0), "good, N s\nforce 9.01 N\n", "good, 3.2 s\nforce 9.01 N\n")
+    assert step.same
+    assert not Step("penode x", (0, 0), step.expected, step.found.replace("9.01", "9.02")).same
+    assert not Step("penode x", (0, 0), step.expected, step.found + "more\n").same
+    assert Step("a.toml ...", (0, 0), "[model]\n", "[model]\nname\n").same
