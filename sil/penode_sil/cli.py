@@ -25,7 +25,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "import": ("import_:import_", "Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits;"),
     "inspect": (
         "inspect:inspect",
-        "List the channels of the recording FILE with units, clock and quality; and which signals of MODEL they are.",
+        "List the channels of the recording FILE with units, clock and quality, and match them to the signals of MODEL.",
     ),
     "measure": ("measure:measure", "Record signals of a controller that runs, a sample a step, with units and its own time stamps."),
     "serve": ("serve:serve", "Run the compiled model file MODEL in real time, for calibration tools to connect to by XCP."),

@@ -26,7 +26,7 @@ def problems(environment: Mapping[str, str]) -> list[str]:
     found = []
     stamp = environment.get("SOURCE_DATE_EPOCH", "0")
     if not (stamp.isascii() and stamp.isdigit() and len(stamp) <= len(str(LAST)) and int(stamp) <= LAST):
-        found.append(f"SOURCE_DATE_EPOCH: '{stamp[:40]}' is no time in seconds; remove it or give a whole number")
+        found.append(f"SOURCE_DATE_EPOCH: '{stamp[:40]}' is not a time in seconds; remove it or give a whole number")
     folder = environment.get("PENODE_BUILD", "")
     if folder and Path(folder).exists() and not Path(folder).is_dir():
         found.append(f"PENODE_BUILD: {folder} is a file; name a directory, or remove it")

@@ -72,7 +72,7 @@ class _Table:
         self.asked: set[str] = set()
         self.data: dict[str, object] = data if isinstance(data, dict) else {}
         if not isinstance(data, dict):
-            self.complain("", "is no table", f"write [{key}]")
+            self.complain("", "is not a table", f"write [{key}]")
 
     def complain(self, key: str, what: str, remedy: str) -> None:
         place = ".".join(part for part in (self.key, key) if part)
@@ -114,7 +114,7 @@ class _Table:
         if value is None:
             return ""
         if not isinstance(value, str):
-            self.complain(key, f"{value!r} is no text", "put it in quotes")
+            self.complain(key, f"{value!r} is not a text", "put it in quotes")
             return ""
         if choices and value not in choices:
             self.complain(key, f'"{value}" is not known', hint(value, choices))
@@ -125,7 +125,7 @@ class _Table:
         value = self.raw(key, default, str(minimum))
         if isinstance(value, bool) or not isinstance(value, int) or value < minimum:
             if value is not None:
-                self.complain(key, f"{value!r} is no whole number of at least {minimum}", "correct it")
+                self.complain(key, f"{value!r} is not a whole number of at least {minimum}", "correct it")
             return minimum
         return value
 
@@ -145,7 +145,7 @@ class _Table:
         value = self.raw(key, [])
         place = ".".join(part for part in (self.key, key) if part)
         if not isinstance(value, list):
-            self.complain(key, "is no list of tables", f"write [[{place}]]")
+            self.complain(key, "is not a list of tables", f"write [[{place}]]")
             return []
         return [_Table(item, f"{place}[{n}]", self.path, self.problems) for n, item in enumerate(value, start=1)]
 
@@ -305,7 +305,7 @@ def load(path: Path, model: Model, set_length: int) -> Scenario:
         raise ScenarioError(f"{path}: {exc.strerror or exc}; name a scenario file that can be read") from exc
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as exc:
         found = re.search(r"at line (\d+)", str(exc))
-        raise ScenarioError(f"{path}: it is no TOML text: {exc}; correct it there", line=int(found[1]) if found else None) from exc
+        raise ScenarioError(f"{path}: it is not valid TOML: {exc}; correct it there", line=int(found[1]) if found else None) from exc
     problems: list[str] = []
     table = _Table(data, "", path, problems)
     title = table.text("title", path.stem)

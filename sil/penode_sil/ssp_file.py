@@ -57,9 +57,7 @@ def read(path: Path) -> System:
     except OSError as error:
         raise ModelError([f"{path}: {error.strerror or error}; name a file that can be read"]) from None
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
-        raise ModelError(
-            [f"{path}: no SSP that can be read: {' '.join(str(error).split()) or type(error).__name__}; export it again"]
-        ) from None
+        raise ModelError([f"{path}: not a readable SSP: {' '.join(str(error).split()) or type(error).__name__}; export it again"]) from None
 
 
 class _Reader:
@@ -83,7 +81,7 @@ class _Reader:
         try:
             root = ElementTree.fromstring(self.data(name, named_by))
         except (ElementTree.ParseError, LookupError) as error:
-            raise self.error(name, f"no XML that can be read: {error}", "export it again") from None
+            raise self.error(name, f"not readable XML: {error}", "export it again") from None
         space, _, local = tag.partition(":")
         if root.tag != f"{{{_SPACE[space]}}}{local}":
             raise self.error(name, f"its root is {root.tag!r}, not {local} of {_SPACE[space]}", "name another file")
@@ -99,7 +97,7 @@ class _Reader:
         try:
             value = words[text] if text in words else float(text)
         except ValueError:
-            raise self.error(where, f"{text[:40]!r} is no number", "mend it") from None
+            raise self.error(where, f"{text[:40]!r} is not a number", "mend it") from None
         if not math.isfinite(value):
             raise self.error(where, f"{text[:40]!r} is not finite", "mend it")
         return value

@@ -225,7 +225,7 @@ def test_the_same_bytes_from_the_command_line(nqvm: Any, efmu: dict[str, bytes],
     assert efmu_manifest.time_stamp() == "2026-01-01T00:00:00Z"
     for wrong in ("soon", "1e9", str(10**30)):
         monkeypatch.setenv("SOURCE_DATE_EPOCH", wrong)
-        with pytest.raises(exports.ExportError, match=f"SOURCE_DATE_EPOCH: '{wrong}' is no time in seconds"):
+        with pytest.raises(exports.ExportError, match=f"SOURCE_DATE_EPOCH: '{wrong}' is not a time in seconds"):
             export(nqvm, tmp_path)
 
 

@@ -179,7 +179,7 @@ def changed(path: Path, to: Path, name: str, *swap: tuple[str, str]) -> Path:
 def test_what_is_wrong_in_an_ssp_is_one_line(ssp: Path, tmp_path: Path) -> None:
     to = tmp_path / "wrong.ssp"
     for name, swap, line in (
-        ("extra/penode/schedule.xml", ('time="1.0"', 'time="soon"'), "extra/penode/schedule.xml: 'soon' is no number; mend it"),
+        ("extra/penode/schedule.xml", ('time="1.0"', 'time="soon"'), "extra/penode/schedule.xml: 'soon' is not a number; mend it"),
         (
             "extra/penode/schedule.xml",
             ('time="1.0"', 'time="9"'),
@@ -200,7 +200,7 @@ def test_what_is_wrong_in_an_ssp_is_one_line(ssp: Path, tmp_path: Path) -> None:
             ('version="1.0">', 'version="2.0">'),
             "extra/penode/schedule.xml: version 2.0; this player reads version 1",
         ),
-        ("SystemStructure.ssd", ("<ssd:Component ", "<ssd:Components "), "SystemStructure.ssd: no XML that can be read: mismatched tag"),
+        ("SystemStructure.ssd", ("<ssd:Component ", "<ssd:Components "), "SystemStructure.ssd: not readable XML: mismatched tag"),
         ("SystemStructure.ssd", ('source="resources/nqvm.fmu"', ""), "SystemStructure.ssd: Component has no attribute source; add it"),
     ):
         with pytest.raises(UserError) as found:
@@ -297,7 +297,7 @@ def test_tables_and_options_that_do_not_fit_are_one_line(ssp: Path, tmp_path: Pa
     record, output = tmp_path / "r.csv", tmp_path / "o.csv"
     for text, part in (
         ("", "it is empty"),
-        ("time [s],z_road [m]\n0,a\n1,0\n", 'channel z_road: "a" is no number'),
+        ("time [s],z_road [m]\n0,a\n1,0\n", 'channel z_road: "a" is not a number'),
         ("time [s],z_road [m]\n0,0\n0,0\n", "has the same value as the row before; remove"),
         ("time [s],z_road [m]\n0,1\n1\n", "1 values for 2 channels"),
         ("time [s],z_road\n0,1\n1,1\n", 'channel z_road has no unit; write "z_road [m]" in the header'),

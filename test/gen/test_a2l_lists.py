@@ -164,5 +164,5 @@ def test_period_of_the_event_is_exact_or_not_stated(scaled: tuple[penode_gen.Mod
     ):
         assert a2l._cycle(seconds) == coded
     for seconds in (1.0 / 3000.0, 1e-7):
-        with pytest.raises(UserError, match="is no whole number of nanoseconds"):
+        with pytest.raises(UserError, match="is not a whole number of nanoseconds"):
             virtual.period(dataclasses.replace(model, sample_time=seconds))

@@ -232,7 +232,7 @@ def test_json_needs_nothing_but_layers(tmp_path: Path) -> None:
         ([], "the file", "must be an object"),
         ("{", "not JSON", "Expecting"),
         ('{"layers": [], "layers": []}', "not JSON", "'layers' stands twice"),
-        ('{"layers": NaN}', "not JSON", "NaN is no number"),
+        ('{"layers": NaN}', "not JSON", "NaN is not a number"),
         ('{"layers": [{"activation": "relu", "weights": [[1e999]], "bias": [0]}]}', r"weights\[0\]\[0\]", "too large"),
         ("[" * 100_000, "not JSON", "recursion"),
     ],

@@ -121,7 +121,7 @@ def test_what_has_no_name_is_taken_by_a_network_without_one(tmp_path, vehicle):
     _, found = diagnosed(tmp_path, MODEL, force) if vehicle else moved(tmp_path, force)
     assert (found.verdict, [c.kind for c in found.causes]) == ("unexplained", ["outside_taxonomy"])
     assert "nameless_k1*tanh(" in (tmp_path / "found" / "model_extended.toml").read_text()
-    assert any("has no name" in note for note in found.notes)
+    assert any("without a name" in note for note in found.notes)
     for gain in found.gain.values():
         assert gain.after_rmse < 0.5 * gain.before_rmse
 

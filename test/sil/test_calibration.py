@@ -218,7 +218,7 @@ def test_compare_names_sets_and_values() -> None:
 def test_nobody_answers_in_one_line() -> None:
     with pytest.raises(UserError, match="nothing answers there"), links.connected(address.parse("tcp:127.0.0.1:1")):
         pass
-    with pytest.raises(UserError, match="is no address"):
+    with pytest.raises(UserError, match="is not an address"):
         address.parse("tcp:nowhere")
     for kind in ("tcp", "udp"):
         with pytest.raises(UserError, match="cannot be opened"), links.connected(address.parse(f"{kind}:nowhere.invalid:5555")):

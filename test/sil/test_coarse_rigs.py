@@ -124,7 +124,9 @@ def test_a_model_that_is_right_but_guessed(tmp_path, penode):
     sensor = 'x = { value = "x", unit = "m", noise = 2e-5 }'
     found = diagnosed(tmp_path, penode, file(5, {"m": (3, "kg"), "d": (5, "N*s/m"), "k": (1500, "N/m")}, sensor=sensor), records)
     assert found["verdict"] == "no_discrepancy" and not found["causes"]
-    assert any(re.fullmatch(r"as fitted, for the file only guesses: m = (2|2\.00\d|1\.99\d) kg \+- .*", note) for note in found["notes"])
+    assert any(
+        re.fullmatch(r"fitted, because the file gives only a guess: m = (2|2\.00\d|1\.99\d) kg \+- .*", note) for note in found["notes"]
+    )
     assert found["advice"][0].startswith("use model_extended.toml")
     assert found["gain"]["x"]["after_rmse"] < 1.05 * 2e-5
 

@@ -146,14 +146,14 @@ def test_what_cannot_be_a_recording_of_the_model_is_refused(diagnose, tmp_path):
     (line,) = diagnose({name: values[:10] for name, values in columns.items()})
     assert "its 10 samples of 2 ms are too few; record at least 100" in line
     lines = diagnose(columns | dict.fromkeys(NOISE, np.ones(SAMPLES)))
-    assert "no sensor has 100 sound samples" in lines[0] and sum("does not change" in line for line in lines) == 3
+    assert "no sensor has 100 valid samples" in lines[0] and sum("does not change" in line for line in lines) == 3
     short = write(tmp_path / "h.csv", {name: values[:50] for name, values in columns.items()})
     (line,) = diagnose(columns, "--holdout", short)
     assert "h.csv: its 50 samples of 2 ms are too few; record at least 100" in line
     broken = tmp_path / "b.csv"
     broken.write_text("time [s],z_road [m]\n0,nothing\n")
     line, rows = diagnose(broken)
-    assert 'b.csv:2: channel z_road: "nothing" is no number; correct the cell' in line
+    assert 'b.csv:2: channel z_road: "nothing" is not a number; correct the cell' in line
     assert "it has 1 rows with a time of their own" in rows
 
 
@@ -167,7 +167,7 @@ def test_a_truncated_mdf_file_is_refused(diagnose, tmp_path):
     for share in (0.1, 0.5, 0.9):
         (tmp_path / "cut.mf4").write_bytes(content[: int(share * len(content))])
         (line,) = diagnose(tmp_path / "cut.mf4")
-        assert "cut.mf4: " in line and ("no sound MDF" in line or "too few" in line), line
+        assert "cut.mf4: " in line and ("not a valid MDF" in line or "too few" in line), line
 
 
 FOREIGN = {

@@ -25,7 +25,7 @@ def test_a_time_that_is_none_is_a_line_of_every_command() -> None:
     """numpy alone would end in a traceback; seeded: it does where the module is passed over."""
     done = called(SOURCE_DATE_EPOCH="")
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "penode: SOURCE_DATE_EPOCH: '' is no time in seconds; remove it or give a whole number\n"
+    assert done.stderr == "penode: SOURCE_DATE_EPOCH: '' is not a time in seconds; remove it or give a whole number\n"
     module = "sys.modules['penode_sil.environment'] = types.ModuleType('penode_sil.environment')"
     code = f"import sys, types; {module}; import penode_sil.simulate"
     unguarded = subprocess.run([sys.executable, "-c", code], env=os.environ | {"SOURCE_DATE_EPOCH": ""}, capture_output=True, text=True)

@@ -58,7 +58,7 @@ def test_motion_is_learnt_from_and_the_rest_is_tested_on():
     assert parts == list(range(1, len(parts) + 1))  # their titles are keys
     said = train[0].quality.problems
     assert len(said) == 2
-    assert f"of {m.time.size} samples are learnt from" in said[0]
+    assert f"of {m.time.size} samples are used for training" in said[0]
     assert "not learnt from are tested on" in said[1]
 
 

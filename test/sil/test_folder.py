@@ -90,7 +90,7 @@ def test_each_recording_has_its_own_answer(alone, place):
     (cause,) = rows[0].causes
     assert (cause["kind"], cause["where"]) == ("coulomb_friction", "damper")
     assert cause["parameters"]["force"]["value"] == pytest.approx(FORCE, rel=0.02)  # 2 N in 2500 samples: 0.1 %; form 1 %
-    assert re.fullmatch(rf"{re.escape(rows[1].recording)}: it is no sound MDF file \(.*\); write it anew", rows[1].error)
+    assert re.fullmatch(rf"{re.escape(rows[1].recording)}: it is not a valid MDF file \(.*\); export it again", rows[1].error)
     for row in (rows[0], rows[2]):
         whole = json.loads((output / row.folder / "diagnosis.json").read_text())
         assert row.diagnosis == {key: whole[key] for key in table.KEPT} and (output / row.folder / "report.html").exists()
@@ -199,7 +199,7 @@ def penode(monkeypatch, capsys):
 def test_the_command_prints_the_table_and_ends_with_2_if_one_failed(place, penode, tmp_path):
     code, out, lines = penode(place / "model.toml", "--data", place / "data", "-o", tmp_path / "out", "--jobs", 2)
     assert code == 2 and "coulomb_friction" in out and len(lines) == 1  # no bar in a pipe
-    assert lines[0].startswith(f"penode: {place / 'data' / 'b broken.MF4'}: it is no sound MDF file")
+    assert lines[0].startswith(f"penode: {place / 'data' / 'b broken.MF4'}: it is not a valid MDF file")
     files = [place / "data" / name for name in ("c sound.csv", "a friction.csv")]
     code, out, lines = penode(place / "model.toml", "--data", *files, "--each", "-o", tmp_path / "out", "--resume", "--json")
     assert code == 0 and lines == []
@@ -217,7 +217,7 @@ def test_what_cannot_begin_is_said_in_one_line_and_leaves_nothing(place, penode,
     data = ("--data", place / "data")
     for words, text in (
         (("--data", tmp_path / "empty"), "empty: there is no recording in this folder; put .csv, .mf4, .mdf files into it"),
-        ((*data, "--holdout", broken), "b broken.MF4: it is no sound MDF file"),
+        ((*data, "--holdout", broken), "b broken.MF4: it is not a valid MDF file"),
         ((*data, "--jobs", 2, "--scheduler", "tcp://127.0.0.1:1"), "--jobs: the cluster of --scheduler has its own"),
         ((*data, "--scheduler", "tcp://127.0.0.1:1"), "--scheduler tcp://127.0.0.1:1: no Dask scheduler answers there; start"),
         ((*data, "--scheduler", "somewhere"), "--scheduler somewhere: no Dask scheduler answers there; start"),

@@ -116,7 +116,7 @@ def test_unsorted_and_repeated_times(record, oscillator):
     assert one.z["a"] == pytest.approx(A, rel=1e-8, abs=1e-12)
     assert re.search(r"r.csv:702: channel time has the same value as the row before; the first", one.quality.problems[0])
     (line,) = problems(record(rows=np.r_[0:N, 0:N]), oscillator)
-    assert "split the recording where its clock starts anew" in line
+    assert "split the recording where its clock restarts" in line
 
 
 def test_times_without_a_value(record, oscillator):
@@ -237,9 +237,9 @@ def test_what_cannot_be_used_is_refused(record, oscillator):
         with np.errstate(over="raise"):
             (line,) = problems(record(time=np.where(np.arange(N) < N - 1, T, end)), oscillator)
         assert "it has far longer gaps than samples" in line
-    assert any("channel foot has hardly a sound sample" in line for line in problems(record(foot=np.nan * T), oscillator))
+    assert any("channel foot has almost no valid sample" in line for line in problems(record(foot=np.nan * T), oscillator))
     lines = problems(record(a=np.full(N, 3.0), z=np.full(N, np.nan)), oscillator)
-    assert "no sensor has 100 sound samples" in lines[0] and "channel a does not change; it is left out" in "\n".join(lines)
+    assert "no sensor has 100 valid samples" in lines[0] and "channel a does not change; it is left out" in "\n".join(lines)
     both = problems([record("1.csv", foot=None), record("2.csv", rows=slice(10))], oscillator)
     assert len(both) == 2  # all recordings at once
     (line,) = problems(record(), oscillator, "feet=foot")

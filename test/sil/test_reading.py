@@ -118,7 +118,7 @@ def channel(path, name, unit, *options):
 def test_a_cell_that_nobody_needs_refuses_nothing(tmp_path):
     path = write(tmp_path, "time [s],x [m],y [m],q [wug],q [V],\n0,1,oops,2,RUN,\n1,2,3,,,\n2,3\n")
     assert channel(path, "x", "m").tolist() == [1.0, 2.0, 3.0]
-    with pytest.raises(UserError, match=r':2: channel y: "oops" is no number; correct the cell'):
+    with pytest.raises(UserError, match=r':2: channel y: "oops" is not a number; correct the cell'):
         channel(path, "y", "m")
 
 
@@ -192,7 +192,7 @@ def test_signs_for_missing_values_and_other_notations(tmp_path, text, first):
 def test_decimal_signs_are_not_mixed(tmp_path):
     path = write(tmp_path, "time [s];x [m];y [m]\n" + "".join(f"{k}.5;{k}.25;1,{k}00\n" for k in range(5)))
     assert channel(path, "x", "m")[1] == 1.25
-    with pytest.raises(UserError, match=r':2: channel y: "1,000" is no number beside decimal points'):
+    with pytest.raises(UserError, match=r':2: channel y: "1,000" is not a number beside decimal points'):
         channel(path, "y", "m")
 
 

@@ -45,7 +45,7 @@ WRONG = [
     ("time [s],z\n0,0\n1,1\n", r':1: channel z has no unit; write "z \[m\]"'),
     ("time [s],z [kg]\n0,0\n1,1\n", r":1: channel z: kg cannot be turned into m; give it in m"),
     ("time [s],z [wug]\n0,0\n1,1\n", r":1: channel z: .*wug"),
-    ("time [s],z [m]\n0,0\n1,x\n", r':3: channel z: "x" is no number; correct the cell'),
+    ("time [s],z [m]\n0,0\n1,x\n", r':3: channel z: "x" is not a number; correct the cell'),
     ("time [s],z [m]\n0,0\n1\n", r":3: 1 values for 2 channels, none for z; give one value a channel"),
     ("time [s],z [m]\n0,0\n1,nan\n2,\n3,inf\n", r":3: channel z has no finite value there \(and in 2 more rows\); cut"),
     ("time [s],z [m]\n0,0\n\nnan,0\n2,0\n", r":4: channel time has no finite value there; cut"),
@@ -143,7 +143,7 @@ DOUBTS = [
     ("time [s],x_b\n0,1\n1,4\n", r"no channel x; "),  # bytes are no length
     ("time [s],x_in\n0,1\n1,4\n", r"no channel x; "),  # inner or inch?
     ("time [s],x\n0,1\n1,4\n", r'channel x has no unit; write "x \[m\]"'),
-    ("time [s];x [m]\n0;1.00,5\n1;4\n", r':2: channel x: "1.00,5" is no number'),
+    ("time [s];x [m]\n0;1.00,5\n1;4\n", r':2: channel x: "1.00,5" is not a number'),
     ("time [s],x [g]\n0,1\n1,4\n", r":1: channel x: g cannot be turned into m"),
 ]
 
@@ -237,8 +237,8 @@ def test_broken_mdf_gives_one_line(mdf, quick, tmp_path):
     assert "channel a is there 2 times in one raster; say --channel" in problem(twice)
     for cut in (100, len(good.read_bytes()) // 2):
         (tmp_path / "cut.mf4").write_bytes(good.read_bytes()[:cut])
-        assert "it is no sound MDF file" in problem(tmp_path / "cut.mf4")
-    assert "it is no sound MDF file" in problem(write(tmp_path, "time [s]\n").rename(tmp_path / "text.mf4"))
+        assert "it is not a valid MDF file" in problem(tmp_path / "cut.mf4")
+    assert "it is not a valid MDF file" in problem(write(tmp_path, "time [s]\n").rename(tmp_path / "text.mf4"))
     assert "No such file" in problem(tmp_path / "none.mf4")
 
 

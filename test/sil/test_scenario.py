@@ -117,7 +117,7 @@ WRONG = [
     ('kind = "road"', 'kind = "raod"', r'input.foot.terms\[3\].kind: "raod" is not known; did you mean "road"\?'),
     ('class = "B"', 'class = "X"', r'terms\[3\].class: "X" is not known; use one of: A, B, C, D'),
     ('speed = "72 km/h"', 'speed = "72 km"', r"terms\[3\].speed: .*; give it in m/s"),
-    ("seed = 4", "seed = -4", r"terms\[3\].seed: -4 is no whole number of at least 0"),
+    ("seed = 4", "seed = -4", r"terms\[3\].seed: -4 is not a whole number of at least 0"),
     ("seed = 4", "sead = 4", r'terms\[3\].sead: is not known here; did you mean "seed"\?'),
     ('amplitude = "1 cm"', "amplitude = 1", r"terms\[2\].amplitude: .*plain number.*mm"),
     ('amplitude = "1 cm"', 'amplitude = "one cm"', r"terms\[2\].amplitude: .*number and its unit"),
@@ -132,7 +132,7 @@ WRONG = [
     ('time = "1500 ms"', 'time = "500 ms"', r"exchange\[2\].time: staging would begin at 0.5 s, before 1.001 s"),
     ('how = "select"', 'how = "rollback"\nchunk = 3', r"exchange\[1\].how: there is nothing to roll back to"),
     ("hold = true", "hold = 1", r"exchange\[3\].hold: 1 is neither true nor false; write true or false"),
-    ("chunk = 1", "chunk = 0", r"exchange\[3\].chunk: 0 is no whole number of at least 1"),
+    ("chunk = 1", "chunk = 0", r"exchange\[3\].chunk: 0 is not a whole number of at least 1"),
 ]
 
 
@@ -163,7 +163,7 @@ def test_input_without_a_signal_is_named(tmp_path, oscillator):
 def test_missing_and_broken_files(tmp_path, oscillator):
     with pytest.raises(UserError, match=r"No such file.*; name a scenario file"):
         scenarios.load(tmp_path / "none.toml", oscillator, 1)
-    with pytest.raises(UserError, match=r"no TOML text.*line 1.*; correct it there"):
+    with pytest.raises(UserError, match=r"not valid TOML.*line 1.*; correct it there"):
         load(tmp_path, oscillator, "duration = = 3")
 
 

@@ -134,7 +134,7 @@ def run(case: Case, seed: int, folder: Path) -> dict[str, object]:
         "outside": 100.0 * t.outside,
         "converged": bool(t.converged),
         "scale": any(u.kind == "scale" for u in t.unknown),
-        "turns": any("turns at once" in n for n in t.notes),
+        "turns": any("bends sharply" in n for n in t.notes),
         "chi2": t.chi2,
     }
 

@@ -185,7 +185,7 @@ def test_other_bits_or_a_damaged_file_are_refused(stopped: Path, short: Path) ->
     refused(stopped, call(stopped, short, "--resume"), "does not compute the bits")
     for damaged in (good[: len(good) // 2], b"no archive", b""):
         file.write_bytes(damaged)
-        refused(stopped, call(stopped, short, "--resume"), "no checkpoint that can be read")
+        refused(stopped, call(stopped, short, "--resume"), "not a readable checkpoint")
 
 
 def test_nothing_to_resume(short: Path, whole: tuple[Path, int], tmp_path: Path) -> None:

@@ -199,7 +199,7 @@ class _Reader:
                 return self.choice(arguments, bool(keywords))
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                 return self.call(name, arguments)
-        raise self.refuse(f"contains '{ast.unparse(node)}', which is no part of an expression")
+        raise self.refuse(f"contains '{ast.unparse(node)}', which is not part of an expression")
 
     def power(self, left: ast.AST, right: ast.AST) -> sp.Expr:
         base, exponent = self.walk(left), self.walk(right)
@@ -214,7 +214,7 @@ class _Reader:
         if name not in self.names:
             raise self.refuse(f"uses der({name}), but the model does not define '{name}'")
         if name not in self.moving:
-            raise self.refuse(f"uses der({name}), but '{name}' is no state or input")
+            raise self.refuse(f"uses der({name}), but '{name}' is neither a state nor an input")
         return derivative(name)
 
     def choice(self, arguments: list[ast.expr], named: bool) -> sp.Expr:
@@ -257,4 +257,4 @@ def _parse(text: str, names: frozenset[str], calls: frozenset[tuple[str, int]], 
     except (ValueError, TypeError, OverflowError) as error:
         if isinstance(error, ExpressionError):
             raise
-        raise refuse(f"is no expression of real numbers ({error})") from error
+        raise refuse(f"is not an expression of real numbers ({error})") from error

@@ -72,7 +72,7 @@ def combination(text: str, moving: dict[str, Motion], parameters: set[str]) -> M
     parts = {name: sp.diff(found, s) for name, s in symbols.items() if found.has(s)}
     rest = sp.expand(found - sp.Add(*(c * symbols[name] for name, c in parts.items())))
     if not parts or rest != 0 or any(c.has(*symbols.values()) for c in parts.values()):
-        raise ex.ExpressionError(f"'{text}' is no linear combination of positions")
+        raise ex.ExpressionError(f"'{text}' is not a linear combination of positions")
     return tuple(sp.Add(*(c * moving[name][k] for name, c in parts.items())) for k in (0, 1))
 
 

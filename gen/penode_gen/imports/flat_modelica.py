@@ -270,7 +270,7 @@ class _Parser:
         if name not in _FUNCTIONS or len(values) != (2 if name in ("max", "min") else 1):
             self.at -= 1
             raise ImportProblem(
-                f"{self.where}: the function '{name}' with {len(values)} arguments is not read; read are der, {', '.join(_FUNCTIONS)}"
+                f"{self.where}: the function '{name}' with {len(values)} arguments is not supported; use der, {', '.join(_FUNCTIONS)}"
             )
         return _FUNCTIONS[name](*values)
 

@@ -34,7 +34,7 @@ class EndTables(NetworkTables):
                 near = difflib.get_close_matches(text, parameters, 1)
                 self.problem(
                     where,
-                    f"'{text}' is no parameter",
+                    f"'{text}' is not a parameter",
                     f"did you mean '{near[0]}'?" if near else f"add it to [parameters] or write a quantity in {unit}",
                 )
             elif not same(parameters[text].unit, unit):
@@ -107,7 +107,7 @@ class EndTables(NetworkTables):
             where = ("points", name)
             self.name(where, name)
             if not isinstance(text, str):
-                self.problem(where, f"{show(text)} is no text", 'write it as "z - a*theta"')
+                self.problem(where, f"{show(text)} is not a text", 'write it as "z - a*theta"')
                 continue
             try:
                 position = combination(text, moving, set(parameters))[0]

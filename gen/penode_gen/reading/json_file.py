@@ -154,4 +154,4 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _refuse(word: str) -> float:
     """json would take NaN and Infinity; a network may not have them."""
-    raise ValueError(f"{word} is no number a network may have")
+    raise ValueError(f"{word} is not a number a network may have")

@@ -190,7 +190,7 @@ class _Reader(ActuatorTables):
         if given == "unknown":
             found = math.inf
         elif isinstance(given, str):
-            self.problem((*where, "tolerance"), f"{show(given)} is no tolerance", 'give a share, such as 0.05 for 5 %, or "unknown"')
+            self.problem((*where, "tolerance"), f"{show(given)} is not a tolerance", 'give a share, such as 0.05 for 5 %, or "unknown"')
             return 0.0
         else:
             found = self.number((*where, "tolerance"), given)

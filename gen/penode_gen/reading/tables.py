@@ -198,7 +198,7 @@ class Tables:
         except OverflowError:
             found = math.inf
         if not ex.in_range(found):
-            self.problem(where, f"{show(value)} is no number that a float can hold", "give 0, or a size from 1.2e-38 to 3.4e38 in SI")
+            self.problem(where, f"{show(value)} is not a number that a float can hold", "give 0, or a size from 1.2e-38 to 3.4e38 in SI")
             return math.nan
         return found
 
@@ -212,7 +212,7 @@ class Tables:
         if not same(given, unit):
             self.problem(where, f"{show(text)} is not measured in {unit}", f"give a quantity in {unit}")
         elif not ex.in_range(value):
-            self.problem(where, f"{show(text)} is no number that a float can hold", "give 0, or a size from 1.2e-38 to 3.4e38 in SI")
+            self.problem(where, f"{show(text)} is not a number that a float can hold", "give 0, or a size from 1.2e-38 to 3.4e38 in SI")
         else:
             return value
         return math.nan

@@ -31,4 +31,4 @@ def parse(text: str, baud: int = 115200) -> Address:
         device, rate = (place, int(number)) if place and number.isdecimal() else (rest, baud)
         settings = {"port": device, "bitrate": rate, "header_format": "HEADER_LEN_CTR_WORD", "tail_format": "NO_CHECKSUM"}
         return Address(text, "sxi", {"SxI": settings})
-    raise WrongUse(f'--to: "{text}" is no address; use {FORMS}')
+    raise WrongUse(f'--to: "{text}" is not an address; use {FORMS}')

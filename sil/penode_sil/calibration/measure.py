@@ -181,7 +181,7 @@ def _seconds(option: str, text: str) -> float:
     except UnitError as exc:
         raise WrongUse(f"{option}: {exc}") from exc
     if not 0.0 < found < 1e6:
-        raise WrongUse(f'{option}: "{text}" is no such time; give one like "10 s"')
+        raise WrongUse(f'{option}: "{text}" is not a time; give one like "10 s"')
     return found
 
 
@@ -209,7 +209,7 @@ def measure(
     for one in done:
         click.echo(one.sentence())
     if not log.time.size:
-        raise TargetError(f"{to}: no sample has come; is the controller stepping?")
+        raise TargetError(f"{to}: no sample arrived; is the controller stepping?")
     write_mf4(output, columns(log, described), "penode measure")
     lost = "lost ones not counted" if log.lost is None else f"{log.lost} lost"
     click.echo(f"{to}: {log.time.size} samples in {log.time[-1]:.3f} s, {lost} -> {output}")
@@ -219,7 +219,7 @@ def measure(
             "see gaps"
         )
     if log.broken:
-        raise TargetError(f"{to}: the controller has fallen silent, or the line is broken; what came until then is in {output}")
+        raise TargetError(f"{to}: the controller stopped answering, or the connection broke; samples until then are in {output}")
     if log.lost:
         note("the line was too slow for some samples: measure fewer signals, or --every 2")
 

@@ -74,7 +74,7 @@ def write(link: Link, a2l: A2l, chosen: ChosenSet) -> tuple[int, float]:
     found = link.checksum(address, size)
     if found != chosen.checksum:
         raise TargetError(
-            f"{chosen.name}: what has arrived is something else (CRC-32 0x{found:08x}, not 0x{chosen.checksum:08x}); the running set "
+            f"{chosen.name}: the set that arrived differs (CRC-32 0x{found:08x}, not 0x{chosen.checksum:08x}); the running set "
             "stays, stage it again"
         )
     return found, seconds
@@ -88,7 +88,7 @@ def stage_set(link: Link, a2l: A2l, chosen: ChosenSet) -> Staged:
     link.set_page(Who.ECU, Page.WORKING)
     identity = _await(link, a2l, before)
     if link.read(address, size) != chosen.values.astype(kind.newbyteorder(link.order)).tobytes():
-        raise TargetError(f"{chosen.name}: it does not read back as it was written; compare the pages (penode compare)")
+        raise TargetError(f"{chosen.name}: what was read back differs from what was written; compare the pages (penode compare)")
     return Staged(chosen.name, size, seconds, checksum, identity)
 
 

@@ -46,7 +46,7 @@ def period(model: Model) -> int:
         near = max(round(exact / 1000.0), 1)
         raise ModelError(
             [
-                f"{model.path.name}: sample_time: {model.sample_time!r} s is no whole number of nanoseconds from 1000 on, "
+                f"{model.path.name}: sample_time: {model.sample_time!r} s is not a whole number of nanoseconds from 1000 on, "
                 f'which a controller needs; choose another, such as "{near} us"'
             ]
         )
@@ -127,7 +127,7 @@ def served(
     try:
         port = port or free_port(host, kind != "tcp")
     except OSError as exc:
-        raise WrongUse(f"--host: {host} is no address of this machine; use 127.0.0.1, or 0.0.0.0 for all") from exc
+        raise WrongUse(f"--host: {host} is not an address of this machine; use 127.0.0.1, or 0.0.0.0 for all") from exc
     a2l = (
         describe(model, program, f"{kind}:{host}:{port}" if kind != "frames" else "can:0x100:0x101")
         if importlib.util.find_spec("elftools")

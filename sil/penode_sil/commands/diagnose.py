@@ -19,14 +19,14 @@ from ..errors import RecordingError, WrongUse
 @click.argument("model", type=FILE)
 @click.option("--data", type=FILE, multiple=True, required=True, help="Recordings (CSV or MDF4), or folders of them.")
 @click.option("--each", is_flag=True, help="Diagnose each recording by itself, as in a folder.")
-@click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on; not learnt from.")
+@click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on; never fitted.")
 @click.option("--still", type=FILE, multiple=True, help="Recordings at standstill: the noise of each channel, instead of the model file's.")
-@click.option("-o", "--output", type=FILE, required=True, help="Directory for what is found; created if need be.")
+@click.option("-o", "--output", type=FILE, required=True, help="Directory for the results; created if missing.")
 @click.option("--set", "set_name", default="default", show_default=True, help="Parameter set to start from.")
 @click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
 @click.option("--jobs", type=click.IntRange(1), help="Processes for a folder (default: one per core).")
 @click.option("--scheduler", help="Address of a Dask scheduler for a folder, like tcp://host:8786.")
-@click.option("--resume", is_flag=True, help="Keep what DIR has of the same model, recordings and options.")
+@click.option("--resume", is_flag=True, help="Keep results in DIR that are of the same model, recordings and options.")
 @click.option("--json", "as_json", is_flag=True, help="Print diagnosis.json, or diagnoses.json for a table.")
 def diagnose(
     model: Path,

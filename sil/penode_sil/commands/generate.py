@@ -14,7 +14,7 @@ from ..errors import WrongUse
 
 @click.command()
 @click.argument("model", type=FILE)
-@click.option("-o", "--output", type=FILE, required=True, help="Directory for the C files; created if need be.")
+@click.option("-o", "--output", type=FILE, required=True, help="Directory for the C files; created if missing.")
 def generate(model: Path, output: Path) -> None:
     """Check the model file MODEL and write its C."""
     import penode_gen

@@ -22,11 +22,15 @@ from ..console import FILE
     required=True,
     help="Network file to write (.json), to be named in a set of a model file; or model file (.toml), from a Modelica model.",
 )
-@click.option("--network", help="Which one, if the file has several.")
+@click.option("--network", help="Network to read, if the file has several.")
 @click.option(
-    "--activation", type=click.Choice(ACTIVATIONS), default="relu", show_default=True, help="Of hidden layers, where the file does not say."
+    "--activation",
+    type=click.Choice(ACTIVATIONS),
+    default="relu",
+    show_default=True,
+    help="Activation of hidden layers, if the file states none.",
 )
-@click.option("--model", help="Which Modelica model, if the file has several; for a .toml only.")
+@click.option("--model", help="Modelica model to read, if the file has several; for a .toml only.")
 def import_(file: Path, output: Path, network: str | None, activation: str, model: str | None) -> None:
     """Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits;
     or a Modelica model of masses, springs and dampers, as a model file."""

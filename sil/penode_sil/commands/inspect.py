@@ -18,7 +18,7 @@ from ..console import FILE, Several
 @click.option("--channel", multiple=True, help="What the file calls a signal: x=pos_mm, or x=Weg [mm], or x=pos@10ms.")
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
 def inspect(file: Path, model: Path | None, channel: tuple[str, ...], as_json: bool) -> None:
-    """List the channels of the recording FILE with units, clock and quality; and which signals of MODEL they are."""
+    """List the channels of the recording FILE with units, clock and quality, and match them to the signals of MODEL."""
     import penode_gen
 
     from ..inspection import machine, people

@@ -13,15 +13,18 @@ from ..console import FILE
 
 
 @click.command()
-@click.option("--signals", required=True, help="Names of the A2L, with commas between; units and types come from there.")
+@click.option("--signals", required=True, help="Signals by their names in the A2L, separated by commas.")
 @click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
 @click.option("--a2l", type=FILE, help="A2L file of the controller (default: the one it uploads).")
 @click.option("--duration", help='How long, like "10 s"; default: until Ctrl-C.')
 @click.option(
-    "--stage", "staged", metavar="SET", help="Write this set meanwhile, as penode stage does: MODEL.toml:NAME, or a file in serial form."
+    "--stage",
+    "staged",
+    metavar="SET",
+    help="Write this set while recording, as penode stage does: MODEL.toml:NAME, or a file in serial form.",
 )
-@click.option("--after", default="1 s", show_default=True, help="When to begin with that.")
-@click.option("--every", type=click.IntRange(1, 255), default=1, show_default=True, help="Every so many steps a sample.")
+@click.option("--after", default="1 s", show_default=True, help="When to start writing it.")
+@click.option("--every", type=click.IntRange(1, 255), default=1, show_default=True, help="Take a sample every so many steps.")
 @click.option("-o", "--output", type=FILE, required=True, help="File to write (.mf4).")
 def measure(
     signals: str, to: str, a2l: Path | None, duration: str | None, staged: str | None, after: str, every: int, output: Path

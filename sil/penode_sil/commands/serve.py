@@ -13,9 +13,9 @@ from ..console import FILE
 
 @click.command()
 @click.argument("model", type=FILE)
-@click.option("--tcp", type=click.IntRange(0, 65535), help="Port to listen at; 0: any that is free.")
-@click.option("--udp", type=click.IntRange(0, 65535), help="The same over UDP.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at; 0.0.0.0: every one of this machine.")
+@click.option("--tcp", type=click.IntRange(0, 65535), help="TCP port to listen on; 0: any free port.")
+@click.option("--udp", type=click.IntRange(0, 65535), help="UDP port to listen on; 0: any free port.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0: all interfaces.")
 @click.option("--scenario", type=FILE, help="Scenario file whose inputs drive the model, repeated (default: zeros).")
 @click.option(
     "--on", "target", default="sil", show_default=True, metavar="sil|pil[:machine]", help="On this machine, or on an emulated Cortex-M."

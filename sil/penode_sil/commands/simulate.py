@@ -38,7 +38,9 @@ from ..console import FILE, Several
 @click.option("--set", "set_name", help="Parameter set for --input.")
 @click.option("--channel", multiple=True, help="What the recording calls a signal: x=pos_mm, or x=Weg [mm].")
 @click.option("--start", multiple=True, help='Start: "state=0.01 m", or measured[:K], fitted to the first K samples of the sensors.')
-@click.option("--replay", "how", type=click.Choice(REPLAYS), default="linear", show_default=True, help="What an input does between rows.")
+@click.option(
+    "--replay", "how", type=click.Choice(REPLAYS), default="linear", show_default=True, help="How an input continues between rows."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def simulate(model: Path | None, ssp: Path | None, target: str, as_json: bool, **given: Any) -> None:
     """Run the model file MODEL on a scenario or on recorded inputs, or play an SSP."""

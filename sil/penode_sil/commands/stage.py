@@ -18,7 +18,7 @@ from ..errors import WrongUse
 @click.argument("chosen", metavar="[SET]", required=False)
 @click.option("--to", "to", required=True, metavar="ADDRESS", help=f"Where the controller is: {addresses.FORMS}.")
 @click.option("--a2l", type=FILE, help="A2L file of the controller (default: the one it uploads).")
-@click.option("--back", is_flag=True, help="Instead of a set: back to the reference page, the set in flash.")
+@click.option("--back", is_flag=True, help="Switch back to the reference page, the set in flash; without SET.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was done as JSON.")
 def stage(chosen: str | None, to: str, a2l: Path | None, back: bool, as_json: bool) -> None:
     """Write a parameter set into a controller that runs: written, proven by its checksum, switched, read back.

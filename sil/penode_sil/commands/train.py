@@ -17,15 +17,15 @@ from ..errors import NotConverged
 @click.command(cls=Several)
 @click.argument("model", type=FILE)
 @click.option("--data", type=FILE, multiple=True, required=True, help="Recordings (CSV or MDF4) to learn from.")
-@click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on; not learnt from.")
-@click.option("-o", "--output", type=FILE, required=True, help="Directory for what is found; created if need be.")
+@click.option("--holdout", type=FILE, multiple=True, help="Recordings to measure the gain on; never fitted.")
+@click.option("-o", "--output", type=FILE, required=True, help="Directory for the results; created if missing.")
 @click.option("--known", multiple=True, help="A parameter that was measured: m_b, or m_b='351 kg'.")
 @click.option(
-    "--from", "start", type=FILE, multiple=True, help="Start there: a trained or extended model file, NETWORK.onnx, or diagnosis.json."
+    "--from", "start", type=FILE, multiple=True, help="Start from a trained or extended model file, NETWORK.onnx, or diagnosis.json."
 )
 @click.option("--channel", multiple=True, help="What a file calls a signal: x=pos_mm, or x=Weg [mm].")
-@click.option("--seed", default=0, show_default=True, help="Of the weights that a network starts from; curves need none.")
-@click.option("--resume", is_flag=True, help="Go on with the training into DIR that was interrupted, to the same bits.")
+@click.option("--seed", default=0, show_default=True, help="Seed of a network's initial weights; curves need none.")
+@click.option("--resume", is_flag=True, help="Resume an interrupted training in DIR; the result has the same bits.")
 @click.option("--json", "as_json", is_flag=True, help="Print training.json.")
 def train(
     model: Path,

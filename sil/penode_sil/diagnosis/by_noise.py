@@ -168,7 +168,7 @@ def _sized(case: Case, study: Study, best: Explanation | None, judged: Judged) -
         unnamed = None if any(g.after_rmse > 1.01 * g.before_rmse for g in worse) else unnamed
     if unnamed is not None:
         explained = nameless.share(study, unnamed.fit)
-        notes.append(f"a small network beside {nameless.beside(study, unnamed)} takes a part of it, and has no name")
+        notes.append(f"a small network beside {nameless.beside(study, unnamed)} explains a part of it, without a name")
     elif judged.verdict == "unexplained":
         explained = 0.0
     return replace(judged, causes=causes, explained=explained, notes=tuple(notes), named=named or unnamed, unnamed=unnamed)
@@ -204,14 +204,14 @@ def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, di
         note = f"parameters that fit the training within their tolerances make {', '.join(worse)} of the hold-out worse: left as they were"
         judged = replace(judged, named=None, unnamed=None, notes=(*judged.notes, note))
     else:
-        judged = replace(judged, notes=(*judged.notes, *(f"{s} gets worse by the extended model: do not use it" for s in worse)))
+        judged = replace(judged, notes=(*judged.notes, *(f"{s} is predicted worse by the extended model: do not use it" for s in worse)))
     if worse and judged.named is None:
         text, extended = extension.extend_file(study, None, judged.causes)
         gain, more, held = measuring.measure(study, extended, case.unused)
     judged = replace(judged, notes=(*judged.notes, *more))
     unseen = [s for s, g in gain.items() if g.after_rmse > UNSEEN * g.noise_floor] if not judged.causes else []
     if unseen:
-        note = f"{', '.join(unseen)}: the hold-out shows what the training does not: train with recordings like it"
+        note = f"{', '.join(unseen)}: the hold-out shows an effect that the training does not: train with recordings like it"
         judged = replace(judged, causes=SURELY_NOT, verdict="unexplained", explained=0.0, notes=(*judged.notes, note))
     return judged, text, gain, held
 
@@ -228,7 +228,7 @@ def hints(
     """Notes on what is left: motion that comes late (`behind`), what changes with time, masses, a tone, a drift of clocks."""
     notes = []
     if behind:
-        notes.append("what is left follows the motion late, as the rear axle of a vehicle that pitches does")
+        notes.append("the residual follows the motion with a delay, as the rear axle of a vehicle that pitches does")
     if change is not None and verdict == "unexplained":
         notes.append(f"{change.what} of {change.place} changes while it is measured: a controller, a leak?")
     if verdict == "unexplained" and explanations:
@@ -236,7 +236,7 @@ def hints(
         notes += damped([c for c in masses if worth(study, c)])
     if tone.detected:
         own = study.model.sensors[tone.sensor].name
-        notes.append(f"{own} has a tone of its own at {tone.frequency:.0f} Hz, or around it: an engine, a wheel, the mains?")
+        notes.append(f"{own} contains a tone at about {tone.frequency:.0f} Hz: an engine, a wheel, the mains?")
     if drift:
         notes.append(f"clocks of sensors and inputs drift apart by {1e6 * abs(drift):.3g} ppm: put both on one clock")
     return notes

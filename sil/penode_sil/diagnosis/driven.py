@@ -59,7 +59,7 @@ def settled(
         return smooth[0], smooth[1], []
     what = f"{', '.join(names)}: repeated between samples; "
     if moving(model):  # the rate of a step is endless
-        return smooth[0], smooth[1], [f"{what}taken as smooth, for the model uses an input's rate"]
+        return smooth[0], smooth[1], [f"{what}taken as smooth, because the model uses an input's rate"]
     held = [[experiment(m, model) for m in ms] for ms in (train, holdout)]
     study, lead = _led(model, held[0], set_name)
     other = begin(model, smooth[0], set_name)[0]

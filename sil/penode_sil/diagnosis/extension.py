@@ -49,7 +49,7 @@ def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[
     model = study.model
     learnt = ", ".join(f"{c.kind} at {c.where or '?'}" for c in causes)
     if e is not None and not e.terms and e.built.model.elements != model.elements:
-        learnt = "something that is on no list; the element nameless takes what it can of it"
+        learnt = "an effect that no known cause explains; the element nameless approximates it"
     lines = [
         f"# What the recordings taught about {model.path.name}: {learnt or 'nothing'}.",
         "",

@@ -51,11 +51,10 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
         if abs(value - p.value) <= _limit(p) * abs(p.value) + Z_95 * sd:
             continue
         if p.name in shared and not straight.off(p.value, value, shared[p.name], _limit(p)):
-            notes.append(f"{p.name} is {value:.4g} {unit} beside what was found at its place, which shares its straight part")
+            notes.append(f"{p.name} is {value:.4g} {unit} beside the cause found at its place, which has a linear part too")
         elif size < WORTH:
             notes.append(
-                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: "
-                "as much as anything that the model leaves out might"
+                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than unmodelled effects may do"
             )
         elif not straight.off(p.value, beside, shared_by_all.get(p.name, (0.0, 0.0)), _limit(p)):
             absorbed.append(p.name)
@@ -81,7 +80,7 @@ def notes_on_guessed(model: Model, fit: Fit) -> list[str]:
             sure = "" if name in ratios else f" +- {Z_95 * fit.deviation(name, ratios):.2g}"
             found.append(f"{name} = {fit.value(name):.4g} {units.si(model.parameters[name].unit)}{sure}")
     only = f"; the recordings show forces as ratios to {', '.join(sorted(ratios))} only" if ratios else ""
-    return [f"as fitted, for the file only guesses: {', '.join(found)}{only}"] if found else []
+    return [f"fitted, because the file gives only a guess: {', '.join(found)}{only}"] if found else []
 
 
 def _limit(p: Parameter) -> float:

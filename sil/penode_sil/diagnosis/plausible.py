@@ -71,7 +71,7 @@ def _line(recording: str, name: str, known: tuple[float, str]) -> str:
     """What is wrong with a signal, where, and the remedy."""
     ratio, what = known
     if ratio < 0.0:
-        return f"{recording}: {name} goes against what the model says; correct its sign in the recording"
+        return f"{recording}: {name} has the opposite sign of the model; correct its sign in the recording"
     times = f"{ratio:.4g} times" if ratio > 1.0 else f"1/{1.0 / ratio:.4g} of"
     wrong = f"{recording}: {name} is {times} what fits the model, like {what}"
     return f"{wrong}; correct its unit, or say --channel {name}=NAME [UNIT]"
@@ -123,4 +123,4 @@ def other_plant(study: Study, bound: float) -> str:
     if len(far) < 2 or fit.chi2 > min(bound - NEW - COST * len(ratios), rows + LITTLE * (study.null.chi2 - rows)):
         return ""
     texts = ", ".join(f"{r:.2f} times its {k}" for k, r in far.items())
-    return f"these are rather data of another plant, with {texts}; name the model file of that plant"
+    return f"the data seem to be of another plant, with {texts}; name the model file of that plant"

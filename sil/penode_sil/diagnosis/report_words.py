@@ -77,7 +77,7 @@ def _named(d: Diagnosis) -> str:
             return f"{text[0].upper()}{text[1:]} {verb} {what}{doubt}."
         case "not_identifiable":
             return "These recordings cannot tell what is wrong."
-    return "The model is wrong in a way that has no name on the list."
+    return "The model is wrong, and no known cause explains it."
 
 
 def lead(d: Diagnosis, train: Sequence[Channel]) -> list[str]:

@@ -158,7 +158,7 @@ VERDICTS = {
     "no_discrepancy": "the model agrees with the recordings within noise and tolerances",
     "explained": "the model is wrong, and the causes named explain it",
     "partly_explained": "the model is wrong, and the causes named explain a part of it",
-    "unexplained": "the model is wrong, and nothing on the list of causes explains it",
+    "unexplained": "the model is wrong, and no known cause explains it",
     "not_identifiable": "something may be wrong, but these recordings cannot tell what",
 }
 

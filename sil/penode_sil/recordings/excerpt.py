@@ -39,7 +39,9 @@ def excerpted(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[l
         stretches = _cut(train)
         best = _most_telling(train, stretches)
         kept = _joined(train, best)
-        notes.append(f"{train[0].path}: {_samples(kept)} of {total} samples are learnt from: the stretches whose motion tells most")
+        notes.append(
+            f"{train[0].path}: {_samples(kept)} of {total} samples are used for training: the stretches with the most informative motion"
+        )
         if not holdout:
             held = _joined(train, [s for s in stretches if s not in best], len(kept))
     tested = sum(m.time.size for m in held)

@@ -31,7 +31,7 @@ def read(path: Path, names: frozenset[str] | None) -> tuple[list[Group], list[st
     asked = json.dumps(None if names is None else sorted(names))
     code, out = apart(path, asked)
     if code != 0:
-        raise RecordingError(f"{path}: it is no sound MDF file (its reader gave up); write it anew")
+        raise RecordingError(f"{path}: it is not a valid MDF file (its reader gave up); export it again")
     with np.load(io.BytesIO(out)) as file:
         said = json.loads(str(file["said"]))
         if "problem" in said:
@@ -49,7 +49,7 @@ def apart(path: Path, asked: str) -> tuple[int, bytes]:
     try:
         run = subprocess.run([sys.executable, "-m", __name__, str(path), asked], capture_output=True, check=False, timeout=limit)
     except subprocess.TimeoutExpired as error:
-        raise RecordingError(f"{path}: it is no sound MDF file (its reader came to no end in {limit:.0f} s); write it anew") from error
+        raise RecordingError(f"{path}: it is not a valid MDF file (its reader came to no end in {limit:.0f} s); export it again") from error
     return run.returncode, run.stdout
 
 
@@ -124,7 +124,7 @@ def _main(path: str, asked: str) -> None:
         said = {"problem": str(problem)}
     except Exception as exc:  # a broken file makes the reader raise a dozen kinds
         what = next(iter(str(exc).splitlines()), "") or type(exc).__name__
-        said = {"problem": f"it is no sound MDF file ({what}); write it anew"}
+        said = {"problem": f"it is not a valid MDF file ({what}); export it again"}
     np.savez(out, allow_pickle=False, said=json.dumps(said), **arrays)
 
 

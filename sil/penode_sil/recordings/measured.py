@@ -220,7 +220,7 @@ def _take(raster: Array, model: Model, signal: Input | Signal, table: Recording,
     faults = quality.examine(own.raw, clock.uneven)
     bad = faults.missing | faults.spikes if driving else faults.any
     if np.mean(bad) > 0.9 or (faults.constant and not driving):
-        what = "does not change" if faults.constant else "has hardly a sound sample"
+        what = "does not change" if faults.constant else "has almost no valid sample"
         place = f"{table.place(clock.rows[0])}: channel {signal.name} {what}"
         if driving:
             raise RecordingError(f"{place}, but it drives the model; record it anew", channel=signal.name)
@@ -257,7 +257,7 @@ def _parts(path: Path, step: float, raster: Array, inputs: list[str], taken: dic
     if not parts:
         raise RecordingError(f"{path}: the inputs are nowhere measured {SHORTEST} samples in a row; record them without gaps", *notes)
     if not any(np.sum(taken[name].usable & sound) >= SHORTEST for name in sensors):
-        raise RecordingError(f"{path}: no sensor has {SHORTEST} sound samples beside those of the inputs; record at least so many", *notes)
+        raise RecordingError(f"{path}: no sensor has {SHORTEST} valid samples where the inputs are valid; record at least so many", *notes)
     _tell_resampling(path, step, {id(t.clock): t.clock for t in taken.values() if not t.how}, notes)
     lost = raster.size - sum(b - a for a, b in parts)
     if lost:

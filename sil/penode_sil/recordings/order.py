@@ -51,7 +51,7 @@ def ordered(time: Array, place: Callable[[int], str], gap: float) -> Ordered:
     far = not onward.size or -np.min(steps) > np.median(onward)  # by more than a row
     if far and np.any(joints <= 0.0) and _spread(onward) <= _spread(np.diff(time[order])):
         what = f"by {-steps[back[0] - 1]:.6g} s, to times that rows before have too"
-        raise RecordingError(f"{where}, {what}; split the recording where its clock starts anew")
+        raise RecordingError(f"{where}, {what}; split the recording where its clock restarts")
     return Ordered(order, time[order], f"{where}; rows are sorted by time")
 
 

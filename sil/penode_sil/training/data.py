@@ -55,7 +55,7 @@ def record(model: Model, m: Measured, signals: Sequence[str]) -> Record:
             noise[j] = found.std if found is not None else np.nan
     held = bool(model.inputs) and all(m.quality.channels[i.name].how == "held" for i in model.inputs)
     if model.inputs and not np.any(np.ptp(m.u, axis=0) > 0.0):
-        raise RecordingError(f"{m.title}: no input moves, so nothing can be learnt from it; record the plant while it is driven")
+        raise RecordingError(f"{m.title}: no input varies, so it cannot be used for training; record the plant while it is driven")
     return Record(m.title, drive(model, m.u, held), y, good, noise)
 
 

@@ -60,9 +60,9 @@ def notes(problem: Problem, fit: Fit, ports: Sequence[Port]) -> list[str]:
             places = ", ".join(f"{x:.3g}" for x, _ in found)
             if found:
                 lines.append(
-                    f"{port.name} turns at once near {places} {unit}, between two knots that are {max(w for _, w in found):.1g} {unit} "
-                    "apart: the whole curve may lie by some of these beside its place, and the bands of all forces do not hold that; "
-                    "put the stop into the model as a law of its own, or give the network more layers"
+                    f"{port.name} bends sharply near {places} {unit}, between two knots that are {max(w for _, w in found):.1g} {unit} "
+                    "apart: the whole curve may be shifted by some of that, which the bands of the forces do not include; "
+                    "model the stop as a law of its own, or give the network more layers"
                 )
         at += columns
     return lines

@@ -53,13 +53,11 @@ def noise(remains: Left, tried: Sequence[Try]) -> list[str]:
                 "passes; state the noise that the sensor has"
             )
         elif j in loud and not alike:
-            found.append(
-                f"{name}: what is left has no memory, as noise has none: the stated noise may be too small, by a factor of {ratio:.3g}"
-            )
+            found.append(f"{name}: the residual is white, as noise is: the stated noise may be too small, by a factor of {ratio:.3g}")
         elif SETTINGS.left_more < ratio <= SETTINGS.story_loud and alike:
             found.append(
-                f"{name}: residuals are {ratio:.3f} times the stated noise and alike from row to row: {_starts(tried)} left something that "
-                "is smaller than the noise, and is none"
+                f"{name}: residuals are {ratio:.3f} times the stated noise and correlated from row to row: {_starts(tried)} left a "
+                "systematic error that is smaller than the noise"
             )
     return found
 
@@ -69,13 +67,13 @@ def _not_down(remains: Left, loud: Sequence[int], tried: Sequence[Try]) -> str:
     by = ", ".join(f"{remains.names[j]} {remains.ratio[j]:.3g}" for j in loud)
     ends = [t.ratio for t in tried if np.isfinite(t.ratio)]
     alike = len(ends) > 1 and max(ends) < SETTINGS.left_more * min(ends)
-    apart = "they end apart, so another one" if len(ends) > 1 else "another one"
+    apart = "they end at different fits, so another one" if len(ends) > 1 else "another one"
     further = (
-        "they all end alike, so another start is not likely to lead further: penode diagnose on these recordings names what a model lacks"
+        "they all end at the same fit, so another start will hardly help: penode diagnose on these recordings names what a model lacks"
         if alike
-        else f"{apart} may lead further: try --seed, --known for what was measured, --from for what is known"
+        else f"{apart} may help: try --seed, --known for what was measured, --from for what is known"
     )
-    return f"did not come down to the stated noise: times that noise are left {by}; tried: {', '.join(_told(t) for t in tried)}; {further}"
+    return f"residuals stayed above the stated noise, {by} times it; tried: {', '.join(_told(t) for t in tried)}; {further}"
 
 
 def _starts(tried: Sequence[Try]) -> str:
@@ -94,7 +92,7 @@ def deployed(training: Sequence[Error], smooth: Sequence[Error]) -> list[str]:
         if error.deployed > SETTINGS.left_more * error.after and other.deployed - error.after < error.deployed - other.deployed:
             more, rest = (100.0 * (e.deployed / error.after - 1.0) for e in (error, other))
             found.append(
-                f"{error.signal}: the generated C errs {more:.1f} % more than the trainer, for it joins the rows of its inputs by straight "
-                f'lines; with input = "cubic" in [model] it errs {rest:.1f} % more'
+                f"{error.signal}: the generated C errs {more:.1f} % more than the trainer, because it interpolates its inputs "
+                f'linearly; with input = "cubic" in [model] it errs {rest:.1f} % more'
             )
     return found

@@ -112,7 +112,7 @@ def beside_noise(t: Trained) -> str:
     return (
         f"residuals over the stated noise: {', '.join(stated)}"
         if stated
-        else "no sensor states its noise, so nothing says whether all is learnt"
+        else "no sensor states its noise, so the residuals cannot be judged"
     )
 
 

@@ -26,7 +26,7 @@ from ..output import whole
 
 Array = NDArray[np.float64]
 NAME = "checkpoint.npz"
-ANEW = "leave out --resume to start anew"
+ANEW = "leave out --resume to start again"
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ class Journal:
             rows = zip(file["numbers"], vectors, file["costs"], file["dampings"], file["poor"], file["steps"], strict=True)
             self._states = {int(n): State(v, float(c), float(d), int(p), int(s)) for n, v, c, d, p, s in rows}
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as exc:
-            raise WrongUse(f"{self.path}: no checkpoint that can be read ({exc}); {ANEW}") from exc
+            raise WrongUse(f"{self.path}: not a readable checkpoint ({exc}); {ANEW}") from exc
         differs = [name for name in {**identity, **self.identity} if identity.get(name) != self.identity.get(name)]
         if differs:
             raise WrongUse(f"{self.path}: a checkpoint of a training with other {', '.join(differs)}; call it as then, or {ANEW}")

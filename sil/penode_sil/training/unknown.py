@@ -89,8 +89,8 @@ def _direction(problem: Problem, names: Sequence[str], by: Array) -> Unknown:
         return Unknown("scale", text, (*chosen, *problem.engine.networks), size)
     if len(chosen) == 1:
         text = (
-            f"{chosen[0]} cannot be told from these recordings; its value is that of the model file, to {100 * size:.1f} %; measure it "
-            f"and give it, --known {chosen[0]}"
+            f"{chosen[0]} cannot be identified from these recordings; its value is that of the model file, to {100 * size:.1f} %; "
+            f"measure it and give it, --known {chosen[0]}"
         )
     else:
         parts = ", ".join(f"{n} {'up' if b > 0 else 'down'} {100 * abs(b):.1f} %" for n, b, s in zip(names, by, some, strict=True) if s)

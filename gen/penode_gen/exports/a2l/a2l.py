@@ -49,7 +49,7 @@ def epk(program: Program, symbol: str | None) -> tuple[str, int] | None:
             return None
         raise ExportError(f"--epk: {program.path} has no variable {symbol}; name an array of characters") from exc
     except UnicodeDecodeError as exc:
-        raise ExportError(f"--epk: {name} is no ASCII text; name an array of characters") from exc
+        raise ExportError(f"--epk: {name} is not ASCII text; name an array of characters") from exc
     if not text or quote(text) != f'"{text}"':  # a tool compares it with the memory, character by character
         raise ExportError(
             f'--epk: {name} holds "{text}", which an A2L cannot repeat as it is; use a text without quotes, backslashes and double spaces'
@@ -174,12 +174,12 @@ EXPORTER = Exporter(
     (".a2l",),
     _build,
     (
-        Option("elf", "Linked program, compiled with -g: where everything lies.", "file"),
+        Option("elf", "Linked program, compiled with -g; it has the addresses.", "file"),
         Option("instance", "Variable that is the model's instance (default: the only one of its type)."),
         Option("measure", "More variables to measure, separated by commas (default: those of the sensors)."),
-        Option("transport", f"How XCP gets there: {_TRANSPORTS}.", default="tcp:127.0.0.1:5555"),
-        Option("max_cto", "Bytes of the longest XCP packet; 8 on CAN, 64 on CAN FD, else 252.", "number"),
-        Option("epk", "Variable with the text that identifies the program; penode_epk if not given and there."),
+        Option("transport", f"XCP transport: {_TRANSPORTS}.", default="tcp:127.0.0.1:5555"),
+        Option("max_cto", "Bytes of the longest XCP packet (default: 8 on CAN, 64 on CAN FD, else 252).", "number"),
+        Option("epk", "Variable with the text that identifies the program (default: penode_epk, if the program has it)."),
     ),
     ("elftools",),
     "xcp",

@@ -31,7 +31,7 @@ class Place:
 
     @property
     def kind(self) -> str:
-        """float, signed, unsigned, bool; "" if it is no number, or one that A2L has no type for (long double, __int128)."""
+        """float, signed, unsigned, bool; "" if it is not a number, or one that A2L has no type for (long double, __int128)."""
         plain = bare(self.type)
         if plain.tag == "DW_TAG_enumeration_type":
             return "unsigned"

@@ -54,7 +54,7 @@ def time_stamp() -> str:
     try:
         return datetime.fromtimestamp(int(given), UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     except (ValueError, OverflowError, OSError) as error:
-        raise ExportError(f"SOURCE_DATE_EPOCH: '{given}' is no time in seconds; remove it or give a whole number") from error
+        raise ExportError(f"SOURCE_DATE_EPOCH: '{given}' is not a time in seconds; remove it or give a whole number") from error
 
 
 def shared(model: Model, dialect: str) -> dict[str, Any]:

@@ -13,7 +13,9 @@ OF = {kind: file for file in FILES for kind in file.KINDS}
 REVERSING = {kind for file in FILES for kind in getattr(file, "REVERSING", ())}  # of what happens where a rate turns
 
 RIVALS = {frozenset(pair): how for file in (*FILES, drives, channels, others) for pair, how in getattr(file, "RIVALS", {}).items()}
-OTHERWISE = "broadband excitation at two amplitudes, with all sensors of the model file; chirps of constant amplitude tell least"
+OTHERWISE = (
+    "broadband excitation at two amplitudes, with all sensors of the model file; chirps of constant amplitude are the least informative"
+)
 
 
 def separating(kind: str, alternatives: Iterable[str]) -> str:

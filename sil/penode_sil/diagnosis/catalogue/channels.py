@@ -4,8 +4,8 @@
 
 KINDS = ("input_sign", "sensor_sign", "swapped_channels")
 MEANING = {
-    "input_sign": "The input acts the other way round than the recording says: a sign, the sense of a drive.",
-    "sensor_sign": "The sensor counts the other way round than the model says.",
+    "input_sign": "The input acts with the opposite sign of its recording: a sign error, the sense of a drive.",
+    "sensor_sign": "The sensor has the opposite sign of the model.",
     "swapped_channels": "Two channels are exchanged: each shows what the other is called.",
 }
 

@@ -21,7 +21,7 @@ REVERSING = KINDS[2:3]
 MEANING = {
     "coulomb_friction": "Friction: a force against the motion that hardly depends on how fast it is.",
     "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",
-    "bouc_wen": "Hysteresis: the force depends on the way since the last reversal, elastic at first, then yielding.",
+    "bouc_wen": "Hysteresis: the force depends on the travel since the last reversal, elastic at first, then yielding.",
     "position_dependent_friction": "Friction that is larger at one end of the travel than at the other, or at both than between.",
     "load_dependent_friction": "Friction that grows with the force that a bearing, a guide or a gear transmits.",
 }

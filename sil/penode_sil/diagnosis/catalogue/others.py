@@ -10,7 +10,7 @@ MEANING = {
     "sensor_dropout": "The sensor lost samples.",
     "network_extrapolation": "A network is used outside of what it was trained on.",
     "integration_error": "The physics is right; the deployed step integrates it too coarsely.",
-    "outside_taxonomy": "Something is left that noise cannot make and that no kind on the list explains.",
+    "outside_taxonomy": "A residual remains that is not noise and that no known kind explains.",
 }
 PARAMETERS = {  # what each number of a report means
     "wrong_parameter": {"its name": "value in the recordings, in its own unit"},

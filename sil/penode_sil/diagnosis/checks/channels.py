@@ -166,7 +166,7 @@ def _refused(m: Mix, model: Model) -> str:
     names = m.names(model)
     if len(names) > 1:
         return f"{' and '.join(names)} are exchanged; say --channel {names[0]}={names[1]} --channel {names[1]}={names[0]}"
-    return f"{names[0]} goes against what the model says; correct its sign in the recording"
+    return f"{names[0]} has the opposite sign of the model; correct its sign in the recording"
 
 
 def _sections(model: Model, found: Sequence[Mix]) -> dict[str, list[str]]:

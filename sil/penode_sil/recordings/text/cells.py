@@ -54,7 +54,7 @@ NUMBER = re.compile(r"\s*[+-]?(?:\d+([.,]?)\d*|([.,])\d+)(?:[eEdD][+-]?\d+)?\s*"
 
 
 def number(text: str, signs: Signs) -> float:
-    """One cell; NaN if it is empty or a sign for a missing value. ValueError if it is no number in this notation."""
+    """One cell; NaN if it is empty or a sign for a missing value. ValueError if it is not a number in this notation."""
     if text.strip().casefold() in MISSING:
         return float("nan")
     text = signs.plain(text.strip())
@@ -86,7 +86,7 @@ def is_number(text: str) -> bool:
 
 
 def numbers(texts: Sequence[str | None], signs: Signs) -> Array:
-    """A column; ValueError(index, text) at the first cell that is no number, (index, None) where a row has no such cell."""
+    """A column; ValueError(index, text) at the first cell that is not a number, (index, None) where a row has no such cell."""
     some = [text for text in texts if text is not None]
     if signs == Signs(".") and len(some) == len(texts):
         try:
@@ -150,8 +150,8 @@ class Columns(Mapping[str, Array]):
         other = "," if self._decimal == "." else "."
         if other in shown and NUMBER.fullmatch(shown):
             point = "points" if self._decimal == "." else "commas"
-            return f'channel {key}: "{shown}" is no number beside decimal {point}; write all numbers in one way'
-        return f'channel {key}: "{shown}" is no number; correct the cell'
+            return f'channel {key}: "{shown}" is not a number beside decimal {point}; write all numbers in one way'
+        return f'channel {key}: "{shown}" is not a number; correct the cell'
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._texts)
