@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -87,10 +88,9 @@ def paragraphs(comment: str) -> list[str]:
     lines: list[str] = []
     for block in re.split(r"\n\s*\n", re.sub(r"(?<=\S)\s*(@return)", r"\n\1", comment)):
         text, *tags = re.split(r"^(?=@)", block, flags=re.MULTILINE)
-        if re.search(r"^ ", text, re.MULTILINE):
-            lines += ["```text", text.rstrip(), "```", ""]
-        elif text.strip():
-            lines += [_escaped(text.strip()), ""]
+        for indented, group in itertools.groupby(text.rstrip().splitlines(), lambda line: line.startswith(" ")):
+            part = "\n".join(group)
+            lines += ["```text", part, "```", ""] if indented else [_escaped(part), ""]
         lines += [_tag(tag) for tag in tags] + [""] * bool(tags)
     return lines
 

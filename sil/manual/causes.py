@@ -159,12 +159,12 @@ def page() -> str:
         "are rebound.",
         f"Hit rates are from the campaign of {draw} (`test/diagnosis/CAMPAIGN.md`); a kind is counted where it was hidden by itself.",
         "",
-        "| kind | meaning | where it can be | named rightly |",
-        "|---|---|---|---|",
+        "| kind | meaning | named rightly |",
+        "|---|---|---|",
     ]
     for kind, meaning in catalogue.MEANING.items():
         hit = f"{rate[kind][0]} of {rate[kind][1]}" if kind in rate else "-"
-        lines.append(f"| [`{kind}`](#{kind}) | {meaning} | {'; '.join(of[kind].where)} | {hit} |")
+        lines.append(f"| [`{kind}`](#{kind}) | {meaning} | {hit} |")
     lines.append("")
     for kind in catalogue.MEANING:
         lines += _section(kind, of[kind], means.get(kind, {}), rate.get(kind))

@@ -16,6 +16,7 @@ import pytest
 import schemas
 import targets
 
+from penode_sil import scenario
 from penode_sil.diagnosis import catalogue
 from penode_sil.errors import RecordingError
 
@@ -32,7 +33,7 @@ def test_every_cause(kind: str, of_causes: str) -> None:
     section = re.search(rf"^## {kind}\n(.*?)(?=^## |\Z)", of_causes, re.MULTILINE | re.DOTALL)
     assert section and catalogue.MEANING[kind] in section[1]
     assert re.search(r"^Where it can be: \w.*\.$", section[1], re.MULTILINE), "nothing says where it can be: WHERE of its file"
-    assert f"| [`{kind}`](#{kind}) | {catalogue.MEANING[kind]} |" in of_causes
+    assert re.search(rf"^\| \[`{kind}`\]\(#{kind}\) \| {re.escape(catalogue.MEANING[kind])} \| (\d+ of \d+|-) \|$", of_causes, re.MULTILINE)
     for pair in catalogue.RIVALS:
         assert kind not in pair or all(f"](#{other})" in section[1] for other in pair - {kind})
 
@@ -71,6 +72,14 @@ def test_every_function_of_the_headers(tmp_path: Path) -> None:
         shown |= {(Path(part.split("\n")[0]).name, name) for name in re.findall(r"^### (\w+)$", part, re.MULTILINE)}
     assert len(listed) > 150
     assert shown == listed
+
+
+def test_every_kind_and_key_of_a_scenario() -> None:
+    page = (ROOT / "sil/manual/reference/scenario.md").read_text(encoding="utf-8")
+    source = (ROOT / "sil/penode_sil/scenario.py").read_text(encoding="utf-8")
+    keys = set(re.findall(r'\.(?:quantity|text|integer|flag|table|tables|has)\("(\w+)"', source))
+    assert all(f"| `{kind}` |" in page for kind in scenario.KINDS)
+    assert len(keys) > 20 and {key for key in keys if not re.search(rf"[`.\[]{key}\b", page)} == set()
 
 
 @pytest.mark.parametrize("name", schemas.NAMES)

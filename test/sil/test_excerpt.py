@@ -59,7 +59,7 @@ def test_motion_is_learnt_from_and_the_rest_is_tested_on():
     said = train[0].quality.problems
     assert len(said) == 2
     assert f"of {m.time.size} samples are used for training" in said[0]
-    assert "not learnt from are tested on" in said[1]
+    assert "not used for training are used for testing" in said[1]
 
 
 def test_a_given_hold_out_is_thinned_over_its_length():

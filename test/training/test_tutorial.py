@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+import importlib.util
+import json
 import re
 import shlex
 import shutil
 from pathlib import Path
 
+import jsonschema
 import pytest
 from click.testing import CliRunner
 
@@ -16,7 +19,17 @@ from penode_gen import load
 from penode_gen.sets.promises import broken
 from penode_sil.cli import cli
 
-PAGE = Path(__file__).parents[2] / "sil" / "TRAINING.md"
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "sil" / "TRAINING.md"
+
+
+def schema() -> dict[str, object]:
+    """The one that the manual shows of training.json."""
+    spec = importlib.util.spec_from_file_location("schemas", ROOT / "sil/manual/schemas.py")
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.schema("training")
 
 
 def test_page_runs(recordings: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,3 +51,4 @@ def test_page_runs(recordings: tuple[Path, Path], tmp_path: Path, monkeypatch: p
     assert {"car.set", "report.html", "training.json", "spring_net.onnx", "damper_net.onnx"} <= {
         p.name for p in (tmp_path / "trained").iterdir()
     }
+    jsonschema.validate(json.loads((tmp_path / "trained/training.json").read_text(encoding="utf-8")), schema())

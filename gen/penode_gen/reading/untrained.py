@@ -15,7 +15,8 @@ WIDEST = 4096  # neurons of a layer, at most
 
 
 def untrained(entry: dict[str, Any], n_inputs: int, name: str) -> Network:
-    """The network of `layers` (widths of the hidden ones) and `activation`, all weights 0, between scalings. Raises NetworkError."""
+    """The network of `layers` (widths of the hidden ones) and `activation`, all weights 0, between scalings. Raises NetworkError. Biases of
+    hidden layers are -1: a neuron whose argument is 0 may switch anywhere, which leaves the target nothing to prove promises with."""
     layers, activation = entry.get("layers", []), entry.get("activation", "relu")
     if not layers or not all(isinstance(w, int) and not isinstance(w, bool) and 0 < w <= WIDEST for w in layers):
         raise NetworkError(f"{name}: layers must list the widths of the hidden layers, like [16, 16]")
@@ -23,7 +24,7 @@ def untrained(entry: dict[str, Any], n_inputs: int, name: str) -> Network:
         raise NetworkError(f"{name}: activation '{activation}' cannot be trained; use relu, tanh, sigmoid or softplus")
     width = (n_inputs, *layers, 1)
     dense = [
-        Dense(np.zeros((o, i)), np.zeros(o), activation if k < len(layers) else "identity")
+        Dense(np.zeros((o, i)), np.full(o, -1.0 if k < len(layers) else 0.0), activation if k < len(layers) else "identity")
         for k, (i, o) in enumerate(itertools.pairwise(width))
     ]
     scales = Affine(np.zeros(n_inputs), np.ones(n_inputs), "centre"), Affine(np.zeros(1), np.ones(1), "rescale")

@@ -50,8 +50,8 @@ def excerpted(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[l
         places = np.linspace(0, len(spread) - 1, MOST // LENGTH).round().astype(int)
         held = _joined(held, [spread[i] for i in np.unique(places)], len(kept))
     if held and (total > MOST or tested > MOST):
-        what = "of the hold-out" if holdout else "not learnt from"
-        notes.append(f"{held[0].path}: {_samples(held)} of {tested} samples {what} are tested on, evenly spread")
+        what = "of the hold-out" if holdout else "not used for training"
+        notes.append(f"{held[0].path}: {_samples(held)} of {tested} samples {what} are used for testing, evenly spread")
     if notes:
         problems = (*kept[0].quality.problems, *notes)
         kept[0] = replace(kept[0], quality=replace(kept[0].quality, problems=problems))
