@@ -37,6 +37,13 @@ run: setup ## The main job: recalibration while it runs, on the host and a Corte
 
 pythons: setup build/setup/pythons ## Packages for other interpreters that are installed here, so that python-install tries the wheel with them too
 
+site: setup build/setup/docs ## The manual as HTML, into build/site; warnings are errors
+	$(Q)$(PYTHON) sil/manual/assemble.py build/manual
+	$(Q)rm -rf build/site
+	$(Q)build/docs/bin/python -m sphinx -q -W --keep-going -b html -d build/docs/doctrees build/manual build/site
+	$(Q)cp sil/manual/start.html build/site/index.html
+	@echo "build/site/index.html"
+
 test: setup ## All checks; the last line adds them up
 	$(Q)$(PYTHON) test/tally.py -j $$(nproc) --python $(FOLDERS) -- $(GATES)
 
@@ -105,13 +112,6 @@ rigs: setup ## Real rigs in RIGS_DIR: names, hold-out before and after, what a p
 	$(Q)$(PYTHON) test/diagnosis/rigs_table.py --rigs $(RIGS_DIR) --command $(PENODE) --page build/rigs/RIGS.md
 
 ##@ Packages and upkeep
-
-site: setup build/setup/docs ## The manual as HTML, into build/site; warnings are errors
-	$(Q)$(PYTHON) sil/manual/assemble.py build/manual
-	$(Q)rm -rf build/site
-	$(Q)build/docs/bin/python -m sphinx -q -W --keep-going -b html -d build/docs/doctrees build/manual build/site
-	$(Q)cp sil/manual/start.html build/site/index.html
-	@echo "build/site/index.html"
 
 dist: ## Packages for firmware, into build/dist: CMake, pkg-config, PlatformIO, Zephyr, CMSIS-Pack, one .c and one .h; no Python
 	$(Q)port/packages/dist.sh build/dist

@@ -9,6 +9,7 @@ Paths of pages in backquotes become links. A link to a file that is no page is c
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -72,6 +73,9 @@ def assemble(target: Path) -> None:
                 shutil.copyfile(file, at.parent / name)
     for name, make in GENERATED.items():
         (target / HERE / "reference" / f"{name}.md").write_text(linked(make(), f"{HERE}/reference/{name}.md", pages), encoding="utf-8")
+    (target / "_extra/schemas").mkdir(parents=True)
+    for name in schemas.NAMES:
+        (target / "_extra/schemas" / schemas.file(name)).write_text(json.dumps(schemas.schema(name), indent=2) + "\n", encoding="utf-8")
     shutil.copy(ROOT / HERE / "conf.py", target)
     shutil.copytree(ROOT / HERE / "static", target / "_static")
 

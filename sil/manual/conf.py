@@ -22,6 +22,7 @@ html_title = "penode"
 html_show_sourcelink = False
 html_copy_source = False
 html_static_path = ["_static"]
+html_extra_path = ["_extra"]
 html_css_files = ["manual.css"]
 html_theme_options = {"navigation_with_keys": True}
 

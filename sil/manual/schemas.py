@@ -52,6 +52,11 @@ def schema(name: str) -> Schema:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"penode:{name}:{VERSION}", "title": NAMES[name], **found}
 
 
+def file(name: str) -> str:
+    """What the schema is called on the site, in the folder schemas."""
+    return f"{name}-{VERSION}.json"
+
+
 def _diagnosis() -> Schema:
     found = of_class(Diagnosis, ("shown",))
     found["properties"]["verdict"] = {"enum": list(VERDICTS)}
@@ -90,5 +95,6 @@ def page() -> str:
     ]
     lines[-2] += " `CHANGELOG.md`. Numbers are in SI units where no `unit` stands beside them."
     for name, title in NAMES.items():
-        lines += [f"## {name}", "", f"Of {title}.", "", "```json", json.dumps(schema(name), indent=2), "```", ""]
+        link = f'<a href="../../../schemas/{file(name)}">{file(name)}</a>'
+        lines += [f"## {name}", "", f"Of {title}: {link}", "", "```json", json.dumps(schema(name), indent=2), "```", ""]
     return "\n".join(lines)

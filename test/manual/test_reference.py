@@ -28,6 +28,11 @@ def of_causes() -> str:
     return causes.page()
 
 
+@pytest.fixture(scope="module")
+def found() -> dict[str, causes.Known]:
+    return causes.known()
+
+
 @pytest.mark.parametrize("kind", catalogue.MEANING)
 def test_every_cause(kind: str, of_causes: str) -> None:
     section = re.search(rf"^## {kind}\n(.*?)(?=^## |\Z)", of_causes, re.MULTILINE | re.DOTALL)
@@ -39,9 +44,9 @@ def test_every_cause(kind: str, of_causes: str) -> None:
 
 
 @pytest.mark.parametrize("kind", catalogue.OF)
-def test_every_parameter_is_explained(kind: str) -> None:
-    means, known = causes.meanings(), causes.known()[kind]
-    assert known.units and set(means.get(kind, {})) == set(known.units), "say what each means in PARAMETERS of its file"
+def test_every_parameter_is_explained(kind: str, found: dict[str, causes.Known]) -> None:
+    units = found[kind].units
+    assert units and set(causes.meanings().get(kind, {})) == set(units), "say what each means in PARAMETERS of its file"
 
 
 def test_kinds_of_the_campaigns_are_kinds() -> None:
