@@ -7,7 +7,7 @@ A page has in order: "Save as `NAME`" before a fence, which is that file; lines 
 `python3 `, which are commands; a ```text fence right behind a command, which is what it prints; `NAME` in the line before any other fence,
 which is the beginning of a file. In what is printed, ", N s" stands for any time.
 
-replay.py --take-over PAGE... rewrites what commands print and files hold to what they do now.
+replay.py --take-over PAGE [FILE...] rewrites what commands print and files hold to what they do now; FILEs are there already.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -74,7 +75,7 @@ def taken_over(page: str, folder: Path) -> str:
     parts, at = [], 0
     for step in replay(page, folder):
         now = step.found if not step.what.endswith("...") else "".join(step.found.splitlines(True)[: step.expected.count("\n")])
-        kept = now if step.what.endswith("...") else re.sub(r", [\d.]+ s$", ", N s", now, flags=re.MULTILINE)
+        kept = now if step.what.endswith("...") else re.sub(r", [\d.]+ s( of|$)", r", N s\1", now, flags=re.MULTILINE)
         parts += [page[at : step.span[0]], step.expected if step.same else kept]
         at = step.span[1]
     return "".join([*parts, page[at:]])
@@ -83,10 +84,12 @@ def taken_over(page: str, folder: Path) -> str:
 def main() -> None:
     if sys.argv[1:2] != ["--take-over"]:
         sys.exit(__doc__)
-    for name in sys.argv[2:]:
-        with tempfile.TemporaryDirectory() as folder:
-            text = taken_over(Path(name).read_text(encoding="utf-8"), Path(folder))
-        Path(name).write_text(text, encoding="utf-8")
+    page, *files = map(Path, sys.argv[2:])
+    with tempfile.TemporaryDirectory() as folder:
+        for file in files:
+            shutil.copy(file, folder)
+        text = taken_over(page.read_text(encoding="utf-8"), Path(folder))
+    page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
