@@ -100,7 +100,7 @@ REFUSED = {
     "  der(v) = -k*sin(time)*x;\n": "it depends on time",
     "  der(v) = -k*besselj(x);\n": "rumoca cannot compile M",
     "  der(v) = -k*x;\n  v = der(x);\n": "rumoca cannot compile M",
-    "  der(v) = -k*cosh(x);\n": "the function 'cosh' with 1 arguments is not read",
+    "  der(v) = -k*cosh(x);\n": "the function 'cosh' with 1 arguments is not supported",
     "  der(v) = -k*x;\ninitial equation\n  x = 2;\n": "'initial equation' is not read",
     "  der(v) = -k*x/0;\n": "no model file can be made of it",
     "  der(v) = -k*x + 0/0;\n": "",

@@ -130,7 +130,7 @@ def test_standing_still_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(
         cli, ["train", str(HERE / "quarter.toml"), "--data", str(tmp_path / "still.csv"), "-o", str(tmp_path / "out")]
     )
-    assert isinstance(result.exception, UserError) and "no input moves" in result.exception.problems[0]
+    assert isinstance(result.exception, UserError) and "no input varies" in result.exception.problems[0]
 
 
 def test_less_than_half_of_a_recording_is_refused(recordings: tuple[Path, Path], tmp_path: Path) -> None:
