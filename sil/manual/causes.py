@@ -15,7 +15,7 @@ import numpy as np
 import penode_gen
 from penode_gen.model import GROUND, Model
 from penode_sil.diagnosis import catalogue
-from penode_sil.diagnosis.catalogue import channels, drives, form, others
+from penode_sil.diagnosis.catalogue import acting, channels, drives, form, others
 from penode_sil.diagnosis.plant import Place, places
 from penode_sil.diagnosis.result import plain
 
@@ -31,10 +31,12 @@ c = { value = 1, unit = "N/m" }
 d = { value = 1, unit = "N*s/m" }
 [inputs]
 road = { unit = "m" }
+push = { unit = "N" }
 [bodies]
 upper = { mass = "m" }
 lower = { mass = "m" }
 [elements]
+drive = { between = ["upper", "ground"], law = "expression", force = "-push" }
 spring = { between = ["upper", "lower"], law = "linear_spring", stiffness = "c" }
 damper = { between = ["upper", "lower"], law = "linear_damper", damping = "d" }
 mount = { between = ["lower", "ground"], law = "linear_spring", stiffness = "c" }
@@ -89,13 +91,14 @@ def known() -> dict[str, Known]:
     model = example()
     found = {kind: Known() for kind in catalogue.MEANING}
     t = np.arange(1000, dtype=np.float64) * 1e-3
-    motion = form.Motion.of([form.Moved(0.01 * np.sin(40.0 * t), 0.4 * np.cos(40.0 * t), t)], 10.0)
+    s = 0.01 * np.sin(40.0 * t)
+    motion = form.Motion.of([form.Moved(s, 0.4 * np.cos(40.0 * t), t, {"+ F_spring": 1000.0 * np.abs(s)})], 10.0)
     sizes = form.Sizes(_Any(), {}, 1.0, True, 1.0)
     for file in catalogue.FILES:
         for index, place in enumerate(places(model)):
             for one in file.forms(model, index, place, motion):
                 found[one.kind].add(said(place), file.sizes(one, sizes))
-    for one in drives.inputs(model, 1):
+    for one in (*drives.inputs(model, 1), *drives.bent(model, 1, acting.Drive([s], t[1], t[10], 0.16))):
         found[one.kind].add("an input", drives.sizes(one, sizes, OWN_UNIT))
     for one in drives.sensors(model, 1):
         found[one.kind].add("a sensor", drives.sizes(one, sizes, OWN_UNIT))

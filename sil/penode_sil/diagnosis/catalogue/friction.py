@@ -33,6 +33,11 @@ PARAMETERS = {  # what each number of a report means
         "stribeck_rate": "rate at which the difference has fallen to 1/e",
     },
     "bouc_wen": {"force": "largest hysteretic force", "yield_deflection": "force over the stiffness of small loops"},
+    "position_dependent_friction": {
+        "force": "level at deflection 0",
+        "slope": "growth of the level with deflection, or with its magnitude",
+    },
+    "load_dependent_friction": {"force": "level without load", "share": "growth of the level with the magnitude of the load"},
 }
 RIVALS = {
     ("position_dependent_friction", "coulomb_friction"): "the same stroke about two places of the travel",
