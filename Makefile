@@ -12,6 +12,7 @@ EXPERIMENT := gen/nqvm/nqvm.toml --scenario sil/scenarios/recalibration.toml
 RECORDED  := sil/recordings/friction
 RIGS_DIR  ?= ../shared/measured
 WORLDS    := 300
+MUJOCO    := 240
 WATCHED   := $(PYTHON) test/diagnosis/ablation/probes.py
 CASES     := 192 # eight rounds of the 24 cases of a draw
 # and of each kind seven in a common form and four in a foreign one, so that one wrong answer is not below 85 or 70 %
@@ -47,8 +48,8 @@ site: setup build/setup/docs ## The manual as HTML, into build/site; warnings ar
 test: setup ## All checks; the last line adds them up
 	$(Q)$(PYTHON) test/tally.py -j $$(nproc) --python $(FOLDERS) -- $(GATES)
 
-nightly: setup ## What `make test` takes a sample of: 24 fresh recordings with something hidden, and all tests marked as long
-	$(Q)$(PYTHON) test/tally.py -j $$(nproc) hidden-nightly python-long $(GATES.misra-long) $(GATES.cores-long)
+nightly: setup build/setup/mujoco ## What `make test` takes a sample of: 36 fresh recordings with something hidden, and all tests marked as long
+	$(Q)$(PYTHON) test/tally.py -j $$(nproc) hidden-nightly mujoco-nightly python-long $(GATES.misra-long) $(GATES.cores-long)
 
 prove: setup build/setup/proof ## The proofs: all values, all orders, all statements; each also has to find seeded faults
 	$(Q)$(PYTHON) test/tally.py $(PROVE_STATIC) $(PROVE_DYNAMIC)
@@ -101,6 +102,9 @@ campaign-worlds: setup ## Wrong worlds: plants that are a few per cent wrong eve
 	$(Q)$(PYTHON) test/diagnosis/worlds_campaign.py --stratum halfcar --stratum drive --cases 20 --jobs $$(nproc) --out build/worlds/mechanisms
 	$(Q)$(PYTHON) test/diagnosis/worlds_campaign.py --stratum main --stratum halfcar --stratum drive --cases 20 --no-tolerance --jobs $$(nproc) --out build/worlds/bare
 
+campaign-mujoco: setup build/setup/mujoco ## Recordings of MuJoCo with something hidden in joints, carts, drives, pendulums, quarter cars: is it named, and nothing else?
+	$(Q)$(PYTHON) test/diagnosis/mujoco_cases/mujoco_campaign.py --cases $(MUJOCO) --jobs $$(nproc)
+
 ablate: setup ## Which thresholds of the diagnosis decide something, and which go, with every one of them watched: build/ablate/ABLATION.md; hours
 	$(Q)rm -rf build/ablate/notes
 	$(Q)PROBES=build/ablate/notes $(PYTHON) test/diagnosis/campaign.py --seed 20261126 --cases 300 --jobs $$(nproc) --command "$(WATCHED) diagnose" --out build/ablate/draw
@@ -122,13 +126,14 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run pythons test nightly prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
+.PHONY: help setup run pythons test nightly prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools
 build/setup/unity build/setup/cmock build/setup/proof: build/setup/tools
 build/setup/pythons: requirements.txt pyproject.toml build/setup/python
 build/setup/rivals: test/diagnosis/rivals/requirements.txt build/setup/tools
+build/setup/mujoco: test/diagnosis/mujoco_cases/requirements.txt build/setup/python
 build/setup/rival_training: test/training/rivals/requirements.txt build/setup/tools
 build/setup/packages: test/packages/requirements.txt build/setup/tools
 build/setup/docs: sil/manual/requirements.txt build/setup/tools

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 #
-# setup.sh tools|python|pythons|unity|cmock|packages|docs|proof|rivals|rival_training: one part of the set-up each; the Makefile calls it, once. All goes into build/
+# setup.sh tools|python|pythons|unity|cmock|packages|docs|proof|rivals|mujoco|rival_training: one part of the set-up each; the Makefile calls it, once. All goes into build/
 # but the Debian packages of `tools` and `proof`. Quiet where there is nothing to do; one line that names the remedy where it cannot.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -141,6 +141,15 @@ rivals() # of the diagnosis, for `make campaign` only
     python3 -m venv build/rivals
     build/rivals/bin/python -m pip install --quiet --disable-pip-version-check -r test/diagnosis/rivals/requirements.txt \
         >build/setup/rivals.log 2>&1 || give_up "pip failed, see build/setup/rivals.log; is the package index reachable?"
+}
+
+mujoco() # the physics of a generator of hidden effects, for `make campaign-mujoco` and tests that skip without it
+{
+    echo "setup: MuJoCo into build/mujoco"
+    rm -rf build/mujoco
+    build/venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --target build/mujoco \
+        -r test/diagnosis/mujoco_cases/requirements.txt >build/setup/mujoco.log 2>&1 ||
+        give_up "pip failed, see build/setup/mujoco.log; is the package index reachable?"
 }
 
 rival_training() # plain Adam in JAX, for `make campaign-train` only

@@ -21,7 +21,7 @@ LIBRARY  := $(RUNTIME) $(MODEL)
 INCLUDE  := -Igen/nqvm/c
 
 .SECONDARY:
-.PHONY: $(SUITES) python hidden hidden-nightly misra-long python-long
+.PHONY: $(SUITES) python hidden hidden-nightly mujoco-nightly misra-long python-long
 # A suite can also be called on its own; python is the last part of the set-up that one needs, unity aside.
 READY := build/setup/python
 
@@ -267,6 +267,8 @@ hidden-fresh: | $(READY)
 	@$(HIDDEN) --cases 4 --out build/campaign/fresh
 hidden-nightly: | $(READY)
 	@$(HIDDEN) --cases 24 --out build/campaign/nightly
+mujoco-nightly: build/setup/mujoco
+	@OPENBLAS_NUM_THREADS=1 $(PYTHON) test/diagnosis/mujoco_cases/mujoco_campaign.py --cases 12 --gate --out build/mujoco-cases/nightly
 
 # -- the price ----------------------------------------------------------------------------------------------------------
 
