@@ -20,7 +20,7 @@ import numpy as np
 
 from . import double, effects, excitation, plants, rivals, single
 from .effects import Effect
-from .engine import COARSE, SAMPLE, STEP, Unstable, run
+from .engine import COARSE, SAMPLE, STEP, Array, Unstable, run
 from .excitation import LONG
 from .fitting import Fit, Record, simulate
 
@@ -30,6 +30,8 @@ RATIO = (0.8, 25.0)  # of the change of the signals to the noise, as drawn
 KEPT = (0.5, 50.0)  # as settled
 NEAR = 0.35  # of the logarithm of the ratio, to what was drawn
 SIZES = (0.03, 5.0)  # of an effect, that are plausible
+BEYOND = 3.0  # tolerances that a wrong parameter is off at least
+INSIDE = 1.25  # of the trained range, that the hold-out may reach
 SHARE = 0.1  # of its size that the own fit may err by
 BETTER = 0.98  # share of the nominal plant's error on the hold-out that the own fit may keep
 STEP_ERROR = 0.1  # of the noise, that a step twice as long may change
@@ -81,9 +83,10 @@ class Case:
         rng = np.random.default_rng([self.seed, self.index, self.attempt, number, 1])
         wrong = {e.place: e.numbers["value"] for e in self.hidden if e.kind == "wrong_parameter"}
         job = plant.job({**self.true, **wrong}, effects.in_plant(self.hidden, plant))
-        start = excitation.start(rng, plant)
+        size, rows = excitation.SIZE.get(name, 1.0), LONG[name]
+        start = excitation.start(rng, plant, size)
         job.start.update(start)
-        self.last = run(job, LONG[name], step, excitation.command(rng, plant, LONG[name]), effects.reach(self.hidden), plant.road)
+        self.last = run(job, rows, step, excitation.command(rng, plant, rows, size), effects.reach(self.hidden), plant.road)
         clean = effects.sensed(self.hidden, plant, plant.columns(self.last.y))
         seen = clean + np.array([s.white for s in plant.sensors]) * rng.standard_normal(clean.shape)
         for i, s in enumerate(plant.sensors):
@@ -103,16 +106,23 @@ class Case:
         stiffness = self.plant.values[site.spring][0] if site and site.spring else 0.0
         at = effects.scale_of(self.kind, place, self.plant, self.last, first.clean, stiffness)
         shape["wave"] = float(draw.uniform(1.5, 3.5)) / max(at.peak, 1e-9)  # so that its level changes some times over the travel
-        file = self.plant.values[place][0] if self.kind == "wrong_parameter" else 0.0
+        wrong, least = self.kind == "wrong_parameter", SIZES[0]
+        file = self.plant.values[place][0] if wrong else 0.0
+        if wrong and self.tolerance:
+            x = least = BEYOND * self.tolerance / effects.WRONG
         for _ in range(5):
             self.effect = Effect(self.kind, place, effects.numbers(self.kind, x, sign, shape, at, file), sign, shape)
             self.records = {"train_1": self._record("train_1", COARSE)}
             self.ratio = self._without(rounds=1).ratio
             before, x = x, x * float(np.clip(self.target / max(self.ratio, 1e-9), 0.2, 4.0)) ** 0.9
-            x = float(np.clip(x, *SIZES))
+            x = float(np.clip(x, least, SIZES[1]))
             if abs(np.log(self.ratio / self.target)) < NEAR or x == before:
                 break
-        if not KEPT[0] < self.ratio < KEPT[1]:
+        self._sized()
+
+    def _sized(self) -> None:
+        """Refuse an effect that is hardly seen, or, unless a tolerance asks for it, one that nobody would miss."""
+        if not KEPT[0] < self.ratio or (self.ratio > KEPT[1] and self.kind != "wrong_parameter"):
             raise Refused("size")
 
     def _without(self, rounds: int = 4, clean: bool = True) -> Fit:
@@ -127,12 +137,14 @@ class Case:
         self.step_error = float(np.sqrt(np.mean(((rough - r.clean) / [s.noise for s in self.plant.sensors]) ** 2)))
         if self.step_error > STEP_ERROR:
             raise Refused("step")
+        most = [np.max([self._reached(x) for x in some], axis=0) for some in (self.trained, [self.records["holdout_1"]])]
+        if np.any(most[1] > INSIDE * most[0]):
+            raise Refused("hold-out outside")
         if self.effect is None:
             return
         null = self._without()
         self.ratio = null.ratio
-        if not KEPT[0] < self.ratio < KEPT[1]:
-            raise Refused("size")
+        self._sized()
         own = Fit(self.plant, self.tolerance, self.trained, False, [self._guess()]).solve()
         got, true = own.state(own.x).effects[0].numbers, self.effect.numbers
         size = rivals.SIZE[self.kind]
@@ -142,6 +154,10 @@ class Case:
             raise Refused("size not recovered")
         if own.elsewhere(self.records["holdout_1"]) > BETTER * null.elsewhere(self.records["holdout_1"]):
             raise Refused("no gain on the hold-out")
+
+    def _reached(self, r: Record) -> Array:
+        """Greatest magnitude of every column of a recording."""
+        return np.asarray(np.abs(r.clean if r.u is None else np.column_stack([r.u, r.clean])).max(axis=0))
 
     def _guess(self) -> Effect:
         """The effect as a fit begins with it: 10 % off."""

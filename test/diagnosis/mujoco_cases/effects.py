@@ -42,6 +42,7 @@ KINDS = {
     "pendulum": ("coulomb_friction", "quadratic_damper", "position_dependent_friction", "wrong_parameter", "sensor_clipping"),
     "quarter": ("coulomb_friction", "bump_stop", "cubic_spring", "quadratic_damper", "tyre_damping", "wrong_parameter", *SENSOR),
 }
+WRONG = 0.08  # relative error of a parameter at size 1
 HISTORY = ("delay", "nsample", "interp")  # attributes of an actuator that acts late
 # Of a delay of whole steps, less a quarter so that no time is on an edge, the last of four evaluations of a step sees the next one: it has
 # a sixth of the weight, so that the delay is EARLY short of whole steps.
@@ -131,7 +132,7 @@ def numbers(kind: str, x: float, sign: float, shape: Mapping[str, float], at: Sc
         "sensor_scale": lambda: {"scale": 1 + sign * min(0.03 * x, 0.4)},
         "sensor_delay": lambda: {"delay": 0.004 * x},
         "sensor_clipping": lambda: {"limit": most(np.abs(at.signal), 0.04 * x)},
-        "wrong_parameter": lambda: {"value": file * (1 + sign * min(0.08 * x, 0.6))},
+        "wrong_parameter": lambda: {"value": file * (1 + sign * min(WRONG * x, 0.6))},
     }
     return table[kind]()
 

@@ -40,9 +40,11 @@ def installed() -> ModuleType | None:
     if (HOME / "mujoco").is_dir() and str(HOME) not in sys.path:
         sys.path.append(str(HOME))
     try:
-        return importlib.import_module("mujoco")
+        module = importlib.import_module("mujoco")
     except ImportError:
         return None
+    module.set_mju_user_warning(lambda text: None)  # else it writes a log into the working directory; `run` looks at the counts
+    return module
 
 
 class Unstable(ArithmeticError):
@@ -174,7 +176,10 @@ def run(job: Job, rows: int, step: float, command: Command | Array | None, reach
                 data.ctrl[0] = within[k, i]
             set_level()
             mujoco.mj_step(model, data)
-    if not (np.isfinite(y).all() and np.isfinite(q).all()) or data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number:
+    warned = mujoco.mjtWarning
+    if not np.isfinite(y).all() or any(
+        data.warning[w].number for w in (warned.mjWARN_BADQACC, warned.mjWARN_BADQVEL, warned.mjWARN_BADQPOS)
+    ):
         raise Unstable
     return Run(sent, y, q, v)
 

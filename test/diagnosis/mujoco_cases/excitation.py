@@ -10,6 +10,7 @@ from .engine import SAMPLE, Array, Command
 from .plants import Plant
 
 LONG = {"train_1": 6000, "train_2": 6000, "holdout_1": 4000}  # rows
+SIZE = {"holdout_1": 0.85}  # of the excitation, so that the hold-out seldom goes where the training has not been
 FADE = 1.0  # s in which a reference begins
 
 
@@ -28,9 +29,9 @@ def waves(rng: np.random.Generator, rows: int, low: float, high: float, size: fl
     return k * g * x, k * (dg * x + g * dx), k * (ddg * x + 2 * dg * dx + g * ddx)
 
 
-def controller(rng: np.random.Generator, plant: Plant, rows: int) -> Command:
+def controller(rng: np.random.Generator, plant: Plant, rows: int, size: float) -> Command:
     """Feed-forward of the nominal plant and a PD law on a position and a rate with noise, as whole steps of a 12 bit converter."""
-    x, dx, ddx = waves(rng, rows, *plant.band, plant.travel, 0.6)
+    x, dx, ddx = waves(rng, rows, *plant.band, size * plant.travel, 0.6)
     forward = plant.forward(x, dx, ddx)
     w = 2 * np.pi * float(rng.uniform(1.5, 3.5))
     kp, kd = plant.inertia * w * w, plant.inertia * 1.4 * w
@@ -44,22 +45,22 @@ def controller(rng: np.random.Generator, plant: Plant, rows: int) -> Command:
     return command
 
 
-def open_loop(rng: np.random.Generator, plant: Plant, rows: int) -> Array:
+def open_loop(rng: np.random.Generator, plant: Plant, rows: int, size: float) -> Array:
     """The command that would move the nominal plant along a reference, without feedback."""
-    forward = plant.forward(*waves(rng, rows, *plant.band, plant.travel, 0.6))
+    forward = plant.forward(*waves(rng, rows, *plant.band, size * plant.travel, 0.6))
     count = 8 * float(np.abs(forward).max()) / 4096
     return np.asarray(count * np.round(forward / count))
 
 
-def command(rng: np.random.Generator, plant: Plant, rows: int) -> Command | Array | None:
-    """What drives one recording."""
+def command(rng: np.random.Generator, plant: Plant, rows: int, size: float = 1.0) -> Command | Array | None:
+    """What drives one recording; `size`: of the motion that is asked for, over the plant's."""
     if plant.road:
-        return waves(rng, rows, *plant.band, plant.travel, 1.3)[0]
+        return waves(rng, rows, *plant.band, size * plant.travel, 1.3)[0]
     if not plant.actuator:
         return None
-    return open_loop(rng, plant, rows) if plant.anchored and rng.random() < 0.4 else controller(rng, plant, rows)
+    return open_loop(rng, plant, rows, size) if plant.anchored and rng.random() < 0.4 else controller(rng, plant, rows, size)
 
 
-def start(rng: np.random.Generator, plant: Plant) -> dict[str, float]:
+def start(rng: np.random.Generator, plant: Plant, size: float = 1.0) -> dict[str, float]:
     """Positions that a recording starts from; all but a free swing are at rest."""
-    return {"q": float(rng.choice([-1, 1]) * rng.uniform(0.7, 1.2))} if plant.name == "pendulum" else {}
+    return {"q": float(size * rng.choice([-1, 1]) * rng.uniform(0.7, 1.2))} if plant.name == "pendulum" else {}

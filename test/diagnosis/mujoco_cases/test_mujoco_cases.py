@@ -39,6 +39,12 @@ def test_same_seed_same_bytes(tmp_path):
     assert written == files(again, tmp_path / "b")
     assert json.dumps(first.truth(a)) == json.dumps(again.truth(b))
     assert written["model.toml"] != files(other, tmp_path / "c")["model.toml"]
+    for case in (first, other):
+        told, held = (
+            np.loadtxt(tmp_path / f"{'a' if case is first else 'c'}" / f, delimiter=",", skiprows=1)
+            for f in ("train_1.csv", "holdout_1.csv")
+        )
+        assert np.all(np.abs(held).max(axis=0)[1:] < 1.3 * np.abs(told).max(axis=0)[1:])
 
 
 @there
@@ -51,6 +57,17 @@ def test_a_hidden_effect_is_made_again_and_stated(tmp_path):
     assert json.dumps(truth) == json.dumps(again.truth(b))
     (effect,) = truth["effects"]
     assert cases.KEPT[0] < effect["ratio"] < cases.KEPT[1] and effect["recovered_within"] <= cases.SHARE and effect["where"]
+
+
+@there
+@pytest.mark.long
+def test_a_wrong_parameter_is_off_by_three_tolerances(monkeypatch):
+    """A deviation inside of a stated tolerance is no finding: a wrong parameter is far outside, even where less would be seen."""
+    monkeypatch.setattr(cases, "MAKERS", {"pendulum": cases.MAKERS["pendulum"]})
+    monkeypatch.setattr(effects, "KINDS", {"pendulum": ("wrong_parameter",)})
+    case, _ = cases.make(13, 0, tolerances=True)
+    ((name, value),) = effects.told(case.effect).items()
+    assert case.tolerance and abs(value / case.plant.values[name][0] - 1) >= 0.999 * cases.BEYOND * case.tolerance
 
 
 HALVED = [
@@ -150,6 +167,15 @@ def test_actuators_do_what_their_names_say(drive, reached):
     lag = 0.05
     exact = t**2 / 4 * reached if reached else (t**2 / 2 - lag * t + lag**2 * (1 - np.exp(-t / lag))) / 2
     assert np.abs(x - exact).max() < 1e-6 * exact.max()
+
+
+@there
+def test_a_simulation_that_diverges_is_refused_quietly(tmp_path, monkeypatch, capfd):
+    """No log file, no line: MuJoCo's warning is an exception."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(engine.Unstable):
+        mass(passive((-1e9,), (0.0,), None, None, 2.0), 0.1, 100)
+    assert not list(tmp_path.iterdir()) and capfd.readouterr() == ("", "")
 
 
 @there
