@@ -200,6 +200,7 @@ class Case:
             "plant": self.plant.name,
             "tolerance": self.tolerance,
             "mismodelling": 0.0,
+            "true": self.true,
             "step_error": round(self.step_error, 5),
             "refused": dict(refused or {}),
             "effects": found,
