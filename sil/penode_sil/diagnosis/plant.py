@@ -64,7 +64,7 @@ def places(model: Model, set_name: str = "default") -> tuple[Place, ...]:
     """All places of a model, those with elements first; ranges of networks are those of a set."""
     found: dict[tuple[str, str], list[tuple[str, int]]] = {}
     for e in model.elements:
-        if not _external(model, e):
+        if not external(model, e):
             back = e.ends[::-1]
             key, sense = (back, -1) if back in found else (e.ends, 1)
             found.setdefault(key, []).append((e.name, sense))
@@ -111,7 +111,7 @@ def _trained(model: Model, e: Element, set_name: str) -> list[tuple[str, str, fl
     return [(e.name, "s" if what == "deflection" else "v", float(low), float(high), stated) for what, low, high in ranges]
 
 
-def _external(model: Model, e: Element) -> bool:
+def external(model: Model, e: Element) -> bool:
     """A measured force that is put on a body: an expression without deflection or rate, and without any state."""
     moves = "|".join(["[sv]", r"[sv]_\w+", *map(re.escape, model.states)])
     return e.law == "expression" and not re.search(rf"\b({moves})\b", e.expression)

@@ -16,7 +16,7 @@ from . import catalogue, clipping, holding
 from .catalogue import drives, friction
 from .catalogue.form import Form, Motion, Moved
 from .evidence.bench import Bench, fit_level
-from .evidence.observer import Filter, force_at
+from .evidence.observer import Filter, drives as drives_of, force_at
 from .evidence.screening import AT_ONCE, Probe, Score, as_they_are, scores
 from .fit import Free
 from .terms import Term, Trial, drive, free_of, with_forms
@@ -34,8 +34,11 @@ FREE_RUN, FOLLOWED = 10, 12  # iterations of a form's fits
 def motions(probe: Probe) -> list[Motion]:
     """Of every place. What acts on a body where nothing of the model does is what moves it."""
     found, bench = [], probe.bench
+    driving = drives_of(bench.model)
     for k, place in enumerate(bench.places):
         loads = {force_at(p): 3 * i + 2 for i, p in enumerate(bench.places) if p.elements and {*p.ends} & {*place.ends} - {GROUND}}
+        first = 3 * len(bench.places)
+        loads |= {f"F_{e.name}": first + i for i, e in enumerate(driving) if {*e.ends} & {*place.ends} - {GROUND}}
         parts = [
             Moved(m[:, 3 * k], m[:, 3 * k + 1], np.arange(len(m)) * bench.step, {f: np.abs(m[:, i]) for f, i in loads.items()})
             for m in probe.motions

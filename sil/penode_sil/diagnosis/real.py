@@ -246,7 +246,8 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
 
 
 def _wider(bench: Bench, term: Term, size: float) -> float:
-    """Factor of the deviations of a term of this share of the force there: noise alone makes less of them than unmodelled forces."""
+    """Factor of the deviations of a term of this share of the force there: noise alone makes less of them than unmodelled forces, as far as
+    there are any."""
     cut = term.form.how == "clip"  # the size of which is its limit itself
     ratios = undetermined(bench.model, bench.fit)
     known = min(
@@ -254,7 +255,8 @@ def _wider(bench: Bench, term: Term, size: float) -> float:
         for f in _values_of(bench, term)
         if cut or not f.log
     )
-    return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
+    systematic = SYSTEMATIC * min(bench.level.size / (0.5 * WORTH), 1.0)  # half of WORTH is what any model is wrong by
+    return float(np.hypot(1.0, systematic / max(size, systematic, 1e-12) / max(known, 1e-12)))
 
 
 def _values_of(bench: Bench, term: Term) -> list[Free]:

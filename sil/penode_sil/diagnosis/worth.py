@@ -62,7 +62,7 @@ def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]
         force = np.sum([np.concatenate(_force(t, fit, motion)) for t in terms], axis=0)
         beside = _beside(bench, form.index, motion, force)
         bent = 1.0 if all(_linear(t, fit, motion) for t in terms) else BENT
-        return min(_rms(beside), _rms(force) * own(bench.model, fit, targets)) / (bent * motion.force)
+        return min(_rms(beside), _rms(force) * own(bench.model, fit, targets)) / (bent * motion.force) if motion.force else 0.0
     return max(_of_signal(bench, t, fit) for t in terms) * own(bench.model, fit, targets)
 
 

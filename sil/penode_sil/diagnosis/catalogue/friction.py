@@ -85,6 +85,8 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         if place.role != "body":
             for grows, kind, note in _growing(motion, edge):
                 yield Form(kind, place.name, "force", index, (slides, grows), note)
+                if grows.load:
+                    yield Form(kind, place.name, "force", index, (grows,), f"{note} alone")
     if place.role == "body":
         return
     for share in WAYS:
@@ -107,6 +109,8 @@ def _slip(m: Moved, presliding: float):
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind."""
+    if form.parts and form.parts[0].load:
+        return {"share": ("1", v(0, "share"))}
     force = ("N", v(0, "force"))
     match form.kind:
         case "stribeck_friction":

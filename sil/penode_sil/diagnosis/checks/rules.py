@@ -114,8 +114,10 @@ def relieved(case: Case, end: End, table: Table, gone: Sequence[tuple[str, str]]
 
 
 def mended(case: Case, end: End, table: Table) -> list[str]:
-    """Sensors that the nominal model misses by more than noise, however its file allows to fit it, and that the written one mends."""
-    if end.answer.verdict != "no_discrepancy":
+    """Sensors that the nominal model misses by more than noise, however its file allows to fit it, and that the written one mends; where
+    nothing was explained, only if the written one leaves no sensor more than its noise."""
+    verdict = end.answer.verdict
+    if verdict != "no_discrepancy" and (verdict != "unexplained" or misses(table.rows, "extended", table.noise)):
         return []
     return list(dict.fromkeys(r.figure.signal for r in _missed(table) if UNSEEN * r.rms("extended") < min(map(r.rms, NOMINAL))))
 

@@ -19,7 +19,7 @@ from ..catalogue.acting import ACTING
 from ..compiling import compiled, ordered
 from ..fit import Free
 from ..noise import Experiment
-from ..plant import Place, anonymous, extend, rotational_unit
+from ..plant import Place, anonymous, extend, external, rotational_unit
 from . import samples
 
 Array = NDArray[np.float64]
@@ -94,7 +94,7 @@ def augmented(model: Model, places: Sequence[Place]) -> Model:
 
 def with_probes(model: Model, places: Sequence[Place]) -> Model:
     """An augmented model with a force at_k as a further input at each place, and its deflection, its rate and the force there already as
-    further sensors."""
+    further sensors; behind them the forces of its drives."""
     forces = [Element(f"probe{k}", p.ends, "expression", expression=f"at{k}") for k, p in enumerate(places)]
     wide = replace(model, inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(places))))
     wide = extend(wide, forces, {}, places)
@@ -102,7 +102,13 @@ def with_probes(model: Model, places: Sequence[Place]) -> Model:
     for k, p in enumerate(places):
         signals = (("s", f"s_probe{k}", "m"), ("v", f"v_probe{k}", "m/s"), ("F", force_at(p), "N"))
         seen += [Signal(f"{q}_of_probe{k}", text, p.unit(unit)) for q, text, unit in signals]
+    seen += [Signal(f"F_of_{e.name}", f"F_{e.name}", rotational_unit(model, e.ends, "N")) for e in drives(model)]
     return replace(wide, sensors=(*wide.sensors, *seen))
+
+
+def drives(model: Model) -> list[Element]:
+    """Forces that inputs put on bodies."""
+    return [e for e in model.elements if external(model, e)]
 
 
 def force_at(p: Place) -> str:

@@ -27,7 +27,7 @@ class Probe:
     bench: Bench
     predictor: Predictor
     by: Filter
-    motions: list[Array]  # deflection, rate and force of every place per recording [n, 3 places]
+    motions: list[Array]  # deflection, rate and force of every place, then forces of drives, per recording [n, .]
 
     @staticmethod
     def of(bench: Bench) -> Probe:
@@ -35,7 +35,7 @@ class Probe:
         predictor = Predictor(wide, bench.records, bench.update, bench.set_name, bench.fastest)
         by = bench.fit.by
         none = {e: np.zeros((1, len(r), len(bench.places))) for e, r in enumerate(bench.records)}
-        watched = 3 * len(bench.places)
+        watched = len(wide.sensors) - len(bench.model.sensors)
         seen = predictor.predict(bench.fit.free, np.zeros((1, len(bench.fit.free))), by, none, watched)[1]
         return Probe(bench, predictor, by, [s[0] for s in seen])
 
