@@ -276,6 +276,7 @@ static pen_real_t nqvm_along(const pen_real_t fx[], const pen_real_t fu[], pen_r
 
     nqvm_drive_along(share, c, du);
     sum = pen_step_inner(NQVM_N_DRIVE, fu, du);
+    PEN_PORT_UNROLL
     for (size_t n = 0U; n < NQVM_N_X; n++) {
         sum += fx[n] * d[n][c];
     }
@@ -345,12 +346,17 @@ static pen_status_t nqvm_integrate_jacobian(const pen_real_t p[], const pen_real
             nqvm_drive(share, u0, u1, us);
             for (size_t n = 0U; n < NQVM_N_X; n++) {
                 xs[n] = x0[n] + ((NQVM_STEP * nqvm_node[s]) * slope[n]);
+                PEN_PORT_UNROLL
                 for (size_t c = 0U; c < NQVM_N_COLUMNS; c++) {
                     ds[n][c] = (s == 0U) ? d[n][c] : (d[n][c] + ((NQVM_STEP * nqvm_node[s]) * dk[before][n][c]));
                 }
             }
             status |= nqvm_rates_jacobian(p, xs, us, k[s], fx, fu);
-            for (size_t n = 0U; n < NQVM_N_X; n++) {
+            for (size_t n = 0U; n < 2U; n++) { /* the rate of a position is its velocity */
+                pen_step_copy(NQVM_N_COLUMNS, ds[2U + n], dk[s][n]);
+            }
+            for (size_t n = 2U; n < NQVM_N_X; n++) {
+                PEN_PORT_UNROLL
                 for (size_t c = 0U; c < NQVM_N_COLUMNS; c++) {
                     dk[s][n][c] = nqvm_along(fx[n], fu[n], ds, share, c);
                 }
@@ -359,6 +365,7 @@ static pen_status_t nqvm_integrate_jacobian(const pen_real_t p[], const pen_real
         for (size_t n = 0U; n < NQVM_N_X; n++) {
             x[n] = x0[n] + (advance * (NQVM_STEP / (pen_real_t)6.0))
                 * (k[0][n] + ((pen_real_t)2.0 * k[1][n]) + ((pen_real_t)2.0 * k[2][n]) + k[3][n]);
+            PEN_PORT_UNROLL
             for (size_t c = 0U; c < NQVM_N_COLUMNS; c++) {
                 d[n][c] += (advance * (NQVM_STEP / (pen_real_t)6.0))
                     * (dk[0][n][c] + ((pen_real_t)2.0 * dk[1][n][c]) + ((pen_real_t)2.0 * dk[2][n][c]) + dk[3][n][c]);

@@ -271,6 +271,7 @@ static pen_real_t nqvm_euler_along(const pen_real_t fx[], const pen_real_t fu[],
 
     nqvm_euler_drive_along(share, c, du);
     sum = pen_step_inner(NQVM_EULER_N_DRIVE, fu, du);
+    PEN_PORT_UNROLL
     for (size_t n = 0U; n < NQVM_EULER_N_X; n++) {
         sum += fx[n] * d[n][c];
     }

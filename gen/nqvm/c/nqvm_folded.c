@@ -247,6 +247,7 @@ static pen_real_t nqvm_folded_along(const pen_real_t fx[], const pen_real_t fu[]
 
     nqvm_folded_drive_along(share, c, du);
     sum = pen_step_inner(NQVM_FOLDED_N_DRIVE, fu, du);
+    PEN_PORT_UNROLL
     for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
         sum += fx[n] * d[n][c];
     }
@@ -316,13 +317,18 @@ static pen_status_t nqvm_folded_integrate_jacobian(const pen_piece_t f[], const 
             nqvm_folded_drive(share, u0, u1, us);
             for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
                 xs[n] = x0[n] + ((NQVM_FOLDED_STEP * nqvm_folded_node[s]) * slope[n]);
+                PEN_PORT_UNROLL
                 for (size_t c = 0U; c < NQVM_FOLDED_N_COLUMNS; c++) {
                     ds[n][c] = (s == 0U) ? d[n][c]
                         : (d[n][c] + ((NQVM_FOLDED_STEP * nqvm_folded_node[s]) * dk[before][n][c]));
                 }
             }
             status |= nqvm_folded_rates_jacobian(f, xs, us, k[s], fx, fu);
-            for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
+            for (size_t n = 0U; n < 2U; n++) { /* the rate of a position is its velocity */
+                pen_step_copy(NQVM_FOLDED_N_COLUMNS, ds[2U + n], dk[s][n]);
+            }
+            for (size_t n = 2U; n < NQVM_FOLDED_N_X; n++) {
+                PEN_PORT_UNROLL
                 for (size_t c = 0U; c < NQVM_FOLDED_N_COLUMNS; c++) {
                     dk[s][n][c] = nqvm_folded_along(fx[n], fu[n], ds, share, c);
                 }
@@ -331,6 +337,7 @@ static pen_status_t nqvm_folded_integrate_jacobian(const pen_piece_t f[], const 
         for (size_t n = 0U; n < NQVM_FOLDED_N_X; n++) {
             x[n] = x0[n] + (advance * (NQVM_FOLDED_STEP / (pen_real_t)6.0))
                 * (k[0][n] + ((pen_real_t)2.0 * k[1][n]) + ((pen_real_t)2.0 * k[2][n]) + k[3][n]);
+            PEN_PORT_UNROLL
             for (size_t c = 0U; c < NQVM_FOLDED_N_COLUMNS; c++) {
                 d[n][c] += (advance * (NQVM_FOLDED_STEP / (pen_real_t)6.0))
                     * (dk[0][n][c] + ((pen_real_t)2.0 * dk[1][n][c]) + ((pen_real_t)2.0 * dk[2][n][c]) + dk[3][n][c]);
