@@ -29,3 +29,5 @@ FLAGS = (
     "set_damaged",
     "set_idle",
 )
+
+FILTER_FLAGS = ("missing", "refused", "limited", "nonfinite")  # PEN_EKF_... of inc/penode/pen_ekf.h, the bits behind those of FLAGS

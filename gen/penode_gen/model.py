@@ -183,6 +183,65 @@ class Guard:
 
 
 @dataclass(frozen=True)
+class FilterSensor:
+    """A sensor that the filter uses: standard deviation of its noise, SI; above `gate` standard deviations it is refused, None: never."""
+
+    name: str
+    noise: float
+    gate: float | None = None
+
+
+@dataclass(frozen=True)
+class FilterState:
+    """A state of the model in the filter, SI: standard deviation at the start, and of what disturbs it within a second; bounds."""
+
+    name: str
+    start: float
+    noise: float = 0.0
+    least: float | None = None
+    most: float | None = None
+
+
+@dataclass(frozen=True)
+class FilterInput:
+    """An input as a state of the filter, SI: `noise` is the standard deviation at the start, and `step` that of what each sample adds
+    to `decay` times the last value. Of a `measured` one the state is the error of its measurement, else the input itself."""
+
+    name: str
+    noise: float
+    step: float
+    decay: float
+    measured: bool
+
+
+@dataclass(frozen=True)
+class FilterLimit:
+    """A sum of the states of the filter that stays within bounds: coefficients by name (the largest is 1 or -1) and bounds."""
+
+    name: str
+    text: str
+    unit: str
+    least: float | None
+    most: float | None
+    coefficients: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Filter:
+    """What [filter] says: an extended Kalman filter beside the step (inc/penode/pen_ekf.h)."""
+
+    sensors: tuple[FilterSensor, ...]
+    states: tuple[FilterState, ...]  # all states of the model, in their order
+    inputs: tuple[FilterInput, ...]
+    limits: tuple[FilterLimit, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its states."""
+        return (*(s.name for s in self.states), *(i.name for i in self.inputs))
+
+
+@dataclass(frozen=True)
 class Model:
     """A checked model. All values are SI; `digest` identifies the files it was read from."""
 
@@ -213,6 +272,7 @@ class Model:
     set_owner: str = ""  # the model whose sets these are, if it is another
     points: tuple[Point, ...] = ()
     sampled: tuple[Sampled, ...] = ()
+    filter: Filter | None = None
 
     @property
     def owner(self) -> str:

@@ -7,6 +7,9 @@
 #include <stdint.h>
 
 #include "sample.h"
+#ifdef EKF_HEADER /* the model file has a filter */
+#include "ekf_loop.h"
+#endif
 
 enum { SIZE_INSTANCE, SIZE_BANKS, SIZE_REAL, SIZE_X, SIZE_U, SIZE_Y, SIZE_Z, SIZE_SAVED, SIZE_COUNT };
 

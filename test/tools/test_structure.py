@@ -69,6 +69,7 @@ def test_counts_of_a_small_tree(tree: Path) -> None:
         "runtime lines": 410,
         "elementary lines": 0,
         "wire protocol lines": 5,
+        "filter lines": 0,
     }
     assert structure.look(tree)[0] == counts
     assert structure.main(["--root", str(tree)]) == 0
@@ -97,6 +98,7 @@ def test_counts_of_a_small_tree(tree: Path) -> None:
         ("src/a.c", "\n", "runtime lines"),
         ("src/pen_log.c", "\n", "elementary lines"),
         ("src/pen_xcp_a.c", "\n", "wire protocol lines"),
+        ("src/pen_ekf.c", "\n", "filter lines"),
     ],
 )
 def test_one_more_is_refused(tree: Path, name: str, text: str, kind: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,7 @@ from ..networks import Dense
 from ..resources import resource
 from ..sets import layout, packing, promises
 from ..version import VERSION
-from . import selftest
+from . import filter_c, selftest
 from .c_text import fold, literal, literals, real
 from .equations_c import RUNGE_KUTTA, Body, Equations
 from .files import write_all
@@ -63,7 +63,11 @@ _FILES = {"model.h.j2": "{name}.h", "model.c.j2": "{name}.c", "sets.h.j2": "{own
 def render(model: Model, self_test: bool = True) -> dict[str, str]:
     """File name -> text of the C of a model, with or without its self-test. Pure: no clock, no path beyond the model file's name."""
     context, texts = selftest.answered(Emitter(model).context(), self_test), {}
-    for template, name in (_FILES | ({"selftest.c.j2": "{name}_selftest.c"} if self_test else {})).items():
+    files = _FILES | ({"selftest.c.j2": "{name}_selftest.c"} if self_test else {})
+    if model.filter:
+        context |= filter_c.context(model, model.filter)
+        files |= filter_c.FILES
+    for template, name in files.items():
         texts[name.format(name=model.name, owner=model.owner)] = fold(TEMPLATES.get_template(template).render(context))
     return texts | {f"{model.owner}_layout.json": layout.to_json(model)}
 

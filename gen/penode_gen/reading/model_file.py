@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from .. import model as m
-from ..algebra import expressions as ex
+from ..algebra import expressions as ex, limits
 from ..algebra.causalise import check
 from ..laws import LAWS
 from ..sets import promises
 from ..sets.fold import room
-from .actuators import ActuatorTables
+from .filter_table import FilterTables
 from .followers import measures
 from .network_tables import ROOM, UNKNOWN
 from .places import one_line, show
@@ -54,7 +54,7 @@ class _All(frozenset[str]):
         return True
 
 
-class _Reader(ActuatorTables):
+class _Reader(FilterTables):
     """Reads the whole model."""
 
     def __init__(self, path: Path):
@@ -66,8 +66,7 @@ class _Reader(ActuatorTables):
             raise m.ModelError([one_line(f"{self.path}:1: is empty; write a model with [model], [inputs] and [outputs]")])
         self.sections()
         head, sample_time = self.head()
-        name = head.get("name", "model")
-        parameters = self.parameters()
+        name, parameters = head.get("name", "model"), self.parameters()
         inputs = tuple(self.inputs())
         bodies = tuple(self.bodies(parameters))
         networks = dict(self.networks())
@@ -77,8 +76,8 @@ class _Reader(ActuatorTables):
         states = (*self.states(), *acts.states, *self.law_states(elements))
         variables = (*self.variables(), *acts.variables)
         equations = (*self.equations(), *acts.equations)
-        outputs = tuple(self.signals("outputs"))
-        sensors = tuple(self.signals("sensors"))
+        outputs, sensors = (tuple(self.signals(section)) for section in ("outputs", "sensors"))
+        own_filter = self.filter(sensors, self.units_of_states(bodies, states), inputs, sample_time)
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
         self.folds(head, sets)
         promises.check(networks, sets, head["outside"], self.problem)
@@ -119,13 +118,14 @@ class _Reader(ActuatorTables):
             set_owner=self.set_owner,
             points=points,
             sampled=tuple(acts.sampled),
+            filter=own_filter,
         )
 
     def sections(self) -> None:
         """The name of the file, and the names of its sections."""
         if not self.path.name.isprintable():
             self.problem((), "the file has a name that cannot stand in a comment", "rename it")
-        known = [*SECTIONS, "model", "points", "elements", "equations", "sets"]
+        known = [*SECTIONS, "model", "points", "elements", "equations", "sets", "filter"]
         for key in self.data:
             if key not in known:
                 near = difflib.get_close_matches(key, known, 1)
@@ -366,11 +366,12 @@ def load(path: str | Path) -> m.Model:
     model = reader.read()
     try:
         problems = check(model)
+        model, more = (model, []) if problems else limits.complete(model)
     except RecursionError as error:
         raise m.ModelError(
             [one_line(f"{path}: has equations that depend on each other in too long a chain; write a smaller model")]
         ) from error
-    for where, what, remedy in problems:
+    for where, what, remedy in (*problems, *more):
         reader.problem(where, what, remedy)
     if reader.problems:
         raise m.ModelError(reader.problems)

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What a filter gives, sample by sample, whatever it ran on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from penode_gen.algebra.mechanics import state_unit
+from penode_gen.errors import ModelError
+from penode_gen.flags import FILTER_FLAGS, FLAGS as STEP_FLAGS
+from penode_gen.model import Filter, Model
+
+VERDICTS = ("not_offered", "used", "missing", "refused")
+FLAGS = {name: 1 << (len(STEP_FLAGS) + at) for at, name in enumerate(FILTER_FLAGS)}  # name -> PEN_EKF_... of pen_ekf.h
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """
+    One row a sample, SI. `values` and `deviations` [n, .] are those of signals(); `innovation`, `variance`, `ratio` and `verdict`
+    [n, measurements]; `counts` [measurements, VERDICTS]; `status` [n] as the C returns it.
+    """
+
+    values: Array
+    deviations: Array
+    innovation: Array
+    variance: Array
+    ratio: Array
+    verdict: NDArray[np.uint32]
+    status: NDArray[np.uint32]
+    counts: NDArray[np.uint32]
+
+
+def of(model: Model) -> Filter:
+    """The filter of a model. Raises ModelError if its file has none."""
+    if model.filter is None:
+        raise ModelError([f"{model.path}: has no [filter]; add one, as gen/README.md describes it"])
+    return model.filter
+
+
+def signals(model: Model) -> Iterator[tuple[str, str, str]]:
+    """Kind (x, u, y, z), name and unit of the columns of `values`, in the order of NAME_ekf_estimate_t: u without inputs is left out."""
+    yield from (("x", name, state_unit(model, name)) for name in model.states)
+    yield from (("u", i.name, i.unit) for i in model.inputs)
+    yield from (("y", s.name, s.unit) for s in model.outputs)
+    yield from (("z", s.name, s.unit) for s in model.sensors)
+
+
+def named(model: Model) -> list[tuple[int, str, str]]:
+    """Column, name and unit of what is estimated, each quantity once: outputs, sensors, estimated inputs, then other states."""
+    own, rank = {i.name for i in of(model).inputs}, "yzux"
+    columns = [(rank.index(kind), at, name, unit) for at, (kind, name, unit) in enumerate(signals(model)) if kind != "u" or name in own]
+    found: dict[str, tuple[int, str, str]] = {}
+    for _, at, name, unit in sorted(columns):
+        found.setdefault(name, (at, name, unit))
+    return list(found.values())

@@ -1,0 +1,339 @@
+/* SPDX-License-Identifier: MIT
+ * Copyright (c) 2026 the penode authors */
+
+#include "penode/pen_exact.h"
+
+#include "penode/pen_ekf.h"
+
+#include "penode/pen_elementary.h"
+#include "penode/pen_math.h"
+#include "penode/pen_port.h"
+
+#define ZERO ((pen_real_t)0)
+#define ONE  ((pen_real_t)1)
+
+/* What became of a measurement, by offered, sound and within its gate. */
+static const uint32_t VERDICT[8] = {
+    PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED,
+    PEN_EKF_IS_MISSING,  PEN_EKF_IS_MISSING,  PEN_EKF_IS_REFUSED,  PEN_EKF_USED,
+};
+/* Flags of measurements and limits, which mean nothing in a step that holds; and of none that advances. */
+static const pen_status_t OF_HELD[2] = { PEN_EKF_MISSING | PEN_EKF_REFUSED | PEN_EKF_LIMITED, PEN_OK };
+static const pen_status_t FLAG[PEN_EKF_VERDICTS] = { PEN_OK, PEN_OK, PEN_EKF_MISSING, PEN_EKF_REFUSED };
+
+/* NaN stays NaN. */
+static pen_real_t above(pen_real_t d, pen_real_t least)
+{
+    return pen_where(d < least, least, d);
+}
+
+static pen_real_t sum_of(size_t n, const pen_real_t c[], const pen_real_t x[])
+{
+    pen_real_t sum = ZERO;
+
+    for (size_t i = 0U; i < n; i++) {
+        sum += c[i] * x[i];
+    }
+    return sum;
+}
+
+/* along = U' c, gain = D U' c; the variance c' P c. */
+static pen_real_t spread(size_t n, const pen_real_t f[], const pen_real_t c[], pen_real_t along[], pen_real_t gain[])
+{
+    pen_real_t variance = ZERO;
+
+    for (size_t j = 0U; j < n; j++) {
+        pen_real_t sum = c[j];
+        for (size_t i = 0U; i < j; i++) {
+            sum += f[(j * n) + i] * c[i];
+        }
+        along[j] = sum;
+        gain[j] = f[(j * n) + j] * sum;
+        variance += sum * gain[j];
+    }
+    return variance;
+}
+
+void pen_ekf_start(const pen_ekf_model_t *model, pen_ekf_t *self, pen_real_t f[], uint32_t count[])
+{
+    const size_t n = model->n_x;
+
+    for (size_t i = 0U; i < (n * n); i++) {
+        f[i] = ZERO;
+    }
+    for (size_t i = 0U; i < n; i++) {
+        f[(i * n) + i] = above(model->start[i], model->floor[i]);
+    }
+    for (size_t i = 0U; i < (model->n_z * PEN_EKF_VERDICTS); i++) {
+        count[i] = 0U;
+    }
+    self->running = 0U;
+    self->held = 0U;
+    self->limited = 0U;
+    self->nonfinite = 0U;
+    self->ready = model->layout;
+}
+
+/* rows = [gamma, phi U], n of them, and their weights, [share Q, D]. */
+static void join(const pen_ekf_model_t *model, const pen_real_t phi[], const pen_real_t gamma[], pen_real_t share, const pen_real_t f[],
+                 pen_real_t rows[], pen_real_t weight[])
+{
+    const size_t n = model->n_x;
+    const size_t first = model->n_w;
+    const size_t wide = first + n;
+
+    for (size_t k = 0U; k < first; k++) {
+        weight[k] = share * model->noise[k];
+    }
+    for (size_t j = 0U; j < n; j++) {
+        weight[first + j] = f[(j * n) + j];
+    }
+    for (size_t i = 0U; i < n; i++) {
+        pen_real_t *const row = &rows[i * wide];
+        const pen_real_t *const own = &phi[i * n];
+        for (size_t k = model->from[i]; k < first; k++) {
+            row[k] = gamma[(i * first) + k];
+        }
+        for (size_t j = 0U; j < n; j++) {
+            pen_real_t sum = own[j];
+            for (size_t k = 0U; k < j; k++) {
+                sum += own[k] * f[(j * n) + k];
+            }
+            row[first + j] = sum;
+        }
+    }
+}
+
+/* Take out of a row what it has along `last`; how much that was. By last times its weights, and 1 / D of it. */
+static pen_real_t take_out(size_t wide, const pen_real_t last[], const pen_real_t weighted[], pen_real_t inverse, pen_real_t row[])
+{
+    const pen_real_t share = sum_of(wide, weighted, row) * inverse;
+
+    for (size_t k = 0U; k < wide; k++) {
+        row[k] -= share * last[k];
+    }
+    return share;
+}
+
+void pen_ekf_predict(const pen_ekf_model_t *model, const pen_real_t phi[], const pen_real_t gamma[], pen_real_t share,
+                     const pen_real_t from[], pen_real_t to[], pen_real_t work[])
+{
+    const size_t n = model->n_x;
+    const size_t wide = n + model->n_w;
+    pen_real_t *const weight = &work[n * wide];
+    pen_real_t *const weighted = &work[(n + 1U) * wide];
+
+    join(model, phi, gamma, share, from, work, weight);
+    for (size_t left = n; left > 0U; left--) {
+        const size_t j = left - 1U;
+        const size_t from_k = model->from[j];
+        const size_t some = wide - from_k;
+        const pen_real_t *const last = &work[(j * wide) + from_k];
+        for (size_t k = 0U; k < some; k++) {
+            weighted[k] = last[k] * weight[from_k + k];
+        }
+        const pen_real_t d = above(sum_of(some, weighted, last), model->floor[j]);
+        const pen_real_t inverse = ONE / d;
+        to[(j * n) + j] = d;
+        for (size_t i = 0U; i < j; i++) {
+            to[(j * n) + i] = take_out(some, last, weighted, inverse, &work[(i * wide) + from_k]);
+        }
+    }
+}
+
+/*
+ * Bierman's update with along = U' h and gain = D U' h, which becomes P h. With both 0 every factor stays, to the bit:
+ * the quotient is 1, and -0 is added. The variance of the innovation.
+ */
+static pen_real_t correct(const pen_ekf_model_t *model, pen_real_t variance, const pen_real_t along[], pen_real_t gain[], pen_real_t f[])
+{
+    const size_t n = model->n_x;
+    pen_real_t before = variance;
+
+    for (size_t j = 0U; j < n; j++) {
+        const pen_real_t own = gain[j];
+        const pen_real_t now = before + (along[j] * own);
+        const pen_real_t lambda = -(along[j] / before);
+        f[(j * n) + j] = above(f[(j * n) + j] * (before / now), model->floor[j]);
+        for (size_t i = 0U; i < j; i++) {
+            const pen_real_t u = f[(j * n) + i];
+            f[(j * n) + i] = u + (gain[i] * lambda);
+            gain[i] += u * own;
+        }
+        before = now;
+    }
+    return before;
+}
+
+pen_status_t pen_ekf_update(const pen_ekf_model_t *model, size_t i, const pen_real_t h[], pen_real_t z, bool offered, pen_real_t f[],
+                            pen_real_t dx[], pen_real_t work[], pen_ekf_test_t *test)
+{
+    const size_t n = model->n_x;
+    pen_real_t *const along = work;
+    pen_real_t *const gain = &work[n];
+    const pen_real_t variance = model->variance[i] + spread(n, f, h, along, gain);
+    const uint32_t there = offered ? 4U : 0U;
+    const uint32_t sound = ((ZERO * z) >= ZERO) ? 2U : 0U;
+    const pen_real_t innovation = pen_where((there + sound) == 6U, z - sum_of(n, h, dx), ZERO);
+    const pen_real_t ratio = (innovation * innovation) / variance;
+    const uint32_t within = (ratio <= model->gate[i]) ? 1U : 0U;
+    const uint32_t number = (variance <= PEN_REAL_MAX) ? 1U : 0U;
+    const uint32_t verdict = VERDICT[there + sound + (within & number)];
+    const bool used = verdict == PEN_EKF_USED;
+
+    for (size_t k = 0U; k < n; k++) {
+        along[k] = pen_where(used, along[k], ZERO);
+        gain[k] = pen_where(used, gain[k], ZERO);
+    }
+    const pen_real_t share = pen_where(used, innovation, ZERO) / correct(model, model->variance[i], along, gain, f);
+    for (size_t k = 0U; k < n; k++) {
+        dx[k] += gain[k] * share;
+    }
+    test->innovation = innovation;
+    test->variance = variance;
+    test->ratio = ratio;
+    test->verdict = verdict;
+    return FLAG[verdict];
+}
+
+/* How far the sum of a limit has to move to lie within it, from inside by more than its rounding error; 0 if it does. */
+static pen_real_t way_in(const pen_ekf_model_t *model, size_t limit, const pen_real_t x[])
+{
+    const size_t n = model->n_x;
+    const pen_real_t *const c = &model->limit[limit * n];
+    const pen_real_t unit = (pen_real_t)(n + 2U) * ((pen_real_t)4 * PEN_REAL_EPSILON);
+    const pen_real_t least = model->least[limit];
+    const pen_real_t most = model->most[limit];
+    pen_real_t sum = ZERO;
+    pen_real_t size = ZERO;
+
+    for (size_t i = 0U; i < n; i++) {
+        sum += c[i] * x[i];
+        size += pen_port_abs(c[i] * x[i]);
+    }
+    const pen_real_t raised = pen_where(sum < least, least + (unit * (size + pen_port_abs(least))), sum);
+    return pen_where(sum > most, most - (unit * (size + pen_port_abs(most))), raised) - sum;
+}
+
+/* Move x by the shortest way, in the metric of P, that moves the sum of a limit by `way`. */
+static void project(const pen_ekf_model_t *model, size_t limit, pen_real_t way, const pen_real_t f[], pen_real_t x[], pen_real_t work[])
+{
+    const size_t n = model->n_x;
+    pen_real_t *const gain = &work[n];
+    const pen_real_t share = way / spread(n, f, &model->limit[limit * n], work, gain);
+
+    for (size_t i = 0U; i < n; i++) {
+        pen_real_t sum = gain[i];
+        for (size_t j = i + 1U; j < n; j++) {
+            sum += f[(j * n) + i] * gain[j];
+        }
+        x[i] += sum * share;
+    }
+}
+
+/* The largest part of the way from `inside` to x, 0 to 1, on which limit is kept. */
+static pen_real_t part_of(const pen_ekf_model_t *model, size_t limit, const pen_real_t x[])
+{
+    const pen_real_t *const c = &model->limit[limit * model->n_x];
+    const pen_real_t way = way_in(model, limit, x);
+    const pen_real_t whole = sum_of(model->n_x, c, x) - sum_of(model->n_x, c, model->inside);
+    const pen_real_t part = ONE + (way / whole);
+    const pen_real_t some = pen_where(part > ZERO, part, ZERO);
+
+    return pen_where(pen_port_abs(way) > ZERO, some, ONE);
+}
+
+/* Draw x towards `inside` until it keeps all limits. */
+static void draw_in(const pen_ekf_model_t *model, pen_real_t x[])
+{
+    pen_real_t part = ONE;
+    pen_real_t out = ZERO;
+
+    for (size_t l = 0U; l < model->n_limits; l++) {
+        const pen_real_t own = part_of(model, l, x);
+        part = pen_where(own < part, own, part);
+    }
+    for (size_t i = 0U; i < model->n_x; i++) {
+        x[i] = pen_where(part < ONE, model->inside[i] + (part * (x[i] - model->inside[i])), x[i]);
+    }
+    for (size_t l = 0U; l < model->n_limits; l++) {
+        out += pen_port_abs(way_in(model, l, x));
+    }
+    for (size_t i = 0U; i < model->n_x; i++) {
+        x[i] = pen_where(out > ZERO, model->inside[i], x[i]);
+    }
+}
+
+pen_status_t pen_ekf_limit(const pen_ekf_model_t *model, const pen_real_t f[], pen_real_t x[], pen_real_t work[])
+{
+    pen_real_t moved = ZERO;
+
+    for (size_t round = 0U; round < PEN_EKF_SWEEPS; round++) {
+        for (size_t l = 0U; l < model->n_limits; l++) {
+            const pen_real_t way = way_in(model, l, x);
+            moved += pen_port_abs(way);
+            project(model, l, way, f, x, work);
+        }
+    }
+    draw_in(model, x);
+    return (moved > ZERO) ? PEN_EKF_LIMITED : PEN_OK;
+}
+
+/* 0, or NaN if a number of the state or the factors is not finite. */
+static pen_real_t doubt(size_t n, const pen_real_t f[], const pen_real_t x[])
+{
+    pen_real_t sum = ZERO;
+
+    for (size_t i = 0U; i < n; i++) {
+        sum += ZERO * x[i];
+        for (size_t j = 0U; j <= i; j++) {
+            sum += ZERO * f[(i * n) + j];
+        }
+    }
+    return sum;
+}
+
+pen_status_t pen_ekf_finish(const pen_ekf_model_t *model, pen_ekf_t *self, pen_status_t status, pen_real_t f[], pen_real_t x[],
+                            pen_ekf_test_t test[], uint32_t count[])
+{
+    const size_t n = model->n_x;
+    const pen_status_t found = (doubt(n, &f[n * n], &x[n]) >= ZERO) ? PEN_OK : PEN_EKF_NONFINITE;
+    const uint32_t good = (((status | found) & PEN_EKF_HOLDING) == PEN_OK) ? 1U : 0U;
+    const pen_status_t result = (status | found) & ~OF_HELD[good];
+    const pen_real_t *const new_f = &f[good * n * n];
+    const pen_real_t *const new_x = &x[good * n];
+    const pen_ekf_test_t *const new_test = &test[good * model->n_z];
+
+    for (size_t i = 0U; i < n; i++) {
+        x[i] = new_x[i];
+        for (size_t j = 0U; j <= i; j++) {
+            f[(i * n) + j] = new_f[(i * n) + j];
+        }
+    }
+    for (size_t i = 0U; i < model->n_z; i++) {
+        test[i].innovation = new_test[i].innovation;
+        test[i].variance = new_test[i].variance;
+        test[i].ratio = new_test[i].ratio;
+        test[i].verdict = new_test[i].verdict;
+        count[(i * PEN_EKF_VERDICTS) + (test[i].verdict % PEN_EKF_VERDICTS)] += good;
+    }
+    self->running |= good;
+    self->held += 1U - good;
+    self->limited += ((result & PEN_EKF_LIMITED) != PEN_OK) ? 1U : 0U;
+    self->nonfinite += ((result & PEN_EKF_NONFINITE) != PEN_OK) ? 1U : 0U;
+    return result;
+}
+
+pen_real_t pen_ekf_deviation(size_t n_x, const pen_real_t f[], const pen_real_t c[])
+{
+    pen_real_t variance = ZERO;
+
+    for (size_t j = 0U; j < n_x; j++) {
+        pen_real_t sum = c[j];
+        for (size_t i = 0U; i < j; i++) {
+            sum += f[(j * n_x) + i] * c[i];
+        }
+        variance += (f[(j * n_x) + j] * sum) * sum;
+    }
+    return pen_sqrt(variance);
+}
