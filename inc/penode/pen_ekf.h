@@ -41,7 +41,7 @@ extern "C" {
 /** The step of the filter did not advance: state, covariance and tests are those before. */
 #define PEN_EKF_HOLDING (PEN_HOLDING | PEN_EKF_NONFINITE)
 
-#define PEN_EKF_SWEEPS 4U /* projections onto each limit, one limit after the other */
+#define PEN_EKF_SWEEPS 2U /* projections onto each limit, one limit after the other */
 
 /** What the runtime needs to know of a filter. Constant, in flash. */
 typedef struct {

@@ -21,6 +21,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "diagnose": ("diagnose:diagnose", "Show what the model file MODEL gets wrong, name the cause, extend the model, measure the gain."),
     "export": ("export:export", "Write the model file MODEL in the format of another tool."),
+    "filter": (
+        "filter:filter",
+        "Estimate the states of the model file MODEL, and what its sensors would show, from the sensors that its [filter] uses.",
+    ),
     "generate": ("generate:generate", "Check the model file MODEL and write its C."),
     "import": ("import_:import_", "Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits;"),
     "inspect": (

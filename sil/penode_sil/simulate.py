@@ -20,6 +20,7 @@ from penode_gen.model import Model
 from . import mil, replay, results, scenario as scenarios, starts, status
 from .console import note, progress
 from .errors import UserError, WrongUse, hint
+from .filtering import beside
 from .mdf_write import write_mf4
 from .output import write_csv
 from .recordings import units
@@ -39,11 +40,12 @@ def simulate(model: Path | None, ssp: Path | None, target: str, as_json: bool, *
         return
     if model is None:
         raise WrongUse("simulate needs a model file, or --ssp FILE; name one")
-    asked = _Asked(model, target, **given)
+    asked = Asked(model, target, **given)
     place, machine = asked.place()
     outputs = asked.outputs()
     loaded = penode_gen.load(model)
     asked.check(loaded)
+    asked.check_filter(loaded, place)
     start = starts.parse(asked.start, loaded)
     jobs = asked.jobs(loaded, start)
     for job in jobs:
@@ -54,18 +56,26 @@ def simulate(model: Path | None, ssp: Path | None, target: str, as_json: bool, *
         found = _run(loaded, job, place, compiled)
         _tell_refused(found)
         columns = results.table(loaded, job.times + job.offset, job.u, found, prefix=len(found) > 1, full=job.replay is None)
+        filtered = [beside.Beside(loaded, place, job.u, result) for result in found] if asked.filter else []
+        for own in filtered:
+            columns += own.columns(f"{own.result.instance.name}." if len(found) > 1 else "")
         output.parent.mkdir(parents=True, exist_ok=True)
         (write_mf4 if output.suffix == ".mf4" else write_csv)(output, columns)
         if asked.plot is not None:
             asked.plot.parent.mkdir(parents=True, exist_ok=True)
-            results.plot(loaded, job.plan, job.times, found, asked.signal or _names(loaded)[0], asked.plot, target)
+            if filtered:
+                filtered[0].plot(job.times, asked.signal, job.plan.title, asked.plot)
+            else:
+                results.plot(loaded, job.plan, job.times, found, asked.signal or _names(loaded)[0], asked.plot, target)
         summary = results.summary(loaded, job.plan, job.times, found, target, output)
+        for entry, own in zip(summary["instances"], filtered, strict=False):
+            entry["filter"] = own.summary()
         if job.replay is not None:
             summary["start"] = job.start
             summary["instances"][0]["rmse"] = results.rmse(loaded, job.replay, found[0])
         summaries.append(summary)
         if not as_json:
-            click.echo(results.sentences(summary))
+            click.echo("\n".join([results.sentences(summary), *(line for own in filtered for line in own.sentences())]))
     if as_json:
         click.echo(json.dumps(summaries[0] if len(summaries) == 1 else {"recordings": summaries}, indent=2))
 
@@ -83,7 +93,7 @@ class _Job:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class Asked:
     """The options, to be checked before anything is read or run. Every method raises UserError."""
 
     model: Path
@@ -97,6 +107,7 @@ class _Asked:
     channel: tuple[str, ...]
     start: tuple[str, ...]
     how: str
+    filter: bool = False
 
     def place(self) -> tuple[str, str]:
         """mil, sil or pil, and the machine of pil."""
@@ -151,6 +162,15 @@ class _Asked:
                     raise WrongUse(f"{option}: {why}; remove it")
         if self.set_name is not None and self.set_name not in model.sets:
             raise WrongUse(f'--set: the model has no set "{self.set_name}"; {hint(self.set_name, model.sets)}')
+
+    def check_filter(self, model: Model, place: str) -> None:
+        """What --filter needs."""
+        if self.filter and self.scenario is None:
+            raise WrongUse('--filter: it needs the truth of a scenario; for a recording use "penode filter"')
+        if self.filter and place not in beside.RUN:
+            raise WrongUse("--filter: it runs on mil and sil; choose one of them by --on")
+        if self.filter:
+            beside.check_signal(model, self.signal)
 
     def jobs(self, model: Model, start: starts.Start) -> list[_Job]:
         """All that is to be run, read and checked."""

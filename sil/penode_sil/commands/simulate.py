@@ -41,6 +41,9 @@ from ..console import FILE, Several
 @click.option(
     "--replay", "how", type=click.Choice(REPLAYS), default="linear", show_default=True, help="How an input continues between rows."
 )
+@click.option(
+    "--filter", "filter", is_flag=True, help="Run the model's filter beside it, on noisy sensors; --plot: truth, estimate, 3 sigma."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def simulate(model: Path | None, ssp: Path | None, target: str, as_json: bool, **given: Any) -> None:
     """Run the model file MODEL on a scenario or on recorded inputs, or play an SSP."""

@@ -18,7 +18,7 @@ from penode_gen.model import Model
 
 from ..building import build_library
 from ..instance import Set
-from .estimates import VERDICTS, Estimates, of, signals
+from .estimates import VERDICTS, Estimates, joined, of, signals
 
 Array = NDArray[Any]
 
@@ -114,3 +114,15 @@ class CompiledFilter:
         values, deviations = np.concatenate(parts[::2], axis=1), np.concatenate(parts[1::2], axis=1)
         assert values.shape[1] == len(list(signals(model)))
         return values, deviations
+
+
+def run(model: Model, set_name: str, u: Any, z: Any, mask: Any, exchanges: dict[int, str], progress: Callable[[int], None]) -> Estimates:
+    """A whole run; `exchanges`: the sample from which on another set is in force."""
+    found, own, edges = [], Compiled(model).filter(set_name), [0, *sorted(exchanges), len(z)]
+    for begin, end in itertools.pairwise(edges):
+        if begin in exchanges:
+            own.select(exchanges[begin])
+        part = slice(begin, end)
+        found.append(own.run(u[part], z[part], None if mask is None else mask[part])[0])
+        progress(end)
+    return joined(found)

@@ -62,3 +62,12 @@ def named(model: Model) -> list[tuple[int, str, str]]:
     for _, at, name, unit in sorted(columns):
         found.setdefault(name, (at, name, unit))
     return list(found.values())
+
+
+def joined(parts: list[Estimates]) -> Estimates:
+    """Stretches of one run, one after the other."""
+    names = ("values", "deviations", "innovation", "variance", "ratio", "verdict", "status")
+    whole = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
+    verdict = whole[5]
+    counts = np.array([np.bincount(v, minlength=len(VERDICTS)) for v in verdict.T], np.uint32)
+    return Estimates(whole[0], whole[1], whole[2], whole[3], whole[4], verdict, whole[6], counts)

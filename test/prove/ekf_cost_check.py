@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Gate: a step of a filter takes, on a Cortex-M4F, the same instructions whatever is measured, and those that gen/README.md states.
+
+Four states, two measurements, folded networks. The last faults are branches on what is measured: each has to be found.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import gate
+
+import penode_gen
+from penode_sil.building import FLAGS
+from penode_sil.targets import MACHINES, PORT
+
+WORK = gate.BUILD / "ekf-cost"
+MODELS = gate.ROOT / "test" / "filter"
+SOURCE = gate.ROOT / "src" / "pen_ekf.c"
+PAGE = gate.ROOT / "gen" / "README.md"
+METHODS = ("euler", "heun", "rk4")
+SHARE = 0.02  # of a count: what compilers of one version may differ by, as for all figures
+KINDS = ("measured", "not offered", "missing", "infinite", "refused", "one of two")
+
+# Faults of pen_ekf.c: see gate.faulty.
+FAULTS = {
+    "a missing measurement takes a shorter way": (
+        "    const uint32_t there =",
+        0,
+        "    if (!(z >= ZERO) && !(z < ZERO)) { return PEN_EKF_MISSING; }\n    const uint32_t there =",
+    ),
+    "a refused measurement takes a shorter way": (
+        "    const bool used = verdict == PEN_EKF_USED;",
+        0,
+        "    const bool used = verdict == PEN_EKF_USED;\n    if (verdict == PEN_EKF_IS_REFUSED) { return PEN_EKF_REFUSED; }",
+    ),
+}
+
+
+def measured(model: str, method: str, level: str, source: Path = SOURCE) -> dict[str, tuple[int, int]]:
+    """Least and most instructions by kind of sample; bytes of the filter, and of the model in it. SystemExit if one is not of its kind."""
+    place = WORK / f"{model}-{method}"
+    place.mkdir(parents=True, exist_ok=True)
+    text = (MODELS / f"{model}.toml").read_text().replace("../../gen", str(gate.ROOT / "gen"))
+    name = re.search(r'name = "(\w+)"', text)[1]
+    (place / "model.toml").write_text(text.replace(f'name = "{name}"', f'name = "{name}"\nmethod = "{method}"'))
+    penode_gen.generate(penode_gen.load(place / "model.toml"), place, self_test=False)
+    told = [f"-DMODEL(name)={name}_##name", f"-DMODEL_SIZE(name)={name.upper()}_##name", f'-DEKF_HEADER="{name}_ekf.h"']
+    sources = [path for path in sorted((gate.ROOT / "src").glob("*.c")) if path != SOURCE]
+    sources += [source, *(place / f"{part}.c" for part in (name, f"{name}_ekf", "nqvm_params")), gate.HERE / "ekf" / "cost.c"]
+    elf = place / f"cost{level}.elf"
+    gate.make([PORT / "cc", MACHINES["m4f"], *FLAGS, level, *told, "-DSET=nqvm_set_default", f"-I{place}", "-o", elf, *sources])
+    done = gate.run([PORT / "run", MACHINES["m4f"], elf])
+    rows = {name: (int(a), int(b)) for name, a, b in re.findall(r"^(.+) (\d+) (\d+)$", done.stdout, re.M)}
+    if done.returncode != 0 or rows.get("wrong") != (0, 0):
+        raise SystemExit(f"FAIL  ekf-cost: {done.stdout}{done.stderr}")
+    return rows
+
+
+def spread(rows: dict[str, tuple[int, int]]) -> list[str]:
+    """Kinds of samples that do not take what the first one takes."""
+    wanted = rows[KINDS[0]][0]
+    return [f"{kind}: {rows[kind]}, a measured sample {wanted}" for kind in KINDS if rows[kind] != (wanted, wanted)]
+
+
+def stated() -> dict[str, tuple[int, int]]:
+    """The table of the page: method, -O2, -Os."""
+    rows = re.findall(r"^\| `(\w+)`(?:, with limits)? \| ([\d ]+) \| ([\d ]+) \|$", PAGE.read_text(encoding="utf-8"), re.M)
+    return {name: (int(a.replace(" ", "")), int(b.replace(" ", ""))) for name, a, b in rows}
+
+
+def main() -> int:
+    found = {(method, level): measured("cost", method, level) for method in METHODS for level in ("-O2", "-Os")}
+    limits = {level: measured("limited", "rk4", level) for level in ("-O2", "-Os")}
+    uneven = [f"{key}: {line}" for key, rows in (*found.items(), *limits.items()) for line in spread(rows)]
+    good = gate.report(f"ekf-cost: the same instructions for {len(KINDS)} kinds of samples, in {len(found) + len(limits)} builds", uneven)
+    page = stated()
+    wrong = []
+    for method in METHODS:
+        counts = tuple(found[method, level]["measured"][0] for level in ("-O2", "-Os"))
+        said = page.get(method, (0, 0))
+        wrong += [f"{method}: {counts}, the page says {said}"] * any(abs(a - b) > SHARE * b for a, b in zip(counts, said, strict=True))
+    good &= gate.report("ekf-cost: those that gen/README.md states", wrong)
+    missed = []
+    for k, (fault, change) in enumerate(FAULTS.items()):
+        copy = WORK / f"fault{k}.c"
+        copy.write_text(gate.faulty(SOURCE.read_text(), change))
+        missed += [] if spread(measured("cost", "euler", "-O2", copy)) else [f"not found: {fault}"]
+    good &= gate.report(f"ekf-cost: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults found", missed)
+    if "--print" in sys.argv:
+        print(
+            {f"{method} {level}": rows["measured"][0] for (method, level), rows in found.items()},
+            {k: v["measured"][0] for k, v in limits.items()},
+        )
+    bytes_of = found["rk4", "-O2"]["struct"]
+    figures = {f"{method} {level}": rows["measured"][0] for (method, level), rows in found.items()}
+    figures |= {f"with limits {level}": rows["measured"][0] for level, rows in limits.items()}
+    gate.keep("ekf-cost", figures | {"bytes": bytes_of[0] - bytes_of[1], "faults": len(FAULTS), "faults found": len(FAULTS) - len(missed)})
+    return int(not good)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
