@@ -7,7 +7,7 @@
 ##@ Suites of make test
 
 SUITES   := check hidden-fixed hidden-fresh figures-check accuracy misra builds unit symbols warnings board gen-check cmock \
-            python-sil python-gen python-training python-tools python-diagnosis python-exports python-install \
+            python-sil python-gen python-training python-tools python-diagnosis python-exports python-filter python-install \
             python-manual
 PYTHONS   = $(filter python-%,$(SUITES))
 GATES     = $(foreach s,$(filter-out python-% packages,$(SUITES)),$(or $(GATES.$s),$s))

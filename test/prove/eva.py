@@ -49,7 +49,7 @@ PROMISED = {
     "folded_and_promised": ['outside = "clamp"', "pieces = 96", "trial = 8", 'on_damage = "rollback"', *PROMISES],
 }
 OWNED = ("nqvm_sets.h", "nqvm_params.c")  # the sets of all others
-PARTS = ("all_layers", "elements", "elementary", "networks_of_16", "systems", "folding", "sets", "serial", "selftest")
+PARTS = ("all_layers", "elements", "elementary", "networks_of_16", "systems", "filters", "folding", "sets", "serial", "selftest")
 # Parts in a file of their own.
 OF_FILE = {"trial": "promise.c", "promises": "promise.c"} | eva_xcp.ENTRIES
 
@@ -155,6 +155,9 @@ SEEDS = [
     ),
     Seed("pen_solve.c", "(n <= PEN_SOLVE_MAX) && ", "", Run(None, "systems")),
     Seed("pen_solve.c", "for (size_t i = k + 1U; i < n; i++)", "for (size_t i = k + 1U; i <= n; i++)", Run(None, "systems")),
+    Seed("pen_ekf.c", "(test[i].verdict % PEN_EKF_VERDICTS)", "test[i].verdict", Run(None, "filters")),
+    Seed("pen_ekf.c", "k = model->from[i]; k < first; k++", "k = model->from[i]; k <= first; k++", Run(None, "filters")),
+    Seed("pen_ekf.c", "VERDICT[there + sound + (within & number)]", "VERDICT[there + sound + within + number]", Run(None, "filters")),
     Seed("pen_math.c", "UINT32_C(1) << (k & 31U)", "UINT32_C(1) << (k & 63U)", Run(None, "elements")),
     Seed("pen_math.c", "#define EXP_HIGH      89.0F", "#define EXP_HIGH      189.0F", Run(None, "elements")),
     Seed("pen_net.c", "(row + 4U) <= n_out", "row < n_out", Run(None, "all_layers")),

@@ -7,7 +7,7 @@
 
 PROVE_STATIC  := prove-rules prove-eva prove-coverage
 PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-xcp-fuzz prove-xcp-preempt prove-xcp-cost prove-xcp-size prove-readers prove-flip prove-longrun prove-stack prove-bits \
-                 prove-accuracy prove-cost prove-kernels prove-promise prove-promises
+                 prove-accuracy prove-cost prove-ekf-cost prove-kernels prove-promise prove-promises
 
 .PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC)
 
@@ -55,6 +55,8 @@ prove-accuracy: | $(READY) ## exp, tanh, sigmoid, softplus: no further off than 
 	@$(PYTHON) test/prove/accuracy_check.py
 prove-cost: | $(READY) ## Functions take the instructions that their headers name
 	@$(PYTHON) test/prove/cost_check.py
+prove-ekf-cost: | $(READY) ## A filter takes the instructions that gen/README.md states, whatever is measured
+	@$(PYTHON) test/prove/ekf_cost_check.py
 prove-kernels: | $(READY) build/setup/unity ## A fault in a kernel in assembler is found by its test
 	@$(PYTHON) test/prove/kernels_check.py
 prove-promise: | $(READY) ## Random networks in exact arithmetic: what the promise check accepts and refuses

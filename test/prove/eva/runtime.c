@@ -11,6 +11,7 @@
 
 #include "__fc_builtin.h"
 
+#include "penode/pen_ekf.h"
 #include "penode/pen_elementary.h"
 #include "penode/pen_fold.h"
 #include "penode/pen_math.h"
@@ -258,6 +259,54 @@ void serial(void)
     seen = (pen_real_t)pen_status_times(&report, any);
 }
 
+#define STATES  3U
+#define SOURCES 2U
+#define TESTS   2U
+
+/* Any numbers in a filter of fixed sizes, damaged verdicts among them; each array ends where its function may still look. */
+void filters(void)
+{
+    static const size_t from[STATES] = { 0U, 1U, 2U };
+    static pen_real_t table[6][STATES];
+    static pen_real_t limit[TESTS * STATES];
+    static pen_real_t f[2U * STATES * STATES];
+    static pen_real_t state[2U * STATES];
+    static pen_real_t phi[STATES * STATES];
+    static pen_real_t gamma[STATES * SOURCES];
+    static pen_real_t work[(STATES + 2U) * (STATES + SOURCES)];
+    static pen_ekf_test_t test[2U * TESTS];
+    static uint32_t count[TESTS * PEN_EKF_VERDICTS];
+    static pen_ekf_t self;
+    const pen_ekf_model_t model = { 1U,   STATES,   SOURCES,  TESTS, TESTS,    table[0], table[1],      END(x, SOURCES),
+                                    from, table[2], table[3], limit, table[4], table[5], END(s, STATES) };
+
+    fill_all();
+    fill(table, sizeof table);
+    fill(limit, sizeof limit);
+    fill(f, sizeof f);
+    fill(state, sizeof state);
+    fill(phi, sizeof phi);
+    fill(gamma, sizeof gamma);
+    fill(work, sizeof work);
+    fill(test, sizeof test);
+    fill(&self, sizeof self);
+    pen_ekf_predict(&model, phi, gamma, t[0], f, &f[STATES * STATES], work);
+    for (size_t i = 0U; i < TESTS; i++) {
+        const bool offered = (any & 1U) != 0U;
+        seen = (pen_real_t)pen_ekf_update(&model, i, END(y, STATES), t[1], offered, f, state,
+                                          &work[((STATES + 2U) * (STATES + SOURCES)) - (2U * STATES)], &test[i]);
+    }
+    fill(test, sizeof test);
+    seen = (pen_real_t)pen_ekf_limit(&model, f, state, &work[((STATES + 2U) * (STATES + SOURCES)) - (2U * STATES)]);
+    seen = (pen_real_t)pen_ekf_finish(&model, &self, any, f, state, test, count);
+    fill(f, sizeof f);
+    for (size_t j = 0U; j < STATES; j++) {
+        f[(j * STATES) + j] = number();
+    }
+    pen_ekf_start(&model, &self, f, count);
+    seen = pen_ekf_deviation(STATES, f, END(y, STATES));
+}
+
 void selftest(void)
 {
     seen = (pen_real_t)pen_selftest_of(any);
@@ -272,6 +321,7 @@ void runtime(void)
     elementary();
     networks_of_16();
     systems();
+    filters();
     folding();
     sets();
     serial();
