@@ -12,17 +12,8 @@
 #define ZERO ((pen_real_t)0)
 #define ONE  ((pen_real_t)1)
 
-/* What became of a measurement, by offered, sound and within its gate. */
-static const uint32_t VERDICT[8] = {
-    PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED,
-    PEN_EKF_IS_MISSING,  PEN_EKF_IS_MISSING,  PEN_EKF_IS_REFUSED,  PEN_EKF_USED,
-};
-/* Flags of measurements and limits, which mean nothing in a step that holds; and of none that advances. */
-static const pen_status_t OF_HELD[2] = { PEN_EKF_MISSING | PEN_EKF_REFUSED | PEN_EKF_LIMITED, PEN_OK };
-static const pen_status_t FLAG[PEN_EKF_VERDICTS] = { PEN_OK, PEN_OK, PEN_EKF_MISSING, PEN_EKF_REFUSED };
-
 /* NaN stays NaN. */
-static pen_real_t above(pen_real_t d, pen_real_t least)
+static pen_real_t at_least(pen_real_t d, pen_real_t least)
 {
     return pen_where(d < least, least, d);
 }
@@ -58,14 +49,13 @@ void pen_ekf_start(const pen_ekf_model_t *model, pen_ekf_t *self, pen_real_t f[]
 {
     const size_t n = model->n_x;
 
-    for (size_t i = 0U; i < (n * n); i++) {
-        f[i] = ZERO;
-    }
-    for (size_t i = 0U; i < n; i++) {
-        f[(i * n) + i] = above(model->start[i], model->floor[i]);
+    for (size_t j = 0U; j < n; j++) {
+        for (size_t i = 0U; i < n; i++) {
+            f[(j * n) + i] = pen_where(i == j, at_least(model->start[j], model->floor[j]), ZERO);
+        }
     }
     for (size_t i = 0U; i < (model->n_z * PEN_EKF_VERDICTS); i++) {
-        count[i] = 0U;
+        pen_port_store(&count[i], 0U); /* a plain loop would become a call of memset */
     }
     self->running = 0U;
     self->held = 0U;
@@ -132,7 +122,7 @@ void pen_ekf_predict(const pen_ekf_model_t *model, const pen_real_t phi[], const
         for (size_t k = 0U; k < some; k++) {
             weighted[k] = last[k] * weight[from_k + k];
         }
-        const pen_real_t d = above(sum_of(some, weighted, last), model->floor[j]);
+        const pen_real_t d = at_least(sum_of(some, weighted, last), model->floor[j]);
         const pen_real_t inverse = ONE / d;
         to[(j * n) + j] = d;
         for (size_t i = 0U; i < j; i++) {
@@ -154,7 +144,7 @@ static pen_real_t correct(const pen_ekf_model_t *model, pen_real_t variance, con
         const pen_real_t own = gain[j];
         const pen_real_t now = before + (along[j] * own);
         const pen_real_t lambda = -(along[j] / before);
-        f[(j * n) + j] = above(f[(j * n) + j] * (before / now), model->floor[j]);
+        f[(j * n) + j] = at_least(f[(j * n) + j] * (before / now), model->floor[j]);
         for (size_t i = 0U; i < j; i++) {
             const pen_real_t u = f[(j * n) + i];
             f[(j * n) + i] = u + (gain[i] * lambda);
@@ -168,6 +158,12 @@ static pen_real_t correct(const pen_ekf_model_t *model, pen_real_t variance, con
 pen_status_t pen_ekf_update(const pen_ekf_model_t *model, size_t i, const pen_real_t h[], pen_real_t z, bool offered, pen_real_t f[],
                             pen_real_t dx[], pen_real_t work[], pen_ekf_test_t *test)
 {
+    static const uint32_t verdicts[8] = {
+                                          /* by offered, sound and within its gate */
+        PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED,
+        PEN_EKF_IS_MISSING,  PEN_EKF_IS_MISSING,  PEN_EKF_IS_REFUSED,  PEN_EKF_USED,
+    };
+    static const pen_status_t flags[PEN_EKF_VERDICTS] = { PEN_OK, PEN_OK, PEN_EKF_MISSING, PEN_EKF_REFUSED };
     const size_t n = model->n_x;
     pen_real_t *const along = work;
     pen_real_t *const gain = &work[n];
@@ -178,7 +174,7 @@ pen_status_t pen_ekf_update(const pen_ekf_model_t *model, size_t i, const pen_re
     const pen_real_t ratio = (innovation * innovation) / variance;
     const uint32_t within = (ratio <= model->gate[i]) ? 1U : 0U;
     const uint32_t number = (variance <= PEN_REAL_MAX) ? 1U : 0U;
-    const uint32_t verdict = VERDICT[there + sound + (within & number)];
+    const uint32_t verdict = verdicts[there + sound + (within & number)];
     const bool used = verdict == PEN_EKF_USED;
 
     for (size_t k = 0U; k < n; k++) {
@@ -193,7 +189,7 @@ pen_status_t pen_ekf_update(const pen_ekf_model_t *model, size_t i, const pen_re
     test->variance = variance;
     test->ratio = ratio;
     test->verdict = verdict;
-    return FLAG[verdict];
+    return flags[verdict];
 }
 
 /* How far the sum of a limit has to move to lie within it, from inside by more than its rounding error; 0 if it does. */
@@ -201,7 +197,8 @@ static pen_real_t way_in(const pen_ekf_model_t *model, size_t limit, const pen_r
 {
     const size_t n = model->n_x;
     const pen_real_t *const c = &model->limit[limit * n];
-    const pen_real_t unit = (pen_real_t)(n + 2U) * ((pen_real_t)4 * PEN_REAL_EPSILON);
+    const size_t roundings = 4U * (n + 2U);
+    const pen_real_t unit = (pen_real_t)roundings * PEN_REAL_EPSILON;
     const pen_real_t least = model->least[limit];
     const pen_real_t most = model->most[limit];
     pen_real_t sum = ZERO;
@@ -296,10 +293,12 @@ static pen_real_t doubt(size_t n, const pen_real_t f[], const pen_real_t x[])
 pen_status_t pen_ekf_finish(const pen_ekf_model_t *model, pen_ekf_t *self, pen_status_t status, pen_real_t f[], pen_real_t x[],
                             pen_ekf_test_t test[], uint32_t count[])
 {
+    /* Flags of measurements and limits mean nothing in a step that holds. */
+    static const pen_status_t of_held[2] = { PEN_EKF_MISSING | PEN_EKF_REFUSED | PEN_EKF_LIMITED, PEN_OK };
     const size_t n = model->n_x;
     const pen_status_t found = (doubt(n, &f[n * n], &x[n]) >= ZERO) ? PEN_OK : PEN_EKF_NONFINITE;
     const uint32_t good = (((status | found) & PEN_EKF_HOLDING) == PEN_OK) ? 1U : 0U;
-    const pen_status_t result = (status | found) & ~OF_HELD[good];
+    const pen_status_t result = (status | found) & ~of_held[good];
     const pen_real_t *const new_f = &f[good * n * n];
     const pen_real_t *const new_x = &x[good * n];
     const pen_ekf_test_t *const new_test = &test[good * model->n_z];

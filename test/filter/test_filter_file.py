@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import os
 import subprocess
 from pathlib import Path
 
@@ -16,9 +17,11 @@ import penode_gen
 from penode_gen.emission.model_c import render
 from penode_gen.errors import ModelError
 from penode_sil.filtering.compiled import Compiled
+from penode_sil.targets import MACHINES, PORT
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
+QUARTER = ROOT / "sil" / "filter" / "quarter.toml"
 TEXT = (HERE / "layered.toml").read_text().replace("../../gen", str(ROOT / "gen"))
 
 
@@ -123,3 +126,38 @@ def test_white_errors_of_a_measured_input_are_those_of_the_reference(tmp_path: P
     gain = p @ hx.T @ np.linalg.inv(hx @ p @ hx.T + r)
     assert x[0, :4] == pytest.approx(gain @ (z[0] - seen), rel=1e-9)
     assert plant.covariance(f[0])[:4, :4] == pytest.approx(p - gain @ hx @ p, rel=1e-7, abs=1e-16)
+
+
+def test_the_c_keeps_misra(tmp_path: Path) -> None:
+    """As the models of gen/nqvm: nothing found in a program that calls every function of the header."""
+    penode_gen.generate(penode_gen.load(QUARTER), tmp_path)
+    headers = [
+        tmp_path / "quarter.h",
+        tmp_path / "quarter_ekf.h",
+        *sorted(f"inc/penode/{p.name}" for p in (ROOT / "inc/penode").glob("*.h")),
+    ]
+    headers.append("port/template/pen_port_target.h")
+    entry = tmp_path / "every_entry.c"
+    made = subprocess.run(["test/misra/every_entry", *headers], cwd=ROOT, capture_output=True, text=True, check=True)
+    entry.write_text(made.stdout)
+    sources = [entry, *(tmp_path / f"quarter{part}.c" for part in ("", "_ekf", "_selftest"))]
+    done = subprocess.run(
+        ["test/misra/check", "clean", *sources], cwd=ROOT, capture_output=True, text=True, env=os.environ | {"OPTIONS": f"-I{tmp_path}"}
+    )
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("machine", ["m4f", "m3"])
+@pytest.mark.parametrize("level", ["-O2", "-Os", "-O3"])
+def test_the_c_needs_nothing_from_outside(tmp_path: Path, machine: str, level: str) -> None:
+    """Neither libc nor heap: functions of the runtime and of the model, and soft float where there is no FPU."""
+    penode_gen.generate(penode_gen.load(QUARTER), tmp_path, self_test=False)
+    tries = "-ftree-loop-distribute-patterns"  # with which gcc may try memcpy
+    out, sources = tmp_path / "filter.o", [str(tmp_path / "quarter_ekf.c"), str(ROOT / "src" / "pen_ekf.c")]
+    found: set[str] = set()
+    for source in sources:
+        subprocess.run([PORT / "cc", MACHINES[machine], "-std=c99", level, tries, f"-I{tmp_path}", "-c", "-o", out, source], check=True)
+        listed = subprocess.run(["arm-none-eabi-nm", "-u", out], capture_output=True, text=True, check=True).stdout
+        found |= {line.split()[-1] for line in listed.splitlines()}
+    soft = {name for name in found if name.startswith(("__aeabi_f", "__aeabi_ui2f", "__aeabi_i2f"))}
+    assert {name for name in found - (soft if machine == "m3" else set()) if not name.startswith(("pen_", "quarter_"))} == set()

@@ -157,7 +157,7 @@ SEEDS = [
     Seed("pen_solve.c", "for (size_t i = k + 1U; i < n; i++)", "for (size_t i = k + 1U; i <= n; i++)", Run(None, "systems")),
     Seed("pen_ekf.c", "(test[i].verdict % PEN_EKF_VERDICTS)", "test[i].verdict", Run(None, "filters")),
     Seed("pen_ekf.c", "k = model->from[i]; k < first; k++", "k = model->from[i]; k <= first; k++", Run(None, "filters")),
-    Seed("pen_ekf.c", "VERDICT[there + sound + (within & number)]", "VERDICT[there + sound + within + number]", Run(None, "filters")),
+    Seed("pen_ekf.c", "verdicts[there + sound + (within & number)]", "verdicts[there + sound + within + number]", Run(None, "filters")),
     Seed("pen_math.c", "UINT32_C(1) << (k & 31U)", "UINT32_C(1) << (k & 63U)", Run(None, "elements")),
     Seed("pen_math.c", "#define EXP_HIGH      89.0F", "#define EXP_HIGH      189.0F", Run(None, "elements")),
     Seed("pen_net.c", "(row + 4U) <= n_out", "row < n_out", Run(None, "all_layers")),

@@ -45,6 +45,7 @@ def context(model: Model, given: Filter) -> dict[str, Any]:
             ],
             "given": [_given(given, name) for name in inputs],
             "noisy": [{"name": s.name, "at": model.states.index(s.name)} for s in noisy],
+            "own": [f"{model.states.index(s.name)}U" for s in noisy] + [f"{len(given.states) + k}U" for k in range(len(given.inputs))],
             "start": [real(s * s) for s in start],
             "floor": {kind: [real(max((s * _EPSILON[kind]) ** 2, tiny)) for s in start] for kind, tiny in _TINY.items()},
             "noise": [real(s.noise**2) for s in noisy] + [real(i.step**2) for i in given.inputs],
