@@ -60,7 +60,8 @@ class Beside:
         entry = results.summary(self.model, self.found) | {"errors": {}}
         for at, name, unit in named(self.model):
             error = self.found.values[:, at].astype(float) - self.truth[name]
-            within = np.abs(error) <= 3.0 * self.found.deviations[:, at]
+            bound = 3.0 * self.found.deviations[:, at]
+            within = np.abs(error) <= bound
             rmse = float(np.sqrt(np.mean(error**2)) / units.factor(unit))
             entry["errors"][name] = {"rmse": rmse, "unit": unit, "within_3_sd": float(np.mean(within))}
         return entry

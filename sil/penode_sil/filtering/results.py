@@ -57,7 +57,8 @@ def checked(model: Model, found: Estimates, read: Replay) -> dict[str, dict[str,
             for part, shift in ((found.values, sensed.values[inside]), (found.deviations, 0.0))
         )
         own = next((s.noise for s in model.sensors if s.name == name), 0.0)
-        within = np.abs(error) <= 3.0 * np.hypot(deviation, own)
+        bound = 3.0 * np.hypot(deviation, own)
+        within = np.abs(error) <= bound
         rmse = float(np.sqrt(np.mean(error**2)) / units.factor(unit))
         result[name] = {"rmse": rmse, "unit": unit, "samples": int(inside.sum()), "within_3_sd": float(within.mean())}
     return result
