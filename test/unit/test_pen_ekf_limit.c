@@ -119,6 +119,8 @@ void test_what_projections_do_not_reach_is_drawn_to_the_point_inside(void)
     limit[N + 1U] = (pen_real_t)-0.125;
     most[0] = (pen_real_t)1;
     most[1] = (pen_real_t)1;
+    inside[0] = (pen_real_t)0.25;
+    inside[1] = (pen_real_t)4; /* where the sums are -0.25 and -0.75 */
     inside[2] = (pen_real_t)2;
     x[0] = (pen_real_t)0;
     x[1] = (pen_real_t)-1000;
