@@ -40,7 +40,12 @@ FAULTS = {
 }
 
 
-def measured(model: str, method: str, level: str, source: Path = SOURCE) -> dict[str, tuple[int, int]]:
+def compiler(machine: str) -> list[object]:
+    """The compiler for one of MACHINES."""
+    return [PORT / "cc", MACHINES[machine]] if MACHINES[machine] else [gate.ROOT / "port" / "host" / "cc", "gcc"]
+
+
+def measured(model: str, method: str, level: str, source: Path = SOURCE, machine: str = "m4f") -> dict[str, tuple[int, int]]:
     """Least and most instructions by kind of sample; bytes of the filter, and of the model in it. SystemExit if one is not of its kind."""
     place = WORK / f"{model}-{method}"
     place.mkdir(parents=True, exist_ok=True)
@@ -51,9 +56,9 @@ def measured(model: str, method: str, level: str, source: Path = SOURCE) -> dict
     told = [f"-DMODEL(name)={name}_##name", f"-DMODEL_SIZE(name)={name.upper()}_##name", f'-DEKF_HEADER="{name}_ekf.h"']
     sources = [path for path in sorted((gate.ROOT / "src").glob("*.c")) if path != SOURCE]
     sources += [source, *(place / f"{part}.c" for part in (name, f"{name}_ekf", "nqvm_params")), gate.HERE / "ekf" / "cost.c"]
-    elf = place / f"cost{level}.elf"
-    gate.make([PORT / "cc", MACHINES["m4f"], *FLAGS, level, *told, "-DSET=nqvm_set_default", f"-I{place}", "-o", elf, *sources])
-    done = gate.run([PORT / "run", MACHINES["m4f"], elf])
+    elf = place / f"cost{level}-{machine}.elf"
+    gate.make([*compiler(machine), *FLAGS, level, *told, "-DSET=nqvm_set_default", f"-I{place}", "-o", elf, *sources])
+    done = gate.run([PORT / "run", MACHINES[machine], elf] if MACHINES[machine] else [elf])
     rows = {name: (int(a), int(b)) for name, a, b in re.findall(r"^(.+) (\d+) (\d+)$", done.stdout, re.M)}
     if done.returncode != 0 or rows.get("wrong") != (0, 0):
         raise SystemExit(f"FAIL  ekf-cost: {done.stdout}{done.stderr}")
@@ -85,6 +90,10 @@ def main() -> int:
         said = page.get(method, (0, 0))
         wrong += [f"{method}: {counts}, the page says {said}"] * any(abs(a - b) > SHARE * b for a, b in zip(counts, said, strict=True))
     good &= gate.report("ekf-cost: those that gen/README.md states", wrong)
+    bits = {machine: measured("limited", "rk4", "-O2", machine=machine)["bits"] for machine in MACHINES}
+    good &= gate.report(
+        f"ekf-cost: the same bits on {len(bits)} machines after 400 samples", [str(bits)] if len(set(bits.values())) > 1 else []
+    )
     missed = []
     for k, (fault, change) in enumerate(FAULTS.items()):
         copy = WORK / f"fault{k}.c"

@@ -100,6 +100,31 @@ void test_limits_hold_to_the_bit(void)
     TEST_ASSERT_GREATER_THAN_UINT32(2500U, drawn);
 }
 
+/* The same with a unit covariance, in the words of the header: rounds of projections, then a straight line to `inside`. */
+static void by_hand(pen_real_t y[N])
+{
+    pen_real_t part = (pen_real_t)1;
+
+    for (size_t turn = 0U; turn < (PEN_EKF_SWEEPS * model.n_limits); turn++) {
+        const pen_real_t *const c = &limit[(turn % model.n_limits) * N];
+        const pen_real_t over = ((c[0] * y[0]) + (c[1] * y[1]) + (c[2] * y[2])) - most[turn % model.n_limits];
+        const pen_real_t share = (over > (pen_real_t)0) ? (over / ((c[0] * c[0]) + (c[1] * c[1]) + (c[2] * c[2]))) : (pen_real_t)0;
+        for (size_t i = 0U; i < N; i++) {
+            y[i] -= share * c[i];
+        }
+    }
+    for (size_t l = 0U; l < model.n_limits; l++) {
+        const pen_real_t *const c = &limit[l * N];
+        const pen_real_t at = (c[0] * y[0]) + (c[1] * y[1]) + (c[2] * y[2]);
+        const pen_real_t from_at = (c[0] * inside[0]) + (c[1] * inside[1]) + (c[2] * inside[2]);
+        const pen_real_t own = (at > most[l]) ? ((most[l] - from_at) / (at - from_at)) : (pen_real_t)1;
+        part = (own < part) ? own : part;
+    }
+    for (size_t i = 0U; i < N; i++) {
+        y[i] = inside[i] + (part * (y[i] - inside[i]));
+    }
+}
+
 /*
  * Two limits that cut each other at a sharp angle: after PEN_EKF_SWEEPS projections on each x is not within both. It is drawn
  * towards `inside`, no further than needed: rounding of terms of 250 is allowed for.
@@ -125,8 +150,13 @@ void test_what_projections_do_not_reach_is_drawn_to_the_point_inside(void)
     x[0] = (pen_real_t)0;
     x[1] = (pen_real_t)-1000;
     x[2] = (pen_real_t)2;
+    pen_real_t wanted[N] = { x[0], x[1], x[2] };
+    by_hand(wanted);
     TEST_ASSERT_EQUAL_HEX32(PEN_EKF_LIMITED, pen_ekf_limit(&model, f, x, work));
     expect_within();
+    for (size_t i = 0U; i < N; i++) {
+        expect_close(wanted[i], x[i], (pen_real_t)1000);
+    }
     TEST_ASSERT_TRUE(x[1] < (pen_real_t)0);
     expect_close((pen_real_t)1, (sum_of_limit(0U) > sum_of_limit(1U)) ? sum_of_limit(0U) : sum_of_limit(1U), (pen_real_t)256);
     expect_close((pen_real_t)2, x[2], (pen_real_t)2);
@@ -236,6 +266,9 @@ void test_finish_holds_if_anything_is_no_number(void)
             expect_held(PEN_EKF_NONFINITE, PEN_OK);
             TEST_ASSERT_EQUAL_UINT32(1U, filter.nonfinite);
             TEST_ASSERT_EQUAL_UINT32(1U, filter.held);
+            (void)pen_ekf_finish(&model, &filter, PEN_EKF_NONFINITE, f, x, test, count);
+            TEST_ASSERT_EQUAL_UINT32(2U, filter.nonfinite);
+            TEST_ASSERT_EQUAL_UINT32(2U, filter.held);
         }
     }
 }

@@ -3,7 +3,7 @@
 
 /*
  * Prints kind of sample, least and most instructions of a step of the filter, then bytes of its struct and of the stack
- * that a step takes. Kinds: what is measured, missing, refused. A line "wrong" where a sample was not of its kind.
+ * that a step takes. Kinds: what is measured, missing, refused. "wrong": samples not of their kind; "bits": checksums.
  */
 
 #include <math.h>
@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "board.h"
+#include "penode/pen_serial.h"
 
 #include EKF_HEADER
 
@@ -84,5 +85,7 @@ int main(void)
     line("struct", (uint32_t)sizeof(filter), (uint32_t)sizeof(filter.model));
     line("limited", filter.head.limited, filter.head.limited);
     line("wrong", wrong, wrong);
+    line("bits", pen_crc_values(PEN_CRC_START, MODEL_SIZE(EKF_N), filter.x[0]),
+         pen_crc_values(PEN_CRC_START, MODEL_SIZE(EKF_N) * MODEL_SIZE(EKF_N), filter.f[0]));
     return 0;
 }
