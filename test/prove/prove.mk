@@ -7,7 +7,7 @@
 
 PROVE_STATIC  := prove-rules prove-eva prove-coverage
 PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-xcp-fuzz prove-xcp-preempt prove-xcp-cost prove-xcp-size prove-readers prove-flip prove-longrun prove-stack prove-bits \
-                 prove-accuracy prove-cost prove-ekf-cost prove-kernels prove-promise prove-promises
+                 prove-accuracy prove-cost prove-ekf-cost prove-ekf-long prove-kernels prove-promise prove-promises
 
 .PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC)
 
@@ -57,6 +57,8 @@ prove-cost: | $(READY) ## Functions take the instructions that their headers nam
 	@$(PYTHON) test/prove/cost_check.py
 prove-ekf-cost: | $(READY) ## A filter takes the instructions that gen/README.md states, whatever is measured
 	@$(PYTHON) test/prove/ekf_cost_check.py
+prove-ekf-long: | $(READY) ## A filter over a million steps with wild and missing measurements: positive, judged and counted
+	@$(PYTHON) test/prove/ekf_long_check.py
 prove-kernels: | $(READY) build/setup/unity ## A fault in a kernel in assembler is found by its test
 	@$(PYTHON) test/prove/kernels_check.py
 prove-promise: | $(READY) ## Random networks in exact arithmetic: what the promise check accepts and refuses
@@ -66,7 +68,7 @@ prove-promises: | $(READY) ## PROMISES.md: each promise, the test that shows it,
 
 # -- the same in full -------------------------------------------------------------------------------------------------
 
-CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-xcp-fuzz campaign-readers campaign-recordings campaign-flip campaign-longrun campaign-accuracy
+CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-xcp-fuzz campaign-readers campaign-recordings campaign-flip campaign-longrun campaign-ekf campaign-accuracy
 .PHONY: campaign-proofs $(CAMPAIGN)
 
 campaign-proofs: setup build/setup/proof ## The long proofs: all floats, 10^7 sequences of calls, every bit, a whole day
@@ -89,3 +91,5 @@ campaign-longrun: | $(READY)
 	@$(PYTHON) test/prove/longrun_check.py --hours 24 --as "longrun campaign"
 campaign-accuracy: | $(READY)
 	@$(PYTHON) test/prove/accuracy_check.py --stride 1 --as "accuracy campaign"
+campaign-ekf: | $(READY)
+	@$(PYTHON) test/prove/ekf_long_check.py --steps 50000000 --as "ekf campaign"
