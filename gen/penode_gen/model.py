@@ -73,13 +73,14 @@ class Point:
 @dataclass(frozen=True)
 class Sampled:
     """What an actuator makes of the samples of an input, or of an earlier one of its kind: a `delay` by, or a value `held` for `time`
-    [s], a whole number of samples."""
+    [s], a whole number of samples; or a `slew_limit`, which follows by at most `rate` [of its unit per s]."""
 
     name: str
     source: str
     law: str
     time: float
     unit: str
+    rate: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -235,7 +235,7 @@ def test_actuators(load):
         (
             'law = "gain", gain = "k_t"',
             'law = "spring", gain = "k_t"',
-            "law 'spring' is unknown; known are gain, lag, dead_zone, saturation, slew_limit, delay, held",
+            "law 'spring' is unknown; known are gain, lag, dead_zone, saturation, delay, held, slew_limit",
         ),
         ('law = "gain", gain = "k_t"', 'law = "gain"', "'gain' is missing"),
         ('law = "gain", gain = "k_t"', 'law = "gain", gain = "k_t", time = "1 s"', "the law 'gain' has no time"),

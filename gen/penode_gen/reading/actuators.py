@@ -18,10 +18,9 @@ LAWS = {  # arguments with their units; further keys that may be left out
     "lag": {"time": "s"},
     "dead_zone": {"width": SOURCE},
     "saturation": {"limit": SOURCE},
-    "slew_limit": {"rate": f"{SOURCE}/s", "time": "s"},
 }
-STATES = {"lag", "slew_limit"}  # laws with a state of their own, which may have a start
-NOT_NEGATIVE = {"time": False, "width": True, "limit": False, "rate": False}  # arguments with a sign, and whether zero is allowed
+STATES = {"lag"}  # laws with a state of their own, which may have a start
+NOT_NEGATIVE = {"time": False, "width": True, "limit": False}  # arguments with a sign, and whether zero is allowed
 KEYS = ("samples", "gain", "time", "width", "limit", "rate", "start")
 
 
@@ -40,8 +39,8 @@ class ActuatorTables(EndTables):
     """Reads [actuators]."""
 
     def actuators(self, inputs: tuple[m.Input, ...], parameters: dict[str, m.Parameter], sample_time: float) -> Actuated:
-        """Actuated signals: a gain is a combination of its input, a lag or a slew limit a state with an equation, a dead zone or a
-        saturation a variable with one; others work on samples."""
+        """Actuated signals: a gain is a combination of its input, a lag a state with an equation, a dead zone or a saturation a variable
+        with one; others work on samples."""
         of: dict[str, str] = {i.name: i.unit for i in inputs}
         made_by: dict[str, str] = {}
         found = Actuated()
@@ -53,7 +52,8 @@ class ActuatorTables(EndTables):
                     self.problem((*where, "input"), f"'{source}' is no input or earlier actuator", f"known are {', '.join(of) or 'none'}")
                 continue
             if law in sampled.LAWS:
-                late = sampled.read(where, entry, of[source], made_by.get(source, ""), sample_time, self.problem)
+                rate = self.quantity((*where, "rate"), entry["rate"], f"{of[source]}/s") if "rate" in entry else 0.0
+                late = sampled.read(where, entry, of[source], made_by.get(source, ""), sample_time, rate, self.problem)
                 found.sampled += [late] if late else []
             elif law in LAWS:
                 arguments = self._arguments(where, entry, law, of[source], parameters)
@@ -109,9 +109,6 @@ def _equation(name: str, law: str, source: str, arguments: Mapping[str, str]) ->
     match law:
         case "lag":
             return f"der({name})*{arguments['time']} = {source} - {name}"
-        case "slew_limit":
-            rate = arguments["rate"]
-            return f"der({name}) = min(max(({source} - {name})/{arguments['time']}, -{rate}), {rate})"
         case "dead_zone":
             width = arguments["width"]
             return f"{name} = max({source} - {width}, 0) + min({source} + {width}, 0)"

@@ -249,6 +249,9 @@ def _actuator(model: Model, t: Term, value: float, source: str, found: Driven) -
         unit = units.si(next(i.unit for i in model.inputs if i.name == name))
         law["law"] = own.law
         for key, (stem, size, of) in own.entry(value, model.sample_time).items():
+            if not stem:
+                law[key] = f"{size:.9g} {drives.of_input(of, unit)}"
+                continue
             law[key] = found.name(f"{name}_{stem}")
             found.parameters.append(f"{law[key]} = {table({'value': size, 'unit': drives.of_input(of, unit)})}")
     elif t.form.how in SAMPLED and round(samples) >= 1:

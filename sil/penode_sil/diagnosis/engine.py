@@ -116,6 +116,8 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
         if answer.verdict == "unexplained" and not answer.explained and w.mends():  # nothing has a name, but parameters are nearer
             return by_innovations(case, replace(w, verdict="unexplained", causes=(), explanations=(), explained=0.0), best)
         return end
+    if w is None and weighed.supports(study.model):
+        return replace(end, other=lambda: by_innovations(case, _weighed(case, study), best))
     return by_innovations(case, sure, best) if sure and answer.verdict == "unexplained" else end
 
 

@@ -30,7 +30,7 @@ from .propose import FREE_RUN, SMALL, motions
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
 from .rounds import MIN_TAKEN, name_of, terms_of
 from .terms import Term, Trial
-from .worth import RIGHT, SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, undetermined
+from .worth import RIGHT, SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, systematic, undetermined
 
 Array = NDArray[np.float64]
 RIVAL = (
@@ -255,8 +255,8 @@ def _wider(bench: Bench, term: Term, size: float) -> float:
         for f in _values_of(bench, term)
         if cut or not f.log
     )
-    systematic = SYSTEMATIC * min(bench.level.size / (0.5 * WORTH), 1.0)  # half of WORTH is what any model is wrong by
-    return float(np.hypot(1.0, systematic / max(size, systematic, 1e-12) / max(known, 1e-12)))
+    unmodelled = systematic(bench.level.size)
+    return float(np.hypot(1.0, unmodelled / max(size, unmodelled, 1e-12) / max(known, 1e-12)))
 
 
 def _values_of(bench: Bench, term: Term) -> list[Free]:

@@ -18,7 +18,7 @@ from ..hypotheses import lag
 
 Array = NDArray[np.float64]
 TINY = np.finfo(float).tiny
-Entry = Mapping[str, tuple[str, float, str]]  # of each argument of a law: end of a parameter's name, value, unit
+Entry = Mapping[str, tuple[str, float, str]]  # of each argument of a law: end of a parameter's name ("": none), value, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +112,7 @@ def _late(u: Array, values: Array, step: float) -> Array:
 
 
 def _limited(u: Array, values: Array, step: float) -> Array:
-    """Behind a limit of the rate, and half a sample late as behind the lag that the model file has with it. Lanes that are alike, as most
-    are in finite differences, are computed once."""
+    """Behind a limit of the rate. Lanes that are alike, as most are in finite differences, are computed once."""
     known: dict[tuple[float, bytes], Array] = {}
     for value, x in zip(values, u, strict=True):
         if (key := (float(value), x.tobytes())) not in known:
@@ -122,10 +121,10 @@ def _limited(u: Array, values: Array, step: float) -> Array:
 
 
 def _followed(x: Array, most: float) -> Array:
-    """A signal [n] that moves to the middle of each pair of samples of `x`, by `most` at most."""
-    now, found = float(x[0]), [float(x[0])]
-    for middle in (0.5 * (x[1:] + x[:-1])).tolist():
-        now += min(max(middle - now, -most), most)
+    """A signal [n] that follows `x` by `most` a sample."""
+    now, found = float(x[0]), []
+    for target in x.tolist():
+        now += min(max(target - now, -most), most)
         found.append(now)
     return np.array(found)
 
@@ -134,9 +133,10 @@ def _inverse(value: float) -> float:
     return float(1.0 / np.maximum(value, TINY))
 
 
-def _halves(most: float) -> list[float]:
-    """Values that are tried: the most, and by halves less."""
-    return [most * 0.5**k for k in range(5)]
+def _halves(most: float, least: float | None = None) -> list[float]:
+    """Values that are tried: the most, and by halves less, down to `least`, or a sixteenth."""
+    count = 5 if least is None else int(np.maximum(np.log2(most / least), 1.0))
+    return [most * 0.5**k for k in range(count)]
 
 
 def _gain() -> Acting:
@@ -186,12 +186,12 @@ def _slew_limit() -> Acting:
         return Value(0.0, 0.05 * d.period / d.largest, 2.0 * d.period / d.largest, 0.0)
 
     def entry(value: float, step: float) -> Entry:
-        return {"rate": ("rate", _inverse(value), "/s"), "time": ("time", 0.5 * step, "s")}
+        return {"rate": ("", _inverse(value), "/s")}
 
     def tried(d: Drive) -> list[float]:
-        return [max(time, d.step) / d.largest for time in _halves(2.0 * d.period)]
+        return [time / d.largest for time in _halves(2.0 * d.period, d.step)]
 
-    return Acting(_limited, fitted, ("rate", "/s"), _inverse, "slew_limit", entry, tried, order=2)
+    return Acting(_limited, fitted, ("rate", "/s"), _inverse, "slew_limit", entry, tried)
 
 
 ACTING: dict[str, Acting] = {

@@ -17,8 +17,8 @@ from .rules import RULES
 
 
 def checked(case: Case, end: End, mixes: Sequence[Mix] = ()) -> Diagnosis:
-    """The answer of a search after all rules, with figures and pictures of the written model; `mixes`: channels that were
-    mixed up, and have been mended. Raises UserError."""
+    """The answer of a search after all rules, with figures and pictures of the written model; where they leave it no name, that of a search
+    that was not asked before. `mixes`: channels that were mixed up, and have been mended. Raises UserError."""
     (case.output / REJECTED).unlink(missing_ok=True)  # of an answer before
     case.tell(0.87, "checking the extended model")
     table = tabled(case, end)
@@ -27,6 +27,8 @@ def checked(case: Case, end: End, mixes: Sequence[Mix] = ()) -> Diagnosis:
             case.log(f"{rule.name}: {broken}")
             before, end = end, rule.consequence(case, end, table, broken)
             table = table if end.extended is before.extended else tabled(case, end)
+    if end.other is not None and end.answer.verdict == "unexplained":
+        return checked(case, end.other(), mixes)
     case.tell(0.9, "showing what is wrong")
     answer, train, held = with_figures(case, end, table)
     missing = missing_forces(end.study) if answer.verdict == "unexplained" else ()
