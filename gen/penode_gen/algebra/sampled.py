@@ -30,8 +30,8 @@ Problem = Callable[[tuple[str, ...], str, str], None]
 def read(
     where: tuple[str, str], entry: dict[str, Any], unit: str, made_by: str, sample_time: float, rate: float, problem: Problem
 ) -> Sampled | None:
-    """An actuator that delays, holds, or follows by at most `rate` [unit/s]; `made_by`: the law of the actuator that it acts on, empty for an
-    input. None if it is wrong."""
+    """An actuator that delays, holds, or follows by at most `rate` [unit/s]; `made_by`: the law of the actuator that it acts on, empty for
+    an input. None if it is wrong."""
     law, source = entry["law"], entry["input"]
     if made_by and made_by not in LAWS:
         remedy = f"let {source} act on what '{where[1]}' makes of the input, instead of the reverse"

@@ -100,7 +100,7 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
     best = explanations[0] if explanations else None
     if beside.size:
         w = w or _weighed(case, study)
-        if _decides(w, beside.size, study, best, bool(faults)):
+        if _decides(w, beside, study, best, bool(faults)):
             return by_innovations(case, w, best)
     study, judged = judge_explanations(case, study, explanations, faults, bursts)
     sure = w if w and (w.verdict == "explained" or (w.causes and w.level > weighed.UNMODELLED)) else None
@@ -121,16 +121,17 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
     return by_innovations(case, sure, best) if sure and answer.verdict == "unexplained" else end
 
 
-def _decides(w: weighed.Weighed, level: float, study: Study, best: Explanation | None, faulty: bool) -> bool:
-    """Do innovations decide, where `level` acts beside the `best` explanation? Not where they explain only a part, unless `best` explains
+def _decides(w: weighed.Weighed, beside: weighed.Misfit, study: Study, best: Explanation | None, faulty: bool) -> bool:
+    """Do innovations decide, where so much acts `beside` the `best` explanation? Not where they explain only a part, unless `best` explains
     enough: it may still be taken. Nor where a sensor is `faulty` and neither search has a cause: they would judge samples that
-    are no measurements. Where `level` is small, they decide only with fewer causes, or as many with fewer laws: many laws together fit any
-    single swing."""
+    are no measurements. Where little acts, they decide only if they leave less of it and follow better, or with fewer causes, or as many
+    with fewer laws: many laws together fit any single swing."""
     if w.verdict == "partly_explained" and not (best and share(study, best) > ENOUGH):
         return False
     if w.verdict == "unexplained":
-        return level > weighed.UNMODELLED and (best is not None or not faulty)
-    return level > weighed.UNMODELLED or (best is not None and _simpler(w, best))
+        return beside.size > weighed.UNMODELLED and (best is not None or not faulty)
+    closer = w.level < beside.size and w.follows_better(beside)
+    return beside.size > weighed.UNMODELLED or closer or (best is not None and _simpler(w, best))
 
 
 def _simpler(w: weighed.Weighed, best: Explanation) -> bool:
