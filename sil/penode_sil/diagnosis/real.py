@@ -30,7 +30,7 @@ from .propose import FREE_RUN, SMALL, motions
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
 from .rounds import MIN_TAKEN, name_of, terms_of
 from .terms import Term, Trial
-from .worth import RIGHT, SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, systematic, undetermined
+from .worth import RIGHT, SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, undetermined
 
 Array = NDArray[np.float64]
 RIVAL = (
@@ -246,8 +246,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
 
 
 def _wider(bench: Bench, term: Term, size: float) -> float:
-    """Factor of the deviations of a term of this share of the force there: noise alone makes less of them than unmodelled forces, as far as
-    there are any."""
+    """Factor of the deviations of a term of this share of the force there: noise alone makes less of them than unmodelled forces."""
     cut = term.form.how == "clip"  # the size of which is its limit itself
     ratios = undetermined(bench.model, bench.fit)
     known = min(
@@ -255,8 +254,7 @@ def _wider(bench: Bench, term: Term, size: float) -> float:
         for f in _values_of(bench, term)
         if cut or not f.log
     )
-    unmodelled = systematic(bench.level.size)
-    return float(np.hypot(1.0, unmodelled / max(size, unmodelled, 1e-12) / max(known, 1e-12)))
+    return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
 
 
 def _values_of(bench: Bench, term: Term) -> list[Free]:

@@ -34,16 +34,10 @@ ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 def least(level: float, taken: float) -> float:
     """Smallest share of the acting force that is named. WORTH, unless the term takes at least half of the power of the innovations beyond
     sensor noise (`taken`). Then it is less where little wanders beside all that was found (RATIO * `level`), or whatever wanders if the
-    term is `alone`, but not below Z_95 * `systematic`, where its interval would include zero."""
+    term is `alone`, but not below Z_95 * SYSTEMATIC, where its interval would include zero."""
     if not mostly(taken):
         return WORTH
-    return min(WORTH, max(0.0 if alone(taken) else RATIO * level, Z_95 * systematic(level)))
-
-
-def systematic(level: float) -> float:
-    """What unmodelled forces of this level do to a form's size, as a share of the force there: SYSTEMATIC from half of WORTH on, which is
-    what any model is wrong by."""
-    return SYSTEMATIC * min(level / (0.5 * WORTH), 1.0)
+    return min(WORTH, max(0.0 if alone(taken) else RATIO * level, Z_95 * SYSTEMATIC))
 
 
 def mostly(taken: float) -> bool:

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from campaign import simulated
 
 from mujoco_cases import cases, effects, engine, excitation, mujoco_campaign

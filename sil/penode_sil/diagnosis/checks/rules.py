@@ -149,6 +149,8 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
         )
         fit = replace(end.study.null, simulated=found[0].fit.simulated)
         return replace(end, answer=replace(d, causes=(cause,), explanations=sets), extended=extended, fit=fit)
+    if end.answer.verdict == "unexplained":
+        return end
     note = f"the model misses {', '.join(sensors)} by more than noise, {EXTENDED} does not: no single one of its values explains that"
     unsure = (Cause(OUTSIDE, "", {}, 0.5),)
     return replace(end, answer=replace(d, verdict="unexplained", causes=unsure, explained=0.0, notes=(*d.notes, note)))
