@@ -54,7 +54,8 @@ def propose(bench: Bench, index: int, delay: float) -> Form | None:
     fewer steps than two for each value that is fitted: each of these may come late by itself."""
     about = 2.0 * delay / bench.step
     steps = [np.diff(r.u[:, index]) for r in bench.records]
-    moves = [np.count_nonzero(np.abs(s) > np.sqrt(np.mean(np.square(s)))) for s in steps]
+    large = [np.abs(s) > np.sqrt(np.mean(np.square(s))) for s in steps]
+    moves = [np.count_nonzero(np.diff(moving, prepend=False) & moving) for moving in large]  # a step may lie between rows of the raster
     fitted = 1 + len(bench.records)  # the period, and a phase for each recording
     if about * SPREAD[1] <= 2.0 or sum(moves) < fitted + fitted:
         return None
