@@ -15,7 +15,7 @@ import numpy as np
 import penode_gen
 from penode_gen.model import GROUND, Model
 from penode_sil.diagnosis import catalogue
-from penode_sil.diagnosis.catalogue import acting, channels, drives, form, others
+from penode_sil.diagnosis.catalogue import actuators, channels, drives, form, others
 from penode_sil.diagnosis.plant import Place, places
 from penode_sil.diagnosis.result import plain
 
@@ -98,7 +98,7 @@ def known() -> dict[str, Known]:
         for index, place in enumerate(places(model)):
             for one in file.forms(model, index, place, motion):
                 found[one.kind].add(said(place), file.sizes(one, sizes))
-    for one in (*drives.inputs(model, 1), *drives.bent(model, 1, acting.Drive([s], t[1], t[10], 0.16))):
+    for one in (*drives.inputs(model, 1), *drives.bent(model, 1, actuators.Drive([s], t[1], t[10], 0.16))):
         found[one.kind].add("an input", drives.sizes(one, sizes, OWN_UNIT))
     for one in drives.sensors(model, 1):
         found[one.kind].add("a sensor", drives.sizes(one, sizes, OWN_UNIT))

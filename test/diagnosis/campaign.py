@@ -215,6 +215,23 @@ def note(out: Path, rows: list[dict]) -> None:
         file.write("".join(json.dumps(row) + "\n" for row in rows))
 
 
+def drawing(about: str | None, out: Path) -> argparse.ArgumentParser:
+    """The options that other campaigns share, which draw cases and write them below `out`."""
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0, help="index of the first case (0), to go on with a draw")
+    parser.add_argument("--seed", type=int, default=None)
+    parser.add_argument("--only", help="SEED:INDEX")
+    parser.add_argument("--no-tolerance", action="store_true", help="leave every tolerance out")
+    parser.add_argument("--command", default="build/venv/bin/penode diagnose")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--timeout", type=float, default=900.0)
+    parser.add_argument("--out", type=Path, default=out)
+    parser.add_argument("--keep", action="store_true", help="keep files and answers of every case")
+    parser.add_argument("--generate", action="store_true", help="only the files and the truth; no command is run")
+    return parser
+
+
 def arguments() -> argparse.ArgumentParser:
     parse = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parse.add_argument

@@ -21,7 +21,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from campaign import commit, diagnose
+from campaign import commit, diagnose, drawing
 from claims import nominals
 from score import wilson
 from worlds import equivalents, world
@@ -99,19 +99,8 @@ def page(rows: Sequence[Mapping], about: str) -> str:
 
 def parsed() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=100)
-    parser.add_argument("--first", type=int, default=0, help="index of the first case (0), to go on with a draw")
-    parser.add_argument("--seed", type=int, default=None)
-    parser.add_argument("--only", help="SEED:INDEX")
+    parser = drawing(__doc__, Path("build/worlds"))
     parser.add_argument("--stratum", choices=("main", "halfcar", "drive"), action="append")
-    parser.add_argument("--no-tolerance", action="store_true", help="leave every tolerance out")
-    parser.add_argument("--command", default="build/venv/bin/penode diagnose")
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--timeout", type=float, default=900.0)
-    parser.add_argument("--out", type=Path, default=Path("build/worlds"))
-    parser.add_argument("--keep", action="store_true", help="keep files and answers of every case")
-    parser.add_argument("--generate", action="store_true", help="only the files and the truth; no command is run")
     return parser.parse_args()
 
 

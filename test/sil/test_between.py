@@ -19,7 +19,7 @@ from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
 from penode_sil.diagnosis import adopting, applied, clipping, plant
 from penode_sil.diagnosis.between import joined, parts, straight
-from penode_sil.diagnosis.catalogue.acting import lagging
+from penode_sil.diagnosis.catalogue.actuators import lagging
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence import gain, samples
 from penode_sil.diagnosis.evidence.fit import Fit

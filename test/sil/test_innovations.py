@@ -20,7 +20,7 @@ from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
 from penode_sil.diagnosis import driven, holding, plant, real, weighed
 from penode_sil.diagnosis.catalogue import FILES, drives
-from penode_sil.diagnosis.catalogue.acting import Drive
+from penode_sil.diagnosis.catalogue.actuators import Drive
 from penode_sil.diagnosis.catalogue.form import Motion, Moved
 from penode_sil.diagnosis.evidence import bench, blocks
 from penode_sil.diagnosis.evidence.bench import with_tolerances

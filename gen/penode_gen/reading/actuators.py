@@ -13,7 +13,7 @@ from ..algebra import sampled
 from .ends import EndTables
 
 SOURCE = "{unit}"  # of an argument in the unit of what the actuator takes
-LAWS = {  # arguments with their units; further keys that may be left out
+LAWS = {  # arguments with their units
     "gain": {"gain": "1"},
     "lag": {"time": "s"},
     "dead_zone": {"width": SOURCE},

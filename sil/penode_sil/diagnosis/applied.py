@@ -14,7 +14,7 @@ from penode_gen.model import Element, Model
 
 from . import late
 from .catalogue import drives
-from .catalogue.acting import ACTING
+from .catalogue.actuators import ACTUATORS
 from .entries import extends, table, toml, unlike
 from .evidence.bench import Bench
 from .evidence.fit import Fit
@@ -231,7 +231,7 @@ def _driven(model: Model, fit: Fit, terms: Sequence[Term], taken: set[str]) -> D
 
 def _order(t: Term) -> int:
     """Place of a term in the row in which those of an input act, as they were fitted."""
-    return ACTING[t.form.how].order if t.form.how in ACTING else 0
+    return ACTUATORS[t.form.how].order if t.form.how in ACTUATORS else 0
 
 
 def bound(model: Model, name: str) -> bool:
@@ -243,12 +243,12 @@ def bound(model: Model, name: str) -> bool:
 def _actuator(model: Model, t: Term, value: float, source: str, found: Driven) -> str:
     """Adds what a term makes of a signal; the name of that, or of the signal itself where the model file has no law for it."""
     name, samples = t.form.where, (t.form.series.period if t.form.series else value) / model.sample_time
-    own = ACTING.get(t.form.how)
+    own = ACTUATORS.get(t.form.how)
     law: dict[str, object] = {}
     if own and own.law:
         unit = units.si(next(i.unit for i in model.inputs if i.name == name))
         law["law"] = own.law
-        for key, (stem, size, of) in own.entry(value, model.sample_time).items():
+        for key, (stem, size, of) in own.entry(value).items():
             if not stem:
                 law[key] = f"{size:.9g} {drives.of_input(of, unit)}"
                 continue

@@ -72,8 +72,8 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     cut = {t.form.where for t in terms if t.form.how == "clip"}
     seen = bench.problem().predictor.sensors(bench.fit.free)
     limits = [clipping.propose(bench, j, seen) for j, s in enumerate(bench.model.sensors) if s.name not in cut]
-    acting = [pair for j in range(n_u) for pair in _bent(bench, j, terms)]
-    ranked = sorted([*ranked, *filter(None, limits), *acting], key=lambda pair: -pair[0].gain)
+    actuators = [pair for j in range(n_u) for pair in _bent(bench, j, terms)]
+    ranked = sorted([*ranked, *filter(None, limits), *actuators], key=lambda pair: -pair[0].gain)
     chosen = _chosen(ranked)
     wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))

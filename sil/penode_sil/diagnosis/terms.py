@@ -15,7 +15,7 @@ from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 
 from . import clipping
-from .catalogue.acting import ACTING, Drive
+from .catalogue.actuators import ACTUATORS, Drive
 from .catalogue.form import Form, Motion, Part
 from .evidence.bench import UPDATES, Bench
 from .evidence.fit import Fit
@@ -78,7 +78,7 @@ def free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
             return (Free(scale(form.where), 1.0, 0.01, sigma=0.3, origin=1.0),)
         case "late":
             return (Free((form.how, form.index), 0.2 * bench.step, 0.1 * step, sigma=step, low=0.0),)
-    v = ACTING[form.how].fitted(drive(bench, form.index))
+    v = ACTUATORS[form.how].fitted(drive(bench, form.index))
     return (Free((form.how, form.index), form.limit or v.start, v.unit, sigma=v.sigma, low=v.low, high=v.high),)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from penode_gen.model import GROUND, Model
 
 from . import clipping
-from .catalogue.acting import ACTING
+from .catalogue.actuators import ACTUATORS
 from .catalogue.form import Motion
 from .evidence.bench import UPDATES, Bench
 from .evidence.fit import Fit
@@ -169,7 +169,7 @@ def _linear(term: Term, fit: Fit, motion: Motion) -> bool:
 def _of_signal(bench: Bench, term: Term, fit: Fit) -> float:
     value = fit.value(term.free[0].target)
     turn = 2.0 * np.pi / (UPDATES * bench.update * bench.step)  # of the motion [rad/s]
-    own = ACTING.get(term.form.how)
+    own = ACTUATORS.get(term.form.how)
     if own and own.tried:
         return own.change(drive(bench, term.form.index), value)
     match term.form.how:

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
-from .acting import ACTING, Drive
+from .actuators import ACTUATORS, Drive
 from .form import Form, Sizes
 
 Array = NDArray[np.float64]
-INPUTS = (*ACTING, "input_hold")
+INPUTS = (*ACTUATORS, "input_hold")
 KINDS = (*INPUTS, "sensor_scale", "sensor_delay")
 MEANING = {
     "input_gain": "The plant is driven by more, or less, than the recording of the input says.",
@@ -61,8 +61,8 @@ def inputs(model: Model, count: int) -> Iterable[Form]:
     """Forms of the first `count` inputs whose effect is proportional to their value: others are compared at several values, see `bent`.
     That of a hold is for `holding`, which has to look for its period."""
     for j, i in enumerate(model.inputs[:count]):
-        for kind, acting in ACTING.items():
-            if acting.tried is None:
+        for kind, actuator in ACTUATORS.items():
+            if actuator.tried is None:
                 yield Form(kind, i.name, kind, j)
 
 
@@ -71,8 +71,8 @@ def bent(model: Model, index: int, drive: Drive) -> Iterable[Form]:
     own = model.inputs[index].name
     if any(own in e.ends for e in model.elements):
         return
-    for kind, acting in ACTING.items():
-        for value in acting.tried(drive) if acting.tried else ():
+    for kind, actuator in ACTUATORS.items():
+        for value in actuator.tried(drive) if actuator.tried else ():
             yield Form(kind, own, kind, index, limit=value)
 
 
@@ -95,9 +95,9 @@ def plain(model: Model, sensor: str, time: Array, z: Array) -> dict[str, Array]:
 
 def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:
     """What a report gives of a form; `unit` of its input or sensor."""
-    if form.how in ACTING:
-        acting = ACTING[form.how]
-        return {acting.size[0]: (of_input(acting.size[1], unit), acting.shown(v.alone))}
+    if form.how in ACTUATORS:
+        actuator = ACTUATORS[form.how]
+        return {actuator.size[0]: (of_input(actuator.size[1], unit), actuator.shown(v.alone))}
     match form.how:
         case "input_added":
             return {"period": ("s", form.series.period)} if form.series else {}
@@ -109,5 +109,5 @@ def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:
 
 
 def of_input(unit: str, own: str) -> str:
-    """A unit of ACTING for an input in `own` units."""
+    """A unit of ACTUATORS for an input in `own` units."""
     return own + unit if unit in ("", "/s") else unit

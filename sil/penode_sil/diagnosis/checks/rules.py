@@ -142,10 +142,10 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
         return replace(end, answer=replace(d, causes=tuple(end.withheld), explanations=sets, notes=notes))
     if found := values.lone(case, end, table):
         cause = values.caused(case, found)
-        extended = write_extended(values.text(case, found[0]), case)
+        extended = write_extended(values.text(case, cause, found[0]), case)
         sets = tuple(
-            {"causes": [{"kind": "wrong_parameter", "where": x.name}], "posterior": p}
-            for x, p in zip(found, values.posterior(found), strict=True)
+            {"causes": [{"kind": name.kind, "where": name.where}], "posterior": p}
+            for name, p in zip((cause, *cause.alternatives), values.posterior(found), strict=True)
         )
         fit = replace(end.study.null, simulated=found[0].fit.simulated)
         return replace(end, answer=replace(d, causes=(cause,), explanations=sets), extended=extended, fit=fit)

@@ -86,11 +86,11 @@ def caused(case: Case, found: list[Lone]) -> Cause:
     return Cause("wrong_parameter", name, {name: interval}, posterior(found)[0], others)
 
 
-def text(case: Case, x: Lone) -> str:
-    """The model file with the values of a fit in it."""
+def text(case: Case, cause: Cause, x: Lone) -> str:
+    """The model file with the values of a fit in it, which has this cause."""
     model = case.model
     values = {f.target: f.value for f in x.fit.free if isinstance(f.target, str)}
-    lines = heading(model, "wrong_parameter", x.name)
+    lines = heading(model, cause.kind, cause.where)
     for p in model.parameters.values():
         if p.name in values and values[p.name] != p.value:
             lines.append(f"{p.name} = {table(entry(p, values[p.name]))}")

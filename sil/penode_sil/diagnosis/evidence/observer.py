@@ -15,7 +15,7 @@ from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter,
 
 from ...batch import Observer
 from ..between import far, finer, joined, straight
-from ..catalogue.acting import ACTING
+from ..catalogue.actuators import ACTUATORS
 from ..compiling import compiled, ordered
 from ..fit import Free
 from ..noise import Experiment
@@ -282,7 +282,7 @@ class Predictor:
                 u[:, :, f.target[1]] += values[:, None] * f.target[2].signals[e]
             else:
                 u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
-                u[:, :, f.target[1]] = ACTING[f.target[0]].acts(u[:, :, f.target[1]], values, record.step)
+                u[:, :, f.target[1]] = ACTUATORS[f.target[0]].output(u[:, :, f.target[1]], values, record.step)
         return np.clip(np.nan_to_num(start), -MAX_INNOVATION, MAX_INNOVATION), parameters, u, y
 
 
@@ -294,7 +294,7 @@ def moved(x: Array, samples: Array) -> Array:
 
 def _order(f: Free) -> int:
     """Place of a free value in the row in which those of one input act."""
-    return ACTING[f.target[0]].order if f.target[0] in ACTING else 0
+    return ACTUATORS[f.target[0]].order if f.target[0] in ACTUATORS else 0
 
 
 def earlier(y: Array, samples: Array) -> Array:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What acts on a plant instead of its recorded input: an actuator that the model does not have. One row a kind.
+"""Actuators between a recorded input and the plant, which the model file does not have. One row a kind.
 
-The value of a kind is what is fitted, 0 where the input acts as recorded. A limit is fitted as its inverse: an infinite one is none.
+One value of a kind is fitted; it is 0 where the actuator passes its input on unchanged. A limit is fitted as its inverse, 0 for no limit.
 """
 
 from __future__ import annotations
@@ -53,26 +53,26 @@ class Value:
 
 
 @dataclass(frozen=True, eq=False)
-class Acting:
-    """A kind of actuator. `acts(u, values, step)`: what acts [runs, n] for the recorded u [runs, n] and a value for each run [runs];
-    `fitted`: how its value is fitted, and `tried`: values that a score test compares, for where the effect is not proportional to it;
-    `size`: name and unit of what a report gives ("": the unit of the input, "/s" behind it), and `shown` that for a value;
-    `law` of [actuators] that does the same, empty if there is none, and its `entry` for a value and a sample time; `order`: which comes
-    first where several act in a row, as in the model file."""
+class Actuator:
+    """A kind of actuator. `output(u, values, step)`: its output [runs, n] for the recorded input u [runs, n] and a value for each run
+    [runs]; `fitted`: how its value is fitted, and `tried`: values that a score test compares, where the effect is not proportional to
+    it; `size`: name and unit of what a report gives ("": the unit of the input, "/s" behind it), and `shown` that for a value; `law` of
+    [actuators] that does the same, empty if there is none, and its `entry` for a value; `order` of actuators in series, as in the model
+    file."""
 
-    acts: Callable[[Array, Array, float], Array]
+    output: Callable[[Array, Array, float], Array]
     fitted: Callable[[Drive], Value]
     size: tuple[str, str]
     shown: Callable[[float], float] = float
     law: str = ""
-    entry: Callable[[float, float], Entry] = lambda value, step: {}
+    entry: Callable[[float], Entry] = lambda value: {}
     tried: Callable[[Drive], Sequence[float]] | None = None
     order: int = 0
 
     def change(self, drive: Drive, value: float) -> float:
-        """Rms of what acts less what was recorded, as a share of the input's standard deviation."""
+        """Rms difference of output and recorded input, relative to the standard deviation of the input."""
         values = np.array([value])
-        moved = np.concatenate([self.acts(u[None, :], values, drive.step)[0] - u for u in drive.series])
+        moved = np.concatenate([self.output(u[None, :], values, drive.step)[0] - u for u in drive.series])
         return float(np.sqrt(np.mean(moved**2))) / drive.spread
 
 
@@ -121,7 +121,7 @@ def _limited(u: Array, values: Array, step: float) -> Array:
 
 
 def _followed(x: Array, most: float) -> Array:
-    """A signal [n] that follows `x` by `most` a sample."""
+    """A signal [n] that follows `x` by at most `most` from one sample to the next."""
     now, found = float(x[0]), []
     for target in x.tolist():
         now += min(max(target - now, -most), most)
@@ -139,65 +139,65 @@ def _halves(most: float, least: float | None = None) -> list[float]:
     return [most * 0.5**k for k in range(count)]
 
 
-def _gain() -> Acting:
-    def entry(value: float, step: float) -> Entry:
+def _gain() -> Actuator:
+    def entry(value: float) -> Entry:
         return {"gain": ("gain", 1.0 + value, "1")}
 
-    return Acting(_amplified, lambda d: Value(0.0, 0.01, 0.3), ("gain", "1"), lambda v: 1.0 + v, "gain", entry, order=3)
+    return Actuator(_amplified, lambda d: Value(0.0, 0.01, 0.3), ("gain", "1"), lambda v: 1.0 + v, "gain", entry, order=3)
 
 
-def _offset() -> Acting:
-    return Acting(_shifted, lambda d: Value(0.0, 0.01 * d.spread, d.spread), ("offset", ""), order=5)
+def _offset() -> Actuator:
+    return Actuator(_shifted, lambda d: Value(0.0, 0.01 * d.spread, d.spread), ("offset", ""), order=5)
 
 
 def _time(d: Drive) -> Value:
     return Value(0.2 * d.step, 0.2 * d.update, 2.0 * d.update, 0.0)
 
 
-def _behind() -> Acting:
-    return Acting(_lag, _time, ("lag", "s"), law="lag", entry=lambda v, step: {"time": ("lag", v, "s")}, order=4)
+def _behind() -> Actuator:
+    return Actuator(_lag, _time, ("lag", "s"), law="lag", entry=lambda v: {"time": ("lag", v, "s")}, order=4)
 
 
-def _dead_zone() -> Acting:
+def _dead_zone() -> Actuator:
     def fitted(d: Drive) -> Value:
         return Value(0.0, 0.05 * d.largest, 0.5 * d.largest, 0.0, d.largest)
 
-    def entry(value: float, step: float) -> Entry:
+    def entry(value: float) -> Entry:
         return {"width": ("width", value, "")}
 
-    return Acting(_dead, fitted, ("width", ""), law="dead_zone", entry=entry, tried=lambda d: _halves(0.5 * d.largest), order=1)
+    return Actuator(_dead, fitted, ("width", ""), law="dead_zone", entry=entry, tried=lambda d: _halves(0.5 * d.largest), order=1)
 
 
-def _saturation() -> Acting:
+def _saturation() -> Actuator:
     def fitted(d: Drive) -> Value:
         return Value(0.0, 0.05 / d.largest, 2.0 / d.largest, 0.0)
 
-    def entry(value: float, step: float) -> Entry:
+    def entry(value: float) -> Entry:
         return {"limit": ("limit", _inverse(value), "")}
 
     def tried(d: Drive) -> list[float]:
         return [1.0 / (d.largest * (1.0 - cut)) for cut in _halves(0.75)]
 
-    return Acting(_saturated, fitted, ("limit", ""), _inverse, "saturation", entry, tried, order=1)
+    return Actuator(_saturated, fitted, ("limit", ""), _inverse, "saturation", entry, tried, order=1)
 
 
-def _slew_limit() -> Acting:
+def _slew_limit() -> Actuator:
     def fitted(d: Drive) -> Value:
         return Value(0.0, 0.05 * d.period / d.largest, 2.0 * d.period / d.largest, 0.0)
 
-    def entry(value: float, step: float) -> Entry:
+    def entry(value: float) -> Entry:
         return {"rate": ("", _inverse(value), "/s")}
 
     def tried(d: Drive) -> list[float]:
         return [time / d.largest for time in _halves(2.0 * d.period, d.step)]
 
-    return Acting(_limited, fitted, ("rate", "/s"), _inverse, "slew_limit", entry, tried)
+    return Actuator(_limited, fitted, ("rate", "/s"), _inverse, "slew_limit", entry, tried)
 
 
-ACTING: dict[str, Acting] = {
+ACTUATORS: dict[str, Actuator] = {
     "input_gain": _gain(),
     "input_offset": _offset(),
-    "input_delay": Acting(_late, _time, ("delay", "s")),
+    "input_delay": Actuator(_late, _time, ("delay", "s")),
     "input_lag": _behind(),
     "input_dead_zone": _dead_zone(),
     "input_saturation": _saturation(),
