@@ -45,7 +45,7 @@ def train(
     running controller, training.json, and report.html, which also says what the recordings cannot tell.
 
     Exit codes: 0 trained; 2 wrong use or bad input; 3 a fault of penode; 4 the fit did not come down to the noise that the sensors state,
-    from several starts: what there is is written, and marked.
+    from several starts, or the trained model predicts the held-out recordings worse than MODEL: what there is is written, and marked.
     """
     from ..diagnosis.files import check_folder
     from ..training import files, result
@@ -54,5 +54,5 @@ def train(
     with staged() as tell:
         found = files.run(files.Job(model, data, holdout, output, channel, known, seed, start, resume), tell)
     click.echo(json.dumps(found.as_json(), indent=2) if as_json else result.sentences(found, output))
-    if not found.converged:
+    if not found.converged or found.rejected:
         sys.exit(NotConverged.exit)

@@ -8,7 +8,7 @@ import json
 import os
 import tomllib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +17,19 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from ..diagnosis.files import all_or_none
+from ..diagnosis.result import REJECTED
 from ..errors import RecordingError, WrongUse
 from ..output import whole
 from ..recordings.excerpt import excerpted
 from ..recordings.measured import Measured, load
 from . import begin, onnx_file, report, resume, threads
 from .engine import compiler
-from .result import Trained
+from .final import checked
+from .result import TRAINED, Trained
 from .settings import SETTINGS
 from .story import Options, check, train, versions
+
+KEEP = f"# Keep the nominal model: this one predicts worse. It would be {TRAINED} if it did not.\n"
 
 
 @dataclass(frozen=True)
@@ -53,11 +57,10 @@ def run(job: Job, tell: Callable[[float, str], None] = lambda share, doing: None
     measured, held = excerpted(measured, held)
     with resume.journal(job.output, _identity(job, model, start), job.resume) as journal:
         with threads.one():
-            after, found = train(model, measured, held, Options(known, job.seed, start, journal), tell)
+            _, found = train(model, measured, held, Options(known, job.seed, start, journal), tell)
         with all_or_none(job.output):
             job.output.mkdir(exist_ok=True)
-            _write(job, model, after, found)
-    return found
+            return _write(job, model, found, measured, held)
 
 
 def _check_kept(measured: Sequence[Measured]) -> None:
@@ -108,8 +111,8 @@ def _known(text: str, model: Model) -> tuple[str, float | None]:
     return name, number
 
 
-def _write(job: Job, model: Model, after: Model, found: Trained) -> None:
-    """All files but for what a later step may refuse: the set is read back from them."""
+def _write(job: Job, model: Model, found: Trained, measured: Sequence[Measured], held: Sequence[Measured]) -> Trained:
+    """All files, and the training with the figures of what was written; no set of a model that predicts worse than the nominal one."""
     facts = {
         "penode.seed": str(found.seed),
         "penode.chi2": "" if found.chi2 is None else f"{found.chi2:.6g}",
@@ -136,15 +139,27 @@ def _write(job: Job, model: Model, after: Model, found: Trained) -> None:
             f"{found.versions['penode']}"
         )
         onnx_file.write(job.output / f"{force.name}.onnx", onnx_file.model(force.network, force.name, text, own))
-    toml = job.output / "model_trained.toml"
-    with whole(toml) as part:
-        part.write_text(_model_file(job, model, found), encoding="utf-8")
-    reread = penode_gen.load(toml)
-    with whole(job.output / f"{model.name}.set") as part:
-        part.write_bytes(penode_gen.serial(reread, "default"))
+    text = _model_file(job, model, found)
+    for name in (TRAINED, REJECTED, f"{model.name}.set"):  # of a training before
+        (job.output / name).unlink(missing_ok=True)
+    with whole(job.output / TRAINED) as part:
+        part.write_text(text, encoding="utf-8")
+    reread = penode_gen.load(job.output / TRAINED)
+    final = checked(model, reread, measured, held, job.channels)
+    found = replace(found, figures=final.figures, simulated=final.simulated, notes=(*found.notes, *final.notes))
+    if final.worse:
+        (job.output / TRAINED).unlink()
+        with whole(job.output / REJECTED) as part:
+            part.write_text(KEEP + text, encoding="utf-8")
+        note = f"{REJECTED} predicts {', '.join(final.worse)} worse than the nominal model: keep that one"
+        found = replace(found, model_file=REJECTED, notes=(note, *found.notes))
+    else:
+        with whole(job.output / f"{model.name}.set") as part:
+            part.write_bytes(penode_gen.serial(reread, "default"))
     with whole(job.output / "training.json") as part:
         part.write_text(json.dumps(found.as_json(), indent=2) + "\n", encoding="utf-8")
     report.write(job.output / "report.html", found)
+    return found
 
 
 def _model_file(job: Job, model: Model, found: Trained) -> str:

@@ -30,8 +30,9 @@ img{{max-width:100%}}.warn{{border-left:4px solid #D55E00;padding-left:.8rem}}co
 
 def write(path: Path, t: Trained) -> None:
     """The page, whole or not at all."""
-    verdict = "The fit converged." if t.converged else "The fit did not converge."
-    parts = [f"<p{'' if t.converged else ' class=warn'}>{verdict} {t.seconds:.1f} s of processor time; {html.escape(beside_noise(t))}.</p>"]
+    verdict = "Keep the nominal model." if t.rejected else "The fit converged." if t.converged else "The fit did not converge."
+    kind = "" if t.converged and not t.rejected else " class=warn"
+    parts = [f"<p{kind}>{verdict} {t.seconds:.1f} s of processor time; {html.escape(beside_noise(t))}.</p>"]
     parts += [f"<p class=warn>{html.escape(n)}</p>" for n in t.notes]
     for force in t.forces:
         parts.append(f"<h2>{html.escape(force.name)}</h2>\n<p>{html.escape(_about(force))}</p>\n{_image(force)}")
@@ -51,6 +52,14 @@ def write(path: Path, t: Trained) -> None:
             f"<p>{100 * t.outside:.2f} % of the held-out samples lie outside of the trained range; for the last column "
             f"{100 * t.masked:.1f} % are left out.</p>"
         )
+    if t.figures:
+        rows = "".join(
+            f"<tr><td>{html.escape(f.signal)} [{html.escape(f.unit)}]</td><td>{html.escape(f.recording)}</td><td>{f.role}</td>"
+            f"<td>{f.nominal:.4g}</td><td>{f.trained:.4g}</td></tr>"
+            for f in t.figures
+        )
+        head = "<tr><th>signal</th><th>recording</th><th>role</th><th>nominal model</th><th>trained model</th></tr>"
+        parts.append(f"<h2>RMS error of the written model</h2>\n<p><code>{html.escape(t.command)}</code></p>\n<table>{head}{rows}</table>")
     facts = {"seed": t.seed, **t.versions, **t.digests}
     parts.append(
         "<h2>Made from</h2>\n<table>"

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from penode_gen.networks import Network
 
+from ..diagnosis.result import REJECTED
+from .final import Figure
 from .tries import Try
 from .unknown import Unknown
 
 Array = NDArray[np.float64]
+TRAINED = "model_trained.toml"
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +81,45 @@ class Trained:
     seed: int
     digests: dict[str, str]
     versions: dict[str, str]
+    model_file: str = TRAINED
+    figures: tuple[Figure, ...] = ()  # of the written model, see final.py
+    simulated: str = ""  # options of `penode simulate` that give these figures
+
+    @property
+    def rejected(self) -> bool:
+        """Does the written model predict worse than the nominal one?"""
+        return self.model_file == REJECTED
+
+    @property
+    def command(self) -> str:
+        """What gives the figures of the written model."""
+        return f"penode simulate {self.model_file} --input RECORDING {self.simulated}".rstrip()
 
     def as_json(self) -> dict[str, object]:
         """For programs; arrays as lists, networks left out."""
         found = {
             k: getattr(self, k)
-            for k in ("model", "known", "outside", "masked", "converged", "notes", "chi2", "seconds", "seed", "digests", "versions")
+            for k in (
+                "model",
+                "known",
+                "outside",
+                "masked",
+                "converged",
+                "notes",
+                "chi2",
+                "seconds",
+                "seed",
+                "digests",
+                "versions",
+                "model_file",
+                "simulated",
+            )
         }
         found["parameters"] = {n: {"value": v, "sigma": s, "before": b, "unit": u} for n, (v, s, b, u) in self.parameters.items()}
         found["tried"] = [{k: v if isinstance(v, str) or np.isfinite(v) else None for k, v in asdict(t).items()} for t in self.tried]
         found["not_identifiable"] = [asdict(u) for u in self.unknown]
         found["training"], found["holdout"] = ([asdict(e) for e in errors] for errors in (self.training, self.holdout))
+        found["figures"] = [asdict(f) for f in self.figures]
         found["networks"] = {f.name: _force(f) for f in self.forces}
         return found
 
@@ -118,7 +149,8 @@ def beside_noise(t: Trained) -> str:
 
 def sentences(t: Trained, folder: object) -> str:
     """What the terminal shows."""
-    lines = [f"{t.model}: {'trained' if t.converged else 'NOT CONVERGED'}, {t.seconds:.1f} s of processor time; {beside_noise(t)}"]
+    verdict = "keep the nominal model" if t.rejected else "trained" if t.converged else "NOT CONVERGED"
+    lines = [f"{t.model}: {verdict}, {t.seconds:.1f} s of processor time; {beside_noise(t)}"]
     for f in t.forces:
         ranges = ", ".join(f"{a:.3g} to {b:.3g} {u}" for a, b, u in zip(f.low, f.high, f.units, strict=True))
         lines.append(f"  {f.name}: {f.way}, trained over {ranges}, {2 * float(np.median(f.sigma[0])):.2g} {f.output} at 2 sigma")

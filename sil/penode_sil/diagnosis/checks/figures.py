@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from penode_gen import units
 
 from ...errors import UserError
+from ...predicted import Options, Predicted, both, known, read
 from ...replay import Replay
 from ..beginning import begins_at_rest
 from ..fit import Free, Problem
@@ -24,7 +25,6 @@ from ..restoring import Surface, surfaces
 from ..result import Diagnosis, Figure, Gain
 from ..study import Study, fitted, uncertain
 from .case import Case, End
-from .predicted import Options, Predicted, both, known, read
 
 Array = NDArray[np.float64]
 ROLES = ("training", "hold-out")
@@ -107,7 +107,7 @@ def _rows(
 ) -> list[Row]:
     """All sensors of a recording; `floor` [n_z]: noise. Of a `part` of a file, figures are errors of the same prediction over its own sound
     samples, for other parts may be learnt from."""
-    nominal, extended = (p.at(e) for p in pair)
+    nominal, extended = (p.at(e.time) for p in pair)
     dropped = {c.sensor: c.good for c in end.held if c.recording == e.name}
     rows, study_set = [], end.study.set_name
     for j, s in enumerate(case.model.sensors):
@@ -168,13 +168,13 @@ def with_figures(case: Case, end: End, table: Table) -> tuple[Diagnosis, list[Ch
     study, model = end.study, case.model
     train: list[Channel] = []
     for k, e in enumerate(study.experiments):
-        after = table.predicted[e.name][1].at(e) if end.fit is not None else None
+        after = table.predicted[e.name][1].at(e.time) if end.fit is not None else None
         train += channels(e, model, study.null.simulated[k], after, noise_floor(study, k))
     held: list[Channel] = []
     for e in case.unused:
         own = {c.sensor: c for c in end.held if c.recording == e.name}
         good = np.column_stack([own[s.name].good if s.name in own else e.good[:, j] for j, s in enumerate(model.sensors)])
-        before, after = (p.at(e) for p in table.predicted[e.name])
+        before, after = (p.at(e.time) for p in table.predicted[e.name])
         beyond = next((c.beyond for c in own.values()), None)
         held += channels(replace(e, good=good), model, before, after, noise_floor(study, 0), beyond)
     gain = {name: _gain(table, name, g) for name, g in end.answer.gain.items()}

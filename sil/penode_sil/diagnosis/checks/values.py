@@ -37,7 +37,7 @@ def lone(case: Case, end: End, figures: Table) -> list[Lone]:
     stated = [uncertain(p) for p in model.parameters.values() if p.tolerance > 0.0 and p.value]
     starts = [f for f in study.null.free if f.target[0] == "start"]
     problem = Problem(model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
-    extended = [figures.predicted[e.name][1].at(e) for e in study.experiments]
+    extended = [figures.predicted[e.name][1].at(e.time) for e in study.experiments]
     fits = [Lone(p.name, problem.solve([*stated, _free(p), *starts])) for p in model.parameters.values() if _unstated(p)]
     good = [x for x in fits if all(map(np.isfinite, (x.fit.cost, *_size(x)))) and not _behind(end, x.fit, extended)]
     good = sorted(good, key=lambda x: x.fit.cost)

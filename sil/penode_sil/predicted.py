@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
-from ... import replay, results, scenario, starts
-from ...errors import RecordingError, UserError
-from ...recordings.measured import Measured
-from ...schedule import instance_calls
-from ...signals import Samples
-from ...targets import Sil
-from ..noise import Experiment
+from . import replay, results, scenario, starts
+from .errors import RecordingError, UserError
+from .recordings.measured import Measured
+from .schedule import instance_calls
+from .signals import Samples
+from .targets import Sil
 
 Array = NDArray[np.float64]
 
@@ -51,9 +50,9 @@ class Predicted:
     z: Array
     errors: dict[str, dict[str, Any]]
 
-    def at(self, e: Experiment) -> Array:
-        """Sensors [samples, n_z] at those of an experiment."""
-        return np.column_stack([np.interp(e.time, self.time, z) for z in self.z.T])
+    def at(self, time: Array) -> Array:
+        """Sensors [samples, n_z] at other times of the file [samples]."""
+        return np.column_stack([np.interp(time, self.time, z) for z in self.z.T])
 
 
 def read(m: Measured, model: Model, options: Options) -> replay.Replay:
