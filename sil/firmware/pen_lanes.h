@@ -16,6 +16,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "penode/pen_real.h"
+
+/* Functions of pen_math.c that no lane calls one by one: internal, so that a compiler leaves them out. */
+#define LANES_INTERNAL static __attribute__((unused))
+LANES_INTERNAL pen_real_t pen_exp(pen_real_t x);
+LANES_INTERNAL pen_real_t pen_tanh(pen_real_t x);
+LANES_INTERNAL pen_real_t pen_sigmoid(pen_real_t x);
+LANES_INTERNAL pen_real_t pen_softplus(pen_real_t x);
+
 #include "pen_math.c"
 
 #if defined(__AVX512F__)

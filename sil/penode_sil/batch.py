@@ -33,7 +33,7 @@ from .output import whole
 
 Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
-SIMPLE = ("-O1", "-march=native")  # with gcc: 0.1 s to compile instead of 0.3 s, and code that takes two to six times as long
+SIMPLE = ("-Og", "-march=native")  # with gcc: 0.12 s to compile instead of 0.35 s, and code that takes two to six times as long
 SHORT = 200_000  # steps of all runs and calls, up to which code is by SIMPLE: 2 to 12 ms; most models of a diagnosis are run no further
 # Not -ffast-math, which takes nothing for NaN. But gcc drops 0*x, by which lanes_max and its like pass NaN on: states, inputs and outputs
 # that are not finite are detected by their bits all the same.
@@ -286,7 +286,7 @@ def _build(model: penode_gen.Model, code: BatchCode, dtype: type, per_run: bool,
     parts = sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "pen_lanes*.h"), *functions)
     folding = []
     if "LANES_PIECES" in code.text:
-        own = [native("src", name) for name in ("pen_fold.c", "pen_net.c")]
+        own = [native("src", name) for name in ("pen_fold.c", "pen_net.c", "pen_math.c")]
         folding = [
             build_once("folding", ".o", [*command, "-r", "-nostdlib", *map(str, own)], [_processor(compiler), *parts, *own])
         ]  # for every model
