@@ -78,6 +78,7 @@ def test_a_damper_that_has_lost_oil_is_found(tmp_path, gas, show):
     assert [(c.kind, c.where) for c in found.causes] == ([("aerated_damper", "spring")] if gas else [])
 
 
+@pytest.mark.long
 def test_the_command_names_it_too(tmp_path, penode):
     """Four plays in series with the damper fit this motion better than its law, and follow it worse."""
     held = tmp_path / "held"

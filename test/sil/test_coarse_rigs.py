@@ -10,6 +10,7 @@ import math
 import re
 
 import numpy as np
+import pytest
 
 HEAD = """
 [model]
@@ -77,6 +78,7 @@ def kinds(found: dict) -> list[str]:
     return [c["kind"] for c in found["causes"]]
 
 
+@pytest.mark.long
 def test_an_oscillator_with_nine_samples_a_period(tmp_path, penode):
     """A hardening spring whose cube is 19 % of the force, under waves up to a third of the sampling rate, with a load: straight lines
     between samples, or one step a sample, would err by more than the cube, and a scale of the sensor would do what a filter does."""
@@ -103,6 +105,7 @@ def carriage(rng, seconds: float, friction: float):
     return h, u, "x [m]", np.round(x, 6)
 
 
+@pytest.mark.long
 def test_a_carriage_with_an_encoder_of_a_micrometre(tmp_path, penode):
     """Friction and load have their names and sizes, though the friction turns round within 0.4 mm/s and the encoder shows any error."""
     records = [carriage(np.random.default_rng(seed), 4.0, 15.0) for seed in (3, 4)]
@@ -199,6 +202,7 @@ def tanks(rng, leak: float):
     return 4.0, u, "level [m]", np.array(level) + 0.005 * rng.standard_normal(len(level)), "u [m]"
 
 
+@pytest.mark.long
 def test_tanks_of_states_and_equations_alone(tmp_path, penode):
     """Parameters alone are wrong: fitted, they leave the noise. With a leak that no cause of the catalogue is, nothing gets a name, and the
     refitted model still predicts far better than the guess."""
@@ -228,6 +232,7 @@ def test_a_sensor_cut_off_in_front_of_its_noise(tmp_path, penode):
     assert abs(found["causes"][0]["parameters"]["limit"]["value"] / 0.016 - 1.0) < 0.01
 
 
+@pytest.mark.long
 def test_a_limit_that_bends_the_fit(tmp_path, penode):
     """A limit at 1.3 of the rms, in a file without tolerances: the parameters that fit it best are far off, and their motion stays below
     it."""

@@ -971,6 +971,7 @@ def test_the_file_has_the_fault_of_a_sensor(tmp_path, fault, show):
     assert found.gain[name].after_rmse < 1.05 * noise[name] < 0.8 * found.gain[name].before_rmse  # see test_hidden_cause
 
 
+@pytest.mark.long
 def test_a_load_put_on_at_the_start_is_no_start_in_motion(tmp_path, model):
     """To accelerometers a load at rest is a start away from rest, in four numbers instead of one: also beside another cause."""
     z = road(3)
@@ -990,6 +991,7 @@ def test_clocks_that_drift_apart_are_on_no_list(tmp_path, model):
     assert float(said.split(" by ")[1].split(" ppm")[0]) == pytest.approx(100.0, rel=0.03)
 
 
+@pytest.mark.long
 def test_a_spring_that_gets_stiffer_is_on_no_list(tmp_path, model):
     """By 3 % while it drives: constant laws that fit see nothing of it, since on the mean it is within the tolerance."""
     z = road(6)

@@ -142,6 +142,7 @@ def test_damping_does_not_stand_for_friction(tmp_path, rough, force, show):
     assert low < force < high
 
 
+@pytest.mark.long
 def test_play_is_no_stop_of_another_stiffness(tmp_path, show):
     """A play of 2 x 0.007 rad in a shaft whose file states no tolerances: with other values of k a stop is the same curve."""
     model, experiments = drive(tmp_path, lambda s: K * touching(s, 0.007) + waves(0.03, s), lambda v: 0.0)

@@ -132,6 +132,7 @@ def cluster():
         yield cluster.scheduler_address
 
 
+@pytest.mark.long
 def test_a_cluster_finds_the_same(alone, place, cluster, tmp_path):
     assert results(folder.diagnose(job(place, tmp_path / "out"), scheduler=cluster)) == results(alone[0])
 

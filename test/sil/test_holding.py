@@ -106,6 +106,7 @@ def test_a_hold_of_a_slow_force(answer, top):
     )  # looked at in steps of 8e-5 s
 
 
+@pytest.mark.long
 def test_a_late_sensor_is_late_in_the_extended_model(answer, tmp_path):
     found = answer("sensor", 0.0235, 1)
     (cause,) = found.causes

@@ -11,6 +11,7 @@ import math
 import numpy as np
 import pytest
 from one_mass import STEP, model
+from samples import sample
 
 from penode_sil.diagnosis import straight
 
@@ -56,7 +57,7 @@ def recording(path, stiffness: float, difference: float, waves: float) -> None:
     np.savetxt(path, rows, delimiter=",", header="time [s],push [N],x [m]", comments="", fmt="%.9g")
 
 
-@pytest.mark.parametrize("waves", (0.0, 0.03))
+@pytest.mark.parametrize("waves", sample((0.0, 0.03), 0.03))
 def test_a_stiffness_behind_an_asymmetric_spring_is_named(tmp_path, penode, waves):
     """25 % more stiffness beside a difference of its sides: both are named, also where nothing else is missed, and innovations do not
     decide."""
