@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The whole way from recordings to a named, measured improvement."""
+"""From recordings to a named, measured improvement."""
 
 from __future__ import annotations
 
@@ -72,14 +72,14 @@ def diagnose(
 
 
 def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> End:
-    """Innovations answer where the file only guesses a parameter, on a free motion that the model misses, or where `_decides`. They are
-    asked first if more than UNMODELLED acts beside the best single cause, and answer at once if they explain it and little still wanders;
-    else the search by sensor noise goes on as long as it gets below UNMODELLED. If that search explains nothing, innovations answer where
-    they explain it, or where they have causes and more than UNMODELLED wanders. If they were not asked before, they answer where they
-    follow the recordings better, name the same, or find an input at fault; where neither has a name, parameters that predict the hold-out
-    better stay."""
-    vague = weighed.supports(study.model) and bool(guessed(study.model))
-    if vague or (not study.model.inputs and weighed.misfit(study, study.null, case.log).size):
+    """The end of the search that decides. Innovations answer where the file only guesses a parameter, where the model misses a free motion,
+    or where `_decides`. If the best single cause leaves an unmodelled force above UNMODELLED, they are asked first, and answer at once if
+    they explain the recordings and leave little; else the search by sensor noise goes on as long as it gets below UNMODELLED. If that
+    search explains nothing, innovations answer where they explain the recordings, or have causes and leave more than UNMODELLED. If they
+    were not asked before, they answer where they follow the recordings better, name the same, or find an input at fault; where neither has
+    a name, parameters that predict the hold-out better stay."""
+    unknown = weighed.supports(study.model) and bool(guessed(study.model))
+    if unknown or (not study.model.inputs and weighed.misfit(study, study.null, case.log).size):
         return by_innovations(case, _weighed(case, study), None)
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
     case.tell(SEARCH[0], "looking for causes")
@@ -122,10 +122,10 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
 
 
 def _decides(w: weighed.Weighed, beside: weighed.Misfit, study: Study, best: Explanation | None, faulty: bool) -> bool:
-    """Do innovations decide, where so much acts `beside` the `best` explanation? Not where they explain only a part, unless `best` explains
-    enough: it may still be taken. Nor where a sensor is `faulty` and neither search has a cause: they would judge samples that
-    are no measurements. Where little acts, they decide only if they leave less of it and follow better, or with fewer causes, or as many
-    with fewer laws: many laws together fit any single swing."""
+    """Do innovations decide, where the `best` explanation leaves the misfit `beside`? Not where they explain only a part, unless `best`
+    explains enough: it may still be taken. Nor where a sensor is `faulty` and neither search has a cause: they would judge samples that are
+    no measurements. Where the unmodelled force is small, they decide only if they leave less of it and follow better, or with fewer causes,
+    or as many with fewer laws: many laws together fit any single swing."""
     if w.verdict == "partly_explained" and not (best and share(study, best) > ENOUGH):
         return False
     if w.verdict == "unexplained":
@@ -141,7 +141,7 @@ def _simpler(w: weighed.Weighed, best: Explanation) -> bool:
 
 
 def _weighed(case: Case, study: Study) -> weighed.Weighed:
-    case.tell(0.3, "weighing what is missed everywhere")
+    case.tell(0.3, "searching with an observer that follows unmodelled forces")
     return weighed.weigh(replace(study, model=case.model), case.unused, case.log)
 
 
@@ -160,7 +160,7 @@ def unburst(model: Model, experiments: Sequence[Experiment], set_name: str) -> t
 
 
 def advancing(log: Callable[[str], None], tell: Callable[[float, str], None]) -> Callable[[str], None]:
-    """A log of the search that tells progress too. How many fits are to come is not known: each takes a share of the rest."""
+    """A log of the search that reports progress too. How many fits are to come is not known: each takes a share of the rest."""
     done = SEARCH[0]
 
     def both(text: str) -> None:

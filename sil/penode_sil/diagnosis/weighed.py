@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A diagnosis of recordings in which more is wrong than sensor noise can tell: by innovations, see `evidence`."""
+"""The diagnosis of recordings that a model misses by more than sensor noise: by innovations, see `evidence`."""
 
 from __future__ import annotations
 
@@ -30,15 +30,13 @@ from .study import Study, fitted, guessed, look
 from .worth import WORTH
 
 Array = NDArray[np.float64]
-MIN_UNMODELLED = (
-    0.0055  # of what moves, and worth MIN_GAIN: less wanders beside causes that are the truth, 0.003 of the levels tried at most
-)
+MIN_UNMODELLED = 0.0055  # of all forces, and worth MIN_GAIN: true causes leave less, 0.003 of the levels tried at most
 UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be that, or a curve that stands for another one
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """How much more acts than an explanation has, beyond the noise of sensors: `size`, as a share of what moves; 0 if that may be chance,
+    """The unmodelled force that an explanation leaves beyond the noise of sensors: `size`, as a share of all forces; 0 if it may be chance,
     infinite if it follows the measurement worse than the model as it is: its curves hold along its own way alone, and bend away beside it.
     Beyond UNMODELLED innovations have to decide, without inputs at any size; else only a simpler answer of theirs counts. `likelihood`: log
     likelihood of its innovations, in steps of `update` samples; infinite where sensor noise is all that is left."""
@@ -64,7 +62,7 @@ class Weighed:
     held: list[Channel]
     fit: Fit
     explained: float  # share taken of the residual in a free run, or of the power of the innovations, whichever is larger
-    level: float  # of what moves wanders beside all that was found
+    level: float  # the unmodelled force beside all that was found, as a share of all forces
     laws: int  # of all causes named
     numerics: dict[str, object]  # error of the deployed step; parameters that the file only guesses are at their fitted values
     likelihood: float  # log likelihood of the innovations with the named causes
@@ -116,7 +114,7 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
     gained = bench.fit.likelihood - still.likelihood
     better = bench.fit.likelihood - nominal.fit.likelihood
     log(
-        f"beside it {bench.level.size:.3g} of what moves wanders, {gained:.0f} nats; "
+        f"unmodelled force beside it: {bench.level.size:.3g} of all forces, {gained:.0f} nats; "
         f"it follows better than the nominal model by {better:.0f}"
     )
     if better < -MIN_GAIN * len(nominal.free):
@@ -125,7 +123,7 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
 
 
 def _is_noise(study: Study, fit: Fit) -> bool:
-    """Does an explanation leave of every sensor no more than the noise that the file states for it? Slow noise looks like what wanders."""
+    """Does an explanation leave of every sensor no more than the noise that the file states for it? Slow noise looks like an unmodelled force."""
     return _within(study, fit, np.array([s.noise for s in study.model.sensors]))
 
 
@@ -221,8 +219,8 @@ def _explanations(causes: Sequence[Cause], sets: Sequence[tuple[tuple[Named, ...
 
 def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: float, quiet: bool) -> str:
     """From what is named, the share of the residual that it takes in a free run, and what is left: the residual with all that was found as
-    a share of the signal, or what wanders as a share of what moves. Small deviations that have been found are what any model has; `quiet`:
-    noise is all that is left."""
+    a share of the signal, or the unmodelled force as a share of all forces. Any model has small deviations, also those that were found;
+    `quiet`: noise is all that is left."""
     if causes:
         return "explained" if share > ENOUGH else "partly_explained"
     return "no_discrepancy" if not found.causes and (quiet or (left < WORTH and found.terms)) else "unexplained"

@@ -32,9 +32,9 @@ ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
 
 def least(level: float, taken: float) -> float:
-    """Smallest share of the acting force that is named. WORTH, unless the term takes at least half of the power of the innovations beyond
-    sensor noise (`taken`). Then it is less where little wanders beside all that was found (RATIO * `level`), or whatever wanders if the
-    term is `alone`, but not below Z_95 * SYSTEMATIC, where its interval would include zero."""
+    """Smallest share of the force there that has a name. WORTH, unless the term takes at least half of the power of the innovations beyond
+    sensor noise (`taken`). Then it is RATIO times the unmodelled force beside all that was found (`level`), or nothing if the term is
+    `alone`, but not below Z_95 * SYSTEMATIC, where its interval would include zero."""
     if not mostly(taken):
         return WORTH
     return min(WORTH, max(0.0 if alone(taken) else RATIO * level, Z_95 * SYSTEMATIC))
