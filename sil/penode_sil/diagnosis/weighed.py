@@ -123,7 +123,7 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
 
 
 def _is_noise(study: Study, fit: Fit) -> bool:
-    """Does an explanation leave of every sensor no more than the noise that the file states for it? Slow noise looks like an unmodelled force."""
+    """Does an explanation leave of every sensor no more than its stated noise? Slow noise looks like an unmodelled force."""
     return _within(study, fit, np.array([s.noise for s in study.model.sensors]))
 
 
