@@ -198,7 +198,7 @@ def test_what_mends_a_form_may_take_away():
 def test_noise_alone_has_a_chi2_of_its_own(chi2, so):
     """10 000 samples: 10 000 +- 141."""
     study = SimpleNamespace(null=SimpleNamespace(residual=np.zeros(10_000)), experiments=[SimpleNamespace(good=np.ones(10_000, bool))])
-    assert only_noise(study, SimpleNamespace(fit=SimpleNamespace(chi2=chi2))) == so
+    assert only_noise(study, SimpleNamespace(chi2=chi2)) == so
 
 
 @pytest.mark.parametrize("steps, so", [(60_000, False), (180_000, True)])

@@ -97,9 +97,9 @@ def rows(study: Study) -> float:
     return len(study.null.residual) * float(np.mean([np.mean(e.good) for e in study.experiments]))
 
 
-def only_noise(study: Study, e: Explanation) -> bool:
-    """Is what an explanation leaves no more than noise? Of few chi2 it is, what a wrong form leaves is hundreds of deviations more."""
-    return e.fit.chi2 < rows(study) + CHANCE * np.sqrt(2.0 * rows(study))
+def only_noise(study: Study, fit: Fit) -> bool:
+    """Does a fit leave no more than noise? Of few chi2 it is, what a wrong form leaves is hundreds of deviations more."""
+    return fit.chi2 < rows(study) + CHANCE * np.sqrt(2.0 * rows(study))
 
 
 def exact(groups: Sequence[Group]) -> bool:

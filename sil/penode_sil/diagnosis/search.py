@@ -31,7 +31,7 @@ def first(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation]
     bare = replace(bare, nothing=min(study.nothing, loss(bare, bare.null)))
     found = singles(bare, regression(bare, bare.null, parameters), 2)
     white = bool(found) and found[0].score > 0.0 and with_noise_of(bare, found[0].fit) is bare
-    if bare.metrics is not study.metrics and not white and not any(only_noise(bare, e) for e in found):
+    if bare.metrics is not study.metrics and not white and not any(only_noise(bare, e.fit) for e in found):
         slow = replace(study, nothing=bare.nothing)
         found = sorted([*found, *singles(slow, regression(slow, slow.null, parameters), 1)], key=lambda e: -e.score)
     for e in found:
@@ -99,7 +99,7 @@ def grow(
             ways = [*filter(None, (terms_of(r, chosen) for chosen in choices))]
             if not ways and e.fit.chi2 - rows(here) < (1.0 - WHOLE) * e.gain:
                 enough = (1.0 - NEAR) * e.gain  # it is whole: only what is about as good may take its place
-                ended = [e] if only_noise(here, e) else []
+                ended = [e] if only_noise(here, e.fit) else []
             for new in ways:
                 wider = explain(here, [*e.terms, *new], start=e.fit, formulas=e.gain if exact(e.groups) else e.formulas)
                 log(f"  + {wider.groups[-1]} -> {wider.gain:.0f}")

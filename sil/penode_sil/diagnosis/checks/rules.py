@@ -140,20 +140,38 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
             {"causes": [{"kind": c.kind, "where": c.where} for c in end.withheld], "posterior": min(c.confidence for c in end.withheld)},
         )
         return replace(end, answer=replace(d, causes=tuple(end.withheld), explanations=sets, notes=notes))
-    if found := values.lone(case, end, table):
-        cause = values.caused(case, found)
-        extended = write_extended(values.text(case, cause, found[0]), case)
-        sets = tuple(
-            {"causes": [{"kind": name.kind, "where": name.where}], "posterior": p}
-            for name, p in zip((cause, *cause.alternatives), values.posterior(found), strict=True)
-        )
-        fit = replace(end.study.null, simulated=found[0].fit.simulated)
-        return replace(end, answer=replace(d, causes=(cause,), explanations=sets), extended=extended, fit=fit)
+    if found := values.few(case, end, table):
+        return by_values(case, replace(end, answer=d), table, found)
     if end.answer.verdict == "unexplained":
         return end
     note = f"the model misses {', '.join(sensors)} by more than noise, {EXTENDED} does not: no single one of its values explains that"
     unsure = (Cause(OUTSIDE, "", {}, 0.5),)
     return replace(end, answer=replace(d, verdict="unexplained", causes=unsure, explained=0.0, notes=(*d.notes, note)))
+
+
+def spread(case: Case, end: End, table: Table) -> list[values.Few]:
+    """The fewest values that explain as much, where values alone are named and the written model has others too; or that explain what
+    nothing else does."""
+    if end.answer.verdict == "unexplained":
+        return values.few(case, end, table)
+    named = {c.where for c in end.answer.causes if c.kind == values.KIND}
+    moved = values.moved(case, end.extended)
+    if len(named) < len(end.answer.causes) or not named or named == moved:
+        return []
+    found = values.few(case, end, table)
+    return found if found and len(found[0].names) < len(moved) else []
+
+
+def by_values(case: Case, end: End, table: Table, found: Sequence[values.Few]) -> End:
+    """The end that names these values, with no others in the written model."""
+    best = found[0]
+    extended = write_extended(values.text(case, best), case)
+    fit = replace(end.study.null, simulated=best.fit.simulated)
+    d = end.answer
+    if d.verdict == "unexplained":
+        d = replace(d, verdict="explained", explained=values.taken(end, best), notes=tuple(case.remarks))
+    d = replace(d, causes=values.caused(case, list(found)), explanations=values.explanations(list(found)))
+    return replace(end, answer=d, extended=extended, fit=fit, without=None)
 
 
 def coupled(case: Case, end: End, table: Table) -> list[tuple[str, float]]:
@@ -206,6 +224,7 @@ RULES = (
     Rule("no law about reversals where a rate keeps its sign", unturned, nameless),
     Rule("nothing that makes a sensor worse than without it", burdens, relieved),
     Rule("no agreement where the nominal model misses what the written one mends", mended, explained),
+    Rule("no value beside the fewest that explain as much", spread, by_values),
     Rule("no agreement where a sensor is off as behind a high-pass", coupled, unsure),
     Rule("no model that predicts worse than the nominal one", worse, reject),
 )

@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The explanation that moves the fewest values: is the model right with another value of one parameter?"""
+"""The explanation that moves the fewest values: is the model right with other values of some parameters, and the rest as the file has them?
+
+Motion shows forces over masses, so a common factor of all of them is invisible, and a fit in which all are free may end at any factor. Of
+all values that follow the recordings equally well, those that differ from the file in the fewest parameters are the explanation."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
+from scipy.special import chdtri, erfc
 
 from penode_gen import units
-from penode_gen.model import Parameter
+from penode_gen.model import Model, Parameter
 
 from ..entries import table
-from ..explanation import CHANCE
+from ..explanation import CHANCE, only_noise, rows
 from ..fit import Fit, Free, Problem
 from ..result import Cause, Named, Value, worsened
 from ..study import uncertain
@@ -21,27 +27,86 @@ from .case import Case, End
 from .figures import Table
 from .written import heading
 
+KIND = "wrong_parameter"
 
-@dataclass(frozen=True, eq=False)
-class Lone:
-    """A parameter, and the fit in which it is free beside what the file states tolerances of."""
 
-    name: str
+@dataclass(frozen=True, eq=False, repr=False)
+class Few:
+    """Parameters, and the fit in which they are free beside what the file states tolerances of."""
+
+    names: tuple[str, ...]
     fit: Fit
 
+    def __repr__(self) -> str:
+        return " and ".join(self.names)
 
-def lone(case: Case, end: End, figures: Table) -> list[Lone]:
-    """Parameters without a stated tolerance of which each alone makes the nominal model follow the training as well as the extended one
-    does, the best first: more than one, and the recordings do not tell which."""
+
+def few(case: Case, end: End, figures: Table) -> list[Few]:
+    """The fewest parameters without a stated tolerance whose values alone make the nominal model follow the training as well as with all of
+    them free, and as the extended model does; the best first: more than one set, and the recordings do not show which. None if it takes
+    all of them."""
     study, model = end.study, case.model
+    unstated = [p for p in model.parameters.values() if _unstated(p)]
+    if not unstated:
+        return []
     stated = [uncertain(p) for p in model.parameters.values() if p.tolerance > 0.0 and p.value]
     starts = [f for f in study.null.free if f.target[0] == "start"]
     problem = Problem(model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
     extended = [figures.predicted[e.name][1].at(e.time) for e in study.experiments]
-    fits = [Lone(p.name, problem.solve([*stated, _free(p), *starts])) for p in model.parameters.values() if _unstated(p)]
-    good = [x for x in fits if all(map(np.isfinite, (x.fit.cost, *_size(x)))) and not _behind(end, x.fit, extended)]
-    good = sorted(good, key=lambda x: x.fit.cost)
-    return [x for x in good if x.fit.cost - good[0].fit.cost < CHANCE * CHANCE]
+
+    def fitted(names: Sequence[str]) -> Few:
+        return Few(tuple(names), problem.solve([*stated, *(_free(model.parameters[n]) for n in names), *starts]))
+
+    whole = fitted([p.name for p in unstated])
+    if end.answer.verdict == "unexplained" and not only_noise(study, whole.fit):
+        return []
+    for count in range(1, max(len(unstated), 2)):
+        found = [fitted(names) for names in _promising(whole, count)]
+        good = [x for x in found if all(map(np.isfinite, (x.fit.cost, *_sizes(x)))) and not _behind(end, x.fit, extended)]
+        good = [x for x in good if x.fit.cost - whole.fit.cost < _by_chance(len(unstated) - count)]
+        if good:
+            good.sort(key=lambda x: x.fit.cost)
+            return [x for x in good if x.fit.cost - good[0].fit.cost < CHANCE * CHANCE]
+    return []
+
+
+def _by_chance(values: int) -> float:
+    """Chi2 that as many values take by fitting noise, at CHANCE deviations (Wilks 1938)."""
+    return float(chdtri(max(values, 1), erfc(CHANCE / np.sqrt(2.0))))
+
+
+def _promising(whole: Few, count: int) -> list[tuple[str, ...]]:
+    """Sets of `count` of the parameters of a fit, as many as there are parameters at most: those that lose least of it, by a quadratic
+    expansion, when all others are as the file has them. In logarithms of the parameters a common factor is a straight line."""
+    free = list(whole.fit.free)
+    own = [k for k, f in enumerate(free) if f.target in whole.names]
+    rest = [k for k in range(len(free)) if k not in own]
+    curvature = whole.fit.jacobian.T @ whole.fit.jacobian
+    curvature = curvature[np.ix_(own, own)] - _absorbed(curvature, own, rest)
+    off = np.array([np.log(free[k].value / free[k].origin) for k in own])
+    lost = {}
+    for chosen in combinations(range(len(own)), count):
+        others = [k for k in range(len(own)) if k not in chosen]
+        left = curvature[np.ix_(others, others)] - _absorbed(curvature, others, list(chosen))
+        lost[tuple(str(free[own[k]].target) for k in chosen)] = float(off[others] @ left @ off[others])
+    return sorted(lost, key=lambda names: lost[names])[: len(own)]
+
+
+def _absorbed(curvature: np.ndarray, kept: list[int], free: list[int]) -> np.ndarray:
+    """What free values take of the curvature of those kept."""
+    cross = curvature[np.ix_(kept, free)]
+    return cross @ np.linalg.pinv(curvature[np.ix_(free, free)], rcond=1e-10, hermitian=True) @ cross.T
+
+
+def taken(end: End, x: Few) -> float:
+    """Share that values take of the chi2 beyond noise of the nominal model, fitted within its tolerances."""
+    noise = rows(end.study)
+    return float(np.clip(1.0 - (x.fit.chi2 - noise) / max(end.study.null.chi2 - noise, 1e-300), 0.0, 1.0))
+
+
+def moved(case: Case, model: Model) -> set[str]:
+    """Parameters without a stated tolerance that have another value in a model."""
+    return {p.name for p in case.model.parameters.values() if _unstated(p) and model.parameters[p.name].value != p.value}
 
 
 def _unstated(p: Parameter) -> bool:
@@ -64,33 +129,42 @@ def _behind(end: End, fit: Fit, extended: list[np.ndarray]) -> bool:
     return False
 
 
-def _size(x: Lone) -> tuple[float, float]:
-    """Value of the parameter, and its standard deviation."""
-    i = next(k for k, f in enumerate(x.fit.free) if f.target == x.name)
-    value = x.fit.free[i].value
-    return value, abs(value) * float(np.sqrt(max(x.fit.covariance()[i, i], 0.0)))
+def _sizes(x: Few) -> list[float]:
+    """Values of the parameters, then their standard deviations."""
+    at = [next(k for k, f in enumerate(x.fit.free) if f.target == name) for name in x.names]
+    values, covariance = [float(x.fit.free[k].value) for k in at], x.fit.covariance()
+    return [*values, *(abs(v) * float(np.sqrt(max(covariance[k, k], 0.0))) for v, k in zip(values, at, strict=True))]
 
 
-def posterior(found: list[Lone]) -> list[float]:
+def posterior(found: list[Few]) -> list[float]:
     """How likely each of them is; what is not among them has the rest."""
     likely = np.exp([0.5 * (found[0].fit.cost - x.fit.cost) for x in found])
     return [float(p) for p in RIGHT * likely / likely.sum()]
 
 
-def caused(case: Case, found: list[Lone]) -> Cause:
-    """The best of them as a cause, with the others as its alternatives."""
-    value, sd = _size(found[0])
-    name, unit = found[0].name, units.si(case.model.parameters[found[0].name].unit)
-    others = tuple(Named("wrong_parameter", x.name) for x in found[1:])
-    interval = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
-    return Cause("wrong_parameter", name, {name: interval}, posterior(found)[0], others)
+def caused(case: Case, found: list[Few]) -> tuple[Cause, ...]:
+    """The best set as causes, each with the parameters of the other sets as its alternatives."""
+    sizes, names = _sizes(found[0]), found[0].names
+    others = tuple(Named(KIND, n) for n in dict.fromkeys(n for x in found[1:] for n in x.names if n not in names))
+    causes = []
+    for name, value, sd in zip(names, sizes[: len(names)], sizes[len(names) :], strict=True):
+        interval = Value(value, units.si(case.model.parameters[name].unit), (value - Z_95 * sd, value + Z_95 * sd))
+        causes.append(Cause(KIND, name, {name: interval}, posterior(found)[0], others))
+    return tuple(causes)
 
 
-def text(case: Case, cause: Cause, x: Lone) -> str:
-    """The model file with the values of a fit in it, which has this cause."""
+def explanations(found: list[Few]) -> tuple[dict[str, object], ...]:
+    """All sets with their posterior."""
+    return tuple(
+        {"causes": [{"kind": KIND, "where": n} for n in x.names], "posterior": p} for x, p in zip(found, posterior(found), strict=True)
+    )
+
+
+def text(case: Case, x: Few) -> str:
+    """The model file with the values of a fit in it."""
     model = case.model
     values = {f.target: f.value for f in x.fit.free if isinstance(f.target, str)}
-    lines = heading(model, cause.kind, cause.where)
+    lines = heading(model, KIND, ", ".join(x.names))
     for p in model.parameters.values():
         if p.name in values and values[p.name] != p.value:
             lines.append(f"{p.name} = {table(entry(p, values[p.name]))}")
