@@ -17,6 +17,7 @@ from ..catalogue.friction import turns
 from ..noise import UNSEEN
 from ..report_figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, REJECTED, Cause, place, worsened
+from ..worth import RATIO
 from . import values
 from .case import Case, End
 from .figures import ROLES, Row, Table, misses, tabled
@@ -128,12 +129,14 @@ def _missed(table: Table) -> list[Row]:
 
 
 def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
-    """Explained: by causes that were withheld, for they are small beside the force there, or else by the value of one parameter."""
+    """Explained: by causes that were withheld, for they are small beside the force there, if they leave noise alone or RATIO times less than
+    the nominal model; or else by values of parameters."""
     d = end.answer
     taken = 1.0 - max((r.rms("extended") / max(r.rms("refitted"), 1e-300)) ** 2 for r in table.rows if r.figure.signal in sensors)
     whole = not misses(table.rows, "extended", table.noise)
     d = replace(d, verdict="explained" if whole else "partly_explained", explained=max(taken, 0.0))
-    if end.withheld:
+    clear = all(RATIO * r.rms("extended") < min(map(r.rms, NOMINAL)) for r in _missed(table) if r.figure.signal in sensors)
+    if end.withheld and (whole or clear):
         names = [place(c.kind, c.where) for c in end.withheld]
         notes = tuple(n for n in d.notes if not any(n.startswith(f"{name} is real but small") for name in names))
         sets = (
@@ -144,7 +147,7 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
         return by_values(case, replace(end, answer=d), table, found)
     if end.answer.verdict == "unexplained":
         return end
-    note = f"the model misses {', '.join(sensors)} by more than noise, {EXTENDED} does not: no single one of its values explains that"
+    note = f"the model misses {', '.join(sensors)} by more than noise, {EXTENDED} by less: neither the small causes in it nor other values of its parameters explain that"
     unsure = (Cause(OUTSIDE, "", {}, 0.5),)
     return replace(end, answer=replace(d, verdict="unexplained", causes=unsure, explained=0.0, notes=(*d.notes, note)))
 
