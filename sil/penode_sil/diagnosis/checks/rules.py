@@ -129,8 +129,8 @@ def _missed(table: Table) -> list[Row]:
 
 
 def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
-    """Explained: by causes that were withheld, for they are small beside the force there, if they leave noise alone or RATIO times less than
-    the nominal model; or else by values of parameters."""
+    """Explained: by causes that were withheld, for they are small beside the force there, if they leave noise alone or RATIO times less
+    than the nominal model; or else by values of parameters."""
     d = end.answer
     taken = 1.0 - max((r.rms("extended") / max(r.rms("refitted"), 1e-300)) ** 2 for r in table.rows if r.figure.signal in sensors)
     whole = not misses(table.rows, "extended", table.noise)
