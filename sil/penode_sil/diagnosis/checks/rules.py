@@ -147,7 +147,8 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
         return by_values(case, replace(end, answer=d), table, found)
     if end.answer.verdict == "unexplained":
         return end
-    note = f"the model misses {', '.join(sensors)} by more than noise, {EXTENDED} by less: neither the small causes in it nor other values of its parameters explain that"
+    off = f"the model misses {', '.join(sensors)} by more than noise, {EXTENDED} by less"
+    note = f"{off}: neither the small causes in it nor other values of its parameters explain that"
     unsure = (Cause(OUTSIDE, "", {}, 0.5),)
     return replace(end, answer=replace(d, verdict="unexplained", causes=unsure, explained=0.0, notes=(*d.notes, note)))
 
