@@ -98,7 +98,7 @@ def one(generator: str, seed: int, index: int, timeout: float, out: Path) -> lis
         row = scored(found)
         kept = {k: row[k] for k in ("kinds", "answer", "verdict", "outcome", "right")}
         stratum = row.get("group") or row["stratum"]
-        about = {"generator": generator, "case": f"{seed}:{index}", "stratum": stratum, "search": search}
+        about = {"generator": generator, "case": f"{seed}:{index}", "stratum": stratum, "search": search, "code": commit()}
         rows.append(about | kept | {"seconds": round(seconds - (found or {}).get("compile_seconds", 0.0), 1), "why": why})
     shutil.rmtree(folder)
     return rows
@@ -194,7 +194,7 @@ def main() -> int:
                     flush=True,
                 )
     if rows:
-        (args.page or args.out / "SEARCHES.md").write_text(page(rows, f"Seed {seed}, code {commit()}."))
+        (args.page or args.out / "SEARCHES.md").write_text(page(rows, f"Seed {seed}, {', '.join(dict.fromkeys(r['code'] for r in rows))}."))
     return 0
 
 
