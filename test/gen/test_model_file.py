@@ -504,10 +504,10 @@ def test_extends(folder):
     assert "good.toml:27: elements.push: " in problems(write(""))[0]
     (folder / "good.toml").write_text(GOOD.replace('name = "good"', "name = good"))
     assert "good.toml:2: is not valid TOML" in problems(write(""))[0]
-    for name, base in (("good", "other"), ("other", "third"), ("third", "fourth")):
+    for name, base in (("good", "other"), ("other", "third"), ("third", "fourth"), ("fourth", "fifth")):
         (folder / f"{name}.toml").write_text(f'[model]\nextends = "{base}.toml"\n')
     found = problems(write(""))
-    assert len(found) == 1 and "other.toml:2: model.extends: " in found[0] and "at most two in a row" in found[0]
+    assert len(found) == 1 and "third.toml:2: model.extends: " in found[0] and "at most three in a row" in found[0]
     (folder / "good.toml").unlink()
     found = problems(write(""))
     assert len(found) == 1 and "extended.toml:2: model.extends: " in found[0] and "good.toml: cannot be read (No such file" in found[0]

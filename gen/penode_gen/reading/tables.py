@@ -96,9 +96,9 @@ class Tables:
         while base := _base(own):
             before = self.places[-1][0]
             place = f"{before}:{lines.of(('model', 'extends'))}: model.extends"
-            if len(self.places) > 2:
+            if len(self.places) > 3:
                 raise m.ModelError(
-                    [one_line(f"{place}: this would be the third file that extends another; extend {base} by at most two in a row")]
+                    [one_line(f"{place}: this would be the fourth file that extends another; extend {base} by at most three in a row")]
                 )
             base_path = before.parent / base
             shares = shares and not {"parameters", "networks", "sets"} & set(own)
