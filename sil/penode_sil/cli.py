@@ -36,6 +36,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "simulate": ("simulate:simulate", "Run the model file MODEL on a scenario or on recorded inputs, or play an SSP."),
     "stage": ("stage:stage", "Write a parameter set into a controller that runs: written, proven by its checksum, switched, read back."),
     "train": ("train:train", "Fit the networks of the model file MODEL, and its parameters within their tolerances, to recordings."),
+    "tune-filter": (
+        "tune_filter:tune_filter",
+        "Fit the noises in [filter] of the model file MODEL to recordings, by the likelihood of the innovations.",
+    ),
 }
 
 

@@ -41,7 +41,7 @@ def over_recordings(
     check_signal(loaded, signal)
     if set_name is not None and set_name not in loaded.sets:
         raise WrongUse(f'--set: the model has no set "{set_name}"; {hint(set_name, loaded.sets)}')
-    given = _read(records, loaded, set_name, channel)
+    given = read(records, loaded, set_name, channel)
     summaries = []
     for one, path in zip(given, outputs, strict=True):
         with progress(f"{one.replay.plan.path.name} on {target}", len(one.z)) as tell:
@@ -63,7 +63,7 @@ def over_recordings(
         click.echo(json.dumps(summaries[0] if len(summaries) == 1 else {"recordings": summaries}, indent=2))
 
 
-def _read(records: tuple[Path, ...], model: Model, set_name: str | None, channel: tuple[str, ...]) -> list[recorded.Measured]:
+def read(records: tuple[Path, ...], model: Model, set_name: str | None, channel: tuple[str, ...]) -> list[recorded.Measured]:
     """All recordings, or one error for what is wrong with any of them."""
     found: list[recorded.Measured] = []
     problems: list[UserError] = []
