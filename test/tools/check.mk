@@ -5,7 +5,7 @@
 
 ##@ Checks in seconds
 
-GATES.check := check-types check-c check-lint check-pages check-structure check-format # the longest begin
+GATES.check := check-types check-c check-lint check-pages check-changelog check-structure check-format # the longest begin
 RUFF := $(PYTHON) -m ruff
 
 .PHONY: check format $(GATES.check)
@@ -20,6 +20,8 @@ check-types: | $(READY)
 	@test/check "types of penode_gen and penode_sil" $(PYTHON) -m mypy -p penode_gen -p penode_sil
 check-pages: | $(READY)
 	@test/check "references of all pages" $(PYTHON) test/tools/pages.py
+check-changelog: | $(READY)
+	@test/check "fragments of the changelog" $(PYTHON) sil/manual/changelog.py
 check-structure: | $(READY)
 	@test/check "counts of structure.json" $(PYTHON) test/tools/structure.py
 check-c: | $(READY)

@@ -32,7 +32,7 @@ FREE_RUN, FOLLOWED = 10, 12  # iterations of a form's fits
 
 
 def motions(probe: Probe) -> list[Motion]:
-    """Of every place. What acts on a body where nothing of the model does is what moves it."""
+    """Of every place. On a body without any modelled force, the reference is the force that accelerates it."""
     found, bench = [], probe.bench
     driving = drives_of(bench.model)
     for k, place in enumerate(bench.places):

@@ -176,7 +176,7 @@ def plain(name: str) -> str:
 
 
 def sigmas(evidence: float) -> str:
-    """A number of standard deviations; beyond a thousand, how many says nothing."""
+    """A number of standard deviations; beyond a thousand the exact number has no meaning."""
     return f"{evidence:.0f}" if evidence < 1000.0 else "more than 1000"
 
 

@@ -82,7 +82,7 @@ class Gains:
 
 
 def is_force(state: str) -> bool:
-    """Is a state of an augmented model a force that wanders?"""
+    """Is a state of an augmented model a random force?"""
     return re.fullmatch(rf"{WANDER}\d+_f", state) is not None
 
 
