@@ -40,22 +40,35 @@ def faults(fragment: Path) -> Iterator[str]:
         yield f"{fragment.name}: a line of more than {WIDTH} characters; break it"
 
 
+def bullets(fragments: list[Path], kind: str) -> str:
+    """Those of a kind as a list, nothing if there are none."""
+    texts = [f.read_text(encoding="utf-8").strip() for f in fragments if f.name.endswith(f".{kind}.txt")]
+    return "".join(f"- {text.replace(chr(10), chr(10) + '  ')}\n" for text in texts)
+
+
 def section(fragments: list[Path], version: str, date: str) -> str:
     """The section of a version: a heading for each kind that has fragments, a bullet for each fragment."""
-    parts = [f"## {version} - {date}\n"]
+    lists = {kind: bullets(fragments, kind) for kind in KINDS}
+    return "\n".join([f"## {version} - {date}\n", *(f"### {kind.capitalize()}\n\n{text}" for kind, text in lists.items() if text)])
+
+
+def released(changelog: str, fragments: list[Path], version: str, date: str) -> str:
+    """A changelog with the section of a version: a new one above all others, or the one that is marked as unreleased, with the fragments."""
+    begun = f"## {version} - unreleased\n"
+    if begun not in changelog:
+        newest = NEWEST.search(changelog)
+        at = newest.start() if newest else len(changelog)
+        return f"{changelog[:at]}{section(fragments, version, date)}\n{changelog[at:]}"
+    before, _, rest = changelog.partition(begun)
+    following = NEWEST.search(rest)
+    own, older = (rest[: following.start()], rest[following.start() :]) if following else (rest, "")
     for kind in KINDS:
-        of_kind = [f.read_text(encoding="utf-8").strip() for f in fragments if f.name.endswith(f".{kind}.txt")]
-        if of_kind:
-            bullets = [f"- {text.replace(chr(10), chr(10) + '  ')}" for text in of_kind]
-            parts.append(f"### {kind.capitalize()}\n\n" + "\n".join(bullets) + "\n")
-    return "\n".join(parts)
-
-
-def released(changelog: str, new: str) -> str:
-    """A changelog with a new section above all others."""
-    newest = NEWEST.search(changelog)
-    at = newest.start() if newest else len(changelog)
-    return f"{changelog[:at]}{new}\n{changelog[at:]}"
+        text, heading = bullets(fragments, kind), f"### {kind.capitalize()}\n\n"
+        if text and heading in own:
+            own = own.replace(heading, heading + text, 1)
+        elif text:
+            own = f"{own.rstrip()}\n\n{heading}{text}" + "\n" * bool(older)
+    return f"{before}## {version} - {date}\n{own}{older}"
 
 
 def main() -> None:
@@ -63,15 +76,15 @@ def main() -> None:
     parser.add_argument("--release", metavar="VERSION", help="write CHANGELOG.md and delete the fragments")
     version = parser.parse_args().release
     fragments = sorted(FRAGMENTS.glob("*.txt"))
-    wrong = [fault for fragment in sorted(FRAGMENTS.iterdir()) for fault in faults(fragment)]
+    wrong = [fault for fragment in sorted(FRAGMENTS.glob("*")) for fault in faults(fragment)]
     if wrong:
         sys.exit("\n".join(wrong))
-    new = section(fragments, version or "Unreleased", datetime.datetime.now(datetime.UTC).date().isoformat())
+    today = datetime.datetime.now(datetime.UTC).date().isoformat()
     if not version:
-        print(new)
+        print(section(fragments, "Unreleased", today))
         return
     page = ROOT / "CHANGELOG.md"
-    page.write_text(released(page.read_text(encoding="utf-8"), new), encoding="utf-8")
+    page.write_text(released(page.read_text(encoding="utf-8"), fragments, version, today), encoding="utf-8")
     for fragment in fragments:
         fragment.unlink()
 

@@ -18,7 +18,7 @@ def write(folder: Path, name: str, text: str) -> Path:
     return file
 
 
-@pytest.mark.parametrize("fragment", sorted(changelog.FRAGMENTS.iterdir()), ids=lambda file: file.name)
+@pytest.mark.parametrize("fragment", sorted(changelog.FRAGMENTS.glob("*")), ids=lambda file: file.name)
 def test_fragments_are_well_formed(fragment: Path) -> None:
     assert list(changelog.faults(fragment)) == []
 
@@ -44,5 +44,15 @@ def test_a_release_is_the_first_section(tmp_path: Path) -> None:
     fragments = [write(tmp_path, "pump.fixed.txt", "A pump\nruns dry.\n"), write(tmp_path, "tank.added.txt", "A tank.\n")]
     new = changelog.section(fragments, "0.2.0", "2026-02-01")
     assert new == "## 0.2.0 - 2026-02-01\n\n### Added\n\n- A tank.\n\n### Fixed\n\n- A pump\n  runs dry.\n"
-    page = changelog.released(PAGE, new)
+    page = changelog.released(PAGE, fragments, "0.2.0", "2026-02-01")
     assert page.index("## 0.2.0") < page.index("## 0.1.0") and page.replace(new + "\n", "") == PAGE
+
+
+def test_a_section_that_is_marked_as_unreleased_is_dated(tmp_path: Path) -> None:
+    fragments = [write(tmp_path, "pump.fixed.txt", "A pump.\n"), write(tmp_path, "tank.added.txt", "A tank.\n")]
+    begun = PAGE.replace("2026-01-01", "unreleased") + "\n## 0.0.9 - 2025-01-01\n\n### Added\n\n- Some.\n"
+    page = changelog.released(begun, fragments, "0.1.0", "2026-02-01")
+    assert page.startswith(
+        "# Changelog\n\nIts form.\n\n## 0.1.0 - 2026-02-01\n\n### Added\n\n- A tank.\n- All.\n\n### Fixed\n\n- A pump.\n\n## 0.0.9"
+    )
+    assert "unreleased" not in page
