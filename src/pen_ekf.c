@@ -12,12 +12,6 @@
 #define ZERO ((pen_real_t)0)
 #define ONE  ((pen_real_t)1)
 
-/* NaN stays NaN. */
-static pen_real_t at_least(pen_real_t d, pen_real_t least)
-{
-    return pen_where(d < least, least, d);
-}
-
 static pen_real_t sum_of(size_t n, const pen_real_t c[], const pen_real_t x[])
 {
     pen_real_t sum = ZERO;
@@ -28,8 +22,8 @@ static pen_real_t sum_of(size_t n, const pen_real_t c[], const pen_real_t x[])
     return sum;
 }
 
-/* along = U' c, gain = D U' c; the variance c' P c. */
-static pen_real_t spread(size_t n, const pen_real_t f[], const pen_real_t c[], pen_real_t along[], pen_real_t gain[])
+/* gain = D U' c; the variance c' P c. As pen_ekf_spread, in loops of any length. */
+static pen_real_t spread(size_t n, const pen_real_t f[], const pen_real_t c[], pen_real_t gain[])
 {
     pen_real_t variance = ZERO;
 
@@ -38,7 +32,6 @@ static pen_real_t spread(size_t n, const pen_real_t f[], const pen_real_t c[], p
         for (size_t i = 0U; i < j; i++) {
             sum += f[(j * n) + i] * c[i];
         }
-        along[j] = sum;
         gain[j] = f[(j * n) + j] * sum;
         variance += sum * gain[j];
     }
@@ -51,7 +44,7 @@ void pen_ekf_start(const pen_ekf_model_t *model, pen_ekf_t *self, pen_real_t f[]
 
     for (size_t j = 0U; j < n; j++) {
         for (size_t i = 0U; i < n; i++) {
-            f[(j * n) + i] = pen_where(i == j, at_least(model->start[j], model->floor[j]), ZERO);
+            f[(j * n) + i] = pen_where(i == j, pen_ekf_at_least(model->start[j], model->floor[j]), ZERO);
         }
     }
     for (size_t i = 0U; i < (model->n_z * PEN_EKF_VERDICTS); i++) {
@@ -62,134 +55,6 @@ void pen_ekf_start(const pen_ekf_model_t *model, pen_ekf_t *self, pen_real_t f[]
     self->limited = 0U;
     self->nonfinite = 0U;
     self->ready = model->layout;
-}
-
-/* rows = [gamma, phi U], n of them, and their weights, [share Q, D]. */
-static void join(const pen_ekf_model_t *model, const pen_real_t phi[], const pen_real_t gamma[], pen_real_t share, const pen_real_t f[],
-                 pen_real_t rows[], pen_real_t weight[])
-{
-    const size_t n = model->n_x;
-    const size_t first = model->n_w;
-    const size_t wide = first + n;
-
-    for (size_t k = 0U; k < first; k++) {
-        weight[k] = share * model->noise[k];
-    }
-    for (size_t j = 0U; j < n; j++) {
-        weight[first + j] = f[(j * n) + j];
-    }
-    for (size_t i = 0U; i < n; i++) {
-        pen_real_t *const row = &rows[i * wide];
-        const pen_real_t *const own = &phi[i * n];
-        for (size_t k = model->from[i]; k < first; k++) {
-            row[k] = gamma[(i * first) + k];
-        }
-        for (size_t j = 0U; j < n; j++) {
-            pen_real_t sum = own[j];
-            for (size_t k = 0U; k < j; k++) {
-                sum += own[k] * f[(j * n) + k];
-            }
-            row[first + j] = sum;
-        }
-    }
-}
-
-/* Take out of a row what it has along `last`; how much that was. By last times its weights, and 1 / D of it. */
-static pen_real_t take_out(size_t wide, const pen_real_t last[], const pen_real_t weighted[], pen_real_t inverse, pen_real_t row[])
-{
-    const pen_real_t share = sum_of(wide, weighted, row) * inverse;
-
-    for (size_t k = 0U; k < wide; k++) {
-        row[k] -= share * last[k];
-    }
-    return share;
-}
-
-void pen_ekf_predict(const pen_ekf_model_t *model, const pen_real_t phi[], const pen_real_t gamma[], pen_real_t share,
-                     const pen_real_t from[], pen_real_t to[], pen_real_t work[])
-{
-    const size_t n = model->n_x;
-    const size_t wide = n + model->n_w;
-    pen_real_t *const weight = &work[n * wide];
-    pen_real_t *const weighted = &work[(n + 1U) * wide];
-
-    join(model, phi, gamma, share, from, work, weight);
-    for (size_t left = n; left > 0U; left--) {
-        const size_t j = left - 1U;
-        const size_t from_k = model->from[j];
-        const size_t some = wide - from_k;
-        const pen_real_t *const last = &work[(j * wide) + from_k];
-        for (size_t k = 0U; k < some; k++) {
-            weighted[k] = last[k] * weight[from_k + k];
-        }
-        const pen_real_t d = at_least(sum_of(some, weighted, last), model->floor[j]);
-        const pen_real_t inverse = ONE / d;
-        to[(j * n) + j] = d;
-        for (size_t i = 0U; i < j; i++) {
-            to[(j * n) + i] = take_out(some, last, weighted, inverse, &work[(i * wide) + from_k]);
-        }
-    }
-}
-
-/*
- * Bierman's update with along = U' h and gain = D U' h, which becomes P h. With both 0 every factor stays, to the bit:
- * the quotient is 1, and -0 is added. The variance of the innovation.
- */
-static pen_real_t correct(const pen_ekf_model_t *model, pen_real_t variance, const pen_real_t along[], pen_real_t gain[], pen_real_t f[])
-{
-    const size_t n = model->n_x;
-    pen_real_t before = variance;
-
-    for (size_t j = 0U; j < n; j++) {
-        const pen_real_t own = gain[j];
-        const pen_real_t now = before + (along[j] * own);
-        const pen_real_t lambda = -(along[j] / before);
-        f[(j * n) + j] = at_least(f[(j * n) + j] * (before / now), model->floor[j]);
-        for (size_t i = 0U; i < j; i++) {
-            const pen_real_t u = f[(j * n) + i];
-            f[(j * n) + i] = u + (gain[i] * lambda);
-            gain[i] += u * own;
-        }
-        before = now;
-    }
-    return before;
-}
-
-pen_status_t pen_ekf_update(const pen_ekf_model_t *model, size_t i, const pen_real_t h[], pen_real_t z, bool offered, pen_real_t f[],
-                            pen_real_t dx[], pen_real_t work[], pen_ekf_test_t *test)
-{
-    static const uint32_t verdicts[8] = {
-                                          /* by offered, sound and within its gate */
-        PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED, PEN_EKF_NOT_OFFERED,
-        PEN_EKF_IS_MISSING,  PEN_EKF_IS_MISSING,  PEN_EKF_IS_REFUSED,  PEN_EKF_USED,
-    };
-    static const pen_status_t flags[PEN_EKF_VERDICTS] = { PEN_OK, PEN_OK, PEN_EKF_MISSING, PEN_EKF_REFUSED };
-    const size_t n = model->n_x;
-    pen_real_t *const along = work;
-    pen_real_t *const gain = &work[n];
-    const pen_real_t variance = model->variance[i] + spread(n, f, h, along, gain);
-    const uint32_t there = offered ? 4U : 0U;
-    const uint32_t sound = ((ZERO * z) >= ZERO) ? 2U : 0U;
-    const pen_real_t innovation = pen_where((there + sound) == 6U, z - sum_of(n, h, dx), ZERO);
-    const pen_real_t ratio = (innovation * innovation) / variance;
-    const uint32_t within = (ratio <= model->gate[i]) ? 1U : 0U;
-    const uint32_t number = (variance <= PEN_REAL_MAX) ? 1U : 0U;
-    const uint32_t verdict = verdicts[there + sound + (within & number)];
-    const bool used = verdict == PEN_EKF_USED;
-
-    for (size_t k = 0U; k < n; k++) {
-        along[k] = pen_where(used, along[k], ZERO);
-        gain[k] = pen_where(used, gain[k], ZERO);
-    }
-    const pen_real_t share = pen_where(used, innovation, ZERO) / correct(model, model->variance[i], along, gain, f);
-    for (size_t k = 0U; k < n; k++) {
-        dx[k] += gain[k] * share;
-    }
-    test->innovation = innovation;
-    test->variance = variance;
-    test->ratio = ratio;
-    test->verdict = verdict;
-    return flags[verdict];
 }
 
 /* How far the sum of a limit has to move to lie within it, from inside by more than its rounding error; 0 if it does. */
@@ -213,11 +78,10 @@ static pen_real_t way_in(const pen_ekf_model_t *model, size_t limit, const pen_r
 }
 
 /* Move x by the shortest way, in the metric of P, that moves the sum of a limit by `way`. */
-static void project(const pen_ekf_model_t *model, size_t limit, pen_real_t way, const pen_real_t f[], pen_real_t x[], pen_real_t work[])
+static void project(const pen_ekf_model_t *model, size_t limit, pen_real_t way, const pen_real_t f[], pen_real_t x[], pen_real_t gain[])
 {
     const size_t n = model->n_x;
-    pen_real_t *const gain = &work[n];
-    const pen_real_t share = way / spread(n, f, &model->limit[limit * n], work, gain);
+    const pen_real_t share = way / spread(n, f, &model->limit[limit * n], gain);
 
     for (size_t i = 0U; i < n; i++) {
         pen_real_t sum = gain[i];

@@ -19,18 +19,18 @@ from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "ekf-cost"
 MODELS = gate.ROOT / "test" / "filter"
-SOURCE = gate.ROOT / "src" / "pen_ekf.c"
+HEADER = gate.ROOT / "inc" / "penode" / "pen_ekf.h"
 PAGE = gate.ROOT / "gen" / "README.md"
 METHODS = ("euler", "heun", "rk4")
 SHARE = 0.02  # of a count: what compilers of one version may differ by, as for all figures
 KINDS = ("measured", "not offered", "missing", "infinite", "refused", "one of two")
 
-# Faults of pen_ekf.c: see gate.faulty.
+# Faults of pen_ekf.h: see gate.faulty.
 FAULTS = {
     "a missing measurement takes a shorter way": (
         "    const uint32_t there =",
         0,
-        "    if (!(z >= ZERO) && !(z < ZERO)) { return PEN_EKF_MISSING; }\n    const uint32_t there =",
+        "    if (!(z >= zero) && !(z < zero)) { return PEN_EKF_MISSING; }\n    const uint32_t there =",
     ),
     "a refused measurement takes a shorter way": (
         "    const bool used = verdict == PEN_EKF_USED;",
@@ -45,7 +45,7 @@ def compiler(machine: str) -> list[object]:
     return [PORT / "cc", MACHINES[machine]] if MACHINES[machine] else [gate.ROOT / "port" / "host" / "cc", "gcc"]
 
 
-def measured(model: str, method: str, level: str, source: Path = SOURCE, machine: str = "m4f") -> dict[str, tuple[int, int]]:
+def measured(model: str, method: str, level: str, header: Path = HEADER, machine: str = "m4f") -> dict[str, tuple[int, int]]:
     """Least and most instructions by kind of sample; bytes of the filter, and of the model in it. SystemExit if one is not of its kind."""
     place = WORK / f"{model}-{method}"
     place.mkdir(parents=True, exist_ok=True)
@@ -54,8 +54,9 @@ def measured(model: str, method: str, level: str, source: Path = SOURCE, machine
     (place / "model.toml").write_text(text.replace(f'name = "{name}"', f'name = "{name}"\nmethod = "{method}"'))
     penode_gen.generate(penode_gen.load(place / "model.toml"), place, self_test=False)
     told = [f"-DMODEL(name)={name}_##name", f"-DMODEL_SIZE(name)={name.upper()}_##name", f'-DEKF_HEADER="{name}_ekf.h"']
-    sources = [path for path in sorted((gate.ROOT / "src").glob("*.c")) if path != SOURCE]
-    sources += [source, *(place / f"{part}.c" for part in (name, f"{name}_ekf", "nqvm_params")), gate.HERE / "ekf" / "cost.c"]
+    told += ["-include", header] if header != HEADER else []  # its guard keeps the other one out
+    sources = sorted((gate.ROOT / "src").glob("*.c"))
+    sources += [*(place / f"{part}.c" for part in (name, f"{name}_ekf", "nqvm_params")), gate.HERE / "ekf" / "cost.c"]
     elf = place / f"cost{level}-{machine}.elf"
     gate.make([*compiler(machine), *FLAGS, level, *told, "-DSET=nqvm_set_default", f"-I{place}", "-o", elf, *sources])
     done = gate.run([PORT / "run", MACHINES[machine], elf] if MACHINES[machine] else [elf])
@@ -96,8 +97,8 @@ def main() -> int:
     )
     missed = []
     for k, (fault, change) in enumerate(FAULTS.items()):
-        copy = WORK / f"fault{k}.c"
-        copy.write_text(gate.faulty(SOURCE.read_text(), change))
+        copy = WORK / f"fault{k}.h"
+        copy.write_text(gate.faulty(HEADER.read_text(), change))
         missed += [] if spread(measured("cost", "euler", "-O2", copy)) else [f"not found: {fault}"]
     good &= gate.report(f"ekf-cost: {len(FAULTS) - len(missed)} of {len(FAULTS)} faults found", missed)
     if "--print" in sys.argv:

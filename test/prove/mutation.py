@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Gate: small faults put into src/ (universalmutator, float build) are found by the unit tests; the rest stand in a list.
+"""Gate: small faults put into src/ and pen_ekf.h (universalmutator, float build) are found by the unit tests; the rest stand in a list.
 
 mutation.py             every fault
 mutation.py --share N   every N-th fault, and all of the list; --first K: others of them, beginning with number K, below N
@@ -38,9 +38,11 @@ LIST = gate.HERE / "mutation.toml"
 MUTATE = gate.ROOT / "build" / "proof" / "bin" / "mutate"
 LEAST = 0.95
 SOURCES = sorted((gate.ROOT / "src").glob("*.c"))
+HEADERS = [gate.ROOT / "inc" / "penode" / "pen_ekf.h"]  # an algorithm in inline functions: its own tests are made again for each fault
 FLAGS = ["-std=c99", "-ffp-contract=off", "-fPIC", "-Werror=implicit-function-declaration", "-Iinc", "-Iport/gnu", "-Isrc"]
 SANITIZE = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 # A fault that makes the same code as none, however it is compiled, changes nothing.
+KEEP = {"gcc": "-fkeep-inline-functions", "clang-19": "-femit-all-decls"}  # of headers
 COMPILERS = (["gcc", "-O2"], ["gcc", "-O3"], ["clang-19", "-O2"])
 
 
@@ -60,13 +62,14 @@ class Bench:
     place: Path
     flags: list[str]
     programs: dict[str, list[object]]
+    made: dict[str, list[object]]  # how the compiler was called for them
     seconds: dict[str, int]  # of processor time, five times what a test takes without a fault
 
 
-def compiled(text: str, compiler: list[str]) -> bytes | None:
-    """The object made of a source; None if the compiler refuses."""
-    out = WORK / "compiled.o"
-    words = ["timeout", "60", *compiler, *FLAGS, "-g0", "-x", "c", "-c", "-o", out, "-"]
+def compiled(text: str, compiler: list[str], header: bool) -> bytes | None:
+    """The object made of a source, or of a header with its inline functions; None if the compiler refuses."""
+    out, keep = WORK / "compiled.o", [KEEP[compiler[0]]] * header
+    words = ["timeout", "60", *compiler, *FLAGS, *keep, "-g0", "-x", "c", "-c", "-o", out, "-"]
     done = subprocess.run(words, cwd=gate.ROOT, input=text.encode(), capture_output=True, check=False)
     return out.read_bytes() if done.returncode == 0 else None
 
@@ -100,7 +103,7 @@ def bench(name: str, flags: list[str], only: str = "*") -> Bench:
     unity = coverage.UNITY
     for source in SOURCES:
         gate.make(["gcc", *FLAGS, *flags, "-c", "-o", place / f"{source.stem}.o", source])
-    made = Bench(place, flags, {}, {})
+    made = Bench(place, flags, {}, {}, {})
     link(made, SOURCES[0].name, SOURCES[0])
     linked = ["-L", place, f"-Wl,-rpath,{place}", "-lruntime"]
     words = [f"-I{coverage.MODELS}", "-Itest/unit", "-Itest/prove", f"-I{unity}/src", "-include", "unity_config.h", "-Isil/firmware"]
@@ -119,7 +122,8 @@ def bench(name: str, flags: list[str], only: str = "*") -> Bench:
         runner = f"{out}_runner.c"
         gate.make(["ruby", unity / "auto" / "generate_test_runner.rb", test, runner])
         sources = [runner, test, *shared, *files]
-        gate.make(["gcc", "-O1", *FLAGS, *words, *told, *flags, "-o", out, *sources, *linked])
+        made.made[out.name] = ["gcc", "-O1", *FLAGS, *words, *told, *flags, "-o", out, *sources, *linked]
+        gate.make(made.made[out.name])
         made.programs[out.name] = [out]
     if fnmatch("accuracy", only):
         out = place / "accuracy"
@@ -136,13 +140,14 @@ def bench(name: str, flags: list[str], only: str = "*") -> Bench:
 def faults(source: Path, share: int, first: int, must: set[Fault]) -> Iterator[tuple[Fault, Path]]:
     """The mutants of a file that compile, differ from it in what they do, and from each other: each `share`-th from `first` on, and those
     of `must`."""
-    place = WORK / source.stem
+    place = WORK / source.name
     place.mkdir()
     gate.make([MUTATE, source, "c", "--noCheck", "--mutantDir", place])
     before = source.read_text().splitlines()
-    seen = {compiled(source.read_text(), ["gcc", "-O1"])}
+    header = source.suffix == ".h"
+    seen = {compiled(source.read_text(), ["gcc", "-O1"], header)}
     texts = {preprocessed(source)}
-    for number, mutant in enumerate(sorted(place.glob("*.c"), key=lambda path: int(re.findall(r"\d+", path.stem)[-1]))):
+    for number, mutant in enumerate(sorted(place.glob(f"*{source.suffix}"), key=lambda path: int(re.findall(r"\d+", path.stem)[-1]))):
         found = fault(source.name, before, mutant.read_text().splitlines())
         if number % share != first and found not in must:
             continue
@@ -150,7 +155,7 @@ def faults(source: Path, share: int, first: int, must: set[Fault]) -> Iterator[t
         if text is None or text in texts:  # in a comment, or in the double build
             continue
         texts.add(text)
-        made = compiled(mutant.read_text(), ["gcc", "-O1"])
+        made = compiled(mutant.read_text(), ["gcc", "-O1"], header)
         if made is not None and made not in seen:
             seen.add(made)
             yield found, mutant
@@ -173,9 +178,21 @@ def fault(file: str, before: list[str], after: list[str]) -> Fault:
     return Fault(file, heads[-1] if heads else "", old, new)
 
 
+def includes(bench: Bench, name: str, mutant: Path, header: str) -> bool:
+    """Make a test program with a mutant in the place of a header; False if the compiler refuses."""
+    (bench.place / "penode").mkdir(exist_ok=True)
+    shutil.copyfile(mutant, bench.place / "penode" / header)
+    compiler, *words = bench.made[name]
+    return gate.run([compiler, f"-I{bench.place}", *words]).returncode == 0
+
+
 def lives(mutant: Path, file: str, benches: list[Bench]) -> bool:
     """Does every test still pass with this fault, and does some compiler make something of it?"""
     own = f"test_{Path(file).stem}"
+    if mutant.suffix == ".h":
+        return all(
+            includes(place, name, mutant, file) and passes(place, name) for place in benches for name in place.made if name.startswith(own)
+        )
     for place in benches:
         if not link(place, file, mutant):
             return False  # so wrong that a sanitizer's compiler sees it
@@ -187,7 +204,8 @@ def lives(mutant: Path, file: str, benches: list[Bench]) -> bool:
 
 def same_code(mutant: Path, source: Path) -> bool:
     """Does a compiler make of it what it makes of the source?"""
-    return any(compiled(mutant.read_text(), words) == compiled(source.read_text(), words) for words in COMPILERS)
+    header = source.suffix == ".h"
+    return any(compiled(mutant.read_text(), words, header) == compiled(source.read_text(), words, header) for words in COMPILERS)
 
 
 def listed() -> dict[Fault, str]:
@@ -210,7 +228,7 @@ def main() -> int:
     eva.models(coverage.MODELS)
     benches = [bench("plain", ["-O1"], options.tests), bench("checked", ["-O1", "-g", *SANITIZE], options.tests)]
     may_live, good, figures = listed(), True, {}
-    for source in SOURCES:
+    for source in [*SOURCES, *HEADERS]:
         if options.files and source.name not in options.files:
             continue
         mine = {fault for fault in may_live if fault.file == source.name}

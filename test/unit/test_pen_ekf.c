@@ -105,14 +105,12 @@ void test_predict_is_that_of_the_whole_matrix(void)
     }
 }
 
-/* Sources 0 and 1 disturb states 0 and 1 alone, source 2 all: rows behind them leave them out. */
-void test_predict_leaves_out_sources_that_do_not_act(void)
+/* Sources 0 and 1 disturb states 0 and 1 alone, source 2 all. */
+void test_predict_with_sources_that_act_on_one_state(void)
 {
     pen_real_t phi[N][N];
     pen_real_t gamma[N][SOURCES] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 0 } };
 
-    from[1] = 1U;
-    from[2] = 2U;
     for (uint32_t round = 0U; round < 50U; round++) {
         random_factors(f);
         for (size_t i = 0U; i < N; i++) {

@@ -49,7 +49,6 @@ def context(model: Model, given: Filter) -> dict[str, Any]:
             "start": [real(s * s) for s in start],
             "floor": {kind: [real(max((s * _EPSILON[kind]) ** 2, tiny)) for s in start] for kind, tiny in _TINY.items()},
             "noise": [real(s.noise**2) for s in noisy] + [real(i.step**2) for i in given.inputs],
-            "from": [f"{sum(model.states.index(s.name) < i for s in noisy)}U" for i in range(n)],
             "variance": [real(s.noise**2) for s in given.sensors],
             "gate": ["PEN_REAL_MAX" if s.gate is None else real(s.gate**2) for s in given.sensors],
             "limits": [_limit(given, limit) for limit in given.limits],

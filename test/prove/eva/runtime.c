@@ -266,7 +266,6 @@ void serial(void)
 /* Any numbers in a filter of fixed sizes, damaged verdicts among them; each array ends where its function may still look. */
 void filters(void)
 {
-    static const size_t from[STATES] = { 0U, 1U, 2U };
     static pen_real_t table[6][STATES];
     static pen_real_t limit[TESTS * STATES];
     static pen_real_t f[2U * STATES * STATES];
@@ -277,8 +276,8 @@ void filters(void)
     static pen_ekf_test_t test[2U * TESTS];
     static uint32_t count[TESTS * PEN_EKF_VERDICTS];
     static pen_ekf_t self;
-    const pen_ekf_model_t model = { 1U,   STATES,   SOURCES,  TESTS, TESTS,    table[0], table[1],      END(x, SOURCES),
-                                    from, table[2], table[3], limit, table[4], table[5], END(s, STATES) };
+    const pen_ekf_model_t model = { 1U,       STATES,   SOURCES, TESTS,    TESTS,    table[0],      table[1], END(x, SOURCES),
+                                    table[2], table[3], limit,   table[4], table[5], END(s, STATES) };
 
     fill_all();
     fill(table, sizeof table);
