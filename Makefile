@@ -62,6 +62,9 @@ figures: setup ## Measure what our steps cost; rewrite the tables of README.md a
 
 bench: setup ## The same with the steps of other tools (ten minutes, downloads them; test/bench/checkouts.py)
 	$(Q)$(PYTHON) test/bench/bench.py
+
+bench-filters: setup ## What an update of the Kalman filter costs beside other forms of it; rewrites test/bench/table.md
+	$(Q)$(PYTHON) test/bench/filters.py
 	$(Q)$(PYTHON) test/prove/promises.py
 
 campaign: campaign-diagnosis campaign-proofs campaign-fmu ## All three campaigns, hours
@@ -132,7 +135,11 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
+<<<<<<< HEAD
 .PHONY: help setup run pythons test nightly prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-values searches campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
+=======
+.PHONY: help setup run pythons test nightly prove figures bench bench-filters train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
+>>>>>>> 4f7559f (What an update of the Kalman filter costs beside TinyEKF, a Cholesky root and Joseph's form)
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

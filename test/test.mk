@@ -274,6 +274,7 @@ mujoco-nightly: build/setup/mujoco
 
 figures-check: | $(READY) ## No figure may be 2 % worse than the kept one, or above what is promised
 	@test/check "figures" $(PYTHON) test/bench/bench.py --check
+	@test/check "figures of filters" $(PYTHON) test/bench/filters.py --check
 
 # -- packages for firmware ------------------------------------------------------------------------------------------------
 

@@ -308,15 +308,6 @@ def shown(figures: Figures) -> str:
     return with_block(with_block(text, "bench", report.summary(figures)), "run", run_text())
 
 
-def written(figures: Figures) -> str:
-    """JSON with a line for each row."""
-    parts = []
-    for key, value in figures.items():
-        rows = [value] if isinstance(value, dict) else value
-        parts.append(f' "{key}": [\n' + ",\n".join(f"  {json.dumps(row)}" for row in rows) + "\n ]")
-    return "{\n" + ",\n".join(parts) + "\n}\n"
-
-
 def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = arguments.add_mutually_exclusive_group()
@@ -334,10 +325,10 @@ def main() -> int:
     if given.checkouts:
         others = [row for row in figures["peers"] if of_checkout(row) not in checkouts.NAMES.values()]
         figures["peers"] = others + local_figures(peers.the_case(), say, figures["peers"])
-        KEPT.write_text(written(figures))
+        KEPT.write_text(report.written(figures))
     elif not given.table:
         figures |= measure_ours() if given.ours else measure(figures)
-        KEPT.write_text(written(figures))
+        KEPT.write_text(report.written(figures))
     TABLE.write_text(report.table(figures))
     README.write_text(shown(figures))
     shutil.copy(ROOT / "build" / "run" / "recalibration.png", ROOT / "sil" / "recalibration.png")
