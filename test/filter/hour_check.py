@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Campaign: a generated filter against the independent one of reference.c, for an hour of samples, in double and in float."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import reference
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent / "prove"))
+import gate  # noqa: E402
+
+import penode_gen  # noqa: E402
+
+LIMITS = {np.float64: 1e-9, np.float32: 1e-2}  # of a standard deviation
+SHARE = 0.02  # of samples, at most, in float: after a kink between both
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seconds", type=int, default=3600)
+    parser.add_argument("--as", dest="name", default="ekf hour campaign")
+    options = parser.parse_args()
+    good, figures = True, {"seconds": options.seconds}
+    for name in ("layered", "folded"):
+        model = penode_gen.load(HERE / f"{name}.toml")
+        for dtype, limit in LIMITS.items():
+            with tempfile.TemporaryDirectory() as place:
+                found = reference.difference(model, dtype, 1000 * options.seconds, Path(place))
+            told = f"state {found.state:.2g}, covariance {found.covariance:.2g}; after kinks {found.at_kinks:.2g}, {found.share:.2%} of samples"
+            whole = dtype is np.float64  # every sample counts
+            wrong = max(found.state, found.covariance, found.at_kinks * whole) > limit or found.share > SHARE
+            good &= gate.report(f"{options.name}: {name}, {dtype.__name__}: {told}", [f"above {limit}"] * wrong)
+            figures |= {f"{name} {dtype.__name__}": f"{found.state:.1e}"}
+            figures |= {} if whole else {f"{name} at kinks": f"{found.at_kinks:.1e}", f"{name} share": f"{found.share:.2%}"}
+    gate.keep(options.name, figures)
+    return int(not good)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
