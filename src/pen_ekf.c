@@ -12,32 +12,6 @@
 #define ZERO ((pen_real_t)0)
 #define ONE  ((pen_real_t)1)
 
-static pen_real_t sum_of(size_t n, const pen_real_t c[], const pen_real_t x[])
-{
-    pen_real_t sum = ZERO;
-
-    for (size_t i = 0U; i < n; i++) {
-        sum += c[i] * x[i];
-    }
-    return sum;
-}
-
-/* gain = D U' c; the variance c' P c. As pen_ekf_spread, in loops of any length. */
-static pen_real_t spread(size_t n, const pen_real_t f[], const pen_real_t c[], pen_real_t gain[])
-{
-    pen_real_t variance = ZERO;
-
-    for (size_t j = 0U; j < n; j++) {
-        pen_real_t sum = c[j];
-        for (size_t i = 0U; i < j; i++) {
-            sum += f[(j * n) + i] * c[i];
-        }
-        gain[j] = f[(j * n) + j] * sum;
-        variance += sum * gain[j];
-    }
-    return variance;
-}
-
 void pen_ekf_start(const pen_ekf_model_t *model, pen_ekf_t *self, pen_real_t f[], uint32_t count[])
 {
     const size_t n = model->n_x;
@@ -78,10 +52,11 @@ static pen_real_t way_in(const pen_ekf_model_t *model, size_t limit, const pen_r
 }
 
 /* Move x by the shortest way, in the metric of P, that moves the sum of a limit by `way`. */
-static void project(const pen_ekf_model_t *model, size_t limit, pen_real_t way, const pen_real_t f[], pen_real_t x[], pen_real_t gain[])
+static void project(const pen_ekf_model_t *model, size_t limit, pen_real_t way, const pen_real_t f[], pen_real_t x[], pen_real_t work[])
 {
     const size_t n = model->n_x;
-    const pen_real_t share = way / spread(n, f, &model->limit[limit * n], gain);
+    pen_real_t *const gain = &work[n];
+    const pen_real_t share = way / pen_ekf_spread(n, f, &model->limit[limit * n], work, gain);
 
     for (size_t i = 0U; i < n; i++) {
         pen_real_t sum = gain[i];
@@ -97,7 +72,7 @@ static pen_real_t part_of(const pen_ekf_model_t *model, size_t limit, const pen_
 {
     const pen_real_t *const c = &model->limit[limit * model->n_x];
     const pen_real_t way = way_in(model, limit, x);
-    const pen_real_t whole = sum_of(model->n_x, c, x) - sum_of(model->n_x, c, model->inside);
+    const pen_real_t whole = pen_ekf_sum(model->n_x, c, x) - pen_ekf_sum(model->n_x, c, model->inside);
     const pen_real_t part = ONE + (way / whole);
     const pen_real_t some = pen_where(part > ZERO, part, ZERO);
 

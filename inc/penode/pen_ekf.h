@@ -293,7 +293,7 @@ static inline pen_status_t pen_ekf_update(const pen_ekf_model_t *model, size_t i
  * does not keep all limits then is drawn towards `inside`, in a straight line, until it does. On return every sum
  * keeps its limits, as a number of pen_real_t summed in the order of the states, and exactly: each is aimed at from
  * inside by more than its rounding error. A state that keeps all limits is not changed.
- * @param f  [n_x][n_x] factors of P; @param x  [n_x]; @param work  [n_x]
+ * @param f  [n_x][n_x] factors of P; @param x  [n_x]; @param work  [2 n_x]
  * @return PEN_OK; PEN_EKF_LIMITED
  * Cost: the same for any values.
  */

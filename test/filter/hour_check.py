@@ -9,15 +9,13 @@ import sys
 import tempfile
 from pathlib import Path
 
+import gate
 import numpy as np
 import reference
 
+import penode_gen
+
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent / "prove"))
-import gate  # noqa: E402
-
-import penode_gen  # noqa: E402
-
 LIMITS = {np.float64: 1e-9, np.float32: 1e-2}  # of a standard deviation
 SHARE = 0.02  # of samples, at most, in float: after a kink between both
 

@@ -9,11 +9,11 @@
 #include <math.h>
 #include <stddef.h>
 
-#define N 5 /* states of the filter, of which the last is the road */
-#define X 4 /* states of the vehicle */
-#define Z 2 /* accelerations of body and wheel */
+#define N     5 /* states of the filter, of which the last is the road */
+#define X     4 /* states of the vehicle */
+#define Z     2 /* accelerations of body and wheel */
 #define WIDTH 64
-#define H 1e-3
+#define H     1e-3
 
 static const double M_B = 350.0, M_W = 90.0, C = 10000.0, D = 800.0, C_T = 300000.0;
 

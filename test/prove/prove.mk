@@ -93,4 +93,4 @@ campaign-accuracy: | $(READY)
 	@$(PYTHON) test/prove/accuracy_check.py --stride 1 --as "accuracy campaign"
 campaign-ekf: | $(READY)
 	@$(PYTHON) test/prove/ekf_long_check.py --steps 50000000 --as "ekf campaign"
-	@$(PYTHON) test/filter/hour_check.py
+	@PYTHONPATH=test/prove $(PYTHON) test/filter/hour_check.py
