@@ -31,7 +31,7 @@ def main() -> int:
         for dtype, limit in LIMITS.items():
             with tempfile.TemporaryDirectory() as place:
                 found = reference.difference(model, dtype, 1000 * options.seconds, Path(place))
-            told = f"state {found.state:.2g}, covariance {found.covariance:.2g}; after kinks {found.at_kinks:.2g}, {found.share:.2%} of samples"
+            told = f"{found.state:.2g}, covariance {found.covariance:.2g}; after kinks {found.at_kinks:.2g}, {found.share:.2%}"
             whole = dtype is np.float64  # every sample counts
             wrong = max(found.state, found.covariance, found.at_kinks * whole) > limit or found.share > SHARE
             good &= gate.report(f"{options.name}: {name}, {dtype.__name__}: {told}", [f"above {limit}"] * wrong)

@@ -40,9 +40,7 @@ def test_filter_is_that_of_the_reference(name: str, tmp_path: Path, show: Callab
     """Over 30 s in double at every sample; in float but where a kink lies between both. An hour: make campaign-ekf."""
     model = penode_gen.load(HERE / f"{name}.toml")
     double, single = (reference.difference(model, dtype, 30_000, tmp_path) for dtype in (np.float64, np.float32))
-    show(
-        f"{name}: double {double.state:.1e}, float {single.state:.1e} standard deviations; at kinks {single.at_kinks:.1e}, {single.share:.1%}"
-    )
+    show(f"{name}: {double.state:.1e} off, in float {single.state:.1e}; after kinks {single.at_kinks:.1e}, {single.share:.1%}")
     assert max(double.state, double.covariance, double.at_kinks) < DOUBLE
     assert max(single.state, single.covariance) < FLOAT and single.share < SHARE
 
