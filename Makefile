@@ -135,11 +135,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-<<<<<<< HEAD
-.PHONY: help setup run pythons test nightly prove figures bench train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-values searches campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
-=======
-.PHONY: help setup run pythons test nightly prove figures bench bench-filters train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
->>>>>>> 4f7559f (What an update of the Kalman filter costs beside TinyEKF, a Cholesky root and Joseph's form)
+.PHONY: help setup run pythons test nightly prove figures bench bench-filters train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-values searches campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools
