@@ -53,7 +53,7 @@ def section(fragments: list[Path], version: str, date: str) -> str:
 
 
 def released(changelog: str, fragments: list[Path], version: str, date: str) -> str:
-    """A changelog with the section of a version: a new one above all others, or the one that is marked as unreleased, with the fragments."""
+    """A changelog with the section of a version: a new one above all others, or the one marked as unreleased, with the fragments."""
     begun = f"## {version} - unreleased\n"
     if begun not in changelog:
         newest = NEWEST.search(changelog)

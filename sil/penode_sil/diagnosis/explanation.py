@@ -83,7 +83,7 @@ class Explanation:
     def score(self) -> float:
         form = 0.0
         plain = len(self.terms) == len(self.groups) and all(kind in (*EXACT, *FORMULAS) for kind, _ in self.groups)
-        slow = all(kind == "sensor_bias" or kind in EXACT for kind, _ in self.groups)  # a bias is no form, however it wanders
+        slow = all(kind == "sensor_bias" or kind in EXACT for kind, _ in self.groups)  # a bias is no form, however it drifts
         filtering = sum(t.candidate.kind == "hidden_resonance" for t in self.terms) > 1  # a second mass may be any form of the first
         if (not plain and not slow) or filtering:
             bent = self.gain - (0.0 if filtering else self.formulas)

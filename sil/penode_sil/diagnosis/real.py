@@ -83,7 +83,8 @@ def answer(
     records = [Record.of(e) for e in experiments]
     noise = sample_noise(records, np.array([s.noise for s in model.sensors]))
     bench = build(model, places, records, noise, fastest, set_name)
-    log(f"corrected every {bench.update} samples; {bench.level.size:.3g} of what moves wanders, for {bench.level.tau:.3g} s")
+    unmodelled = f"{bench.level.size:.3g} of all forces, correlated over {bench.level.tau:.3g} s"
+    log(f"corrected every {bench.update} samples; unmodelled force: {unmodelled}")
     alone = bench.problem().solve(bench.fit.free, Filter.none(*bench.fit.by.gain.shape), FREE_RUN)
     found, moved, judged = _searched(model, bench, log)
     plain, after = found.plain, found.bench

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A model on its recordings before any hypothesis: how often it is corrected, what is free, what moves it, how much of it wanders."""
+"""A model on its recordings before any hypothesis: corrections, free values, forces, and the unmodelled one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 UPDATES = 16  # a period of the motion
 UNSTATED = 0.05  # tolerance of a parameter for which the file has none: one that is farther off is worth a name
 FAR = 1e3  # factor off the file's value, or off the expected motion, beyond which nothing is believed
-SIZES = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3)  # of what wanders, relative to what moves: levels that are tried
+SIZES = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3)  # unmodelled force, relative to all forces: levels that are tried
 CORRELATION = 0.5  # updates for which it stays: about white. One that stays longer winds up against a friction that sticks
 AGAIN = 6  # iterations with another level
 TURNS = 3  # how often levels and values are fitted in turn
@@ -168,7 +168,7 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
 
 
 def _followed(bench: Bench) -> list[Array]:
-    """States [n, n_x] of every recording, corrected as if all that moves wandered."""
+    """States [n, n_x] of every recording, corrected as if all forces were unmodelled."""
     by = bench.gains().at(Level(1.0, 2.0 * bench.update * bench.step))
     return [np.array(m[0]) for m in bench.problem().predictor.predict((), np.zeros((1, 0)), by, states=bench.model.states)[2]]
 
@@ -192,7 +192,7 @@ def smooth(x: Array, width: int) -> Array:
 
 
 def fit_null(bench: Bench) -> Bench:
-    """The bench with its free values fitted, first as a free run, then in turn with the level of the forces that wander."""
+    """The bench with its free values fitted, first as a free run, then in turn with the level of the unmodelled forces."""
     problem = bench.problem()
     n_x = len(bench.model.states)
     fit = problem.solve(bench.free, Filter.none(n_x, len(bench.noise)), 12)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The steady gain of an observer: Kalman's, for the model linearised where it stands still, with forces that wander."""
+"""The steady gain of an observer: Kalman's, for the model linearised where it stands still, with unmodelled forces."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ FORGETTING = 1e-6  # by which states decay at an update: one that no sensor show
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """How much force wanders: `size` is its standard deviation at each place, in units of the force there; `tau` [s] how long it stays.
-    In a model of states and equations alone the rates of the states wander instead, as white noise of the same spectral density at 0 Hz."""
+    """The unmodelled force, an Ornstein-Uhlenbeck process: `size` is its standard deviation at each place, in units of the force there;
+    `tau` [s] its correlation time. In a model of states and equations alone it is added to the rates of the states instead, as white noise
+    of the same spectral density at 0 Hz."""
 
     size: float
     tau: float
