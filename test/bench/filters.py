@@ -34,7 +34,7 @@ LEVELS = ("-Os", "-O2", "-O3")
 SHARE = 0.02  # of a figure
 CLOSE = 1e-2  # how far states [standard deviations] and variances [of them] may be from ours: rounding
 NAMES = {
-    "penode": "**penode**, UD factors",
+    "penode": "**penode** (`cost.toml`), UD factors",
     "cholesky": "root of the covariance (Cholesky)",
     "joseph": "whole matrices (Joseph)",
     "tinyekf": "TinyEKF",

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Campaign: a generated filter against the independent one of reference.c, for an hour of samples, in double and in float."""
+"""Campaign: a generated filter against the independent one of independent.c, for an hour of samples, in double and in float."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import tempfile
 from pathlib import Path
 
 import gate
+import independent
 import numpy as np
-import reference
 
 import penode_gen
 
@@ -30,7 +30,7 @@ def main() -> int:
         model = penode_gen.load(HERE / f"{name}.toml")
         for dtype, limit in LIMITS.items():
             with tempfile.TemporaryDirectory() as place:
-                found = reference.difference(model, dtype, 1000 * options.seconds, Path(place))
+                found = independent.difference(model, dtype, 1000 * options.seconds, Path(place))
             told = f"{found.state:.2g}, covariance {found.covariance:.2g}; after kinks {found.at_kinks:.2g}, {found.share:.2%}"
             whole = dtype is np.float64  # every sample counts
             wrong = max(found.state, found.covariance, found.at_kinks * whole) > limit or found.share > SHARE

@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import independent
 import numpy as np
 import plant
 import pytest
-import reference
 from scipy.stats import chi2
 
 import penode_gen
@@ -22,9 +22,9 @@ SHARE = 0.02  # of samples, at most, in 0.1 s after a kink between both: four to
 
 
 def test_reference_is_the_filter_of_numpy(tmp_path: Path) -> None:
-    """reference.c against plant.Dense, with missing measurements; both in double."""
+    """independent.c against plant.Dense, with missing measurements; both in double."""
     model = penode_gen.load(HERE / "layered.toml")
-    fast, slow = reference.Reference(model, tmp_path, seed=3), plant.Dense(plant.Plant(model), model)
+    fast, slow = independent.Reference(model, tmp_path, seed=3), plant.Dense(plant.Plant(model), model)
     _, z = fast.drive(300)
     z[50], z[60, 1] = np.nan, np.nan
     x, p = fast.run(z)
@@ -39,7 +39,7 @@ def test_reference_is_the_filter_of_numpy(tmp_path: Path) -> None:
 def test_filter_is_that_of_the_reference(name: str, tmp_path: Path, show: Callable[[str], None]) -> None:
     """Over 30 s in double at every sample; in float but where a kink lies between both. An hour: make campaign-ekf."""
     model = penode_gen.load(HERE / f"{name}.toml")
-    double, single = (reference.difference(model, dtype, 30_000, tmp_path) for dtype in (np.float64, np.float32))
+    double, single = (independent.difference(model, dtype, 30_000, tmp_path) for dtype in (np.float64, np.float32))
     show(f"{name}: {double.state:.1e} off, in float {single.state:.1e}; after kinks {single.at_kinks:.1e}, {single.share:.1%}")
     assert max(double.state, double.covariance, double.at_kinks) < DOUBLE
     assert max(single.state, single.covariance) < FLOAT and single.share < SHARE

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""reference.c, compiled: plant.py's vehicle and filter for hours of samples, and how far a generated filter is from it."""
+"""independent.c, compiled: plant.py's vehicle and filter for hours of samples, and how far a generated filter is from it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class _Filter(ctypes.Structure):
 
 
 def numbers(network: Any) -> Array:
-    """A network as reference.c takes it."""
+    """A network as independent.c takes it."""
     first, *dense, last = network.layers
     parts = [np.ravel(first.shift), np.ravel(first.factor), [len(dense)]]
     for layer in dense:
@@ -56,7 +56,7 @@ class Reference:
         given, self.rng = model.filter, np.random.default_rng(seed)
         library = place / "reference.so"
         subprocess.run(
-            ["gcc", "-O2", "-std=c99", "-ffp-contract=off", "-shared", "-fPIC", "-o", library, HERE / "reference.c", "-lm"], check=True
+            ["gcc", "-O2", "-std=c99", "-ffp-contract=off", "-shared", "-fPIC", "-o", library, HERE / "independent.c", "-lm"], check=True
         )
         self.library = ctypes.CDLL(str(library))
         nets = model.sets["default"].networks

@@ -3,7 +3,7 @@
 
 /*
  * plant.py in C, for hours of samples: the quarter vehicle on an unknown road, and its Kalman filter with whole matrices in
- * double. Nothing of penode is in it. States: z_b, z_w, v_b, v_w, road. Compiled and called by reference.py.
+ * double. Nothing of penode is in it. States: z_b, z_w, v_b, v_w, road. Compiled and called by independent.py.
  */
 
 #include <math.h>
