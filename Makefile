@@ -62,10 +62,10 @@ figures: setup ## Measure what our steps cost; rewrite the tables of README.md a
 
 bench: setup ## The same with the steps of other tools (ten minutes, downloads them; test/bench/checkouts.py)
 	$(Q)$(PYTHON) test/bench/bench.py
+	$(Q)$(PYTHON) test/prove/promises.py
 
 bench-filters: setup ## What an update of the Kalman filter costs beside other forms of it; rewrites test/bench/table.md
 	$(Q)$(PYTHON) test/bench/filters.py
-	$(Q)$(PYTHON) test/prove/promises.py
 
 campaign: campaign-diagnosis campaign-proofs campaign-fmu ## All three campaigns, hours
 

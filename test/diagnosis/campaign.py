@@ -232,6 +232,18 @@ def drawing(about: str | None, out: Path) -> argparse.ArgumentParser:
     return parser
 
 
+def drawn(args: argparse.Namespace) -> tuple[int, list[int]]:
+    """The seed, printed, and the indices that these options ask for; the folder for results is made."""
+    seed = secrets.randbelow(10**6) if args.seed is None else args.seed
+    indices = list(range(args.first, args.first + args.cases))
+    if args.only:
+        seed, index = map(int, args.only.split(":"))
+        indices = [index]
+    args.out.mkdir(parents=True, exist_ok=True)
+    print(f"seed {seed}", flush=True)
+    return seed, indices
+
+
 def arguments() -> argparse.ArgumentParser:
     parse = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parse.add_argument

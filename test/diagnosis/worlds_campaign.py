@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import secrets
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
@@ -21,7 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from campaign import commit, diagnose, drawing
+from campaign import commit, diagnose, drawing, drawn
 from claims import nominals
 from score import wilson
 from worlds import equivalents, world
@@ -106,14 +105,8 @@ def parsed() -> argparse.Namespace:
 
 def main() -> int:
     args = parsed()
-    seed = secrets.randbelow(10**6) if args.seed is None else args.seed
-    indices = list(range(args.first, args.first + args.cases))
-    if args.only:
-        seed, index = map(int, args.only.split(":"))
-        indices = [index]
+    seed, indices = drawn(args)
     tolerances = False if args.no_tolerance else None
-    args.out.mkdir(parents=True, exist_ok=True)
-    print(f"seed {seed}", flush=True)
     chosen = [(s, i) for s in args.stratum or ["main"] for i in indices]
     if args.generate:
         for s, i in chosen:

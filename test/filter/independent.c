@@ -168,7 +168,7 @@ static void predict(filter_t *self)
 {
     double d[X][X + 2];
     double phi[N][N] = { { 0.0 } };
-    double g[N] = { 0.0 }; /* what acts on the road acts on the vehicle in the same sample */
+    double g[N] = { 0.0 }; /* derivatives of the states by the noise of the road */
     double part[N][N];
     const double before = self->x[X];
     const double now = self->decay * before;

@@ -37,12 +37,23 @@ def test_reference_is_the_filter_of_numpy(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["layered", "folded"])
 def test_filter_is_that_of_the_reference(name: str, tmp_path: Path, show: Callable[[str], None]) -> None:
-    """Over 30 s in double at every sample; in float but where a kink lies between both. An hour: make campaign-ekf."""
+    """Over 30 s in double at every sample, in float but where a kink lies between both; over 4 s in float at every sample too. An hour:
+    make campaign-ekf."""
     model = penode_gen.load(HERE / f"{name}.toml")
     double, single = (independent.difference(model, dtype, 30_000, tmp_path) for dtype in (np.float64, np.float32))
     show(f"{name}: {double.state:.1e} off, in float {single.state:.1e}; after kinks {single.at_kinks:.1e}, {single.share:.1%}")
     assert max(double.state, double.covariance, double.at_kinks) < DOUBLE
     assert max(single.state, single.covariance) < FLOAT and single.share < SHARE
+    short = independent.difference(model, np.float32, 4_000, tmp_path)
+    assert max(short.state, short.covariance, short.at_kinks) < FLOAT
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_filter_is_that_of_the_reference_for_ten_minutes(dtype: type, tmp_path: Path) -> None:
+    """At every sample; in float it is 0.035 off within a minute, after a kink lies between both: not solved."""
+    found = independent.difference(penode_gen.load(HERE / "layered.toml"), dtype, 600_000, tmp_path)
+    assert max(found.state, found.covariance, found.at_kinks) < (DOUBLE if dtype is np.float64 else FLOAT)
 
 
 def inside(values: np.ndarray, freedom: int) -> float:

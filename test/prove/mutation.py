@@ -41,8 +41,8 @@ SOURCES = sorted((gate.ROOT / "src").glob("*.c"))
 HEADERS = [gate.ROOT / "inc" / "penode" / "pen_ekf.h"]  # an algorithm in inline functions: its own tests are made again for each fault
 FLAGS = ["-std=c99", "-ffp-contract=off", "-fPIC", "-Werror=implicit-function-declaration", "-Iinc", "-Iport/gnu", "-Isrc"]
 SANITIZE = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
-# A fault that makes the same code as none, however it is compiled, changes nothing.
 KEEP = {"gcc": "-fkeep-inline-functions", "clang-19": "-femit-all-decls"}  # of headers
+# A fault that makes the same code as none, however it is compiled, changes nothing.
 COMPILERS = (["gcc", "-O2"], ["gcc", "-O3"], ["clang-19", "-O2"])
 
 

@@ -17,6 +17,7 @@ from scipy import constants
 from penode_gen.model import Model
 
 from .build import Extended, Term
+from .catalogue.others import DRIFTING
 from .fit import Fit, Problem
 from .hypotheses import CLOCK, VALUED, Basis, Fault
 from .score import Candidate
@@ -83,7 +84,7 @@ class Explanation:
     def score(self) -> float:
         form = 0.0
         plain = len(self.terms) == len(self.groups) and all(kind in (*EXACT, *FORMULAS) for kind, _ in self.groups)
-        slow = all(kind == "sensor_bias" or kind in EXACT for kind, _ in self.groups)  # a bias is no form, however it drifts
+        slow = all(kind in (*EXACT, *DRIFTING) for kind, _ in self.groups)
         filtering = sum(t.candidate.kind == "hidden_resonance" for t in self.terms) > 1  # a second mass may be any form of the first
         if (not plain and not slow) or filtering:
             bent = self.gain - (0.0 if filtering else self.formulas)

@@ -14,6 +14,7 @@ from penode_gen import units
 from penode_gen.model import Model, Parameter
 
 from . import catalogue, straight
+from .catalogue import values as of_values
 from .catalogue.form import Motion
 from .evidence.bench import UNSTATED
 from .evidence.fit import Fit
@@ -92,4 +93,4 @@ def _cause(p: Parameter, value: float, sd: float, shared: Mapping[str, straight.
     """The parameter as a cause, with the slopes that laws at its place share with it."""
     least, most = shared.get(p.name, (0.0, 0.0))
     size = Value(value + 0.5 * (least + most), units.si(p.unit), (value - Z_95 * sd + least, value + Z_95 * sd + most))
-    return Cause("wrong_parameter", p.name, {p.name: size}, confidence)
+    return of_values.cause(p.name, size, confidence)

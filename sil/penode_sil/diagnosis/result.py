@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
+from ..compared import REJECTED, Compared, worsened
 from ..recordings.measured import Measured
 
 OUTSIDE = "outside_taxonomy"  # kind of what has no name
 EXTENDED = "model_extended.toml"
-REJECTED = "model_rejected.toml"  # the same where it predicts worse than the nominal model
 SIZES = {"force", "stiffness", "damping", "mass", "bias", "offset", "delay", "lag", "coefficient", "cubic", "difference", "scale", "gain"}
 NOTHING = {"scale": 1.0, "gain": 1.0}  # sizes without any effect; 0 for others
 MAY_BE_NOTHING = "may be nothing, by the 95 % interval of its size; not named, but in model_extended.toml"
@@ -58,11 +58,6 @@ class Cause:
         return len(self.parameters) == 1 and all(v.ci95[0] <= NOTHING.get(k, 0.0) <= v.ci95[1] for k, v in self.parameters.items())
 
 
-def worsened(before: float, after: float) -> bool:
-    """Is an error larger than before, or none at all? Less than 5 % may be chance."""
-    return not after <= 1.05 * before
-
-
 @dataclass(frozen=True)
 class Gain:
     """RMS errors of one signal on data that were not used, with the generated C; `share` of what could be gained.
@@ -83,17 +78,10 @@ class Gain:
 
 
 @dataclass(frozen=True)
-class Figure:
-    """RMS errors of a sensor over all `samples` of a recording, in the unit that the model file has for it: of the nominal model and of the
-    written one as `penode simulate` gives them; of the nominal one with parameters within stated tolerances, start and offset as they fit
-    best; and the noise. `role`: training or hold-out; `set`: parameter set of the written model."""
+class Figure(Compared):
+    """The same error of the nominal model with parameters within stated tolerances, start and offset as they fit best; of the written model
+    as `penode simulate` gives it, with its parameter set `set`; and the noise."""
 
-    recording: str
-    role: str
-    signal: str
-    unit: str
-    samples: int
-    nominal: float
     refitted: float
     extended: float
     noise: float

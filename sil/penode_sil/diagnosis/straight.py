@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from penode_gen import laws, units
 from penode_gen.model import Model
 
+from .catalogue import values as of_values
 from .catalogue.form import Motion, Moved
 from .evidence.bench import Bench
 from .explanation import Explanation
@@ -73,7 +74,7 @@ def missed(study: Study, e: Explanation, causes: Sequence[Cause]) -> list[Cause]
             own = values.get(name, p.value)
             if name not in known and not p.exact and off(p.value, own, slopes, p.tolerance):
                 value = Value(own + 0.5 * sum(slopes), units.si(p.unit), (own + slopes[0], own + slopes[1]))
-                found.append(Cause("wrong_parameter", name, {name: value}, max(sure)))
+                found.append(of_values.cause(name, value, max(sure)))
     return found
 
 

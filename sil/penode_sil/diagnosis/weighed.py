@@ -15,6 +15,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from . import applied, measuring, numerics, real
+from .catalogue import values as of_values
 from .catalogue.drives import INPUTS
 from .evidence.bench import UNSTATED, build
 from .evidence.gain import Level
@@ -229,7 +230,7 @@ def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, left: 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:
     """Causes, none where several parameters have left tolerances that the file states: that is another plant, and what else was found is
     of that; and a note on it. All by one factor, they are the gain of an input that the file does not have."""
-    off = [c for c in causes if c.kind == "wrong_parameter" and model.parameters[c.where].tolerance <= 1.0]
+    off = [c for c in causes if of_values.is_one(c) and model.parameters[c.where].tolerance <= 1.0]
     if len(off) < 2:
         return causes, []
     if gain := _gain(model, off):

@@ -16,8 +16,8 @@ import penode_gen
 from penode_gen import units
 from penode_gen.model import Model
 
+from ..compared import REJECTED, rejected
 from ..diagnosis.files import all_or_none
-from ..diagnosis.result import REJECTED
 from ..errors import RecordingError, WrongUse
 from ..output import whole
 from ..recordings.excerpt import excerpted
@@ -28,8 +28,6 @@ from .final import checked
 from .result import TRAINED, Trained
 from .settings import SETTINGS
 from .story import Options, check, train, versions
-
-KEEP = f"# Keep the nominal model: this one predicts worse. It would be {TRAINED} if it did not.\n"
 
 
 @dataclass(frozen=True)
@@ -150,7 +148,7 @@ def _write(job: Job, model: Model, found: Trained, measured: Sequence[Measured],
     if final.worse:
         (job.output / TRAINED).unlink()
         with whole(job.output / REJECTED) as part:
-            part.write_text(KEEP + text, encoding="utf-8")
+            part.write_text(rejected(text, TRAINED), encoding="utf-8")
         note = f"{REJECTED} predicts {', '.join(final.worse)} worse than the nominal model: keep that one"
         found = replace(found, model_file=REJECTED, notes=(note, *found.notes))
     else:

@@ -13,7 +13,7 @@ import numpy as np
 
 from penode_gen.model import Model
 
-from ..diagnosis.result import worsened
+from ..compared import Compared, worsened
 from ..errors import UserError
 from ..predicted import Options, Predicted, both, read
 from ..recordings.measured import Measured
@@ -21,16 +21,9 @@ from ..replay import Replay
 
 
 @dataclass(frozen=True)
-class Figure:
-    """RMS errors of a sensor over all `samples` of a recording as `penode simulate` gives them, in the unit of the model file: of the
-    nominal model and of the trained one as written. `role`: training or hold-out."""
+class Figure(Compared):
+    """The same error of the trained model as written."""
 
-    recording: str
-    role: str
-    signal: str
-    unit: str
-    samples: int
-    nominal: float
     trained: float
 
 

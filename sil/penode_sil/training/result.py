@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from penode_gen.networks import Network
 
-from ..diagnosis.result import REJECTED
+from ..compared import REJECTED
 from .final import Figure
 from .tries import Try
 from .unknown import Unknown

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import secrets
 import shutil
 import sys
 from collections import Counter
@@ -24,7 +23,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from campaign import commit, diagnose, drawing
+from campaign import commit, diagnose, drawing, drawn
 from claims import nominals
 from score import allowed_failures, wilson
 from worlds_score import score
@@ -130,13 +129,7 @@ def main() -> int:
     if engine.installed() is None:
         print(f"mujoco_campaign: {engine.REMEDY}", file=sys.stderr)
         return 2
-    seed = secrets.randbelow(10**6) if args.seed is None else args.seed
-    indices = list(range(args.first, args.first + args.cases))
-    if args.only:
-        seed, index = map(int, args.only.split(":"))
-        indices = [index]
-    args.out.mkdir(parents=True, exist_ok=True)
-    print(f"seed {seed}", flush=True)
+    seed, indices = drawn(args)
     keep, tolerances = args.keep or bool(args.only) or args.generate, False if args.no_tolerance else None
     command, rows, code = "" if args.generate else args.command, [], commit()
     with ProcessPoolExecutor(args.jobs) as pool, (args.out / "rows.jsonl").open("w") as file:

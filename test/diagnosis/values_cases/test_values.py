@@ -28,8 +28,8 @@ def test_wrong_values_are_named_and_no_others(index: int, names: list[str], tmp_
     assert found["verdict"] == "explained" and json.dumps(found["explanations"]).count("wrong_parameter") == len(names)
 
 
-def test_a_pair_that_others_explain_is_no_case() -> None:
-    """Of the three values of one mass on a spring, any two do what any other two do where the road drives it."""
+def test_a_common_factor_is_no_case() -> None:
+    """A common factor of all values shows nothing."""
     case, factors = values.draw(5, 3)
     assert values.solvable(case, factors)
     assert not values.solvable(case, dict.fromkeys(case.bench.plant.true, 1.1))

@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import json
 import re
-import secrets
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
@@ -27,7 +26,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from campaign import commit, diagnose, drawing
+from campaign import commit, diagnose, drawing, drawn
 from hidden import cases
 from score import wilson
 
@@ -94,7 +93,8 @@ def one(seed: int, index: int, command: str, timeout: float, out: Path, keep: bo
     case, factors = draw(seed, index)
     folder = out / "cases" / f"{seed}-{index}"
     shutil.rmtree(folder, ignore_errors=True)
-    found, seconds, why = diagnose(command, folder, write(case, factors, folder), timeout)
+    recordings = write(case, factors, folder)
+    found, seconds, why = diagnose(command, folder, recordings, timeout) if command else (None, 0.0, "")
     right, words, errors = judged(case, factors, found)
     if not keep:
         shutil.rmtree(folder)
@@ -129,20 +129,16 @@ def page(rows: Sequence[Mapping], about: str) -> str:
 
 def main() -> int:
     args: argparse.Namespace = drawing(__doc__, Path("build/values")).parse_args()
-    seed = secrets.randbelow(10**6) if args.seed is None else args.seed
-    indices = list(range(args.first, args.first + args.cases))
-    if args.only:
-        seed, index = map(int, args.only.split(":"))
-        indices = [index]
-    args.out.mkdir(parents=True, exist_ok=True)
-    print(f"seed {seed}", flush=True)
-    rows = []
+    seed, indices = drawn(args)
+    keep, command, rows = args.keep or bool(args.only) or args.generate, "" if args.generate else args.command, []
     with ProcessPoolExecutor(args.jobs) as pool, (args.out / "rows.jsonl").open("w") as file:
-        for job in [pool.submit(one, seed, i, args.command, args.timeout, args.out, args.keep or bool(args.only)) for i in indices]:
+        for job in [pool.submit(one, seed, i, command, args.timeout, args.out, keep) for i in indices]:
             rows.append(job.result())
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
-            print(line(rows[-1]), flush=True)
+            print(line(rows[-1]) if command else f"{rows[-1]['case']} {rows[-1]['hidden']}", flush=True)
+    if args.generate:
+        return 0
     text = page(rows, f"Seed {seed}, {commit()}, `{args.command}`.")
     (args.out / "VALUES.md").write_text(text)
     print(text)

@@ -12,6 +12,7 @@ MEANING = {
     "integration_error": "The physics is right; the deployed step integrates it too coarsely.",
     "outside_taxonomy": "A residual remains that is not noise and that no known kind explains.",
 }
+DRIFTING = ("sensor_bias",)  # constant, or of any slow course: it has no form
 PARAMETERS = {  # what each number of a report means
     "wrong_parameter": {"its name": "value in the recordings, in its own unit"},
     "differs_between_recordings": {"its name": "a value for each recording, in its own unit"},

@@ -7,9 +7,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ...compared import REJECTED
 from .. import residual
 from ..missing import missing_forces
-from ..result import REJECTED, Diagnosis
+from ..result import Diagnosis
 from .case import Case, End
 from .channels import Mix, told
 from .figures import tabled, with_figures

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from scipy.signal import butter, lfilter
 
+from ...compared import REJECTED, rejected, worsened
 from .. import catalogue
-from ..catalogue import drives
+from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
 from ..noise import UNSEEN
 from ..report_figure import number
-from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, REJECTED, Cause, place, worsened
+from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, Cause, place
 from ..worth import RATIO
 from . import values
 from .case import Case, End
@@ -24,7 +25,6 @@ from .figures import ROLES, Row, Table, misses, tabled
 from .written import write_extended
 
 NOMINAL = ("nominal", "refitted")
-KEEP = f"# Keep the nominal model: this one predicts worse. It would be {EXTENDED} if it did not.\n"
 NOT_NAMED = f"not named, but in {EXTENDED}"
 
 
@@ -158,7 +158,7 @@ def spread(case: Case, end: End, table: Table) -> list[values.Few]:
     nothing else does."""
     if end.answer.verdict == "unexplained":
         return values.few(case, end, table)
-    named = {c.where for c in end.answer.causes if c.kind == values.KIND}
+    named = {c.where for c in end.answer.causes if of_values.is_one(c)}
     moved = values.moved(case, end.extended)
     if len(named) < len(end.answer.causes) or not named or named == moved:
         return []
@@ -168,13 +168,13 @@ def spread(case: Case, end: End, table: Table) -> list[values.Few]:
 
 def by_values(case: Case, end: End, table: Table, found: Sequence[values.Few]) -> End:
     """The end that names these values, with no others in the written model."""
-    best = found[0]
-    extended = write_extended(values.text(case, best), case)
+    best, causes = found[0], values.caused(case, found)
+    extended = write_extended(values.text(case, causes, best), case)
     fit = replace(end.study.null, simulated=best.fit.simulated)
     d = end.answer
     if d.verdict == "unexplained":
         d = replace(d, verdict="explained", explained=values.taken(end, best), notes=tuple(case.remarks))
-    d = replace(d, causes=values.caused(case, list(found)), explanations=values.explanations(list(found)))
+    d = replace(d, causes=causes, explanations=values.explanations(found))
     return replace(end, answer=d, extended=extended, fit=fit, without=None)
 
 
@@ -213,7 +213,7 @@ def worse(case: Case, end: End, table: Table) -> list[str]:
 def reject(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
     """The written model under another name, and no more than a part explained."""
     written = case.output / EXTENDED
-    (case.output / REJECTED).write_text(KEEP + written.read_text())
+    (case.output / REJECTED).write_text(rejected(written.read_text(), EXTENDED))
     written.unlink()
     d = end.answer
     verdict = "partly_explained" if d.verdict == "explained" else d.verdict

@@ -8,7 +8,7 @@ all values that follow the recordings equally well, those that differ from the f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import combinations
 
 import numpy as np
@@ -17,17 +17,17 @@ from scipy.special import chdtri, erfc
 from penode_gen import units
 from penode_gen.model import Model, Parameter
 
+from ...compared import worsened
+from ..catalogue import values as of_values
 from ..entries import table
 from ..explanation import CHANCE, only_noise, rows
 from ..fit import Fit, Free, Problem
-from ..result import Cause, Named, Value, worsened
+from ..result import Cause, Value
 from ..study import uncertain
 from ..worth import RIGHT, Z_95
 from .case import Case, End
 from .figures import Table
 from .written import heading
-
-KIND = "wrong_parameter"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,38 +136,38 @@ def _sizes(x: Few) -> list[float]:
     return [*values, *(abs(v) * float(np.sqrt(max(covariance[k, k], 0.0))) for v, k in zip(values, at, strict=True))]
 
 
-def posterior(found: list[Few]) -> list[float]:
+def posterior(found: Sequence[Few]) -> list[float]:
     """How likely each of them is; what is not among them has the rest."""
     likely = np.exp([0.5 * (found[0].fit.cost - x.fit.cost) for x in found])
     return [float(p) for p in RIGHT * likely / likely.sum()]
 
 
-def caused(case: Case, found: list[Few]) -> tuple[Cause, ...]:
+def caused(case: Case, found: Sequence[Few]) -> tuple[Cause, ...]:
     """The best set as causes, each with the parameters of the other sets as its alternatives."""
     sizes, names = _sizes(found[0]), found[0].names
-    others = tuple(Named(KIND, n) for n in dict.fromkeys(n for x in found[1:] for n in x.names if n not in names))
+    others = list(dict.fromkeys(n for x in found[1:] for n in x.names if n not in names))
     causes = []
     for name, value, sd in zip(names, sizes[: len(names)], sizes[len(names) :], strict=True):
         interval = Value(value, units.si(case.model.parameters[name].unit), (value - Z_95 * sd, value + Z_95 * sd))
-        causes.append(Cause(KIND, name, {name: interval}, posterior(found)[0], others))
+        causes.append(of_values.cause(name, interval, posterior(found)[0], others))
     return tuple(causes)
 
 
-def explanations(found: list[Few]) -> tuple[dict[str, object], ...]:
+def explanations(found: Sequence[Few]) -> tuple[dict[str, object], ...]:
     """All sets with their posterior."""
     return tuple(
-        {"causes": [{"kind": KIND, "where": n} for n in x.names], "posterior": p} for x, p in zip(found, posterior(found), strict=True)
+        {"causes": [asdict(of_values.named(n)) for n in x.names], "posterior": p} for x, p in zip(found, posterior(found), strict=True)
     )
 
 
-def text(case: Case, x: Few) -> str:
-    """The model file with the values of a fit in it."""
+def text(case: Case, causes: Sequence[Cause], x: Few) -> str:
+    """The model file with the values of a fit in it, which has these causes."""
     model = case.model
-    values = {f.target: f.value for f in x.fit.free if isinstance(f.target, str)}
-    lines = heading(model, KIND, ", ".join(x.names))
+    fitted = {f.target: f.value for f in x.fit.free if isinstance(f.target, str)}
+    lines = heading(model, causes[0].kind, ", ".join(c.where for c in causes))
     for p in model.parameters.values():
-        if p.name in values and values[p.name] != p.value:
-            lines.append(f"{p.name} = {table(entry(p, values[p.name]))}")
+        if fitted.get(p.name, p.value) != p.value:
+            lines.append(f"{p.name} = {table(entry(p, fitted[p.name]))}")
     return "\n".join([*lines, ""])
 
 

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Another value of a parameter of the model file, as a cause. Both searches and `checks` find it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..result import Cause, Named, Value
+
+KIND = "wrong_parameter"
+
+
+def named(parameter: str) -> Named:
+    """The name of this cause."""
+    return Named(KIND, parameter)
+
+
+def cause(parameter: str, value: Value, confidence: float, others: Sequence[str] = ()) -> Cause:
+    """The cause, with other parameters that explain the recordings as well."""
+    return Cause(KIND, parameter, {parameter: value}, confidence, tuple(map(named, others)))
+
+
+def is_one(found: Cause) -> bool:
+    """Is a cause another value of a parameter?"""
+    return found.kind == KIND
