@@ -58,10 +58,10 @@ def test_a_step_that_is_slightly_wrong_is_refused_once_that_adds_up(counting: Na
 @pytest.mark.parametrize("version", [3, 2])
 @pytest.mark.parametrize("name", ["nqvm", "nqvm_euler"])
 def test_a_step_costs_little_more_than_plain_c(name: str, version: int, tmp_path: Path) -> None:
-    """Steps alone: derivatives and sensors are computed when they are asked for. Both are timed in turn, and the least times compared."""
+    """Steps alone: derivatives and sensors are computed when they are asked for. The median of pairs that are timed in turn."""
     native = build(penode_gen.load(NQVM / f"{name}.toml"), version, tmp_path)
-    fmu, plain = native.numbers("cost", "z_road", 200)
-    assert fmu <= 1.3 * plain, f"{fmu} ns, {plain} ns"
+    (ratio,) = native.numbers("cost", "z_road", 1000)
+    assert ratio <= 1.3
 
 
 @pytest.fixture(scope="module")
