@@ -10,7 +10,7 @@ import pytest
 
 from penode_sil.diagnosis.advice import advice, doubts, likely
 from penode_sil.diagnosis.catalogue import MEANING, OTHERWISE, RIVALS, separating
-from penode_sil.diagnosis.report_words import headline
+from penode_sil.diagnosis.report.words import headline
 from penode_sil.diagnosis.result import OUTSIDE, Cause, Diagnosis, Gain, Named, Recorded, Value
 from penode_sil.diagnosis.terminal import sentences
 

@@ -25,13 +25,12 @@ from penode_sil.diagnosis import (
     noise,
     reliability,
     report,
-    report_figure as fig,
-    report_price,
     residual,
     restoring,
     result,
     terminal,
 )
+from penode_sil.diagnosis.report import changes, figure as fig
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
 EXTENDED = """# What the recordings taught about car.toml: coulomb_friction at damper.
@@ -267,7 +266,7 @@ def test_both_colour_schemes_can_be_read(page):
 
 
 def test_difference_shows_what_was_learnt(model, extended):
-    got = report_price.difference(model.path, extended)
+    got = changes.difference(model.path, extended)
     assert ("-", 'd = { value = 1500.0, unit = "N*s/m", tolerance = 0.01 }') in got
     at = got.index(("+", 'd = { value = 1490.0, unit = "N*s/m", tolerance = 0.01 }'))
     assert got[at - 1][0] == "-" and got[at + 1] == ("+", 'f_c = { value = 61.3, unit = "N" }')
@@ -275,8 +274,8 @@ def test_difference_shows_what_was_learnt(model, extended):
 
 
 def test_price_is_left_out_without_a_compiler(model, found, monkeypatch, extended):
-    monkeypatch.setattr(report_price.shutil, "which", lambda name: None)
-    assert report_price.price(model, extended) == []
+    monkeypatch.setattr(changes.shutil, "which", lambda name: None)
+    assert changes.price(model, extended) == []
     assert "What it costs" not in report.render(model, found, extended)
 
 
@@ -355,13 +354,13 @@ def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path, monkeypatch):
 
 
 def test_price_is_compiled_once(model, monkeypatch, extended):
-    first = report_price.price(model, extended)
+    first = changes.price(model, extended)
 
     def refuse(*_):
         raise AssertionError("compiled again")
 
     monkeypatch.setattr(building, "compile_program", refuse)
-    assert first and report_price.price(model, extended) == first
+    assert first and changes.price(model, extended) == first
 
 
 def test_what_compilers_take_for_the_report_counts_as_well(model, found, monkeypatch, tmp_path):

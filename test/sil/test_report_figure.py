@@ -10,8 +10,8 @@ import re
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import report_figure as fig
-from penode_sil.diagnosis.report_figure import Axis
+from penode_sil.diagnosis.report import figure as fig
+from penode_sil.diagnosis.report.figure import Axis
 
 
 def test_thinning_keeps_the_extremes():

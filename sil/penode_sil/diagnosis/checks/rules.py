@@ -16,7 +16,7 @@ from .. import catalogue
 from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
 from ..noise import UNSEEN
-from ..report_figure import number
+from ..report.figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, Cause, place
 from ..worth import RATIO
 from . import values

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from . import catalogue, report_figure as fig
-from .advice import doubts
-from .reliability import line
-from .report_figure import pretty, readable
-from .residual import Channel
-from .result import OUTSIDE, Cause, Diagnosis, place, plain, sigmas
+from .. import catalogue
+from . import figure as fig
+from ..advice import doubts
+from ..reliability import line
+from .figure import pretty, readable
+from ..residual import Channel
+from ..result import OUTSIDE, Cause, Diagnosis, place, plain, sigmas
 
 LIKE_NOISE = 1.1  # times the noise power
 

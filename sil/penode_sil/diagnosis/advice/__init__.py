@@ -10,12 +10,12 @@ from typing import Any
 
 from penode_gen.model import Model
 
-from .by_noise import FARTHER
-from .catalogue import channels, separating
-from .catalogue.drives import alike
-from .noise import UNSEEN
-from .reliability import reliability
-from .result import OUTSIDE, Cause, Diagnosis, Named, place
+from ..by_noise import FARTHER
+from ..catalogue import channels, separating
+from ..catalogue.drives import alike
+from ..noise import UNSEEN
+from ..reliability import reliability
+from ..result import OUTSIDE, Cause, Diagnosis, Named, place
 
 
 def likely(d: Diagnosis) -> list[Mapping[str, Any]]:

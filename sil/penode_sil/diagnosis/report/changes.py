@@ -12,8 +12,8 @@ from pathlib import Path
 import penode_gen
 from penode_gen.model import Model
 
-from ..errors import UserError
-from ..targets import build_object
+from ...errors import UserError
+from ...targets import build_object
 
 CORE = "m4f"
 

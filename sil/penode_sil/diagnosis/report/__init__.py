@@ -8,7 +8,7 @@ spectrum above the noise floor, its coherence with the input and a test for whit
 rivals; the restoring force of each element over deflection and rate, measured, nominal and extended; the gain on held-out data with the
 generated C, samples outside of the trained range marked; the change of the model file and what it costs on a Cortex-M4F; findings in the
 data; the error of the deployed step; the terms. Figures zoom, move and read out where scripts run; all of the page can be read without, on
-paper, on a phone, in light and in dark. Figures are data (report_figure.py), the page is templates/report.html.
+paper, on a phone, in light and in dark. Figures are data (figure.py), the page is templates/report.html.
 """
 
 from __future__ import annotations
@@ -26,16 +26,17 @@ from penode_gen.emission.model_c import compiled_templates
 from penode_gen.model import Model
 from penode_gen.resources import resource
 
-from ..output import whole
-from . import catalogue, report_figure as fig
-from .advice import doubts
-from .reliability import line
-from .report_figure import Axis, Figure, pretty, readable
-from .report_price import difference, price
-from .report_words import LIKE_NOISE, command, gains, headline, key_figures, lead, percent, relative, sentence, sure, value, where
-from .residual import Channel, Residual, Shown
-from .restoring import LEAST, Surface, averages, cells, rms
-from .result import VERDICTS, Diagnosis, place, plain
+from ...output import whole
+from .. import catalogue
+from . import figure as fig
+from ..advice import doubts
+from ..reliability import line
+from .figure import Axis, Figure, pretty, readable
+from .changes import difference, price
+from .words import LIKE_NOISE, command, gains, headline, key_figures, lead, percent, relative, sentence, sure, value, where
+from ..residual import Channel, Residual, Shown
+from ..restoring import LEAST, Surface, averages, cells, rms
+from ..result import VERDICTS, Diagnosis, place, plain
 
 Array = NDArray[np.float64]
 SAMPLES = 800  # that a picture of forces shows one by one
