@@ -18,19 +18,8 @@ from test_diagnosis import MODEL, SAMPLES, STEP, drive, record, road
 import penode_gen
 from penode_sil import building
 from penode_sil.cli import cli
-from penode_sil.diagnosis import (
-    advice,
-    catalogue,
-    files,
-    noise,
-    reliability,
-    report,
-    residual,
-    restoring,
-    result,
-    terminal,
-)
-from penode_sil.diagnosis.report import changes, figure as fig
+from penode_sil.diagnosis import advice, catalogue, files, noise, reliability, report, residual, restoring, result, terminal
+from penode_sil.diagnosis.report import changes, figure as fig, panels
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
 EXTENDED = """# What the recordings taught about car.toml: coulomb_friction at damper.
@@ -184,7 +173,7 @@ def test_page_says_what_the_diagnosis_says(found, tree):
     text = " ".join(" ".join(tree.text).split())
     for fact in (
         "Coulomb friction at damper explains what the model gets wrong",
-        *("61.3 N", "59.8 N … 62.9 N", "± 2.5 %", "Confidence 87 %"),
+        *("61.3 N", "59.8 … 62.9 N", "± 2.5 %", "Confidence 87 %"),
         *("Stribeck friction at damper", found.causes[0].separate),
         (
             "Of causes named with 80 to 90 % confidence in simulated cases, 51 of 60 were right (85 %, "
@@ -192,7 +181,7 @@ def test_page_says_what_the_diagnosis_says(found, tree):
         ),
         *("The recordings do not tell these apart", "Coulomb friction at damper (87 %) or Stribeck friction at damper (13 %)"),
         *("the recordings do not rule out others.", "Tell Coulomb friction at damper from Stribeck friction at damper: slow motion"),
-        "0.104 m/s² → 0.0203 m/s² RMS of a_body; noise 0.02 m/s², 99.6 % of what can be gained",
+        "0.104 → 0.0203 m/s² RMS of a_body; noise 0.02 m/s², 99.6 % of what can be gained",
         *("0.104 m/s²", "0.0203 m/s²", "99.6 %", "97 % … 102 %", "nothing to gain", "31.0% of the samples"),
         *("512 σ", "deflection: 12 samples are missing", RECORDING, "0.00125 m/s²", "0.2 %"),
     ):
@@ -223,7 +212,7 @@ def test_figures_have_titles_units_and_words(tree, page):
 def test_values_can_be_read_back_from_paths(found):
     """Half of a unit of the box is what rounding to it may cost."""
     c = found.shown.train[0]
-    f = report.over_time(c, 10_000)
+    f = panels.over_time(c, 10_000)
     line = next(m for m in f.marks if m.name == "before")
     x, y = [], []
     for part in line.path.split("M")[1:]:

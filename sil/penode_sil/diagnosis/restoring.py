@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,8 +17,9 @@ from penode_gen.laws import for_angles
 from penode_gen.model import GROUND, Input, Model, Signal
 
 from ..errors import UserError
-from .fit import Fit, Problem
-from .plant import Place
+from .fit import Fit, Free, Problem
+from .noise import Experiment
+from .plant import Linear, Place, external
 from .score import likely
 from .study import Study, watch
 
@@ -30,7 +31,8 @@ LEAST = 5  # samples of a bin that counts
 @dataclass(frozen=True, eq=False)
 class Surface:
     """Restoring force of a place along the smoothed motion: s, v, and forces [n] as measured and as the elements give
-    them there; means on a grid of BINS deflections by BINS rates (NaN where fewer than LEAST samples are)."""
+    them there; means on a grid of BINS deflections by BINS rates (NaN where fewer than LEAST samples are). `located`: do the sensors show
+    the deflection, and not only how much it changes?"""
 
     place: str
     elements: tuple[str, ...]
@@ -41,6 +43,7 @@ class Surface:
     extended: Array | None
     edges: tuple[Array, Array]
     turns: bool = False
+    located: bool = True
 
     def unit(self, of_length: str) -> str:
         """A unit of the force there: `of_length` as it is, or what stands for it where the ends turn."""
@@ -57,14 +60,14 @@ class Surface:
         return cells(self.s, self.edges[0]), cells(self.v, self.edges[1])
 
 
-def rig(model: Model, places: Sequence[Place]) -> Model:
+def rig(model: Model, places: Sequence[Place], driving: Set[str] = frozenset()) -> Model:
     """The elements of places alone, each place under prescribed deflection `s_place0`...; sensors are their forces
-    [N]."""
+    [N]. Elements that are `driving`, which put a measured force on a body, are none of them."""
     elements, signals = [], []
     for k, place in enumerate(places):
         names = []
         for x in model.elements:
-            if x.ends in (place.ends, place.ends[::-1]):
+            if x.ends in (place.ends, place.ends[::-1]) and x.name not in driving:
                 ahead = x.ends == place.ends
                 elements.append(replace(x, ends=(f"s_place{k}", GROUND) if ahead else (GROUND, f"s_place{k}")))
                 names.append(f"{'+' if ahead else '-'} F_{x.name}")
@@ -86,47 +89,99 @@ def rig(model: Model, places: Sequence[Place]) -> Model:
 
 
 def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surface]:
-    """Restoring forces of all places with elements, over all recordings; none if their laws need more than motion.
+    """Restoring forces of all places with elements, over all recordings but their ends; none if their laws need more than motion.
 
-    The motion and the measured force are those of the best model there is (`fit`, or the null fit), and what the
-    smoother makes of its residual; its gain is that for the residual of the null fit.
+    The motion and the measured force are those of the best fit there is (`fit`, or the null fit), and what the
+    smoother makes of its residual; its gain is that for the residual of the null fit. `extended` may know more than that fit.
     """
     acting = [p for p, place in enumerate(study.places) if place.elements]
     places = [study.places[p] for p in acting]
     if not places:
         return []
-    n_z, n_u = len(study.model.sensors), len(study.model.inputs)
-    motions, beside, rigs = [], [], []
+    motions, beside, rigs, kept = [], [], [], []
     for k, (e, simulated) in enumerate(zip(study.experiments, watch(study, fit or study.null), strict=True)):
-        nominal, rest = (rfft(np.where(e.good, e.y - z[:, :n_z], 0.0), axis=0)[: e.band] for z in (study.null.simulated[k], simulated))
-        h = study.linear.transfer(e.frequencies[: e.band])[:, :, [n_u + p for p in acting] + list(range(n_u))]
-        gain = likely(e, study.levels[k], h[:, :n_z], len(acting), nominal / np.sqrt(len(e.time)))
-        w = np.einsum("fqz,fz->fq", gain, rest)
-        h = h[:, n_z:]
-        whole = np.zeros((len(e.frequencies), h.shape[1] + len(acting)), dtype=complex)
-        whole[: e.band] = np.concatenate([np.einsum("fyq,fq->fy", h, w), w[:, : len(acting)]], axis=1)
-        change = irfft(whole, len(e.time), axis=0)
-        paths = simulated[:, n_z:] + change[:, : h.shape[1]]
-        s, v = (paths[:, [2 * p + q for p in acting]] for q in (0, 1))
+        s, v, more = _smoothed(study, k, simulated, acting)
         motions.append((s, v))
-        beside.append(change[:, h.shape[1] :])
+        beside.append(more)
+        kept.append(_weights(len(s)) == 1.0)
         none = np.zeros((len(s), len(acting)))
         rigs.append(replace(e.driven_at(s, v), y=none, good=none > 0.0))
-    known = tuple(f for f in study.null.free if isinstance(f.target, str))  # nominal is what the tolerance allows
+    driving = {x.name for x in study.model.elements if external(study.model, x)}
+    best = fit or study.null
+    models = [(study.model, _known(study.null)), (best.model, _known(best)), *([(extended, ())] if extended else [])]
     try:
-        laws = [(Problem(rig(m, places), rigs, (), study.set_name), free) for m, free in ((study.model, known), (extended, ())) if m]
+        laws = [(Problem(rig(m, places, driving), rigs, (), study.set_name), free) for m, free in models]
     except (CausaliseError, UserError):
         return []
     both = [[np.array(p.simulate(k, free, np.zeros((1, len(free))))[0][0]) for k in range(len(rigs))] for p, free in laws]
+    inner = np.concatenate(kept)
+    located = _located(study.linear, acting)
     found = []
     for i, place in enumerate(places):
-        s, v = (np.concatenate([m[q][:, i] for m in motions]) for q in (0, 1))
-        forces = [np.concatenate([z[:, i] for z in each]) for each in both]
-        edges = tuple(np.linspace(-x, x, BINS + 1) for x in (max(float(np.quantile(np.abs(q), 0.999)), 1e-12) for q in (s, v)))
-        measured = forces[-1] + np.concatenate([w[:, i] for w in beside])
+        s, v = (np.concatenate([m[q][:, i] for m in motions])[inner] for q in (0, 1))
+        forces = [np.concatenate([z[:, i] for z in each])[inner] for each in both]
+        edges = tuple(np.linspace(*_ends(q), BINS + 1) for q in (s, v))
+        measured = forces[1] + np.concatenate([w[:, i] for w in beside])[inner]
         names = tuple(name for name, _ in place.elements)
-        found.append(Surface(place.name, names, s, v, measured, forces[0], forces[1] if extended else None, edges, place.turns))
+        new = forces[2] if extended else None
+        found.append(Surface(place.name, names, s, v, measured, forces[0], new, edges, place.turns, located[i]))
     return found
+
+
+def _known(fit: Fit) -> tuple[Free, ...]:
+    """Its parameters: what a simulation of elements alone can take."""
+    return tuple(f for f in fit.free if isinstance(f.target, str))
+
+
+def _smoothed(study: Study, k: int, simulated: Array, acting: Sequence[int]) -> tuple[Array, Array, Array]:
+    """Deflections and rates [n, acting] of the places with elements in recording k as they most likely were, and the force at each that its
+    elements do not give, from what was simulated: sensors, then paths [n, n_z + 2 places]."""
+    e, n_z, n_u = study.experiments[k], len(study.model.sensors), len(study.model.inputs)
+    nominal, rest = (rfft(_residual(e, z[:, :n_z]), axis=0)[: e.band] for z in (study.null.simulated[k], simulated))
+    h = study.linear.transfer(e.frequencies[: e.band])[:, :, [n_u + p for p in acting] + list(range(n_u))]
+    gain = likely(e, study.levels[k], h[:, :n_z], len(acting), nominal / np.sqrt(len(e.time)))
+    w = np.einsum("fqz,fz->fq", gain, rest)
+    moved = np.einsum("fyq,fq->fy", h[:, n_z:], w)
+    whole = np.zeros((len(e.frequencies), moved.shape[1] + len(acting)), dtype=complex)
+    whole[: e.band] = np.concatenate([moved, w[:, : len(acting)]], axis=1)
+    change = irfft(whole, len(e.time), axis=0)
+    paths = simulated[:, n_z:] + change[:, : moved.shape[1]]
+    s, v = (paths[:, [2 * p + q for p in acting]] for q in (0, 1))
+    return s, v, change[:, moved.shape[1] :]
+
+
+def _residual(e: Experiment, simulated: Array) -> Array:
+    """What a simulation [n, n_z] leaves of the sensors, for a Fourier transform: interpolated over samples that do not count, where a
+    zero would be a jump that needs a huge force; faded at both ends, because the transform is periodic."""
+    rest, at = e.y - simulated, np.arange(len(e.time))
+    for j, good in enumerate(e.good.T):
+        rest[:, j] = np.interp(at, at[good], rest[good, j]) if good.any() else 0.0
+    return rest * _weights(len(rest))[:, None]
+
+
+def _weights(n: int, parts: int = 20) -> Array:
+    """Weights [n]: 1 but for the first and the last of so many parts of a recording, where they fall to 0."""
+    ramp = n // parts
+    rise = 0.5 - 0.5 * np.cos(np.pi * (np.arange(ramp) + 0.5) / max(ramp, 1))
+    return np.concatenate([rise, np.ones(n - 2 * ramp), rise[::-1]])
+
+
+def _ends(q: Array) -> tuple[float, float]:
+    """Between which nearly all values are; apart."""
+    low, high = (float(x) for x in np.quantile(q, (0.001, 0.999)))
+    return low, max(high, low + max(1e-12, 1e-9 * abs(low)))
+
+
+def _located(linear: Linear, acting: Sequence[int], rounding: float = 1e-6) -> list[bool]:
+    """Of each place: do the sensors show its deflection? Not where bodies may be moved and all rates and sensors stay the same, as a car on
+    a floor of which the speed is measured."""
+    seen = np.vstack([linear.a, linear.c[: linear.n_sensors]])
+    if not seen.size:
+        return [True] * len(acting)
+    seen = seen / np.maximum(np.max(np.abs(seen), axis=1, keepdims=True), 1e-300)
+    directions = np.linalg.svd(seen)[2][np.linalg.matrix_rank(seen, tol=rounding) :]
+    moved = linear.c[linear.n_sensors :: 2] @ directions.T  # deflections of the places
+    return [np.allclose(moved[p], 0.0, atol=rounding) for p in acting]
 
 
 def surface_numbers(s: Surface) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from penode_gen.model import Model
 from ..by_noise import FARTHER
 from ..catalogue import channels, separating
 from ..catalogue.drives import alike
+from ..catalogue.experiments import proposed
 from ..noise import UNSEEN
 from ..reliability import reliability
 from ..result import OUTSIDE, Cause, Diagnosis, Named, place
@@ -41,13 +42,14 @@ class Doubt:
         return ", ".join(place(n.kind, n.where) + (f" ({p:.0%})" if p is not None else "") for n, p in self.others)
 
 
-def doubts(d: Diagnosis) -> list[Doubt]:
-    """Of the named causes those that may as well be others: not what explanations with little posterior have in their place."""
+def doubts(d: Diagnosis, model: Model | None = None) -> list[Doubt]:
+    """Of the named causes those that may as well be others: not what explanations with little posterior have in their place. `model`: the
+    plant that the experiments are for."""
     found = []
     for c in d.causes:
         others = tuple((a, p) for a in c.alternatives if (p := _posterior(d, a)) != 0.0)
         if others:
-            found.append(Doubt(c, others, separating(c.kind, [n.kind for n, _ in others])))
+            found.append(Doubt(c, others, separating(c.kind, [n.kind for n, _ in others], model)))
     return found
 
 
@@ -64,9 +66,9 @@ def advised(d: Diagnosis, model: Model) -> Diagnosis:
     """A diagnosis of a model with what follows from it: what would tell its causes from others, how often such causes are right, what to do
     next."""
     causes = tuple(_with_alike(model, c) for c in d.causes)
-    causes = tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives])) for c in causes)
+    causes = tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives], model)) for c in causes)
     d = replace(d, causes=causes)
-    return replace(d, reliability=reliability(causes), advice=advice(d))
+    return replace(d, reliability=reliability(causes), advice=advice(d, model))
 
 
 def _with_alike(model: Model, c: Cause) -> Cause:
@@ -77,13 +79,13 @@ def _with_alike(model: Model, c: Cause) -> Cause:
     return replace(c, alternatives=(Named(*other), *c.alternatives)[:3])
 
 
-def advice(d: Diagnosis) -> tuple[str, ...]:
-    """What to do next, the most useful first."""
+def advice(d: Diagnosis, model: Model | None = None) -> tuple[str, ...]:
+    """What to do next with a plant, the most useful first."""
     first = [
         f"tell {place(x.cause.kind, x.cause.where)} from {' and '.join(place(n.kind, n.where) for n, _ in x.others)}: {x.how}"
-        for x in doubts(d)
+        for x in doubts(d, model)
     ]
-    return (*first, *_of_verdict(d), *_of_holdout(d))
+    return (*first, *_of_verdict(d), *_experiment(d, model), *_of_holdout(d))
 
 
 def _of_verdict(d: Diagnosis) -> list[str]:
@@ -94,9 +96,9 @@ def _of_verdict(d: Diagnosis) -> list[str]:
     ):
         return ["use model_extended.toml: it is the model as fitted to the recordings"]
     if d.verdict == "no_discrepancy":
-        return ["keep the model; before you use it for faster or larger motion, record some"]
+        return ["keep the model; record what it has to predict beyond these recordings before you use it there"]
     if d.verdict == "not_identifiable":
-        return ["record again with more excitation: larger motion, more frequencies, all sensors of the model file"]
+        return ["record again with more excitation: larger signals, more frequencies, all sensors of the model file"]
     if d.verdict == "unexplained":
         return _where_to_look(d)
     found = _take_over(d)
@@ -106,6 +108,13 @@ def _of_verdict(d: Diagnosis) -> list[str]:
             "the report shows where and when it occurs"
         )
     return found
+
+
+def _experiment(d: Diagnosis, model: Model | None) -> list[str]:
+    """What to record where something is left to explain."""
+    if model is None or d.verdict not in ("partly_explained", "unexplained", "not_identifiable"):
+        return []
+    return [f"record for the next diagnosis: {proposed(model, [c.kind for c in d.causes if c.kind != OUTSIDE])}"]
 
 
 def _take_over(d: Diagnosis) -> list[str]:

@@ -4,7 +4,9 @@
 
 from collections.abc import Iterable
 
-from . import aerated, bushings, channels, dampers, drives, friction, loads, masses, others, plays, springs, tyres
+from penode_gen.model import Model
+
+from . import aerated, bushings, channels, dampers, drives, experiments, friction, loads, masses, others, plays, springs, tyres
 
 FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aerated)
 MEANING = {kind: text for file in (*FILES, drives, channels, others) for kind, text in file.MEANING.items()}
@@ -18,9 +20,14 @@ OTHERWISE = (
 )
 
 
-def separating(kind: str, alternatives: Iterable[str]) -> str:
-    """The excitation that would tell a kind from others; empty if there are none."""
-    return "; ".join(dict.fromkeys(RIVALS.get(frozenset((kind, other)), OTHERWISE) for other in alternatives))
+def separating(kind: str, alternatives: Iterable[str], model: Model | None = None) -> str:
+    """The excitation that would tell a kind from others; empty if there are none. Where no file of the catalogue has one for a pair, that
+    under which both show in the plant of `model`."""
+
+    def general(other: str) -> str:
+        return OTHERWISE if model is None else experiments.proposed(model, (kind, other))
+
+    return "; ".join(dict.fromkeys(RIVALS.get(frozenset((kind, other))) or general(other) for other in alternatives))
 
 
 def curve(kind: str) -> object:

@@ -184,11 +184,23 @@ def readable(peak: float, unit: str) -> tuple[float, str]:
     return 1.0, unit
 
 
+def time_unit(seconds: float) -> tuple[float, str]:
+    """Factor and unit in which a stretch of time is neither tiny nor huge."""
+    return next(((k, u) for limit, k, u in ((600.0, 1.0, "s"), (10_800.0, 1.0 / 60.0, "min")) if seconds < limit), (1.0 / 3600.0, "h"))
+
+
 def pretty(unit: str) -> str:
     """m/s^2 as m/s², and N*s/m as N·s/m."""
     for plain, small in (("^2", "²"), ("^3", "³"), ("*", "·")):
         unit = unit.replace(plain, small)
     return unit
+
+
+def within(values: Sequence[Array], share: float = 0.05) -> tuple[float, float]:
+    """Ends of an axis that shows all values, 0 only if it is among them."""
+    low, high = (float(pick([pick(v) for v in values])) for pick in (np.min, np.max))
+    room = share * (high - low) or share * abs(high) or 1.0
+    return low - room, high + room
 
 
 def around(values: Sequence[Array], share: float = 0.05) -> tuple[float, float]:

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from .. import catalogue
-from . import figure as fig
 from ..advice import doubts
 from ..reliability import line
-from .figure import pretty, readable
 from ..residual import Channel
 from ..result import OUTSIDE, Cause, Diagnosis, place, plain, sigmas
+from . import figure as fig
+from .figure import pretty, readable, time_unit
 
 LIKE_NOISE = 1.1  # times the noise power
 
@@ -34,6 +34,18 @@ def value(x: float, unit: str = "") -> str:
     return f"{text.replace('-', '−')} {pretty(unit)}".removesuffix(" 1").strip()
 
 
+def common(values: Sequence[float], unit: str) -> list[str]:
+    """Values that are compared, in one unit: that in which the largest reads well."""
+    factor, shown = readable(max(map(abs, values), default=0.0), unit)
+    return [f"{value(x * factor)} {pretty(shown)}".removesuffix(" 1") for x in values]
+
+
+def between(low: float, high: float, unit: str) -> str:
+    """An interval with its unit once."""
+    factor, shown = readable(max(abs(low), abs(high)), unit)
+    return f"{value(low * factor)} … {value(high * factor)} {pretty(shown)}".removesuffix(" 1")
+
+
 def sure(confidence: float) -> str:
     """A confidence; nothing is certain."""
     return "> 99 %" if confidence > 0.99 else percent(confidence)
@@ -44,6 +56,12 @@ def relative(c: Cause, name: str) -> str:
     v = c.parameters[name]
     half = 0.5 * (v.ci95[1] - v.ci95[0])
     return "± " + (percent(half / abs(v.value)) if 10.0 * abs(v.value) > half else value(half, v.unit))
+
+
+def duration(seconds: float) -> str:
+    """A time in the unit that people would take."""
+    factor, unit = time_unit(seconds)
+    return f"{seconds * factor:.3g} {unit}"
 
 
 def joined(parts: Sequence[str]) -> str:
@@ -90,38 +108,49 @@ def lead(d: Diagnosis, train: Sequence[Channel]) -> list[str]:
     recordings, sensors = (f"{n} {word}{'s' * (n > 1)}" for n, word in counts)
     worst = train[0]
     times, share = worst.level(worst.before) / worst.noise, percent(worst.share)
-    found = [f"Learnt from {recordings} of {sum(seconds.values()):.0f} s with {sensors}."]
+    found = [f"Learnt from {recordings} of {duration(sum(seconds.values()))} with {sensors}."]
     if d.verdict == "no_discrepancy":
         return [*found, f"The largest residual, of {worst.sensor}, is {times:.2f} × its noise, {share} of the signal."]
     found.append(f"It errs most at {worst.sensor}: {times:.1f} × the noise, {share} of the signal, {where(worst)}.")
     if worst.after is not None:
-        found.append(f"In the extended model that falls to {worst.level(worst.after) / worst.noise:.2f} × the noise.")
+        found.append(f"With the extended model that error is {worst.level(worst.after) / worst.noise:.2f} × the noise.")
     return [*found, *(because(c) for c in known(d))]
 
 
 def because(c: Cause) -> str:
     """A cause with what it means and its sizes."""
-    sizes = ", ".join(
-        f"{plain(k)} {value(v.value, v.unit)} ({value(v.ci95[0], v.unit)} … {value(v.ci95[1], v.unit)})" for k, v in c.parameters.items()
-    )
+    sizes = ", ".join(f"{plain(k)} {value(v.value, v.unit)} (95 % interval {between(*v.ci95, v.unit)})" for k, v in c.parameters.items())
     name = place(c.kind, c.where)
     return f"{name[0].upper()}{name[1:]}{': ' * bool(sizes)}{sizes}. {catalogue.MEANING.get(c.kind, '')}".strip()
 
 
 def where(c: Channel) -> str:
     """Where the residual beyond the noise is, in frequency and time."""
-    if c.before.white.level < LIKE_NOISE:
-        return "no more than noise"
-    excess = np.maximum(c.before.density - c.floor, 0.0)
-    total = np.cumsum(excess)
-    if total[-1] <= 0.0:
-        return "no more than noise"
+    band = _band(c)
+    return f"half of it {band}{bursts(c)}" if band else "no more than noise"
+
+
+def half_between(c: Channel) -> str:
+    """The same of frequency, as a sentence; empty where there is no more than noise."""
+    band = _band(c)
+    return f"Half of the power above it lies {band}" if band else ""
+
+
+def _band(c: Channel) -> str:
+    """Frequencies that hold the middle half of the power beyond the noise; empty where there is none."""
+    total = np.cumsum(np.maximum(c.before.density - c.floor, 0.0))
+    if c.before.white.level < LIKE_NOISE or total[-1] <= 0.0:
+        return ""
     low, high = (float(c.f[int(np.searchsorted(total, q * total[-1]))]) for q in (0.25, 0.75))
-    text = f"half of it between {low:.2g} and {high:.2g} Hz" if high > 1.05 * low else f"half of it near {low:.2g} Hz"
+    return f"between {low:.2g} and {high:.2g} Hz" if high > 1.05 * low else f"near {low:.2g} Hz"
+
+
+def bursts(c: Channel) -> str:
+    """What share of the residual's power is in the worst tenth of the time, if that is much more than a tenth."""
     blocks = np.array_split(np.where(c.good, c.before.values, 0.0) ** 2, 20)
     powers = np.sort([float(np.sum(b)) for b in blocks])
     burst = powers[-2:].sum() / max(powers.sum(), 1e-300)
-    return text + (f", {percent(burst)} in a tenth of the time" if burst > 0.3 else "")
+    return f", {percent(burst)} of its power in a tenth of the time" if burst > 0.3 else ""
 
 
 def key_figures(d: Diagnosis) -> list[tuple[str, str, str]]:
@@ -146,9 +175,10 @@ def cost(d: Diagnosis) -> tuple[str, str, str]:
         else max(d.gain, key=lambda n: d.gain[n].before_rmse / max(d.gain[n].noise_floor, 1e-300))
     )
     g = d.gain[name]
-    before, after, noise = (value(x, g.unit) for x in (g.before_rmse, g.after_rmse, g.noise_floor))
+    (before, after), noise = common((g.before_rmse, g.after_rmse), g.unit), value(g.noise_floor, g.unit)
     gained = f", {percent(min(shares[name], 1.0))} of what can be gained" if name in shares and before != after else ""
-    return what, before if before == after else f"{before} → {after}", f"RMS of {name}; noise {noise}{gained}"
+    change = f"{before.partition(' ')[0]} → {after}" if " " in before else f"{before} → {after}"
+    return what, before if before == after else change, f"RMS of {name}; noise {noise}{gained}"
 
 
 def command(d: Diagnosis) -> str:
@@ -162,5 +192,6 @@ def gains(d: Diagnosis) -> list[dict[str, Any]]:
     for name, g in d.gain.items():
         top = 1.05 * max(g.before_rmse, g.after_rmse, g.noise_floor, 1e-300)
         at = {key: round(100.0 * getattr(g, key) / top, 1) for key in ("before_rmse", "after_rmse", "noise_floor")}
-        rows.append({"name": name, "g": g, "at": at})
+        sizes = common((g.before_rmse, g.after_rmse, g.noise_floor), g.unit)
+        rows.append({"name": name, "g": g, "at": at, "sizes": sizes})
     return rows
