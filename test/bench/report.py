@@ -123,6 +123,7 @@ function and kind of layer that there is (`all_laws.py`); ros1 runs through all 
 HOSTS = {f"**penode, {what}**": f"**penode, {what}** ({OURS['RK4', what].title})" for what in ("layered", "folded")}
 BATCH = {"nQVM, layer by layer": "`nqvm.toml`", "nQVM, folded": "`nqvm.toml`, pieces = 96", "hypothesis, 12 states": "`batch.py`"}
 CALLER = ("instance", "banks", "set", "commit stack bound")
+DECIDING = ("m3", "m4f", "m7")  # a core without an FPU, the most common one, and a fast one
 COSTS = ("instructions", "modelled kilocycles", "text", "constants", "RAM", "stack", "its bound")
 
 
@@ -158,13 +159,26 @@ def files(figures: Figures) -> dict[str, str]:
 
 
 def prices(figures: Figures) -> str:
-    """The price table of README.md."""
-    at = {
-        (title, machine, level): ours_at(figures, method=method, evaluator=evaluator, real="float", machine=machine, level=level)[0]
-        for title, (method, evaluator) in PRICES.items()
-        for machine in CORES
-        for level in ("-O2", "-Os")
-    }
+    """The price table of README.md: what decides between the methods, at -O2."""
+    at = _at(figures)
+    memory = _memory(figures)
+    errors = {row["model"]: row for row in figures["accuracy"]}
+    rows = [["model file", *files(figures).values()]]
+    rows += [
+        [f"instructions a step, {name}", *(span(at[title, machine, "-O2"]["instructions"]) for title in PRICES)]
+        for machine, name in CORES.items()
+        if machine in DECIDING
+    ]
+    names = {"text": "code of the whole step [B]", "stack": "its stack [B]"}
+    rows += [[name, *(number(at[title, "m4f", "-O2"][key]) for title in PRICES)] for key, name in names.items()]
+    rows.append(["an instance [B]", *(number(memory[PRICES[title]]["instance"]) for title in PRICES)])
+    rows.append(["largest error after 10 s", *(_micrometres(errors[title]["largest"]) for title in PRICES)])
+    return rows_of(["float, -O2; bytes on a Cortex-M4F", *PRICES], rows)
+
+
+def all_prices(figures: Figures) -> tuple[str, ...]:
+    """The same for all cores, at -O2 and -Os, with all of memory and accuracy: tables of table.md."""
+    at, memory = _at(figures), _memory(figures)
     file = files(figures)
     columns = [(title, level) for title in PRICES for level in ("-O2", "-Os")]
     header = [f"{title} {level}" for title, level in columns]
@@ -172,7 +186,6 @@ def prices(figures: Figures) -> str:
     counts = [[name, *(span(at[title, machine, level]["instructions"]) for title, level in columns)] for machine, name in CORES.items()]
     names = {"text": "code of the whole step", "rodata": "its constants, without weights", "stack": "its stack", "ram": "other RAM"}
     sizes = [[name, *(number(at[title, "m4f", level][key]) for title, level in columns)] for key, name in names.items()]
-    memory = {(row["method"], row["evaluator"]): row for row in figures["memory"] if row["real"] == "float"}
     caller = {"instance": "an instance", "set": "a parameter set, in flash or in RAM of the caller"}
     sizes += [[name, *(number(memory[PRICES[title]][key]) for title, _ in columns)] for key, name in caller.items()]
     errors = {row["model"]: row for row in figures["accuracy"]}
@@ -180,13 +193,26 @@ def prices(figures: Figures) -> str:
         [name, *(_micrometres(errors[title][key]) for title in PRICES)]
         for key, name in (("largest", "largest error of z_b, z_w"), ("RMS", "RMS error"))
     ]
-    return "\n\n".join(
-        (
-            rows_of(["instructions a step", *header], [of, *counts]),
-            rows_of(["bytes on a Cortex-M4F", *header], [of, *sizes]),
-            rows_of(["float C at 1 ms against the exact solution, 10 s of a chirp", *PRICES], [["model file", *file.values()], *exact]),
-        )
+    return (
+        rows_of(["instructions a step", *header], [of, *counts]),
+        rows_of(["bytes on a Cortex-M4F", *header], [of, *sizes]),
+        rows_of(["float C at 1 ms against the exact solution, 10 s of a chirp", *PRICES], [["model file", *file.values()], *exact]),
     )
+
+
+def _at(figures: Figures) -> dict[tuple[str, str, str], Figures]:
+    """Our figures in float by title, core and level."""
+    return {
+        (title, machine, level): ours_at(figures, method=method, evaluator=evaluator, real="float", machine=machine, level=level)[0]
+        for title, (method, evaluator) in PRICES.items()
+        for machine in CORES
+        for level in ("-O2", "-Os")
+    }
+
+
+def _memory(figures: Figures) -> dict[tuple[str, str], Figures]:
+    """Memory of the caller in float by method and evaluator."""
+    return {(row["method"], row["evaluator"]): row for row in figures["memory"] if row["real"] == "float"}
 
 
 def _micrometres(nanometres: int) -> str:
@@ -245,6 +271,8 @@ def table(figures: Figures) -> str:
             [[f"{r['method']}, {r['evaluator']}", r["model"], r["real"], *(number(r[k]) for k in CALLER)] for r in figures["memory"]],
         ),
         MEMORY,
+        "### The columns of README.md",
+        *all_prices(figures),
         "## Peers, each at its best flags",
         rows_of(
             ["RK4 step, Cortex-M4F", "flags", *COSTS],

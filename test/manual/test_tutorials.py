@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The tutorials, command by command: each prints what the page says, each file begins as the page says."""
+"""The tutorials and the how-to pages with commands, one by one: each prints what the page says, each file begins as the page says."""
 
 from __future__ import annotations
 
@@ -13,16 +13,21 @@ import pytest
 import schemas
 from replay import ROOT, STEP, Step, replay
 
-TUTORIALS = ROOT / "sil/manual/tutorials"
-DIAGNOSING = sorted(p.stem for p in TUTORIALS.glob("*.md") if "\n    penode diagnose " in p.read_text(encoding="utf-8"))
+PAGES = {
+    p.stem: p.read_text(encoding="utf-8")
+    for folder in ("tutorials", "howto")
+    for p in sorted((ROOT / "sil/manual" / folder).glob("*.md"))
+    if folder == "tutorials" or "\nSave as `" in p.read_text(encoding="utf-8")
+}
+DIAGNOSING = [name for name, text in PAGES.items() if "\n    penode diagnose " in text]
 MOST_COMMANDS = 8  # from a folder with a recording to a named cause
 
 
-@pytest.fixture(scope="module", params=sorted(p.stem for p in TUTORIALS.glob("*.md")))
+@pytest.fixture(scope="module", params=PAGES)
 def done(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Step]]:
-    """A tutorial that was followed: its folder, and its steps."""
+    """A page that was followed: its folder, and its steps."""
     folder = tmp_path_factory.mktemp(request.param)
-    return folder, list(replay((TUTORIALS / f"{request.param}.md").read_text(encoding="utf-8"), folder))
+    return folder, list(replay(PAGES[request.param], folder))
 
 
 def test_all_is_as_the_page_says(done: tuple[Path, list[Step]]) -> None:
@@ -37,10 +42,10 @@ def test_what_was_written_fits_the_schema(done: tuple[Path, list[Step]]) -> None
     jsonschema.validate(json.loads(file.read_text(encoding="utf-8")), schemas.schema("diagnosis"))
 
 
-@pytest.mark.parametrize("page", sorted(p.name for p in TUTORIALS.glob("*.md")))
+@pytest.mark.parametrize("page", PAGES)
 def test_nothing_is_left_out(page: str) -> None:
     """Each command and each fence of a page is a step, and the way to the cause is short."""
-    text = (TUTORIALS / page).read_text(encoding="utf-8")
+    text = PAGES[page]
     steps = list(STEP.finditer(text))
     assert sum(bool(m["command"]) for m in steps) == len(re.findall(r"^    (?:penode|python3) ", text, re.MULTILINE))
     assert sum(bool(m["name"] or m["printed"] or m["holds"]) for m in steps) == text.count("\n```\n") == text.count("```") / 2
