@@ -86,24 +86,30 @@ bool pen_usable(const pen_model_t *model, const pen_instance_t *self);
 
 /* ---- the tuning half: as in penode/pen_set.h; also counted, and PEN_SET_BADARG if the instance is not usable ---- */
 
-/** pen_ready makes the instance usable if `found` is PEN_OK. @return as pen_tuning_init */
+/** Give a new instance its set and up to two banks [model->length], or NULL. @return as pen_tuning_init */
 pen_status_t pen_init(const pen_model_t *model, pen_instance_t *self, const pen_set_t *set, pen_real_t bank0[], pen_real_t bank1[]);
+/** Then make it usable if `found` is PEN_OK. @param piece  of both slots, or NULL if nothing is folded. @return found */
 pen_status_t pen_ready(const pen_model_t *model, pen_instance_t *self, const pen_piece_t piece[], pen_status_t found);
 
-pen_status_t pen_tune_begin(const pen_model_t *model, pen_instance_t *self, const pen_set_head_t *head);
-pen_status_t pen_tune_begin_copy(const pen_model_t *model, pen_instance_t *self, uint32_t id);
+pen_status_t pen_tune_begin(const pen_model_t *model, pen_instance_t *self, const pen_set_head_t *head); /* PEN_SET_BUSY, PEN_SET_LAYOUT */
+pen_status_t pen_tune_begin_copy(const pen_model_t *model, pen_instance_t *self, uint32_t id); /* of the running set; errors as begin */
+/** Values [offset, offset + n) of the open set, in order. @return PEN_OK; PEN_SET_CLOSED; PEN_SET_RANGE; PEN_SET_BADARG */
 pen_status_t pen_tune_write(const pen_model_t *model, pen_instance_t *self, uint32_t offset, const pen_real_t value[], uint32_t n);
+/** The same in bytes of the serial form (penode/pen_serial.h): offset and n count bytes, nothing need be aligned. */
 pen_status_t pen_tune_write_bytes(const pen_model_t *model, pen_instance_t *self, uint32_t offset, const uint8_t byte[], uint32_t n);
-pen_status_t pen_tune_abort(const pen_model_t *model, pen_instance_t *self);
-pen_status_t pen_tune_withdraw(const pen_model_t *model, pen_instance_t *self);
-pen_status_t pen_tune_hold(const pen_model_t *model, pen_instance_t *self, bool hold);
-pen_status_t pen_tune_expect(const pen_model_t *model, pen_instance_t *self, uint32_t checksum);
-pen_status_t pen_tune_pending(const pen_model_t *model, const pen_instance_t *self, bool *pending);
+pen_status_t pen_tune_abort(const pen_model_t *model, pen_instance_t *self); /* the open set; PEN_SET_CLOSED: none is open */
+pen_status_t pen_tune_withdraw(const pen_model_t *model, pen_instance_t *self); /* a published set; PEN_SET_IDLE: none */
+pen_status_t pen_tune_hold(const pen_model_t *model, pen_instance_t *self, bool hold); /* state and outputs, from the next step on */
+pen_status_t pen_tune_expect(const pen_model_t *model, pen_instance_t *self, uint32_t checksum); /* of the open set; PEN_SET_CLOSED */
+pen_status_t pen_tune_pending(const pen_model_t *model, const pen_instance_t *self, bool *pending); /* waits for the next step? */
+/** The head of the set in force. @return PEN_OK; PEN_SET_BADARG */
 pen_status_t pen_tune_running(const pen_model_t *model, const pen_instance_t *self, pen_set_head_t *head);
 
 /* These three return the checked set in *ready; pen_tune_publish counts the result. */
 pen_status_t pen_tune_commit(const pen_model_t *model, pen_instance_t *self, pen_set_t *ready);
+/** A whole set, in flash say, without a copy; what is open is dropped. @return also PEN_SET_BUSY; PEN_SET_BADARG */
 pen_status_t pen_tune_select(const pen_model_t *model, pen_instance_t *self, const pen_set_t *set, pen_set_t *ready);
+/** The set that ran before; what is open is dropped. @return also PEN_SET_BUSY; PEN_SET_NO_PREVIOUS */
 pen_status_t pen_tune_rollback(const pen_model_t *model, pen_instance_t *self, pen_set_t *ready);
 
 /** Publish `ready` if `found` is PEN_OK, and count. @param piece  of the inactive slot; NULL if nothing is folded. @return found */
@@ -130,7 +136,7 @@ pen_status_t pen_instance_status(const pen_model_t *model, pen_instance_t *self,
 
 /** Add a piece to a CRC-32, as pen_crc_values; checksum of all pieces of a slot, [networks * pieces]. */
 uint32_t pen_piece_crc(uint32_t crc, const pen_piece_t *piece);
-uint32_t pen_pieces_crc(const pen_model_t *model, const pen_piece_t piece[]);
+uint32_t pen_pieces_crc(const pen_model_t *model, const pen_piece_t piece[]); /* of all pieces of a slot */
 
 /**
  * Check up to n values of the running set and its pieces. Tuning context.

@@ -61,13 +61,13 @@ static inline pen_real_t pen_where(bool condition, pen_real_t yes, pen_real_t no
     return both[condition ? 1U : 0U];
 }
 
-/* Kinks. NaN, and an Inf that the result would hide, come out as NaN. */
-
+/** The larger one; NaN for NaN, and where the result would hide an Inf. */
 static inline pen_real_t pen_max(pen_real_t a, pen_real_t b)
 {
     return pen_where(a > b, a, b) + ((pen_real_t)0 * (a + b));
 }
 
+/** The smaller one; NaN as pen_max. */
 static inline pen_real_t pen_min(pen_real_t a, pen_real_t b)
 {
     return pen_where(a < b, a, b) + ((pen_real_t)0 * (a + b));

@@ -49,6 +49,7 @@ typedef struct {
     pen_real_t r15;
 } pen_rows_t;
 
+/** Rows at their biases. @param bias [16] */
 PEN_PORT_INLINE void pen_rows_begin(pen_rows_t *a, const pen_real_t bias[])
 {
     a->r0 = bias[0];
@@ -69,6 +70,7 @@ PEN_PORT_INLINE void pen_rows_begin(pen_rows_t *a, const pen_real_t bias[])
     a->r15 = bias[15];
 }
 
+/** Add a column of the weights times an input. @param column [16] */
 PEN_PORT_INLINE void pen_rows_add(pen_rows_t *a, const pen_real_t column[], pen_real_t x)
 {
     a->r0 += column[0] * x;
@@ -89,6 +91,7 @@ PEN_PORT_INLINE void pen_rows_add(pen_rows_t *a, const pen_real_t column[], pen_
     a->r15 += column[15] * x;
 }
 
+/** The rows, before any activation. @param y [16] */
 PEN_PORT_INLINE void pen_rows_end(const pen_rows_t *a, pen_real_t y[])
 {
     y[0] = a->r0;
@@ -139,6 +142,7 @@ PEN_PORT_INLINE pen_real_t pen_net16(size_t hidden, const pen_real_t w[], pen_re
 
 #elif defined(__OPTIMIZE_SIZE__)
 
+/* The same with one loop for all layers: the smallest code. */
 PEN_PORT_INLINE pen_real_t pen_net16(size_t hidden, const pen_real_t w[], pen_real_t x)
 {
     const pen_real_t *p = &w[32];
@@ -186,6 +190,7 @@ PEN_PORT_INLINE pen_real_t pen_rows_last(const pen_rows_t *a, const pen_real_t w
     return (pen_real_t)0.5F * twice;
 }
 
+/* The same with the rows in registers: the fastest code. */
 PEN_PORT_INLINE pen_real_t pen_net16(size_t hidden, const pen_real_t w[], pen_real_t x)
 {
     const pen_real_t *p = &w[32];
@@ -252,6 +257,7 @@ PEN_PORT_INLINE void pen_duals_begin(pen_duals_t *a, const pen_real_t bias[], co
     a->d7 = column[7] * t;
 }
 
+/* One more column: eight rows of values and of tangents. */
 PEN_PORT_INLINE void pen_duals_add(pen_duals_t *a, const pen_real_t column[], pen_real_t x, pen_real_t t)
 {
     a->r0 += column[0] * x;
@@ -292,6 +298,7 @@ PEN_PORT_INLINE pen_real_t pen_rectified_slope(pen_real_t r, pen_real_t d)
     return (r > (pen_real_t)0) ? d : (pen_real_t)0;
 }
 
+/* The rows after the ReLU, and their tangents. */
 PEN_PORT_INLINE void pen_duals_end(const pen_duals_t *a, pen_real_t y[], pen_real_t s[])
 {
     y[0] = pen_rectified(a->r0);

@@ -48,11 +48,11 @@ void pen_serial_write(const pen_set_head_t *head, uint8_t byte[PEN_SERIAL_HEAD])
 
 /** A word as four bytes, and back. @param byte  [4] */
 void pen_serial_put(uint32_t word, uint8_t byte[4]);
-uint32_t pen_serial_get(const uint8_t byte[4]);
+uint32_t pen_serial_get(const uint8_t byte[4]); /* the word of four bytes, whatever their alignment */
 
 /** Write n bytes of the serial form of value[] from its byte `offset` on to byte[]; read them from byte[] into value[]. */
 void pen_serial_put_bytes(const pen_real_t value[], size_t offset, size_t n, uint8_t byte[]);
-void pen_serial_get_bytes(pen_real_t value[], size_t offset, size_t n, const uint8_t byte[]);
+void pen_serial_get_bytes(pen_real_t value[], size_t offset, size_t n, const uint8_t byte[]); /* the reverse; whole or parts of values */
 
 /**
  * CRC-32 (IEEE 802.3, reflected) of bytes; of values, over their serial form; of a word. Begin with PEN_CRC_START, pass
@@ -60,8 +60,8 @@ void pen_serial_get_bytes(pen_real_t value[], size_t offset, size_t n, const uin
  */
 #define PEN_CRC_START UINT32_MAX
 uint32_t pen_crc_bytes(uint32_t crc, size_t n, const uint8_t byte[]);
-uint32_t pen_crc_values(uint32_t crc, size_t n, const pen_real_t value[]);
-uint32_t pen_crc_word(uint32_t crc, uint32_t word);
+uint32_t pen_crc_values(uint32_t crc, size_t n, const pen_real_t value[]); /* n values, in their serial form */
+uint32_t pen_crc_word(uint32_t crc, uint32_t word); /* one word, in its serial form */
 
 #ifdef __cplusplus
 }

@@ -116,6 +116,7 @@ static inline pen_real_t pen_step_clamp(pen_real_t u, pen_real_t least, pen_real
     return (raised > most) ? most : raised;
 }
 
+/** Sum of a[i] b[i], in this order. @param a, b [n] */
 static inline pen_real_t pen_step_inner(size_t n, const pen_real_t a[], const pen_real_t b[])
 {
     pen_real_t sum = (pen_real_t)0;

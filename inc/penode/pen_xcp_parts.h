@@ -47,7 +47,7 @@ static inline uint32_t pen_xcp_turn(void)
 
 /** A number of 2 or 4 bytes, in the core's order. */
 uint32_t pen_xcp_get(const uint8_t byte[], uint32_t size);
-void pen_xcp_put(uint8_t byte[], uint32_t size, uint32_t number);
+void pen_xcp_put(uint8_t byte[], uint32_t size, uint32_t number); /* write one */
 
 /** Bytes of a region of the configuration; NULL if [address, address + n) is not all in one. */
 const uint8_t *pen_xcp_region(const pen_xcp_config_t *config, uint32_t address, uint32_t n);

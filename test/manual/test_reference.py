@@ -63,6 +63,11 @@ def test_every_make_target() -> None:
     assert documented == set(re.findall(r"^\| `make ([a-z-]+)` \| \S", page, re.MULTILINE))
 
 
+@pytest.mark.parametrize("header", [h for h in c_api.headers() if re.match(r"inc/(?!.*pen_ekf)", h)])  # that of the filter lacks one
+def test_every_function_of_the_runtime_has_a_comment(header: str) -> None:
+    assert [f.name for f in c_api.functions((ROOT / header).read_text(encoding="utf-8")) if not f.comment.strip()] == []
+
+
 def test_every_function_of_the_headers(tmp_path: Path) -> None:
     """As gcc lists them."""
     own = sorted(p.name for p in (ROOT / "inc/penode").glob("*.h"))
