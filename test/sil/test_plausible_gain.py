@@ -31,7 +31,7 @@ def test_one_factor_is_the_gain_of_the_input():
     model = plant()
     delay = Cause("sensor_delay", "x", {"delay": Value(1e-3, "s", (9e-4, 1.1e-3))}, 0.9)
     (gain, other), notes = weighed._plausible(model, (*wrong(model, m=1.37, c=1.35, d=1.39), delay))
-    assert (gain.kind, gain.where, other) == ("input_gain", "push", delay) and "by one factor" in notes[0]
+    assert (gain.kind, gain.where, other) == ("input_gain", "push", delay) and "by a common factor" in notes[0]
     # weights are those of intervals 4 % of each factor wide; truth: their mean is within a tenth of a per cent of 1.37
     assert gain.parameters["gain"].value == pytest.approx(1.0 / 1.37, rel=2e-3)
     low, high = gain.parameters["gain"].ci95

@@ -126,7 +126,7 @@ class EndTables(NetworkTables):
             moving[name] = (ex.symbol(name),) * 2
             yield m.Point(name, text, unit)
 
-    # -- what acts ------------------------------------------------------------------------------------------------
+    # -- elements --------------------------------------------------------------------------------------------------
 
     def ends(self, where: tuple[str, ...], ends: list[Any], inputs: tuple[m.Input, ...]) -> tuple[str, str]:
         """The two ends of an element."""

@@ -44,7 +44,7 @@ from .result import MAY_BE_NOTHING, OUTSIDE, Cause, Diagnosis, Gain, Named, plac
 from .study import Study, look
 
 CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
-FARTHER = 0.02  # share of samples outside of what was trained, from which a hold-out says little about a name
+FARTHER = 0.02  # share of samples outside of the training, above which a hold-out is no evidence for a name
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 SURELY_NOT = (Cause(OUTSIDE, "", {}, 0.5),)  # named by nothing on the list
 
@@ -211,7 +211,7 @@ def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, di
     judged = replace(judged, notes=(*judged.notes, *more))
     unseen = [s for s, g in gain.items() if g.after_rmse > UNSEEN * g.noise_floor] if not judged.causes else []
     if unseen:
-        note = f"{', '.join(unseen)}: the hold-out shows an effect that the training does not: train with recordings like it"
+        note = f"{', '.join(unseen)}: the hold-out shows an effect that the training does not: train with recordings like that one"
         judged = replace(judged, causes=SURELY_NOT, verdict="unexplained", explained=0.0, notes=(*judged.notes, note))
     return judged, text, gain, held
 

@@ -67,7 +67,7 @@ def limited(model: Model, form: Form, name: str) -> tuple[Model, Free]:
 
 
 def share(bench: Bench, form: Form, limit: Free) -> float:
-    """What a limit cuts off, as a share of what the sensor shows."""
+    """What a limit cuts off, as a share of the signal."""
     whole = tuple(replace(f, value=FAR**2 * f.value) if f.target == limit.target else f for f in bench.fit.free)
     z = np.concatenate([x[:, form.index] for x in bench.problem().predictor.sensors(whole)])
     return float(np.sqrt(np.mean((z - np.clip(z, -limit.value, limit.value)) ** 2)) / max(np.std(z), 1e-300))

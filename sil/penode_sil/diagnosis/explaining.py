@@ -16,7 +16,7 @@ from .hypotheses import VALUED, Basis, Fault
 from .naming import with_kinds
 from .study import Study, loss
 
-CLOSED = 1e-4  # of what there is to gain: a fit that gains less by an iteration is good enough to be compared
+CLOSED = 1e-4  # of the possible gain: a fit that gains less in an iteration is good enough for a comparison
 # steps for all derivatives: where it takes more, only the best explanation is gone on with, and with one rival of a cause; and one law
 # mends its form
 HEAVY = 2e6

@@ -26,8 +26,8 @@ from .study import Study
 CHANCE = 3.0  # deviations of chi2
 COST = 10.0  # chi2 that an elementary law must gain for each of its numbers, and the choice among many
 NEW = 50.0  # chi2 that a further kind must gain beyond that
-FORM = 7e-4  # of what has been gained: a number more must gain that, or it only mends the form
-LEAST = 1e-3  # of what has been gained: less, beside a curve, is a matter of its memory that no family has
+FORM = 7e-4  # of the total gain: what one more number must gain, or it only adapts the form
+LEAST = 1e-3  # of the total gain: less, together with a curve, is a detail of its memory that no family has
 CURVES = {  # kinds of one family at one place are one curve with one name
     "coulomb_friction": "friction",
     "stribeck_friction": "friction",

@@ -30,7 +30,7 @@ KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
 FAR = 1e20  # residual of a run that cannot be simulated, and the most that it shows
 REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
-PROMISE = 0.7  # of what a full step promises to gain: if it keeps that, derivatives are about what they were
+PROMISE = 0.7  # of the gain that a full step predicts: if that is reached, the derivatives have hardly changed
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
 
 

@@ -77,7 +77,7 @@ def judge(
 
 
 def share(study: Study, e: Explanation, left: float = 0.0) -> float:
-    """Of the avoidable residual that an explanation takes away, 0 to 1; `left`: chi2 at least of what it leaves."""
+    """Of the avoidable residual that an explanation takes away, 0 to 1; `left`: a lower bound of the chi2 that remains."""
     left, gained = max(e.fit.chi2 - explanation.rows(study), left), study.null.cost - e.fit.cost
     return gained / (gained + left) if gained + left > 0.0 else 1.0
 
@@ -95,7 +95,8 @@ def damped(causes: Sequence[Cause]) -> list[str]:
         if v["damping_ratio"] > DAMPED:
             like = f"a mass of {v['mass']:.3g} kg at {v['frequency']:.3g} Hz with a damping ratio of {v['damping_ratio']:.2f}"
             lines.append(
-                f"what {c.where} lacks is like {like}, too much for a part on rubber: pitch, roll, an occupant, a load that moves?"
+                f"the force missing at {c.where} is like that of {like}, too much for a part on rubber: "
+                "pitch, roll, an occupant, a load that moves?"
             )
     return lines
 

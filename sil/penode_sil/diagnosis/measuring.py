@@ -58,9 +58,9 @@ def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
 def measure(
     study: Study, extended: Model, holdout: Sequence[Experiment], lost: Collection[str] = (), set_name: str = ""
 ) -> tuple[dict[str, Gain], list[str], list[Channel]]:
-    """Errors before and after on held-out recordings, with the generated C; how much of them lies outside of what was
-    seen in training, where a right name says nothing about size; and all of it sample by sample. Sensors `lost` drop out:
-    bursts of theirs do not count. `set_name`: parameter set of the extended model, if it is another one."""
+    """Errors before and after on held-out recordings, with the generated C; which share of them lies outside of the range of
+    the training, where a right name does not determine the size; and all of it sample by sample. Sensors `lost` have dropouts, which do not
+    count. `set_name`: parameter set of the extended model, if it is another one."""
     model = study.model
     shown: list[Channel] = []
     floors = noise_floor(study, 0)
@@ -97,13 +97,12 @@ def measure(
     return gains, notes, shown
 
 
-BLOCKS = 40  # of the held-out samples, drawn anew together: errors near in time are alike
+BLOCKS = 40  # of the held-out samples for the bootstrap: errors close in time are correlated
 
 
 def achieved(before: Array, after: Array, floor: float) -> tuple[float | None, tuple[float, float] | None]:
     """Share of the achievable gain in RMS [errors before and after, n each], and its 95 % interval by a block bootstrap; None
-    where there is next to nothing to gain. All of it where less is left than the floor, which training
-    recordings show above the band: there, edges of forces are in it too."""
+    where there is hardly anything to gain; all of it where the error after is below the floor."""
     power = np.array([[np.mean(b**2) for b in np.array_split(x, min(BLOCKS, len(x)))] for x in (before, after)])
     draws = np.random.default_rng(0).integers(power.shape[1], size=(DRAWS, power.shape[1]))
     b, a = np.sqrt(power[:, draws].mean(axis=2))

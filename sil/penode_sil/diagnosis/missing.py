@@ -32,8 +32,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Effort:
-    """How a walk is looked for. `strengths`: variance of a force's rate after a second, in squares of `_unit` times `pace` [1/s^2];
-    `finer`: factors around the best. `forgets`: recordings after which a walk has forgotten where it was, for accelerations do not show a
+    """Settings of the estimate. `strengths`: variance of a force's rate after a second, in squares of `_unit` times `pace` [1/s^2];
+    `finer`: factors around the best. `forgets`: memory of the filter, in lengths of the recording, because accelerations do not show a
     constant force. `shift`: units by which free values are moved for derivatives. The `refined` places that explain most are looked at
     `again`, about the free values found there, so many times each."""
 
@@ -308,7 +308,7 @@ def _discrete(linear: Linear, column: int, p: _Recording, unit: float) -> tuple[
 
 
 def _walk(linear: Linear, column: int, p: _Recording, unit: float, strength: float) -> Walk | None:
-    """The plant under a wandering force, for residuals that fade (`_fade`): what no sensor shows is forgotten in the end."""
+    """The plant under a force that is a random walk, for residuals weighted by `_fade`: what no sensor shows is forgotten in the end."""
     f, h = _discrete(linear, column, p, unit)
     n, step = len(linear.a), p.experiment.step
     into = np.concatenate([f[:n, n + 1], [1.0, 1.0]])
@@ -348,9 +348,9 @@ def _innovations(parts: Sequence[_Recording], walks: Sequence[Walk], of: Callabl
 
 
 def _shifts(free: Sequence[Free], parts: Sequence[_Recording], walks: Sequence[Walk]) -> Array:
-    """The likeliest shifts of the free values, within their priors and limits, beside a walk of the greatest strength: what a force at this
-    place does as well, as a torque does for an inertia, says nothing about them. A walk that is smoother than the force would rather
-    have a part of it in a parameter (Rice 1986, Speckman 1988)."""
+    """The likeliest shifts of the free values, within their priors and limits, beside a walk of the greatest strength: an effect
+    that a force at this place has as well, as a torque has that of an inertia, is no evidence for them. With a smoother walk a part of the
+    force would be taken for a change of a parameter (Rice 1986, Speckman 1988)."""
     if not free:
         return np.zeros(0)
     r = np.concatenate([x.ravel() for x in _innovations(parts, walks, lambda p: p.residual)] + [[-f.offset for f in free]])

@@ -135,7 +135,7 @@ def straight(model: Model, places: Sequence[Place], terms: Sequence[Term], names
     if group[0] not in (*DAMPERS, "cubic_spring", "asymmetric_spring", "tyre_nonlinear"):
         return ""
     law, argument = ("linear_damper", "damping") if group[0] in DAMPERS else ("linear_spring", "stiffness")
-    size = {True: 0.0, False: 0.0}  # of what is straight, and of what is not
+    size = {True: 0.0, False: 0.0}  # of linear parts, and of others
     for term, name in own:
         what = term.candidate.what
         gain = values.get(f"{name}_{what.gain[0]}", term.gain)

@@ -352,7 +352,7 @@ def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Met
     return Metric(len(e.time), root)
 
 
-UNSEEN = 1.5  # times the noise, of whatever colour: more than sensors have, and a hold-out that is that far off is of another plant
+UNSEEN = 1.5  # times the noise: an error that no coloured noise of sensors explains
 ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
 
 

@@ -52,10 +52,10 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
         if abs(value - p.value) <= _limit(p) * abs(p.value) + Z_95 * sd:
             continue
         if p.name in shared and not straight.off(p.value, value, shared[p.name], _limit(p)):
-            notes.append(f"{p.name} is {value:.4g} {unit} beside the cause found at its place, which has a linear part too")
+            notes.append(f"{p.name} is {value:.4g} {unit} together with the cause found at its place, which has a linear part too")
         elif size < WORTH:
             notes.append(
-                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than unmodelled effects may do"
+                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than unmodelled effects can"
             )
         elif not straight.off(p.value, beside, shared_by_all.get(p.name, (0.0, 0.0)), _limit(p)):
             absorbed.append(p.name)

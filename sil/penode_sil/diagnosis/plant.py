@@ -51,7 +51,7 @@ class Place:
 
 
 def nominal(model: Model, place: Place, law: str, argument: str, values: Mapping[object, float]) -> float:
-    """Sum of what the linear elements of a place have already, with what was fitted."""
+    """Sum of an argument of the linear elements of a place, with fitted values."""
     total = 0.0
     for e in model.elements:
         if e.law == law and any(name == e.name for name, _ in place.elements):

@@ -28,7 +28,7 @@ NEAR = 0.14  # of a factor, in its logarithm: what else is wrong with a model ch
 ALIKE = 0.9  # correlation of measured and simulated signals that differ by a factor only
 POOR = 0.1  # share of a signal's power that the model must miss before another plant is thought of
 FAR = 0.1  # a parameter that is so much off, and 3 tolerances, is another one
-LITTLE = 0.05  # of what the nominal plant leaves: more than that, and it is no explanation either
+LITTLE = 0.05  # of the residual of the nominal plant: an explanation that leaves more is none
 UNLIKE = 0.5  # share of a signal's power that the model misses, beyond which the signal may not be of its plant
 
 

@@ -27,7 +27,7 @@ TRIED = 6  # forms that are fitted in a round, the best of each name and place f
 PROMISE = 3.0  # log likelihood that a form has to promise for it
 SMALL = 0.02  # of the force at a place: a force that is put on to see what it does, and a law's start
 LITTLE = 0.4  # of a unit, which is 0.05 of the force at the place
-VAGUE = 0.5  # standard deviation of the logarithm of a parameter from which on it is hardly known
+VAGUE = 0.5  # standard deviation of the logarithm of a parameter above which it counts as a guess
 FREE_RUN, FOLLOWED = 10, 12  # iterations of a form's fits
 
 

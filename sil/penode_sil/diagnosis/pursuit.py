@@ -16,7 +16,7 @@ from .score import Candidate, Regression
 from .study import Study
 
 TERMS = 3  # elementary laws of one kind
-WANDERING = 5  # and of a bias, which may go any slow way
+WANDERING = 5  # and of a bias, which may have any slow course
 OCTAVE = 2.0  # factor of frequency, within which another form of a hidden mass is seen
 PART = 0.1  # of the size a law has alone: left to it where its companions do the rest
 
@@ -115,7 +115,7 @@ def further(study: Study, e: Explanation, r: Regression) -> list[list[int]]:
 
 def terms_of(r: Regression, chosen: Sequence[int]) -> list[Term]:
     """The chosen candidates with the sizes that the regression gives them. Where only companions are left, the first of the others
-    keeps a part of what it has alone; none if that is nothing."""
+    keeps a part of its gain alone; none if that is zero."""
     _, gains = r.gain(chosen)
     alone = [c for c in chosen if not r.candidates[c].companion][:1]
     if all(g == 0.0 or r.candidates[c].companion for c, g in zip(chosen, gains, strict=True)):

@@ -139,14 +139,14 @@ def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[F
         return first
     wider = judged(first[0].naming(large))
     log(
-        f"{', '.join(first[2].absorbed)} may have made up for {', '.join(' at '.join(name_of(a.trial)) for a in large)}; "
+        f"{', '.join(first[2].absorbed)} may have compensated for {', '.join(' at '.join(name_of(a.trial)) for a in large)}; "
         f"still does {wider[2].absorbed}"
     )
     return wider if set(wider[2].absorbed) < set(first[2].absorbed) else first
 
 
 def _small(t: Term, what: str) -> str:
-    """A note on a term that is too small for a name."""
+    """A note on a term that is too small to be named."""
     return f"{place(*name_of(t))} is real but small: {what}; not named, but in model_extended.toml"
 
 

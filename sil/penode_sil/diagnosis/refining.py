@@ -17,7 +17,7 @@ from .score import Regression
 from .study import Study, noise_of, regression
 
 SHAPED = {*FRICTION, *DAMPERS} - {"bouc_wen"}  # kinds whose names follow from the shape of a curve alone, whatever laws it is made of
-FILTER = 0.93  # of what two hidden masses gain: where one gains less, they are a filter that stands for other dynamics
+FILTER = 0.93  # of the gain of two hidden masses: where one gains less, the two are a filter that replaces other dynamics
 SINGLE = ("wrong_parameter", "hidden_resonance", CLOCK)  # kinds that have one law only
 
 

@@ -28,7 +28,7 @@ from .study import Study
 Array = NDArray[np.float64]
 STRETCHES = 40  # of time, at most
 OVERLAP = 1.0 + 2.0 / 36.0  # variance of a mean over Hann segments that overlap by half, over that of separate ones
-CHANCE = 0.05  # of what a limit calls significant
+CHANCE = 0.05  # probability of a false alarm at a limit
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Residual:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One sensor in one recording. `good`: samples that count; `noise`: RMS of what measurement alone leaves, `floor`
+    """One sensor in one recording. `good`: samples that count; `noise`: RMS that measurement alone leaves, `floor`
     its density; `limit`: coherence that chance exceeds at 5 % of all frequencies, `chance`: its mean; `beyond`: samples
     farther or faster than trained."""
 
@@ -234,7 +234,7 @@ def noise_floor(study: Study, k: int) -> tuple[Array, Array]:
 
 
 def noise_rms(study: Study) -> Array:
-    """RMS [n_z] of what measurement alone leaves in the first recording: of the sensors, and of the inputs as they were measured.
+    """RMS [n_z] that measurement alone leaves in the first recording: noise of the sensors, and of the measured inputs through the plant.
 
     Above the band a sensor's noise is what its own record shows, or goes on evenly if that shows none.
     """

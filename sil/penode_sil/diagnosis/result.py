@@ -11,7 +11,7 @@ from typing import Any
 from ..compared import REJECTED, Compared, worsened
 from ..recordings.measured import Measured
 
-OUTSIDE = "outside_taxonomy"  # kind of what has no name
+OUTSIDE = "outside_taxonomy"  # kind of an effect without a name
 EXTENDED = "model_extended.toml"
 SIZES = {"force", "stiffness", "damping", "mass", "bias", "offset", "delay", "lag", "coefficient", "cubic", "difference", "scale", "gain"}
 NOTHING = {"scale": 1.0, "gain": 1.0}  # sizes without any effect; 0 for others
@@ -60,7 +60,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Gain:
-    """RMS errors of one signal on data that were not used, with the generated C; `share` of what could be gained.
+    """RMS errors of one signal on data that were not used, with the generated C; `share` of the possible gain.
     `outside`: share of the samples at which an element moves farther or faster than in training."""
 
     before_rmse: float

@@ -19,7 +19,7 @@ from .study import Study, loss, regression, with_noise_of
 from .textbook import owned, plain, softened
 
 WHOLE = 0.97  # share that is a whole explanation
-NEAR = 0.1  # of what there is to be explained: two explanations that differ less may change places with more laws
+NEAR = 0.1  # of the avoidable residual: two explanations that differ less may change their order with more laws
 
 
 def first(study: Study, log=lambda text: None) -> tuple[Study, list[Explanation]]:

@@ -16,7 +16,7 @@ from .score import RESONANCES, Candidate, Regression
 from .study import Study
 from .textbook import softened, whole
 
-KEPT = 0.5  # of what a regression promises: a fit that keeps less than that of it began in the wrong place
+KEPT = 0.5  # of the gain that a regression predicts: a fit that reaches less has started in the wrong place
 STIFF = 1.5  # of the highest frequency of hidden masses: one that a fit has taken beyond it moves with its body
 
 

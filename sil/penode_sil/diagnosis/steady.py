@@ -129,6 +129,6 @@ def _whitened(e: Experiment, m: Metric, spectra: NDArray[np.complex128]) -> Arra
 
 
 def _basis(columns: Array) -> Array:
-    """An orthonormal basis of what columns span."""
+    """An orthonormal basis of the span of columns."""
     u, values, _ = np.linalg.svd(columns / (np.linalg.norm(columns, axis=0) + 1e-300), full_matrices=False)
     return u[:, values > TWIN * values[0]]

@@ -23,9 +23,9 @@ from .plant import Linear, Place
 from .score import Regression, Seen, smooth
 
 Array = NDArray[np.float64]
-SKEW = 0.001  # of a sample: channels are never sampled at quite the same time
+SKEW = 0.001  # of a sample: channels are never sampled at exactly the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
-VAGUE = 0.5  # a parameter known no better may itself make a plant of another kind
+VAGUE = 0.5  # tolerance above which a parameter counts as a guess: it may change the behaviour of the plant entirely
 FEW = 4  # studies with other noise that are kept: the next step of a search may ask for one again
 
 

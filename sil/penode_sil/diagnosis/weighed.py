@@ -235,13 +235,13 @@ def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ..
         return causes, []
     if gain := _gain(model, off):
         names = ", ".join(c.where for c in off)
-        return (gain, *(c for c in causes if c not in off)), [f"{names} by one factor do the same; model_extended.toml has it so"]
+        return (gain, *(c for c in causes if c not in off)), [
+            f"{names} changed by a common factor have the same effect; model_extended.toml has that form"
+        ]
     stated = [c.where for c in off if model.parameters[c.where].tolerance > 0.0]
     if len(stated) < 2:
         return causes, []
-    return (), [
-        f"{', '.join(stated)} would all have to be outside of their tolerances: another plant, or dynamics that the model does not have"
-    ]
+    return (), [f"{', '.join(stated)} would all have to be outside of their tolerances: another plant, or dynamics that the model lacks"]
 
 
 def _gain(model: Model, off: Sequence[Cause]) -> Cause | None:

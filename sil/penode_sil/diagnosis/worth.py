@@ -46,7 +46,7 @@ def mostly(taken: float) -> bool:
 
 
 def alone(taken: float) -> bool:
-    """Has a term that took this share of the power RATIO times the rms of what is left?"""
+    """Has a term that took this share of the power RATIO times the rms of the remaining residual?"""
     return taken > RATIO**2 / (1.0 + RATIO**2)
 
 

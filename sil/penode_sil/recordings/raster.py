@@ -19,7 +19,7 @@ from .uneven import joined, longest, mean_interval, measured_near
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 BRIDGE = 3  # missing samples of an input that a straight line may bridge
-SHORTEST = 100  # samples on the model's raster; less says nothing about a model
+SHORTEST = 100  # samples on the model's raster; fewer are no evidence about a model
 SCATTER = 0.05  # of an interval: time stamps that are off by less are taken as those of a regular clock
 SPILL = 0.1  # a filtered sample is bad if bad samples have more than this share of its weights
 

@@ -25,7 +25,9 @@ def longest(between: Array, gap: float) -> float:
     if not between.size:
         return np.inf
     middle, edge = (float(x) for x in np.quantile(between, (0.5, 0.9), method="lower"))
-    scale = (edge - middle) / np.log(5.0)  # of an exponential tail that starts at the median: nine in ten rows say nothing of a rare gap
+    scale = (edge - middle) / np.log(
+        5.0
+    )  # of an exponential tail that starts at the median: nine in ten rows are no evidence of a rare gap
     if scale == 0.0:
         return gap * middle
     # a longer one comes by chance in one of 400 recordings; quantiles of intervals that are whole rows are off by one
@@ -98,7 +100,7 @@ def _along(time: Array, values: Array, count: Array, off: Array, usual: float) -
     inside = (around >= 0) & (around < time.size)
     around = around.clip(0, time.size - 1)
     x = (time[around] - time[:, None]) / usual
-    weight = np.where(inside, np.maximum(1.0 - (x / 4.0) ** 2, 0.0), 0.0) ** 2  # rows farther than 4 intervals say nothing
+    weight = np.where(inside, np.maximum(1.0 - (x / 4.0) ** 2, 0.0), 0.0) ** 2  # rows farther than 4 intervals have no weight
     powers = np.stack([np.ones_like(x), x, x**2], axis=-1)
     known = (np.count_nonzero(weight, axis=1) >= powers.shape[-1]) & (np.min(x, axis=1) < 0.0) & (np.max(x, axis=1) > 0.0)
     weight = weight * np.minimum(count[around], 4.0)

@@ -86,7 +86,7 @@ def _silent(network: Network) -> bool:
 
 
 def ratios(start: Start, free: Sequence[str], model: Model, before: Array) -> Array:
-    """Parameters over their nominal values; those of before where the start says nothing."""
+    """Parameters over their nominal values; those of before where the start does not determine them."""
     return np.array(
         [start.parameters[n] / model.parameters[n].value if n in start.parameters else b for n, b in zip(free, before, strict=True)]
     )

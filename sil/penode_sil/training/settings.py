@@ -43,7 +43,9 @@ class Settings:
     unknown_invisible: float = (
         0.5  # of its prior deviation: what data leave uncertain by more rests on the model file, not on the recordings
     )
-    unknown_nothing: float = 1e-2  # of what the model file says of a direction: what data say less of is not seen at all
+    unknown_nothing: float = (
+        1e-2  # information in the data relative to that of the model file: a direction with less is not determined at all
+    )
     unknown_part: float = 0.25  # of the largest: components of a direction that are named
     unknown_split: float = 0.01  # of a force's span: a constant that is known no better is reported
 

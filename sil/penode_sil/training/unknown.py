@@ -56,7 +56,7 @@ def invisible(problem: Problem, fit: Fit) -> Array:
 
 
 def _seen(problem: Problem, fit: Fit) -> tuple[list[str], Array, Array, Array]:
-    """Names of free parameters; eigenvalues and vectors of what data say of them, over what the model file says; its deviations."""
+    """Names of free parameters; eigenvalues and vectors of the information in the data relative to that of the file; its deviations."""
     names = [n for n in problem.engine.free if n not in problem.held]
     at = np.array([problem.engine.free.index(n) for n in names], dtype=int)
     if not len(at):

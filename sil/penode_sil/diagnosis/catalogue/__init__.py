@@ -12,7 +12,7 @@ FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aera
 MEANING = {kind: text for file in (*FILES, drives, channels, others) for kind, text in file.MEANING.items()}
 OF = {kind: file for file in FILES for kind in file.KINDS}
 
-REVERSING = {kind for file in FILES for kind in getattr(file, "REVERSING", ())}  # of what happens where a rate turns
+REVERSING = {kind for file in FILES for kind in getattr(file, "REVERSING", ())}  # kinds that act where a rate changes its sign
 
 RIVALS = {frozenset(pair): how for file in (*FILES, drives, channels, others) for pair, how in getattr(file, "RIVALS", {}).items()}
 OTHERWISE = (

@@ -11,7 +11,7 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("maxwell_bushing",)
-MEANING = {"maxwell_bushing": "Relaxation: an elastic force that a damper in series lets decay."}
+MEANING = {"maxwell_bushing": "Relaxation: a spring and a damper in series, whose force decays when the motion stops."}
 PARAMETERS = {  # what each number of a report means
     "maxwell_bushing": {"stiffness": "of the spring in series", "relaxation_time": "damping over stiffness of the series"}
 }

@@ -4,9 +4,9 @@
 
 KINDS = ("input_sign", "sensor_sign", "swapped_channels")
 MEANING = {
-    "input_sign": "The input acts with the opposite sign of its recording: a sign error, the sense of a drive.",
+    "input_sign": "The input acts with the opposite sign of its recording, as where a drive turns the other way.",
     "sensor_sign": "The sensor has the opposite sign of the model.",
-    "swapped_channels": "Two channels are exchanged: each shows what the other is called.",
+    "swapped_channels": "Two channels are exchanged: each has the name of the other.",
 }
 
 

@@ -17,7 +17,7 @@ MEANING = {
     "asymmetric_damper": "A damper with different damping in rebound and in compression.",
     "degressive_damper": "A damper whose damping falls at higher rates.",
     "quadratic_damper": "A damper whose damping grows with the rate.",
-    "damper_fading": "A damper that loses damping while the recording goes on, as with heat.",
+    "damper_fading": "A damper that loses damping in the course of the recording, as it does when it heats up.",
 }
 PARAMETERS = {  # what each number of a report means
     "asymmetric_damper": {"rebound": "slope of the whole damper in rebound", "compression": "slope of the whole damper in compression"},

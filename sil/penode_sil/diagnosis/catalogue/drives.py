@@ -16,20 +16,20 @@ Array = NDArray[np.float64]
 INPUTS = (*ACTUATORS, "input_hold")
 KINDS = (*INPUTS, "sensor_scale", "sensor_delay")
 MEANING = {
-    "input_gain": "The plant is driven by more, or less, than the recording of the input says.",
+    "input_gain": "The input that drives the plant is larger, or smaller, than its recording by a factor.",
     "input_offset": "A constant acts on top of the recorded input.",
     "input_delay": "The input acts later than the recording says.",
     "input_lag": "The input acts with a lag: an actuator that the model does not have.",
-    "input_hold": "The input acts in steps: its controller is slower than the recorder, and holds it in between.",
-    "input_dead_zone": "Small inputs do nothing: the plant is driven by what the input is beyond a width.",
+    "input_hold": "The input acts in steps: its controller is slower than the recorder and holds the value in between.",
+    "input_dead_zone": "Inputs below a width have no effect; of larger ones the part beyond it drives the plant.",
     "input_saturation": "The actuator gives no more than a limit, whatever the recorded input asks for.",
     "input_slew_limit": "The actuator follows the recorded input at a limited rate.",
-    "sensor_scale": "The sensor's scale is off.",
-    "sensor_delay": "The sensor is late.",
+    "sensor_scale": "The sensor reads too much, or too little, by a factor.",
+    "sensor_delay": "The sensor reads with a delay.",
 }
 RIVALS = {
     ("sensor_scale", "wrong_parameter"): "record acceleration and deflection of other parts too, or weigh a body",
-    ("input_delay", "sensor_delay"): "a second sensor, of another make: a late input makes both late",
+    ("input_delay", "sensor_delay"): "measure with a second sensor of another make: if the input is late, both are",
     ("input_gain", "sensor_scale"): "measure the force of the actuator, or show the sensor a known size",
     (
         "input_dead_zone",

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 KINDS = ("coulomb_friction", "stribeck_friction", "bouc_wen", "position_dependent_friction", "load_dependent_friction")
 REVERSING = KINDS[2:3]
 MEANING = {
-    "coulomb_friction": "Friction: a force against the motion that hardly depends on how fast it is.",
+    "coulomb_friction": "Friction: a force against the motion that hardly depends on the rate.",
     "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",
     "bouc_wen": "Hysteresis: the force depends on the travel since the last reversal, elastic at first, then yielding.",
     "position_dependent_friction": "Friction that is larger at one end of the travel than at the other, or at both than between.",

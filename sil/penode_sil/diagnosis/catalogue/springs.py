@@ -24,7 +24,7 @@ RIVALS = {
     ("cubic_spring", "bump_stop"): "broadband excitation, which has small and large amplitudes, instead of a chirp of constant amplitude"
 }
 STRAIGHT = ("asymmetric_spring",)
-GAPS = (0.5, 0.75)  # of what the deflection reaches
+GAPS = (0.5, 0.75)  # of the largest deflection
 SPAN = 3.3  # a gap starts at 0.5 of the reach and is fitted down to 0.15: below that it is a spring with play
 
 

@@ -206,8 +206,8 @@ def _sections(model: Model, found: Sequence[Mix]) -> dict[str, list[str]]:
     }
 
 
-def told(model: Model, found: Sequence[Mix], d: Diagnosis) -> Diagnosis:
-    """The answer of a search in which channels were mended, with what was wrong with them first."""
+def with_mixes(model: Model, found: Sequence[Mix], d: Diagnosis) -> Diagnosis:
+    """The answer of a search with corrected channels; the faults of the channels are its first causes."""
     own = tuple(Cause(m.kind, ",".join(m.names(model)), {}, RIGHT) for m in found)
     if not own:
         return d

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The final check: the written model is read back and simulated as a user would simulate it, and what rules do not allow is taken back."""
+"""The final check: the written model is read back and simulated as a user would do it, and what the rules do not allow is withdrawn."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from .. import residual
 from ..missing import missing_forces
 from ..result import Diagnosis
 from .case import Case, End
-from .channels import Mix, told
+from .channels import Mix, with_mixes
 from .figures import tabled, with_figures
 from .rules import RULES
 
 
 def checked(case: Case, end: End, mixes: Sequence[Mix] = ()) -> Diagnosis:
-    """The answer of a search after all rules, with figures and pictures of the written model; where they leave it no name, that of a search
-    that was not asked before. `mixes`: channels that were mixed up, and have been mended. Raises UserError."""
+    """The answer of a search after all rules, with figures and pictures of the written model; if no named cause is left, the answer of the
+    other search. `mixes`: exchanged or inverted channels that were corrected before. Raises UserError."""
     (case.output / REJECTED).unlink(missing_ok=True)  # of an answer before
     case.tell(0.87, "checking the extended model")
     table = tabled(case, end)
@@ -34,4 +34,4 @@ def checked(case: Case, end: End, mixes: Sequence[Mix] = ()) -> Diagnosis:
     answer, train, held = with_figures(case, end, table)
     missing = missing_forces(end.study) if answer.verdict == "unexplained" else ()
     shown = residual.Shown(tuple(train), tuple(held), table.surfaces, missing)
-    return replace(told(case.nominal, mixes, answer), residual=shown.numbers(), shown=shown)
+    return replace(with_mixes(case.nominal, mixes, answer), residual=shown.numbers(), shown=shown)

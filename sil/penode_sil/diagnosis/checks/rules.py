@@ -223,12 +223,12 @@ def reject(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
 
 
 RULES = (
-    Rule("no name whose interval holds what has no effect", neutral, nameless),
+    Rule("the interval of a named cause excludes no effect", neutral, nameless),
     Rule("no force larger than everything measured at its place", larger, nameless),
-    Rule("no law about reversals where a rate keeps its sign", unturned, nameless),
-    Rule("nothing that makes a sensor worse than without it", burdens, relieved),
-    Rule("no agreement where the nominal model misses what the written one mends", mended, explained),
-    Rule("no value beside the fewest that explain as much", spread, by_values),
-    Rule("no agreement where a sensor is off as behind a high-pass", coupled, unsure),
+    Rule("a law about reversals only where the rate changes its sign", unturned, nameless),
+    Rule("no offset, scale or delay that makes its sensor worse", burdens, relieved),
+    Rule("no_discrepancy only if the nominal model misses nothing that the written one predicts", mended, explained),
+    Rule("the fewest parameter values that explain as much", spread, by_values),
+    Rule("no_discrepancy only if no sensor is off as behind a high-pass", coupled, unsure),
     Rule("no model that predicts worse than the nominal one", worse, reject),
 )

@@ -31,8 +31,8 @@ TURNS = 3  # how often levels and values are fitted in turn
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """An augmented model, its recordings and what is known of both: `forces` [wandering] rms acceleration of each body (without bodies, rms
-    force of each place), `noise` [n_z] of a sample."""
+    """An augmented model, its recordings and what is known of both: `forces` [unmodelled] rms acceleration of each body (without bodies,
+    rms force of each place), `noise` [n_z] of a sample."""
 
     model: Model
     set_name: str

@@ -48,7 +48,7 @@ class Blocks:
 
     def fit_level(self, bench: Bench, problem: Problem, fit: Fit, level: Level, sizes: Sequence[float]) -> tuple[Level, Fit, Array]:
         """The level with which left-out blocks are predicted best, that of a fit or one of other `sizes`, the fit with it, and its scores.
-        The likeliest level in training is too small where few updates meet many free values: they then follow what should wander."""
+        The likeliest level in training is too small where few updates meet many free values: they then fit the unmodelled force."""
         best = level, fit, self.scores(problem, fit)
         gains = bench.gains(fit, problem.predictor.model)
         for size in sizes:

@@ -35,8 +35,8 @@ class Level:
 @dataclass(frozen=True, eq=False)
 class Gains:
     """The linear `plant` of an augmented model with states `names`; `into`: states of the model that follows, of which others are not
-    corrected. `input_noise` [n_u] and `noise` [n_z]: standard deviations of a sample of each input and sensor; `forces` [wandering]:
-    what levels are relative to; `period` [s] between updates, and how many `samples` that are."""
+    corrected. `input_noise` [n_u] and `noise` [n_z]: standard deviations of a sample of each input and sensor; `forces` [unmodelled]:
+    the unit of levels; `period` [s] between updates, and how many `samples` that are."""
 
     names: tuple[str, ...]
     into: tuple[str, ...]
@@ -88,7 +88,7 @@ def is_force(state: str) -> bool:
 
 
 def wandering(states: Sequence[str]) -> list[int]:
-    """Which states wander: forces of an augmented model, or all where it has none."""
+    """Numbers of the states that are driven by noise: unmodelled forces of an augmented model, or all where it has none."""
     return [i for i, n in enumerate(states) if is_force(n)] or list(range(len(states)))
 
 

@@ -23,7 +23,7 @@ from ..plant import Place, anonymous, extend, external, rotational_unit
 from . import samples
 
 Array = NDArray[np.float64]
-WANDER = "wander"  # stem of the forces that wander, and of their states
+WANDER = "wander"  # stem of the unmodelled forces and of their states
 MAX_TURN = 0.15  # of a period of the fastest mode, in one step of the integration: Runge-Kutta of order 4 then errs by 1e-4 of it a step
 MOST_STEPS = 50_000  # integration steps, over all recordings, up to which edges are steepened; a fit of a form then takes half a second
 MIN_STEPS = 5  # steps between updates: the edge of a friction, 0.02 of the rms rate wide, then damps less than Runge-Kutta bears
@@ -70,9 +70,10 @@ def scale(sensor: str) -> str:
 
 
 def augmented(model: Model, places: Sequence[Place]) -> Model:
-    """The model with a bias and a scale of each sensor as parameters, and with an acceleration that wanders, w' = -w/tau, of each body;
-    without bodies, with a force at each place. The parameter wander_tau is tau [s]. An acceleration, so that the observer stays the
-    same where masses and forces are scaled together, which no sensor of motion shows."""
+    """The model with a bias and a scale of each sensor as parameters, and with an unmodelled acceleration w of each body, a
+    first-order Gauss-Markov process w' = -w/tau + noise; without bodies, with such a force at each place. The parameter wander_tau is tau
+    [s]. It is an acceleration because the observer then does not change if all masses and forces are scaled by one factor, which sensors
+    of motion cannot show."""
     free = {bias(s.name): Parameter(bias(s.name), 0.0, s.unit) for s in model.sensors}
     free |= {scale(s.name): Parameter(scale(s.name), 1.0, "1") for s in model.sensors}
     free[f"{WANDER}_tau"] = Parameter(f"{WANDER}_tau", 1.0, "s")
@@ -118,8 +119,8 @@ def force_at(p: Place) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Filter:
-    """How an observer corrects its states: gain [n_x, n_z] or [runs, n_x, n_z], and the time tau [s], one or [runs], for which what
-    wanders stays."""
+    """How an observer corrects its states: gain [n_x, n_z] or [runs, n_x, n_z], and the correlation time tau [s], one or [runs],
+    of the unmodelled forces."""
 
     gain: Array
     tau: Array
