@@ -44,7 +44,7 @@ extern uint32_t board_fault_stack_top[];
 #define HOST_CMDLINE 0x15U
 #define HOST_EXIT    0x20U
 
-/** @param argument  a text for HOST_WRITE0, else the block of words that the service wants */
+/** @param argument  a text for HOST_WRITE0, else the block of words that the service takes */
 static inline uint32_t host_call(uint32_t service, const void *argument)
 {
     register uint32_t r0 __asm__("r0") = service;

@@ -2,7 +2,7 @@
  * Copyright (c) 2026 the penode authors */
 
 /**
- * One sample of any generated model, and what a test wants to know about it. For the SiL library and the PiL program.
+ * One sample of any generated model, and what tests need of it. For the SiL library and the PiL program.
  *
  * The compiler is told which model by options; for the model nqvm:
  *   -DMODEL_HEADER='"nqvm.h"'  '-DMODEL(name)=nqvm_##name'  '-DMODEL_SIZE(name)=NQVM_##name'

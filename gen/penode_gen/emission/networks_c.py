@@ -36,7 +36,7 @@ class NetworkCode:
         return max(self.n, *(layer.n_out for layer in self.network.layers))
 
     def chain(self) -> list[str]:
-        """The layers, as pen_fold() wants them."""
+        """The layers in the form that pen_fold() takes."""
         kinds = {"identity": "DENSE", "relu": "RELU"}
         return [
             f"{{ PEN_LAYER_{layer.form.upper() if isinstance(layer, Affine) else kinds[layer.activation]}, {layer.n_in}U, {layer.n_out}U }}"

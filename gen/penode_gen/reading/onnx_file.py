@@ -166,7 +166,7 @@ class _Reader(Graph):
         return (width,) if len(dims) == 1 else (batch, width), batch
 
     def width_wanted(self, step: Step) -> int:
-        """How many inputs a step wants; 0 if it does not state that."""
+        """How many inputs a step takes; 0 if it does not state that."""
         node = step.node
         sizes: list[Shape] = [self.constants[n].shape for n in node.input if n in self.constants]
         if node.op_type == "Scaler":

@@ -145,12 +145,11 @@ def prepare(
 
 
 def _blows(taken: Array, sigma: float, f: Array, share: Array, power: Array, step: float) -> tuple[Array, Array]:
-    """What was there for a while of that which a damping has `taken` [n] as noise: most of the time it is, but not in a bump. And
-    which further share of the signal that is at frequencies f, in the mean over time, beside the `share` that the damping left of
-    its `power`.
+    """Bursts of signal, as at a bump, in that part of an input which the Wiener damping has `taken` [n] as noise; and the share of the
+    signal at frequencies f that they are, in the mean over time, in addition to the `share` that the damping left of its `power`.
 
-    Parts of a quarter of a second, each half over the next, whose windows add up to 1. What is taken has no slow motion, which
-    would leak through such short windows.
+    Windows of a quarter of a second that overlap by half and add up to 1. The part that was taken has no slow motion, which would leak
+    through such short windows.
     """
     half = max(round(0.125 / step), 2)
     window = np.sin(np.pi * (np.arange(2 * half) + 0.5) / (2 * half))

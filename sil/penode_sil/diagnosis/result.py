@@ -156,7 +156,7 @@ PEOPLE |= {"outside taxonomy": "outside of the list"}
 
 
 def plain(name: str) -> str:
-    """coulomb_friction as people write it."""
+    """The name of a kind in words: Coulomb friction for coulomb_friction."""
     text = name.replace("_", " ")
     for low, proper in PEOPLE.items():
         text = text.replace(low, proper)

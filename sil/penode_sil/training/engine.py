@@ -120,7 +120,7 @@ class Engine:
         nodes, shares = np.array(NODES[drive.method]), np.array(SHARES[drive.method])
         nets = (_Net * max(1, len(shapes)))()
         at, kept = len(self.free) + len(start), []
-        for net, shape in zip(nets, shapes, strict=False):  # without networks, C still wants one
+        for net, shape in zip(nets, shapes, strict=False):  # without networks the C still needs one
             kept += shape.fill(net)
             net.first = at
             at += shape.columns

@@ -99,7 +99,7 @@ def _all(model: Model, experiments: Sequence[Experiment]) -> list[Mix]:
 
 def _explains(m: Mix, before: Array, after: Array) -> bool:
     """Does it leave less than half of the power of each sensor that it is about, and a quarter of what was missed there? An input is about
-    all sensors: a quarter of what was missed of that which shows it most, and no more of any."""
+    all sensors: a quarter of the misfit of the sensor that shows it most, and no larger misfit of any."""
     own = np.isfinite(before) if m.driving else np.isin(np.arange(len(before)), m.numbers)
     before, after = before[own] + LITTLE * LITTLE, after[own] + LITTLE * LITTLE
     most = [np.argmax(before)] if m.driving else slice(None)

@@ -59,7 +59,7 @@ class Axis:
 
 
 def number(v: float) -> str:
-    """A tick as people write it."""
+    """The text of a tick: no exponent where six characters are enough."""
     if v == 0.0:
         return "0"
     text = f"{v:.10g}"

@@ -77,9 +77,8 @@ def whole_force(s: Surface, which: int) -> Figure:
     factor, unit = readable(max(float(np.max(np.abs(f[pick]))) for f in forces.values()), s.unit("N"))
     y = Axis(words(s).force, pretty(unit), *fig.within([factor * f[pick] for f in forces.values()]))
     marks = [fig.dots(f"fine {name}", values[pick], factor * f[pick], x, y, name) for name, f in forces.items()]
-    says = (
-        f"One point is one sample, positive against growing {words(s).axes[0]}. The model is wrong where measured and nominal points part."
-    )
+    says = f"One point is one sample; a positive {words(s).force} acts against a growing {words(s).axes[0]}. "
+    says += "The model is wrong where measured and nominal points differ."
     return Figure(f"{words(s).force.title()} over {x.name}", x, y, tuple(marks), says)
 
 
