@@ -29,11 +29,11 @@ extern "C" {
 
 /** Any shape. @param w [n_out * (n_in + 1)] as above; @param x [n_in]; @param y [n_out], may not overlap x */
 void pen_dense(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[]);
-void pen_dense_relu(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[]); /* as pen_dense, of max(0, x) */
+void pen_dense_relu(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t x[], pen_real_t y[]); /* x < 0 counts as 0 */
 
 /** One row. @param w [1 + n_in]; @param x [n_in] */
 pen_real_t pen_dense1(size_t n_in, const pen_real_t w[], const pen_real_t x[]);
-pen_real_t pen_dense1_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[]); /* as pen_dense1, of max(0, x) */
+pen_real_t pen_dense1_relu(size_t n_in, const pen_real_t w[], const pen_real_t x[]); /* x < 0 counts as 0 */
 
 /** y = W t, without the bias: how a small change t of the input changes the output. */
 void pen_dense_tangent(size_t n_out, size_t n_in, const pen_real_t w[], const pen_real_t t[], pen_real_t y[]);
@@ -45,9 +45,9 @@ void pen_dense_dual(size_t n_out, size_t n_in, const pen_real_t w[], const pen_r
 /* ---- activations, in place on h[n] ---- */
 
 void pen_act_relu(size_t n, pen_real_t h[]); /* only where no dense layer follows */
-void pen_act_tanh(size_t n, pen_real_t h[]); /* h = tanh(h) */
-void pen_act_sigmoid(size_t n, pen_real_t h[]); /* h = 1 / (1 + exp(-h)) */
-void pen_act_softplus(size_t n, pen_real_t h[]); /* h = log(1 + exp(h)) */
+void pen_act_tanh(size_t n, pen_real_t h[]); /* hyperbolic tangent */
+void pen_act_sigmoid(size_t n, pen_real_t h[]); /* 1 / (1 + e^-h) */
+void pen_act_softplus(size_t n, pen_real_t h[]); /* logarithm of 1 + e^h */
 void pen_act_step(size_t n, pen_real_t h[]); /* 0 below zero, 1 from zero on */
 
 /* ---- their slopes: t[i] *= act'(.), from the value h[i] after the activation (relu: before or after) ---- */
@@ -55,7 +55,7 @@ void pen_act_step(size_t n, pen_real_t h[]); /* 0 below zero, 1 from zero on */
 void pen_slope_relu(size_t n, const pen_real_t h[], pen_real_t t[]); /* 0 at the kink */
 void pen_slope_tanh(size_t n, const pen_real_t h[], pen_real_t t[]); /* 1 - h^2 */
 void pen_slope_sigmoid(size_t n, const pen_real_t h[], pen_real_t t[]); /* h (1 - h) */
-void pen_slope_softplus(size_t n, const pen_real_t h[], pen_real_t t[]); /* 1 - exp(-h) */
+void pen_slope_softplus(size_t n, const pen_real_t h[], pen_real_t t[]); /* 1 - e^-h */
 void pen_slope_step(size_t n, const pen_real_t h[], pen_real_t t[]); /* 0 */
 
 /* ---- their second derivatives: c[i] = act'(.) c[i] + act''(.) a[i] b[i], from the value h[i] after the activation ---- */
