@@ -161,13 +161,18 @@ def regular(time: Array, marks: Flags, wide: bool = False) -> Raster | None:
         return None
     best = min(found, key=lambda r: r.surprise)
     size = first.time.size
-    while size < time.size:  # followed to the end
+    while size < time.size and best.surprise < _rare(size):  # followed to the end, while it may still be one
         size = min(2 * size, time.size)
         best = _Marks(time[:size], marks[:size], wide).refined(best)
-    every = best.interval / first.usual
+    if best.interval <= 0.99 * least or best.surprise >= _rare(size):
+        return None
     caught = np.sum(marks[_Marks(time, marks, wide).rows(best)])
-    limit = np.log(RULES.chance) - 2.0 * np.log(time.size)
-    return best if every > 0.99 * least / first.usual and best.surprise < limit and caught >= RULES.exact * count else None
+    return best if caught >= RULES.exact * count else None
+
+
+def _rare(rows: int) -> float:
+    """The surprise below which marks of so many rows follow a clock."""
+    return float(np.log(RULES.chance) - 2.0 * np.log(rows))
 
 
 class _Marks:
