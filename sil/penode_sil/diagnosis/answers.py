@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from . import explanation, plausible, weighed
 from .checks.case import Case, End
 from .checks.written import write_extended
 from .explanation import Explanation
+from .fit import Fit
 from .result import OUTSIDE, Cause, Diagnosis, Recorded
 
 
@@ -36,16 +37,18 @@ def alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
     return tuple(sets)
 
 
-def by_innovations(case: Case, w: weighed.Weighed, best: Explanation | None) -> End:
+def by_innovations(case: Case, w: weighed.Weighed, best: Explanation | None, broken: Callable[[Fit], Sequence[Cause]]) -> End:
     """The diagnosis of recordings that sensor noise alone cannot judge, from what was weighed, and of which `best` is what sensor noise
-    would say; without pictures, recordings and time."""
+    would say; without pictures, recordings and time. `broken`: sensors at fault beside a fit."""
     study = w.study
     rows = explanation.rows(study)
     evidence = (study.null.cost - rows) / np.sqrt(2.0 * rows)
     doubt = plausible.doubt(study, best, w.verdict) if w.verdict == "unexplained" else ""
     causes = w.causes or ((Cause(OUTSIDE, "", {}, 0.5),) if w.verdict == "unexplained" else ())
+    own = {(c.kind, c.where) for c in causes}
+    causes = (*causes, *(f for f in (broken(w.fit) if w.verdict != "unexplained" else ()) if (f.kind, f.where) not in own))
     answer = Diagnosis(
-        w.verdict,
+        "explained" if causes and w.verdict == "no_discrepancy" else w.verdict,
         causes,
         w.gain,
         w.numerics,
@@ -55,5 +58,5 @@ def by_innovations(case: Case, w: weighed.Weighed, best: Explanation | None) -> 
         (*[doubt] * bool(doubt), *case.remarks, *w.notes),
         explanations=w.explanations,
     )
-    again = None if w.without is None else lambda gone: by_innovations(case, w.without(gone), best)
+    again = None if w.without is None else lambda gone: by_innovations(case, w.without(gone), best, broken)
     return End(answer, study, write_extended(w.text, case), w.fit, w.held, w.withheld, again)

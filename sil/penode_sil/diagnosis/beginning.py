@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
+from .evidence.colour import Colour
 from .evidence.fit import Problem
 from .evidence.observer import Filter, Predictor, Record, augmented, sample_noise
 from .fit import Free, Problem as OutputError
@@ -64,4 +65,4 @@ def _first(model: Model, e: Experiment, study: Study, set_name: str) -> tuple[li
     at = {i: float(model.start[i]) for i in own}
     free = tuple(Free(("start", 0, i), at[i], 0.01 * size[model.states[i]], sigma=size[model.states[i]], origin=at[i]) for i in own)
     predictor = Predictor(wide, [few], 1, set_name or study.set_name, study.linear.fastest)
-    return own, free, Problem(predictor, noise**2), Filter.none(len(wide.states), len(noise))
+    return own, free, Problem(predictor, Colour.none(noise, 1)), Filter.none(len(wide.states), len(noise))

@@ -15,7 +15,7 @@ from penode_gen.model import Model
 
 from ..recordings.measured import Measured
 from . import dropouts
-from .explanation import Explanation
+from .fit import Fit
 from .result import Cause, Value
 from .study import Study
 
@@ -26,12 +26,23 @@ WILD = 2.0  # standard deviations of the noise that bursts have together: one sa
 STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often are no measurements
 
 
-def still_wild(study: Study, e: Explanation, bursts: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
-    """Per recording, whether the bursts of each sensor [1, n_z] are as wild beside an explanation as they were without."""
+def still_broken(
+    train: Sequence[Measured], study: Study, fit: Fit, faults: Sequence[Cause], bursts: Sequence[NDArray[np.bool_]]
+) -> list[Cause]:
+    """Sensors that clip or drop out beside a fit of what explains the recordings: bursts and spikes that it explains were none. One with a
+    rail among the `faults` before has no drop-outs: a cause may clip as well, and then a rail looks like one."""
+    kept = [b & wild for b, wild in zip(bursts, _still_wild(study, fit, bursts), strict=True)]
+    rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
+    again = broken_sensors(study.model, train, study, fit.simulated, kept)
+    return [f for f in again if f.kind != "sensor_dropout" or f.where not in rails]
+
+
+def _still_wild(study: Study, fit: Fit, bursts: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
+    """Per recording, whether the bursts of each sensor [1, n_z] are as wild beside a fit as they were without."""
     found = []
     for k, b in enumerate(bursts):
         b = b[: len(study.experiments[k].time)]
-        sums = [np.sum(np.where(b, (study.experiments[k].y - f.simulated[k]) ** 2, 0.0), axis=0) for f in (e.fit, study.null)]
+        sums = [np.sum(np.where(b, (study.experiments[k].y - f.simulated[k]) ** 2, 0.0), axis=0) for f in (fit, study.null)]
         noise_there = np.sum(b, axis=0) * np.mean(study.levels[k], axis=0)
         found.append((sums[0] > np.maximum(0.5 * sums[1], WILD**2 * noise_there))[None, :])
     return found

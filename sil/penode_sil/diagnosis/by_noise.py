@@ -33,7 +33,7 @@ from . import (
     tones,
 )
 from .answers import alternatives
-from .broken import broken_sensors, still_wild
+from .broken import still_broken
 from .checks.case import Case, End
 from .checks.written import write_extended
 from .explanation import Explanation
@@ -79,7 +79,7 @@ def judge_explanations(
     """Judges explanations; returns the study with the smoothed motion of the best one, and the judgement."""
     best = explanations[0] if explanations else None
     if best is not None:  # bursts and spikes that a cause explains were none
-        faults = _still_broken(case, study, best, faults, bursts)
+        faults = still_broken(case.train, study, best.fit, faults, bursts)
     case.tell(SEARCH[1], "weighing them against numerics")
     study = replace(study, seen=look(study, best.fit if best else study.null))
     return study, _weighed(case, study, explanations, faults)
@@ -109,15 +109,6 @@ def by_noise(case: Case, study: Study, best: Explanation | None, judged: Judged)
         explanations=alternatives(judged.causes),
     )
     return End(answer, study, extended, judged.named.fit if whole else None, held)
-
-
-def _still_broken(case: Case, study: Study, best: Explanation, faults: list[Cause], bursts: Sequence[np.ndarray]) -> list[Cause]:
-    kept = [b & wild for b, wild in zip(bursts, still_wild(study, best, bursts), strict=True)]
-    rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
-    again = broken_sensors(
-        study.model, case.train, study, best.fit.simulated, kept
-    )  # a cause may clip as well: then a rail looks like a drop-out
-    return [f for f in again if f.kind != "sensor_dropout" or f.where not in rails]
 
 
 def _weighed(case: Case, study: Study, explanations: Sequence[Explanation], faults: list[Cause]) -> Judged:

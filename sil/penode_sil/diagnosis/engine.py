@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from ..recordings.measured import Measured, with_shared_rails
 from . import dropouts, plausible, search, weighed
 from .advice import advised
 from .answers import by_innovations, recorded
-from .broken import broken_sensors
+from .broken import broken_sensors, still_broken
 from .by_noise import SEARCH, by_noise, judge_explanations
 from .checks import channels as mix_ups, differing, final
 from .checks.case import Case, End
@@ -78,17 +79,18 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
     search explains nothing, innovations answer where they explain the recordings, or have causes and leave more than UNMODELLED. If they
     were not asked before, they answer where they follow the recordings better, name the same, or find an input at fault; where neither has
     a name, parameters that predict the hold-out better stay."""
+    faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
+    broken = partial(still_broken, case.train, study, faults=faults, bursts=bursts)
     unknown = weighed.supports(study.model) and bool(guessed(study.model))
     if unknown or (not study.model.inputs and weighed.misfit(study, study.null, case.log).size):
-        return by_innovations(case, _weighed(case, study), None)
-    faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
+        return by_innovations(case, _weighed(case, study), None, broken)
     case.tell(SEARCH[0], "looking for causes")
     study, beam = search.first(study, case.log)
     w = None
     if beam and weighed.misfit(study, beam[0].fit, case.log).size > weighed.UNMODELLED:
         w = _weighed(case, study)
         if w.verdict == "explained" and weighed.UNMODELLED < w.level < 2.0 * WORTH:
-            return by_innovations(case, w, beam[0])
+            return by_innovations(case, w, beam[0], broken)
 
     def hopeless(study: Study, e: Explanation) -> bool:
         return w is not None and weighed.misfit(study, e.fit, case.log).size > weighed.UNMODELLED
@@ -101,24 +103,24 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
     if beside.size:
         w = w or _weighed(case, study)
         if _decides(w, beside, study, best, bool(faults)):
-            return by_innovations(case, w, best)
+            return by_innovations(case, w, best, broken)
     study, judged = judge_explanations(case, study, explanations, faults, bursts)
     sure = w if w and (w.verdict == "explained" or (w.causes and w.level > weighed.UNMODELLED)) else None
     if sure and judged.verdict == "unexplained":  # before an extended model is made that nobody would see
-        return by_innovations(case, sure, best)
+        return by_innovations(case, sure, best, broken)
     end = by_noise(case, study, best, judged)
     answer = end.answer
     if answer.verdict in ("unexplained", "partly_explained") and w is None and weighed.supports(study.model):
         w = _weighed(case, study)
         same = {(c.kind, c.where) for c in w.causes} == set(best.groups if best else ()) != set()
         if (same or w.follows_better(beside) or w.of_inputs) and not w.worsens():
-            return by_innovations(case, w, best)
+            return by_innovations(case, w, best, broken)
         if answer.verdict == "unexplained" and not answer.explained and w.mends():  # nothing has a name, but parameters are nearer
-            return by_innovations(case, replace(w, verdict="unexplained", causes=(), explanations=(), explained=0.0), best)
+            return by_innovations(case, replace(w, verdict="unexplained", causes=(), explanations=(), explained=0.0), best, broken)
         return end
     if w is None and weighed.supports(study.model):
-        return replace(end, other=lambda: by_innovations(case, _weighed(case, study), best))
-    return by_innovations(case, sure, best) if sure and answer.verdict == "unexplained" else end
+        return replace(end, other=lambda: by_innovations(case, _weighed(case, study), best, broken))
+    return by_innovations(case, sure, best, broken) if sure and answer.verdict == "unexplained" else end
 
 
 def _decides(w: weighed.Weighed, beside: weighed.Misfit, study: Study, best: Explanation | None, faulty: bool) -> bool:

@@ -19,6 +19,7 @@ from .catalogue import drives, friction, loads
 from .catalogue.form import Form, Motion, Sizes
 from .evidence.bench import Bench, build
 from .evidence.blocks import posterior
+from .evidence.colour import shape
 from .evidence.fit import Fit
 from .evidence.observer import Filter, Record, bias, sample_noise
 from .evidence.screening import Probe
@@ -30,7 +31,7 @@ from .propose import FREE_RUN, SMALL, motions
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
 from .rounds import MIN_TAKEN, name_of, terms_of
 from .terms import Term, Trial
-from .worth import RIGHT, SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, undetermined
+from .worth import RIGHT, SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, systematic, undetermined
 
 Array = NDArray[np.float64]
 RIVAL = (
@@ -77,12 +78,20 @@ class Answer:
 
 
 def answer(
-    model: Model, places: Sequence[Place], experiments: Sequence[Experiment], fastest: float, set_name: str, log: Callable[[str], None]
+    model: Model,
+    places: Sequence[Place],
+    experiments: Sequence[Experiment],
+    fastest: float,
+    set_name: str,
+    log: Callable[[str], None],
+    levels: Sequence[Array] = (),
 ) -> Answer:
-    """Searches recordings for causes by innovations, and weighs what is found."""
+    """Searches recordings for causes by innovations, and weighs what is found. `levels` [f, n_z] of each recording: variances per sample of
+    the sensors' noise by frequency; white without."""
     records = [Record.of(e) for e in experiments]
     noise = sample_noise(records, np.array([s.noise for s in model.sensors]))
-    bench = build(model, places, records, noise, fastest, set_name)
+    bench = build(model, places, records, noise, fastest, set_name, shape=shape(experiments, levels) if levels else None)
+    log(f"noise: {'white' if bench.colour is None else 'coloured'}")
     unmodelled = f"{bench.level.size:.3g} of all forces, correlated over {bench.level.tau:.3g} s"
     log(f"corrected every {bench.update} samples; unmodelled force: {unmodelled}")
     alone = bench.problem().solve(bench.fit.free, Filter.none(*bench.fit.by.gain.shape), FREE_RUN)
@@ -279,8 +288,14 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         if alone * abs(value) <= 3.0 * sd or bias(s.name) in mixed:
             continue
-        sd = float(np.hypot(sd, SYSTEMATIC * shown / alone))  # collinearity with other free values amplifies the effect of model error
-        large = WORTH * shown < abs(value) - Z_95 * sd and abs(value) < shown and abs(abs(value) / constants.g - 1.0) > WORTH
+        sd = float(
+            np.hypot(sd, systematic(bench.level.size) * shown / alone)
+        )  # collinearity with other free values amplifies the effect of model error
+        large = (
+            least(bench.level.size, 0.0) * shown < abs(value) - Z_95 * sd
+            and abs(value) < shown
+            and abs(abs(value) / constants.g - 1.0) > WORTH
+        )
         if bench.places and not loaded and large:  # without places it may stand for any law
             causes.append(
                 _load(model, bench, probe, s.name, value, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit))

@@ -67,14 +67,15 @@ class Rounds:
 
     def grow(self, accepted: Sequence[Accepted] = ()) -> Grown:
         """Accepts causes beside those accepted already, one at a time, the best predictor first, until none predicts enough better, or the
-        best is too small for a name and cannot hide a larger one. The search goes on after a small form that takes most of the misfit,
-        because one more cause may explain the rest. If it does, all forms are judged again by the smaller level that remains."""
+        best is too small for a name and cannot hide a larger one. The search goes on after a small form that takes most of the misfit, or,
+        while none is large, enough that little may remain: one more cause may explain the rest. If it does, all forms are judged again by
+        the smaller level that remains."""
         bench, scores, found = self.beside(accepted)
         large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
         hides = not found or large[-1] or any(_hidden(t, found[-1].trial) for t in found[-1].trials)
         while good := self.good(bench, scores, found):
             best = simplest(good, scores, terms_of(found))
-            if not hides and not _matters(best):
+            if not hides and not _matters(best) and not _may_remain(bench, large, best):
                 break
             number = 1 + max((a.number for a in found), default=-1)
             bench, terms = adopt(bench, best, number)
@@ -82,10 +83,10 @@ class Rounds:
             found.append(Accepted(best, number, tuple(terms), good))
             large.append(_large(best, least(bench.level.size, best.whole)))
             hides = large[-1] or any(_hidden(t, best) for t in good)
-            if not hides and not mostly(best.whole):
+            if not hides and not mostly(best.whole) and not _may_remain(bench, large, best):
                 good = ()
                 break
-        if found and alone(found[-1].trial.whole):
+        if found and (alone(found[-1].trial.whole) or least(bench.level.size, 0.0) < WORTH):
             large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
         return Grown(bench, scores, tuple(found), tuple(large), good)
 
@@ -133,6 +134,12 @@ def _hidden(t: Trial, small: Trial) -> bool:
     """May a form at another place prove large once a small one is in the model? Its force is large enough; its share of the innovations
     rises when the small one is gone."""
     return t.form.where != small.form.where and t.share >= WORTH
+
+
+def _may_remain(bench: Bench, large: Sequence[bool], best: Trial) -> bool:
+    """May small forms together leave so little that they have names? Where none is large, the last has taken its share of a sensor's
+    innovations, and the unmodelled force is small already."""
+    return not any(large) and best.taken >= MIN_TAKEN and least(bench.level.size, 0.0) < WORTH
 
 
 def _matters(t: Trial) -> bool:

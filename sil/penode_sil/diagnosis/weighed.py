@@ -18,6 +18,7 @@ from . import applied, measuring, numerics, real
 from .catalogue import values as of_values
 from .catalogue.drives import INPUTS
 from .evidence.bench import UNSTATED, build
+from .evidence.colour import shape
 from .evidence.gain import Level
 from .evidence.observer import Record, sample_noise
 from .fit import Fit, Problem
@@ -109,7 +110,9 @@ def misfit(study: Study, fit: Fit, log: Callable[[str], None] = lambda text: Non
         alone = np.array(problem.simulate(e, plain, np.zeros((1, len(plain))))[0][0])
         records.append(replace(Record.of(x), y=np.where(x.good, x.y - fit.simulated[e] + alone, np.nan)))
     noise = sample_noise(records, np.array([s.noise for s in model.sensors]))
-    nominal = build(study.model, study.places, records, noise, study.linear.fastest, study.set_name)
+    nominal = build(
+        study.model, study.places, records, noise, study.linear.fastest, study.set_name, shape=shape(study.experiments, study.levels)
+    )
     bench = build(model, study.places, records, noise, study.linear.fastest, study.set_name, nominal)
     still = bench.problem().solve(bench.fit.free, bench.gains(bench.fit).at(Level(0.0, 1.0)), 12)
     gained = bench.fit.likelihood - still.likelihood
@@ -140,7 +143,9 @@ def _within(study: Study, fit: Fit, noise: Array) -> bool:
 def weigh(study: Study, unused: Sequence[Experiment], log: Callable[[str], None]) -> Weighed:
     """Causes by innovations, the model with them, and what it gains."""
     model, study = study.model, replace(study, seen=look(study, study.null))
-    return _written(study, unused, real.answer(model, study.places, study.experiments, study.linear.fastest, study.set_name, log))
+    return _written(
+        study, unused, real.answer(model, study.places, study.experiments, study.linear.fastest, study.set_name, log, study.levels)
+    )
 
 
 def _written(study: Study, unused: Sequence[Experiment], found: real.Answer) -> Weighed:

@@ -32,12 +32,15 @@ ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
 
 def least(level: float, taken: float) -> float:
-    """Smallest share of the force there that has a name. WORTH, unless the term takes at least half of the power of the innovations beyond
-    sensor noise (`taken`). Then it is RATIO times the unmodelled force beside all that was found (`level`), or nothing if the term is
-    `alone`, but not below Z_95 * SYSTEMATIC, where its interval would include zero."""
-    if not mostly(taken):
-        return WORTH
-    return min(WORTH, max(0.0 if alone(taken) else RATIO * level, Z_95 * SYSTEMATIC))
+    """Smallest share of the force there that has a name: RATIO times the unmodelled force beside all that was found (`level`), and not more
+    than WORTH. Of a term that took nearly all (`alone`) it is where its interval would include zero."""
+    return min(WORTH, Z_95 * systematic(level) if alone(taken) else RATIO * level)
+
+
+def systematic(level: float) -> float:
+    """What unmodelled forces of this share of all do to the size of a form, in its share of the force there: in proportion, up to the
+    mis-modelling, half of WORTH, of which SYSTEMATIC is."""
+    return SYSTEMATIC * min(2.0 * level / WORTH, 1.0)
 
 
 def mostly(taken: float) -> bool:

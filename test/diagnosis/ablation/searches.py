@@ -19,6 +19,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -44,10 +45,12 @@ HEAD = "| | cases | sensor noise alone | innovations alone | both | both lose wh
 def only(search: str) -> Iterator[None]:
     """The diagnosis with one of its searches alone; innovations leave what they do not support to the other."""
 
-    def innovations(case: Any, study: Any, *rest: Any) -> Any:
+    def innovations(case: Any, study: Any, other: Any, bursts: Any) -> Any:
         if not weighed.supports(study.model):
-            return both(case, study, *rest)
-        return engine.by_innovations(case, engine._weighed(case, study), None)
+            return both(case, study, other, bursts)
+        faults = engine.broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
+        broken = partial(engine.still_broken, case.train, study, faults=faults, bursts=bursts)
+        return engine.by_innovations(case, engine._weighed(case, study), None, broken)
 
     both = engine._searched
     with (

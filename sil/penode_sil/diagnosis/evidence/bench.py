@@ -14,6 +14,7 @@ from penode_gen.model import Model, Parameter
 
 from ..fit import Free
 from ..plant import Place
+from .colour import Colour, is_white
 from .fit import Fit, Problem, likelihood
 from .gain import Gains, Level, linear, wandering
 from .observer import MAX_TURN, MIN_STEPS, Filter, Predictor, Record, augmented, bias, scale
@@ -48,6 +49,7 @@ class Bench:
     fit: Fit
     nominal: tuple[Free, ...] = ()  # free values as the model file has them
     linear: Mapping[str, float] = field(default_factory=dict)  # values fitted to the model alone; empty before that fit
+    colour: Colour | None = None  # of the noise; None: white
 
     @property
     def step(self) -> float:
@@ -56,7 +58,7 @@ class Bench:
     def problem(self, model: Model | None = None) -> Problem:
         """Fits of this model, or of one with more in it."""
         predictor = Predictor(model or self.model, self.records, self.update, self.set_name, self.fastest)
-        return Problem(predictor, self.noise**2 / self.update)
+        return Problem(predictor, self.colour or Colour.none(self.noise, self.update))
 
     def gains(self, fit: Fit | None = None, model: Model | None = None) -> Gains:
         """The linearised plant with the values that a fit of the model alone found, scales of sensors left at 1 (see Predictor._scales). It
@@ -99,9 +101,11 @@ def build(
     fastest: float,
     set_name: str = "default",
     like: Bench | None = None,
+    shape: Array | None = None,
 ) -> Bench:
     """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]. `like`: the bench of
-    the nominal model if `model` is another one; base, updates and forces are taken from it."""
+    the nominal model if `model` is another one; base, updates, forces and colour are taken from it. `shape` [f, n_z]: spectrum of the noise
+    as a fit has left it; it counts if the recordings are likelier with it."""
     wide = augmented(model, places)
     free = [f for f in map(parameter, model.parameters.values()) if f]
     spans = np.array([max(np.nanstd(np.concatenate([r.y[:, j] for r in records])), noise[j]) for j in range(len(noise))])
@@ -119,7 +123,7 @@ def build(
     base, forces = like.base if like else augmented(model, places), np.ones(len(wandering(wide.states)))
     bench = Bench(wide, set_name, tuple(places), tuple(records), base, (), first, forces, noise, fastest, Level(0.0, 1.0), plain)
     if like:
-        bench = replace(bench, update=like.update, forces=like.forces, fastest=like.fastest)
+        bench = replace(bench, update=like.update, forces=like.forces, fastest=like.fastest, colour=like.colour)
         x = [np.where(np.abs(s) < np.inf, s, 0.0) for s in _followed(bench)]
     else:
         bench, x = _moved(bench, model, spans)
@@ -136,7 +140,12 @@ def build(
                     origin=start,
                 )
             )
-    return fit_null(replace(bench, free=(*free, *starts), nominal=(*free, *starts)))
+    found = fit_null(replace(bench, free=(*free, *starts), nominal=(*free, *starts)))
+    if like or shape is None or is_white(shape):
+        return found
+    colour = Colour.of(shape, noise, bench.update, UPDATES // 2)
+    other = fit_null(replace(bench, free=(*free, *starts), nominal=(*free, *starts), colour=colour))
+    return max(found, other, key=lambda b: b.fit.cost)
 
 
 def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]]:

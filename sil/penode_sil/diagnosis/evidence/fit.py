@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fit import Free
+from .colour import Colour
 from .observer import Filter, Predictor
 from .prior import cost, precisions, slopes as prior_slopes
 
@@ -92,17 +93,26 @@ def likelihood(nu: Array, used: NDArray[np.bool_], floor: Array) -> tuple[Array,
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Fits of a predictor's innovations; `floor` [n_z]: variance that sensor noise alone leaves."""
+    """Fits of a predictor's innovations, whitened by the `colour` of the sensors' noise."""
 
     predictor: Predictor
-    floor: Array
+    colour: Colour
+
+    @property
+    def floor(self) -> Array:
+        """Variance [n_z] that sensor noise alone leaves."""
+        return self.colour.variance
 
     def nu(self, free: Sequence[Free], shifts: Array, by: Filter) -> Array:
         """[runs, updates, n_z], of all recordings in turn."""
         lanes = self.predictor.predict(free, shifts, by)[0]
-        nu = np.concatenate(lanes.nu, axis=1)
+        nu = self.whole(lanes.nu)
         nu[~lanes.sane] = np.where(np.isfinite(nu[~lanes.sane]), 1e12, np.nan)
         return nu
+
+    def whole(self, nu: Sequence[Array]) -> Array:
+        """Innovations [..., updates, n_z] of recordings, whitened, in turn."""
+        return np.concatenate([self.colour.white(x) for x in nu], axis=-2)
 
     def at(self, free: Sequence[Free], by: Filter) -> Fit:
         """The fit that ends at these free values."""

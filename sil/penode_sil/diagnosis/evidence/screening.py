@@ -53,7 +53,7 @@ class Probe:
                     u[k + 1, :, place] = sizes[k] * series[e]
                 extra[e] = u
             lanes = self.predictor.predict(free, np.zeros((len(some) + 1, len(free))), self.by, extra)[0]
-            nu = np.concatenate(lanes.nu, axis=1)
+            nu = bench.problem().whole(lanes.nu)
             found.append((nu[1:] - nu[0]) / np.array(sizes)[:, None, None])
         return np.concatenate(found) if found else np.zeros((0, *bench.fit.nu.shape))
 

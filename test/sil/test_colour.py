@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Noise of sensors that is not white, and signals between their samples: against noise drawn here, and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from penode_sil.diagnosis.evidence.colour import Colour, is_white
+from penode_sil.diagnosis.evidence.observer import earlier
+
+UPDATE, COUNT, FREQUENCIES, BEFORE = 4, 200_000, 2048, 8
+POLE, SLOW = 0.95, 0.8  # of the noise of a sensor with unit power: this share of it is slow
+
+
+def slow_spectrum() -> np.ndarray:
+    """[f, 1], in closed form."""
+    turn = np.exp(-1j * np.pi * np.linspace(0.0, 1.0, FREQUENCIES + 1))
+    return ((1.0 - SLOW) + SLOW * (1.0 - POLE**2) / np.abs(1.0 - POLE * turn) ** 2)[:, None]
+
+
+def slow_noise(seed: int = 1) -> np.ndarray:
+    """[samples]: AR(1) beside white noise."""
+    rng = np.random.default_rng(seed)
+    slow, steps = np.zeros(COUNT), rng.normal(size=COUNT) * np.sqrt(SLOW * (1.0 - POLE**2))
+    for k in range(1, COUNT):
+        slow[k] = POLE * slow[k - 1] + steps[k]
+    return slow + rng.normal(size=COUNT) * np.sqrt(1.0 - SLOW)
+
+
+def means(x: np.ndarray) -> np.ndarray:
+    return x.reshape(-1, UPDATE).mean(axis=1)[:, None]
+
+
+def test_slow_noise_becomes_white() -> None:
+    """50 000 updates: correlations within 4.5 of 1/sqrt(n), and the variance within 4.5 sqrt(2/n) of that stated. The means themselves
+    are correlated by more than half."""
+    shape = slow_spectrum()
+    colour = Colour.of(shape, np.sqrt([np.min(shape)]), UPDATE, BEFORE)
+    raw, white = means(slow_noise()), colour.white(means(slow_noise()))[:, 0]
+    n = len(white)
+    assert np.mean(raw[1:] * raw[:-1]) > 0.5 * np.var(raw)
+    assert max(abs(np.mean(white[k:] * white[:-k])) / np.var(white) for k in range(1, 13)) < 4.5 / np.sqrt(n)
+    assert np.var(white) == pytest.approx(colour.variance[0], rel=4.5 * np.sqrt(2.0 / n))
+
+
+def test_white_noise_stays_as_it_is() -> None:
+    shape, nu = np.ones((FREQUENCIES + 1, 2)), np.random.default_rng(2).normal(size=(3, 50, 2))
+    colour = Colour.of(shape, np.array([0.1, 2.0]), UPDATE, BEFORE)
+    assert colour.variance == pytest.approx(np.array([0.01, 4.0]) / UPDATE)
+    np.testing.assert_allclose(colour.white(nu), nu, atol=1e-12)
+    assert np.array_equal(Colour.none(np.array([0.1, 2.0]), UPDATE).white(nu), nu)
+    assert is_white(shape) and not is_white(slow_spectrum())
+
+
+def test_an_update_without_a_measurement_stays_one() -> None:
+    """It predicts nothing, and the others keep their numbers."""
+    nu = np.random.default_rng(3).normal(size=(40, 1))
+    colour = Colour.of(slow_spectrum(), np.ones(1), UPDATE, BEFORE)
+    holed = nu.copy()
+    holed[7] = np.nan
+    zero = nu.copy()
+    zero[7] = 0.0
+    assert np.flatnonzero(np.isnan(colour.white(holed)[:, 0])).tolist() == [7]
+    assert np.array_equal(np.delete(colour.white(holed), 7, 0), np.delete(colour.white(zero), 7, 0))
+
+
+@pytest.mark.parametrize("late", (0.25, 0.5, 1.5))
+def test_half_a_sample_takes_no_noise_away(late: float) -> None:
+    """Straight lines between samples would leave 7/8 of the power of means of four at half a sample, which likelihood takes for a delay."""
+    white = np.random.default_rng(4).normal(size=COUNT)
+    moved = earlier(white, np.array([late]))[0]
+    power = np.var(moved[: (len(moved) // UPDATE - 1) * UPDATE].reshape(-1, UPDATE).mean(axis=1))
+    assert power * UPDATE == pytest.approx(1.0, rel=4.5 * np.sqrt(2.0 * UPDATE / COUNT))
+
+
+def test_a_tone_between_samples() -> None:
+    """Its turn at the end rings, by 1/(pi k) of its jump in slope k samples away, squared; the end was not seen."""
+    t = np.arange(300.0)
+    found = earlier(np.sin(0.4 * np.pi * t), np.array([0.0, 0.5, 3.3]))
+    for row, late in zip(found, (0.0, 0.5, 3.3), strict=True):
+        inside = slice(25, 270)
+        assert row[inside] == pytest.approx(np.sin(0.4 * np.pi * (t + late))[inside], abs=0.004)
+    assert np.isnan(found[2, -4:]).all() and np.isfinite(found[2, :-4]).all()
+
+
+def test_what_was_not_measured_stays_so() -> None:
+    y = np.ones(50)
+    y[20] = np.nan
+    assert np.flatnonzero(np.isnan(earlier(y, np.array([0.5]))[0])).tolist() == [19, 20, 49]
