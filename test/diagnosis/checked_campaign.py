@@ -28,8 +28,9 @@ from worlds_score import score as score_world
 PENODE = str(Path(sys.executable).with_name("penode"))
 
 
-def errors(model: Path, recording: Path, options: str) -> dict[str, float]:
-    """By sensor, in the unit of the model file, as the command gives them."""
+def errors(model: Path, recording: Path, options: str, set_name: str = "default") -> dict[str, float]:
+    """By sensor, in the unit of the model file, as the command gives them with a parameter set."""
+    options += f" --set {set_name}" * (set_name != "default")
     call = [PENODE, "simulate", str(model), "--input", str(recording), "-o", str(recording.with_suffix(".predicted.csv")), "--json"]
     run = subprocess.run([*call, *shlex.split(options)], capture_output=True, text=True, timeout=300, check=True)
     return {k: e["value"] for k, e in json.loads(run.stdout)["instances"][0]["rmse"].items()}
@@ -50,7 +51,8 @@ def one(name: str, case: object, out: Path, timeout: float) -> dict:
     differing, worse = 0, []
     for recording in recordings:
         own = [f for f in found["figures"] if f["recording"] == recording.name]
-        given = {what: errors(model, recording, found["simulated"]) for what, model in other.items()}
+        sets = {"extended": own[0]["set"] if own else "default"}
+        given = {what: errors(model, recording, found["simulated"], sets.get(what, "default")) for what, model in other.items()}
         differing += sum(f[what] != given[what][f["signal"]] for f in own for what in given)
         worse += [f["signal"] for f in own if f["role"] == "hold-out" and not f["extended"] <= 1.05 * f["nominal"]]
     rejected = found["model_file"] == "model_rejected.toml"
