@@ -3,7 +3,7 @@
 
 #include "penode/pen_exact.h"
 
-#include "penode/pen_cell.h"
+#include "penode/pen_promise.h"
 
 #define ZERO ((pen_real_t)0)
 #define HALF ((pen_real_t)0.5F)

@@ -5,7 +5,6 @@
 
 #include "penode/pen_promise.h"
 
-#include "penode/pen_cell.h"
 #include "penode/pen_net.h"
 
 #define ZERO  ((pen_real_t)0)

@@ -54,7 +54,7 @@ def include(*folders: str) -> list[str]:
 
 def generated(model: Model) -> Path:
     """The folder with the model's C, generated unless an earlier call did; keyed by model and generator."""
-    sources = sorted(path for pattern in ("*.py", "templates/*") for path in resource("penode_gen").rglob(pattern))
+    sources = sorted(path for pattern in ("*.py", "*.j2") for path in resource("penode_gen").rglob(pattern))
     folder = build_directory() / f"{model.name}-{digest_of([model.digest, *sources])}"
     if not (folder / f"{model.name}.c").exists():
         folder.parent.mkdir(parents=True, exist_ok=True)

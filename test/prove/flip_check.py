@@ -42,33 +42,37 @@ FAULTS = {
     ),
 }
 VERIFY_FAULTS = {
-    "pieces not covered": ("small_rollback", "pen_verify.c", ("good = (guard->crc == guard->pieces[guard->slot]);", 0, "good = true;")),
-    "the status of a piece left out": ("small_rollback", "pen_verify.c", ("return pen_crc_word(next, piece->status);", 0, "return next;")),
+    "pieces not covered": ("small_rollback", "pen_instance.c", ("good = (guard->crc == guard->pieces[guard->slot]);", 0, "good = true;")),
+    "the status of a piece left out": (
+        "small_rollback",
+        "pen_instance.c",
+        ("return pen_crc_word(next, piece->status);", 0, "return next;"),
+    ),
     "values not compared if a call ends with the last": (
         "small_layers_rollback",
-        "pen_verify.c",
+        "pen_instance.c",
         ("if (guard->at == length) {", 0, "if ((guard->at == length) && (*n > 0U)) {"),
     ),
     "the last value left out": (
         "small_layers_rollback",
-        "pen_verify.c",
+        "pen_instance.c",
         (
             "if (guard->at < length) {",
             0,
             "if (guard->at == (length - 1U)) {\n        guard->at = length;\n        *n -= 1U;\n    } else if (guard->at < length) {",
         ),
     ),
-    "which slot the guard is about not compared": ("small_rollback", "pen_verify.c", ("(self->guard.slot != slot) || ", 0, "")),
+    "which slot the guard is about not compared": ("small_rollback", "pen_instance.c", ("(self->guard.slot != slot) || ", 0, "")),
     "the head not compared": ("small_rollback", "pen_set.c", ("(differences == 0U) && ", 0, "")),
     "the address not compared": ("small_rollback", "pen_set.c", (" && (a->value == b->value)", 0, "")),
     "the addresses of the banks not compared": (
         "small_rollback",
-        "pen_verify.c",
+        "pen_instance.c",
         ("return pen_tuning_banks_known(tuning) && fits", 0, "return fits"),
     ),
     "which slot is active not compared": (
         "small_rollback",
-        "pen_verify.c",
+        "pen_instance.c",
         ("(tuning->settled == pen_port_load(&tuning->active))", 0, "true"),
     ),
     "a damaged rollback set taken": (
@@ -82,16 +86,16 @@ VERIFY_FAULTS = {
         "model",
         ("found = small_rollback_prepare(self, ready.value,", 0, "found = small_rollback_prepare(self, self->head.tuning.slot[0].value,"),
     ),
-    "reacts while a set is open": ("small_rollback", "pen_verify.c", ("if (tuning->open == 0U) {", 0, "if (true) {")),
-    "holds while a set is open": ("small_hold", "pen_verify.c", ("!good && idle &&", 0, "!good &&")),
+    "reacts while a set is open": ("small_rollback", "pen_instance.c", ("if (tuning->open == 0U) {", 0, "if (true) {")),
+    "holds while a set is open": ("small_hold", "pen_instance.c", ("!good && idle &&", 0, "!good &&")),
     "does not hold without a set to go back to": (
         "small_rollback",
-        "pen_verify.c",
+        "pen_instance.c",
         ("        pen_tuning_hold(&self->tuning, true);", 0, ""),
     ),
     "no confirmation": (
         "small_rollback",
-        "pen_verify.c",
+        "pen_instance.c",
         ("good = whole(model, &tuning->slot[slot], own, &self->guard, round);", 0, "good = false;"),
     ),
 }

@@ -9,7 +9,7 @@ from typing import Any
 from ..model import Filter, FilterLimit, Model
 from .c_text import real
 
-FILES = {"ekf.h.j2": "{name}_ekf.h", "ekf.c.j2": "{name}_ekf.c"}
+FILES = {"filter/ekf.h.j2": "{name}_ekf.h", "filter/ekf.c.j2": "{name}_ekf.c"}
 _TINY = {"float": 2.0**-102, "double": 2.0**-998}  # 2^24 times the smallest normal number
 _EPSILON = {"float": 2.0**-23, "double": 2.0**-52}
 
