@@ -31,3 +31,4 @@ FLAGS = (
 )
 
 FILTER_FLAGS = ("missing", "refused", "limited", "nonfinite")  # PEN_EKF_... of inc/penode/pen_ekf.h, the bits behind those of FLAGS
+MONITOR_FLAGS = ("cause", "other", "nonfinite")  # PEN_MONITOR_... of inc/penode/pen_monitor.h, the bits behind those

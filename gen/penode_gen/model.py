@@ -243,6 +243,24 @@ class Filter:
 
 
 @dataclass(frozen=True)
+class MonitorCause:
+    """A change that is watched for: of parameters by name, SI, signs included."""
+
+    name: str
+    changes: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Monitor:
+    """What [monitor] says: tests on the innovations of the filter (inc/penode/pen_monitor.h). `mean_time` between false alarms [s], at
+    least; `spread`: factor on the standard deviation of innovations that the test for anything else is made for."""
+
+    mean_time: float
+    spread: float
+    causes: tuple[MonitorCause, ...]
+
+
+@dataclass(frozen=True)
 class Model:
     """A checked model. All values are SI; `digest` identifies the files it was read from."""
 
@@ -274,6 +292,7 @@ class Model:
     points: tuple[Point, ...] = ()
     sampled: tuple[Sampled, ...] = ()
     filter: Filter | None = None
+    monitor: Monitor | None = None
 
     @property
     def owner(self) -> str:

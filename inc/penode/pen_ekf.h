@@ -244,7 +244,7 @@ static inline pen_real_t pen_ekf_correct(const pen_ekf_model_t *model, pen_real_
  * @param z        measured less predicted by the state before any measurement of this sample; NaN or Inf: missing
  * @param offered  false: there is none in this sample
  * @param f        [n_x][n_x] factors; @param dx  [n_x] correction of the state so far: both are updated
- * @param work     [2 n_x]
+ * @param work     [2 n_x]; then from n_x on P h of a measurement that was used, 0 of any other
  * @return PEN_OK; PEN_EKF_MISSING; PEN_EKF_REFUSED
  * Cost: 3/2 n_x^2 + 5 n_x multiply-adds and 2 n_x + 1 divisions, the same for any values and verdict.
  */

@@ -10,6 +10,9 @@
 #ifdef EKF_HEADER /* the model file has a filter */
 #include "ekf_loop.h"
 #endif
+#ifdef MONITOR_HEADER /* and a monitor */
+#include "monitor_loop.h"
+#endif
 
 enum { SIZE_INSTANCE, SIZE_BANKS, SIZE_REAL, SIZE_X, SIZE_U, SIZE_Y, SIZE_Z, SIZE_SAVED, SIZE_COUNT };
 

@@ -124,9 +124,11 @@ def build_library(model: Model, dtype: type = np.float32, compiler: Sequence[str
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
     shim = native("sil", "firmware", "sil.c")
     code += [source / f"{model.name}_ekf.c"] if model.filter else []
+    code += [source / f"{model.name}_monitor.c"] if model.monitor else []
     options = [*compiler, *FLAGS, "-fPIC", *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []), *include("inc", "port/gnu")]
     read: list[Part] = [compiler_version(compiler[0]), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
     same = build_once("runtime", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     own = ["-shared", *model_options(model), f"-I{source}", *map(str, [shim, *code, same])]
     own += [f'-DEKF_HEADER="{model.name}_ekf.h"'] if model.filter else []
+    own += [f'-DMONITOR_HEADER="{model.name}_monitor.h"'] if model.monitor else []
     return build_once(model.name, ".so", [*options, *own], [*read, shim, *code, *sorted(source.glob(f"{model.name}*.h")), same])

@@ -22,6 +22,7 @@ runtime lines      lines of inc/penode and src together, without the next three;
 elementary lines   the same of the functions that only some models call (pen_elementary.h), which no other program links
 wire protocol lines lines of pen_xcp* there: the XCP slave, which only firmware with a calibration tool links; a budget too
 filter lines       lines of pen_ekf* there: the Kalman filter, which only firmware with virtual sensors links; a budget too
+monitor lines      lines of pen_monitor* there: the fault monitor, which only firmware with one links; a budget too
 """
 
 from __future__ import annotations
@@ -53,7 +54,15 @@ RATCHETS = (
     "tabled numbers",
     "compared numbers",
 )
-BUDGETS = ("thresholds of innovations", "settings of training", "runtime lines", "elementary lines", "wire protocol lines", "filter lines")
+BUDGETS = (
+    "thresholds of innovations",
+    "settings of training",
+    "runtime lines",
+    "elementary lines",
+    "wire protocol lines",
+    "filter lines",
+    "monitor lines",
+)
 ELEMENTARY = {"pen_elementary.h", "pen_parts.h", "pen_trig.c", "pen_atan.c", "pen_log.c", "pen_root.c"}
 
 NEWER, TABLE = BUDGETS[:2]
@@ -208,7 +217,7 @@ def budget(name: str) -> str:
     """Which budget a file of the runtime counts for."""
     if name in ELEMENTARY:
         return "elementary lines"
-    kinds = {"pen_xcp": "wire protocol lines", "pen_ekf": "filter lines"}
+    kinds = {"pen_xcp": "wire protocol lines", "pen_ekf": "filter lines", "pen_monitor": "monitor lines"}
     return next((kind for start, kind in kinds.items() if name.startswith(start)), "runtime lines")
 
 

@@ -70,6 +70,7 @@ def test_counts_of_a_small_tree(tree: Path) -> None:
         "elementary lines": 0,
         "wire protocol lines": 5,
         "filter lines": 0,
+        "monitor lines": 0,
     }
     assert structure.look(tree)[0] == counts
     assert structure.main(["--root", str(tree)]) == 0

@@ -43,7 +43,7 @@ def context(model: Model, given: Filter) -> dict[str, Any]:
                 }
                 for k, i in enumerate(given.inputs)
             ],
-            "given": [_given(given, name) for name in inputs],
+            "given": [given_input(given, name) for name in inputs],
             "noisy": [{"name": s.name, "at": model.states.index(s.name)} for s in noisy],
             "own": [f"{model.states.index(s.name)}U" for s in noisy] + [f"{len(given.states) + k}U" for k in range(len(given.inputs))],
             "start": [real(s * s) for s in start],
@@ -57,7 +57,7 @@ def context(model: Model, given: Filter) -> dict[str, Any]:
     }
 
 
-def _given(given: Filter, name: str) -> dict[str, Any]:
+def given_input(given: Filter, name: str) -> dict[str, Any]:
     """An input as the model gets it in a step: C of u and of the state x of the filter, and the number of its state."""
     names = [i.name for i in given.inputs]
     if name not in names:

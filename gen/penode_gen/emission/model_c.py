@@ -19,7 +19,7 @@ from ..networks import Dense
 from ..resources import resource
 from ..sets import layout, packing, promises
 from ..version import VERSION
-from . import filter_c, selftest
+from . import filter_c, monitor_c, selftest
 from .c_text import fold, literal, literals, real
 from .equations_c import RUNGE_KUTTA, Body, Equations
 from .files import write_all
@@ -67,6 +67,9 @@ def render(model: Model, self_test: bool = True) -> dict[str, str]:
     if model.filter:
         context |= filter_c.context(model, model.filter)
         files |= filter_c.FILES
+        if model.monitor:
+            context |= monitor_c.context(model, model.filter, model.monitor)
+            files |= monitor_c.FILES
     for template, name in files.items():
         texts[name.format(name=model.name, owner=model.owner)] = fold(TEMPLATES.get_template(template).render(context))
     return texts | {f"{model.owner}_layout.json": layout.to_json(model)}

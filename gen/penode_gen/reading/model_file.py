@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from .. import model as m
-from ..algebra import expressions as ex, limits
+from ..algebra import expressions as ex, limits, monitored
 from ..algebra.causalise import check
 from ..laws import LAWS
 from ..sets import promises
 from ..sets.fold import room
-from .filter_table import FilterTables
 from .followers import measures
+from .monitor_table import MonitorTables
 from .network_tables import ROOM, UNKNOWN
 from .places import one_line, show
 from .tables import C_PATTERN, MACROS, SECTIONS
@@ -54,7 +54,7 @@ class _All(frozenset[str]):
         return True
 
 
-class _Reader(FilterTables):
+class _Reader(MonitorTables):
     """Reads the whole model."""
 
     def __init__(self, path: Path):
@@ -74,10 +74,10 @@ class _Reader(FilterTables):
         points = (*acts.points, *self.points(bodies, inputs, (*acts.states, *acts.sampled), acts.points, parameters))
         elements = tuple(self.elements(parameters, inputs, networks))
         states = (*self.states(), *acts.states, *self.law_states(elements))
-        variables = (*self.variables(), *acts.variables)
-        equations = (*self.equations(), *acts.equations)
+        variables, equations = (*self.variables(), *acts.variables), (*self.equations(), *acts.equations)
         outputs, sensors = (tuple(self.signals(section)) for section in ("outputs", "sensors"))
         own_filter = self.filter(sensors, self.units_of_states(bodies, states), inputs, sample_time)
+        own_monitor = self.monitor(parameters, own_filter is not None, sample_time)
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
         self.folds(head, sets)
         promises.check(networks, sets, head["outside"], self.problem)
@@ -119,13 +119,14 @@ class _Reader(FilterTables):
             points=points,
             sampled=tuple(acts.sampled),
             filter=own_filter,
+            monitor=own_monitor,
         )
 
     def sections(self) -> None:
         """The name of the file, and the names of its sections."""
         if not self.path.name.isprintable():
             self.problem((), "the file has a name that cannot stand in a comment", "rename it")
-        known = [*SECTIONS, "model", "points", "elements", "equations", "sets", "filter"]
+        known = [*SECTIONS, "model", "points", "elements", "equations", "sets", "filter", "monitor"]
         for key in self.data:
             if key not in known:
                 near = difflib.get_close_matches(key, known, 1)
@@ -367,6 +368,7 @@ def load(path: str | Path) -> m.Model:
     try:
         problems = check(model)
         model, more = (model, []) if problems else limits.complete(model)
+        more += [] if problems or more else monitored.problems(model)
     except RecursionError as error:
         raise m.ModelError(
             [one_line(f"{path}: has equations that depend on each other in too long a chain; write a smaller model")]

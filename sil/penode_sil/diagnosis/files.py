@@ -16,7 +16,7 @@ import penode_gen
 from ..errors import WrongUse, hint
 from ..recordings.excerpt import excerpted
 from ..recordings.measured import load
-from . import report
+from . import monitored, report
 from .engine import diagnose
 from .result import Diagnosis
 from .still import with_noise_at_rest
@@ -53,6 +53,8 @@ def run(
     model = with_noise_at_rest(model, job.still, job.channels, train)
     with all_or_none(job.output):
         found = diagnose(model, train, held, job.output, job.set_name, log, tell, job.channels)
+        note = monitored.write(job.output, model, found.model_file)
+        found = replace(found, notes=(*found.notes, *[note] * bool(note)))
         report.write(job.output / "report.html", model, found, job.output / found.model_file)
         found = replace(found, compile_seconds=compilers() - compiled)
         (job.output / "diagnosis.json").write_text(json.dumps(found.as_json(), indent=2) + "\n", encoding="utf-8")

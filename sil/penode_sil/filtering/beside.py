@@ -19,10 +19,11 @@ from ..output import Column
 from ..recordings import units
 from ..results import Result
 from ..scenario import Instance
-from . import compiled, exact, results
+from . import compiled, exact, exact_monitor, results, watched
 from .estimates import Estimates, named, of
 
 RUN = {"mil": exact.run, "sil": compiled.run}
+WATCH = {"mil": exact_monitor.run, "sil": watched.run}
 SEED = "filter"  # of the noise of a simulation: its bytes
 
 
@@ -47,17 +48,23 @@ class Beside:
         exchanges = _exchanges(result.instance, result.adopted)
         with progress(f"{name}: filter on {place}", len(z)) as tell:
             self.found: Estimates = RUN[place](model, result.instance.set, driven, z, None, exchanges, tell)
+        self.watched = None
+        if model.monitor is not None:
+            with progress(f"{name}: monitor on {place}", len(z)) as tell:
+                self.watched = WATCH[place](model, result.instance.set, driven, z, None, exchanges, tell)
         self.truth: dict[str, NDArray[Any]] = dict(zip((i.name for i in model.inputs), u.T, strict=True))
         self.truth |= dict(zip(model.states, result.x.T, strict=True))
         self.truth |= {s.name: v for s, v in zip((*model.outputs, *model.sensors), (*result.y.T, *result.z.T), strict=True)}
 
     def columns(self, prefix: str) -> list[Column]:
         """Estimates, to stand behind the table of the simulation."""
-        return [replace(c, name=f"{prefix}{c.name}") for c in results.columns(self.model, self.found, ".estimate")]
+        found = results.columns(self.model, self.found, ".estimate") + watched.columns(self.model, self.watched)
+        return [replace(c, name=f"{prefix}{c.name}") for c in found]
 
     def summary(self) -> dict[str, Any]:
         """Counts, and each estimate against the truth."""
-        entry = results.summary(self.model, self.found) | {"errors": {}}
+        times = np.arange(len(self.found.status)) * self.model.sample_time
+        entry = results.summary(self.model, self.found) | watched.summary(self.model, self.watched, times) | {"errors": {}}
         for at, name, unit in named(self.model):
             error = self.found.values[:, at].astype(float) - self.truth[name]
             bound = 3.0 * self.found.deviations[:, at]
@@ -73,7 +80,7 @@ class Beside:
             f"  {n}: RMSE {e['rmse']:.6g} {e['unit']}, {e['within_3_sd']:.1%} within 3 standard deviations"
             for n, e in entry["errors"].items()
         ]
-        return [f"  filter of {self.result.instance.name}:", *results.sentences(entry), *errors]
+        return [f"  filter of {self.result.instance.name}:", *results.sentences(entry), *watched.sentences(entry), *errors]
 
     def plot(self, times: NDArray[np.float64], signal: str | None, title: str, path: Path) -> None:
         """Truth, estimate and 3 standard deviations of a signal, the first one that is estimated if None."""

@@ -17,8 +17,8 @@ from ..errors import RecordingError, UserError, WrongUse, hint
 from ..mdf_write import write_mf4
 from ..output import Column, write_csv
 from ..simulate import Asked
-from . import recorded, results
-from .beside import RUN, check_signal
+from . import recorded, results, watched
+from .beside import RUN, WATCH, check_signal
 from .estimates import named, of
 
 
@@ -46,19 +46,29 @@ def over_recordings(
     for one, path in zip(given, outputs, strict=True):
         with progress(f"{one.replay.plan.path.name} on {target}", len(one.z)) as tell:
             found = RUN[target](loaded, set_name or next(iter(loaded.sets)), one.u, one.z, one.mask, {}, tell)
+        watch = None
+        if loaded.monitor is not None:
+            with progress(f"{one.replay.plan.path.name}: monitor on {target}", len(one.z)) as tell:
+                watch = WATCH[target](loaded, set_name or next(iter(loaded.sets)), one.u, one.z, one.mask, {}, tell)
         times = one.replay.times + one.replay.offset
+        time = Column("time", "s", times, "%.12g")
         path.parent.mkdir(parents=True, exist_ok=True)
-        (write_mf4 if path.suffix == ".mf4" else write_csv)(path, [Column("time", "s", times, "%.12g"), *results.columns(loaded, found)])
+        (write_mf4 if path.suffix == ".mf4" else write_csv)(path, [time, *results.columns(loaded, found), *watched.columns(loaded, watch)])
         if plot is not None:
             plot.parent.mkdir(parents=True, exist_ok=True)
             name = signal or named(loaded)[0][1]
             sensed = one.replay.sensed.get(name)
             results.plot(loaded, found, times, name, (sensed.time, sensed.values) if sensed else None, one.replay.plan.title, plot)
         entry = {"model": loaded.name, "recording": str(one.replay.plan.path), "target": target, "samples": len(one.z), "output": str(path)}
-        summaries.append(entry | results.summary(loaded, found) | {"checked": results.checked(loaded, found, one.replay)})
+        summaries.append(
+            entry
+            | results.summary(loaded, found)
+            | watched.summary(loaded, watch, times)
+            | {"checked": results.checked(loaded, found, one.replay)}
+        )
         if not as_json:
             head = f"{loaded.name} on {target}: {entry['recording']}, {len(one.z)} samples -> {path}"
-            click.echo("\n".join([head, *results.sentences(summaries[-1])]))
+            click.echo("\n".join([head, *results.sentences(summaries[-1]), *watched.sentences(summaries[-1])]))
     if as_json:
         click.echo(json.dumps(summaries[0] if len(summaries) == 1 else {"recordings": summaries}, indent=2))
 

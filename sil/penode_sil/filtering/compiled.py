@@ -45,12 +45,13 @@ class CompiledFilter:
         self.owner = owner
         self._memory = np.zeros(owner.size // 8 + 1)
         self._kept: list[Set] = []
-        status = self._function("ekf_init")(self._self, ctypes.byref(self._set(set_name)), None)
+        status = self._function("ekf_init")(self.address, ctypes.byref(self._set(set_name)), None)
         if status:
             raise AssertionError(f"init refused its own set: {status:#x}")
 
     @property
-    def _self(self) -> ctypes.c_void_p:
+    def address(self) -> ctypes.c_void_p:
+        """Of NAME_ekf_t."""
         return ctypes.c_void_p(self._memory.ctypes.data)
 
     def _function(self, name: str) -> Callable[..., int]:
@@ -65,7 +66,7 @@ class CompiledFilter:
 
     def select(self, name: str) -> int:
         """Let the next step adopt a set of the model file; a status."""
-        return self._function("tune_select")(self._self, ctypes.byref(self._set(name)))  # `model` is the first member
+        return self._function("tune_select")(self.address, ctypes.byref(self._set(name)))  # `model` is the first member
 
     def run(
         self,
@@ -95,10 +96,10 @@ class CompiledFilter:
         for begin in range(0, n, stretch):
             some = slice(begin, begin + stretch)
             at = [part[some].ctypes.data if part.size else None for part in (u, z, offered, x, f, found, test, status)]
-            owner.library.sil_ekf_run(self._self, ctypes.c_uint32(len(z[some])), *map(ctypes.c_void_p, at))
+            owner.library.sil_ekf_run(self.address, ctypes.c_uint32(len(z[some])), *map(ctypes.c_void_p, at))
             progress(min(begin + stretch, n))
         counts = np.zeros((owner.n_z, len(VERDICTS)), np.uint32)
-        owner.library.sil_ekf_counts(self._self, ctypes.c_void_p(counts.ctypes.data))
+        owner.library.sil_ekf_counts(self.address, ctypes.c_void_p(counts.ctypes.data))
         values, deviations = self._columns(found)
         tests = (test["innovation"], test["variance"], test["ratio"], test["verdict"])
         return Estimates(values, deviations, *tests, status, counts), x, f

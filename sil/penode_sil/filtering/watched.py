@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""What a monitor gives, sample by sample, and the compiled one: NAME_monitor.h in the shared library of its model."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from penode_gen.algebra import placeholder
+from penode_gen.flags import FILTER_FLAGS, FLAGS as STEP_FLAGS, MONITOR_FLAGS
+from penode_gen.model import Model
+
+from ..output import Column
+from .compiled import Compiled
+
+Array = NDArray[Any]
+OTHER = "other"  # the test for what no named cause is
+FLAGS = {name: 1 << (len(STEP_FLAGS) + len(FILTER_FLAGS) + at) for at, name in enumerate(MONITOR_FLAGS)}  # PEN_MONITOR_... of pen_monitor.h
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """One row a sample: sums of the tests in thresholds [n, tests], and whether each is raised."""
+
+    sums: Array
+    raised: NDArray[np.bool_]
+
+
+def names(model: Model) -> list[str]:
+    """Names of the tests, in their order; of a model without a monitor none."""
+    return [*(c.name for c in model.monitor.causes), OTHER] if model.monitor else []
+
+
+class CompiledMonitor:
+    """A monitor and its filter, from their start; run() goes on where it was."""
+
+    def __init__(self, owner: Compiled, set_name: str):
+        self.owner, self.filter = owner, owner.filter(set_name)
+        size, self.n = list((ctypes.c_uint32 * 2).in_dll(owner.library, "sil_monitor_sizes"))
+        self._memory = np.zeros(size // 8 + 1)
+        getattr(owner.library, f"{owner.model.name}_monitor_init")(ctypes.c_void_p(self._memory.ctypes.data))
+
+    def run(self, u: Array, z: Array, mask: Array | None = None) -> tuple[Watched, NDArray[np.uint32]]:
+        """Step through inputs u [n, n_u] and measurements z [n, n_z]; and the status [n] of filter and monitor."""
+        owner, n = self.owner, len(z)
+        z = np.ascontiguousarray(z, owner.dtype)
+        u = np.ascontiguousarray(placeholder.columns(owner.model, np.asarray(u, float).reshape(n, -1)), owner.dtype)
+        offered = np.full(n, 2**owner.n_z - 1, np.uint32) if mask is None else np.ascontiguousarray(mask, np.uint32)
+        sums, raised, status = np.zeros((n, self.n), owner.dtype), np.zeros((n, self.n), np.uint32), np.zeros(n, np.uint32)
+        own = [self.filter.address, ctypes.c_void_p(self._memory.ctypes.data), ctypes.c_uint32(n)]
+        owner.library.sil_monitor_run(*own, *(ctypes.c_void_p(a.ctypes.data) for a in (u, z, offered, sums, raised, status)))
+        return Watched(sums, raised != 0), status
+
+
+def run(model: Model, set_name: str, u: Any, z: Any, mask: Any, exchanges: dict[int, str], progress: Callable[[int], None]) -> Watched:
+    """A whole run; `exchanges`: the sample from which on another set is in force."""
+    own, found = CompiledMonitor(Compiled(model), set_name), []
+    for begin, end in itertools.pairwise([0, *sorted(exchanges), len(z)]):
+        if begin in exchanges:
+            own.filter.select(exchanges[begin])
+        part = slice(begin, end)
+        found.append(own.run(u[part], z[part], None if mask is None else mask[part])[0])
+        progress(end)
+    return joined(found)
+
+
+def joined(parts: list[Watched]) -> Watched:
+    """Stretches of one run, one after the other."""
+    return Watched(np.concatenate([p.sums for p in parts]), np.concatenate([p.raised for p in parts]))
+
+
+def columns(model: Model, found: Watched | None) -> list[Column]:
+    """Sums in thresholds and flags, to stand behind the estimates; none without a monitor."""
+    table: list[Column] = []
+    if found is None:
+        return table
+    for name, total, up in zip(names(model), found.sums.T, found.raised.T, strict=True):
+        table += [Column(f"monitor.{name}", "1", total.astype(float)), Column(f"monitor.{name}.raised", "1", up.astype(np.uint32), "%d")]
+    return table
+
+
+def summary(model: Model, found: Watched | None, times: Array) -> dict[str, Any]:
+    """Of each test: when it was raised first [s], how often, and its highest sum in thresholds; nothing without a monitor."""
+    entry: dict[str, Any] = {}
+    if found is None:
+        return entry
+    for name, total, up in zip(names(model), found.sums.T, found.raised.T, strict=True):
+        rises = np.flatnonzero(np.diff(up.astype(int), prepend=0) > 0)
+        first = float(times[rises[0]]) if rises.size else None
+        entry[name] = {"raised": int(rises.size), "first": first, "highest": float(total.max(initial=0.0))}
+    return {"monitor": entry}
+
+
+def sentences(entry: dict[str, Any]) -> list[str]:
+    """A summary in lines."""
+    lines = []
+    for name, test in entry.get("monitor", {}).items():
+        first = "not raised" if test["first"] is None else f"raised first at {test['first']:.6g} s, {test['raised']} times"
+        lines.append(f"  monitor {name}: {first}; highest {test['highest']:.3g} thresholds")
+    return lines
