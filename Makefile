@@ -87,9 +87,6 @@ train: setup ## From a recording to a running controller: record, train, check o
 onnx-table: setup ## Which operators of ONNX are read, by the cases of its own project; why others are refused
 	$(Q)$(PYTHON) test/gen/onnx_table.py
 
-campaign-monitor: setup ## The fault monitor: friction put in, and hours without, beside chi-square tests: test/filter/MONITOR.md; RUNS and HOURS
-	$(Q)$(PYTHON) test/filter/monitor_campaign.py --runs $(or $(RUNS),200) --hours $(or $(HOURS),200) --jobs $$(nproc)
-
 # A part with a row that is not met (-) does not keep the page from being written; the page says so.
 campaign-train: setup build/setup/rival_training ## Train on recordings of plants that are known, five seeds each, and on measured dampers: test/training/CAMPAIGN.md; goes on where it was stopped
 	$(Q)$(PYTHON) test/training/campaign.py

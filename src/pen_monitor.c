@@ -89,7 +89,7 @@ static uint32_t take(const pen_monitor_model_t *model, pen_real_t score, uint32_
     const uint32_t stays = (sum > ZERO) ? (test->raised & 1U) : 0U;
     const uint32_t raised = up | stays;
 
-    test->count += raised & ~(test->raised & 1U);
+    test->count += raised & ~test->raised;
     test->sum = sum;
     test->raised = raised;
     return raised;
@@ -133,5 +133,5 @@ pen_status_t pen_monitor_step(const pen_monitor_model_t *model, pen_monitor_t *s
     }
     self->running |= good;
     self->nonfinite += advanced & ~finite;
-    return of_cause[found & 1U] | of_rest[others & 1U] | of_held[good | (1U - advanced)];
+    return of_cause[found] | of_rest[others] | of_held[good | (1U - advanced)];
 }

@@ -7,9 +7,11 @@
 
 PROVE_STATIC  := prove-rules prove-eva prove-coverage
 PROVE_DYNAMIC := prove-spin prove-preempt prove-tsan prove-status prove-fuzz prove-xcp-fuzz prove-xcp-preempt prove-xcp-cost prove-xcp-size prove-readers prove-flip prove-longrun prove-stack prove-bits \
-                 prove-accuracy prove-cost prove-ekf-cost prove-ekf-long prove-kernels prove-promise prove-promises
+                 prove-accuracy prove-cost prove-ekf-cost prove-monitor-cost prove-ekf-long prove-kernels prove-promise prove-promises
 
-.PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC)
+PROVE_PARTS   := prove-eva-filter prove-mutation-filter
+
+.PHONY: $(PROVE_STATIC) $(PROVE_DYNAMIC) $(PROVE_PARTS)
 
 # -- static -----------------------------------------------------------------------------------------------------------
 
@@ -57,6 +59,8 @@ prove-cost: | $(READY) ## Functions take the instructions that their headers nam
 	@$(PYTHON) test/prove/cost_check.py
 prove-ekf-cost: | $(READY) ## A filter takes the instructions that gen/README.md states, whatever is measured
 	@$(PYTHON) test/prove/ekf_cost_check.py
+prove-monitor-cost: | $(READY) ## A monitor takes the instructions that gen/README.md states, whatever is measured
+	@$(PYTHON) test/prove/monitor_cost_check.py
 prove-ekf-long: | $(READY) ## A filter over a million steps with wild and missing measurements: positive, judged and counted
 	@$(PYTHON) test/prove/ekf_long_check.py
 prove-kernels: | $(READY) build/setup/unity ## A fault in a kernel in assembler is found by its test
@@ -66,9 +70,17 @@ prove-promise: | $(READY) ## Random networks in exact arithmetic: what the promi
 prove-promises: | $(READY) ## PROMISES.md: each promise, the test that shows it, the figures of the last run
 	@$(PYTHON) test/prove/promises.py
 
+# -- parts of gates, while one works on what they are about --------------------------------------------------------------
+
+prove-eva-filter: | $(READY) build/setup/proof ## Frama-C: filter and monitor alone, with their seeded faults
+	@$(PYTHON) test/prove/eva.py "runtime, filters" "runtime, monitors" --seeds
+prove-mutation-filter: | $(READY) build/setup/proof build/setup/unity ## Small faults in filter and monitor are found by their unit tests
+	@$(PYTHON) test/prove/mutation.py --tests 'test_pen_ekf*' pen_ekf.c pen_ekf.h
+	@$(PYTHON) test/prove/mutation.py --tests 'test_pen_monitor*' pen_monitor.c
+
 # -- the same in full -------------------------------------------------------------------------------------------------
 
-CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-xcp-fuzz campaign-readers campaign-recordings campaign-flip campaign-longrun campaign-ekf campaign-accuracy
+CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-xcp-fuzz campaign-readers campaign-recordings campaign-flip campaign-longrun campaign-ekf campaign-monitor campaign-accuracy
 .PHONY: campaign-proofs $(CAMPAIGN)
 
 campaign-proofs: setup build/setup/proof ## The long proofs: all floats, 10^7 sequences of calls, every bit, a whole day
@@ -94,3 +106,5 @@ campaign-accuracy: | $(READY)
 campaign-ekf: | $(READY)
 	@$(PYTHON) test/prove/ekf_long_check.py --steps 50000000 --as "ekf campaign"
 	@PYTHONPATH=test/prove $(PYTHON) test/filter/hour_check.py
+campaign-monitor: | $(READY) ## The fault monitor: friction put in, and hours without, beside chi-square tests: test/filter/MONITOR.md; RUNS and HOURS
+	@$(PYTHON) test/filter/monitor_campaign.py --runs $(or $(RUNS),200) --hours $(or $(HOURS),200) --jobs $$(nproc)

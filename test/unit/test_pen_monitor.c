@@ -9,7 +9,7 @@
 #include "penode/pen_port.h"
 #include "unity.h"
 
-#define N      2U
+#define N      3U
 #define TESTS  2U
 #define CAUSES 2U
 #define ALL    (CAUSES * N)
@@ -41,8 +41,9 @@ void setUp(void)
     for (size_t i = 0U; i < (N * N); i++) {
         phi[i] = (pen_real_t)0;
     }
-    phi[0] = (pen_real_t)1;
-    phi[3] = (pen_real_t)1;
+    for (size_t i = 0U; i < N; i++) {
+        phi[(i * N) + i] = (pen_real_t)1;
+    }
     for (size_t i = 0U; i < (TESTS * N); i++) {
         h[i] = (pen_real_t)0;
         gain[i] = (pen_real_t)0;
@@ -59,6 +60,11 @@ void setUp(void)
     for (size_t i = 0U; i <= (2U * ALL); i++) {
         s[i] = POISON;
         effect[i] = POISON;
+    }
+    for (size_t i = 0U; i <= CAUSES; i++) {
+        sums[i].sum = POISON;
+        sums[i].raised = 9U;
+        sums[i].count = 9U;
     }
     sums[CAUSES + 1U].count = 99U;
     monitor.ready = 9U;
@@ -106,6 +112,19 @@ void test_score_is_the_log_likelihood_ratio(void)
     TEST_ASSERT_TRUE(same((pen_real_t)0, sums[0].sum));
 }
 
+/* m = 2 and 1 of the second cause: l = 2 (3 - 1) / 4 + 1 (1.5 - 0.5) / 1. */
+void test_each_cause_has_a_change_of_the_measurements(void)
+{
+    direct[TESTS] = (pen_real_t)2;
+    direct[TESTS + 1U] = (pen_real_t)1;
+    test[0].innovation = (pen_real_t)3;
+    test[0].variance = (pen_real_t)4;
+    test[1].innovation = (pen_real_t)1.5;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, step());
+    TEST_ASSERT_TRUE(same((pen_real_t)0, sums[0].sum));
+    TEST_ASSERT_TRUE(same((pen_real_t)2, sums[1].sum));
+}
+
 /* l = 0.25 * 12 - 1, and 0.25 * 8 - 1: 2 + 1; then the threshold of 4. */
 void test_score_of_anything_else(void)
 {
@@ -134,25 +153,25 @@ void test_sensitivity_goes_through_the_step(void)
     TEST_ASSERT_TRUE(same((pen_real_t)0, s[0]) && same((pen_real_t)0, s[1]));
 }
 
-/* s = 2, 4 of the first cause; h = 1, 0.5 then 0, 1 of the state that the first measurement has corrected. */
+/* s = 2, 4 of the first cause; h = 1, 0.5 then 0, 2 of the state that the first measurement has corrected. */
 void test_sensitivity_goes_through_the_measurements(void)
 {
-    model.threshold = (pen_real_t)5.5;
+    model.threshold = (pen_real_t)10;
     s[0] = (pen_real_t)2;
     s[1] = (pen_real_t)4;
     h[0] = (pen_real_t)1;
     h[1] = (pen_real_t)0.5;
-    h[3] = (pen_real_t)1;
+    h[N + 1U] = (pen_real_t)2;
     gain[0] = (pen_real_t)1;
     gain[1] = (pen_real_t)2;
-    gain[2] = (pen_real_t)4;
+    gain[N] = (pen_real_t)4;
     test[0].variance = (pen_real_t)8;
     test[0].innovation = (pen_real_t)10;
-    test[1].innovation = (pen_real_t)2;
+    test[1].innovation = (pen_real_t)4;
     TEST_ASSERT_EQUAL_HEX32(PEN_MONITOR_CAUSE, step());
-    /* m = 4, share 0.5, l = 0.5 (10 - 2) = 4; s = 1.5, 3; then m = 3, l = 3 (2 - 1.5) = 1.5; s = 1.5 - 12, 3 */
-    TEST_ASSERT_TRUE(same((pen_real_t)5.5, sums[0].sum));
-    TEST_ASSERT_TRUE(same((pen_real_t)-10.5, s[0]) && same((pen_real_t)3, s[1]));
+    /* m = 4, share 0.5, l = 0.5 (10 - 2) = 4; s = 1.5, 3; then m = 6, l = 6 (4 - 3) = 6; s = 1.5 - 24, 3 */
+    TEST_ASSERT_TRUE(same((pen_real_t)10, sums[0].sum));
+    TEST_ASSERT_TRUE(same((pen_real_t)-22.5, s[0]) && same((pen_real_t)3, s[1]));
 }
 
 void test_measurement_that_is_not_used_says_nothing(void)
@@ -196,12 +215,25 @@ void test_a_test_is_raised_and_falls(void)
     TEST_ASSERT_EQUAL_UINT32(2U, sums[0].count);
 }
 
+/* Only the lowest bit says whether a test is raised: another one is damage. */
+void test_a_damaged_flag_is_not_kept(void)
+{
+    direct[0] = (pen_real_t)2;
+    test[0].innovation = (pen_real_t)2; /* 2 */
+    sums[0].raised = 6U;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, step());
+    TEST_ASSERT_EQUAL_UINT32(0U, sums[0].raised);
+    TEST_ASSERT_EQUAL_UINT32(0U, sums[0].count);
+}
+
 void test_monitor_holds_with_the_filter(void)
 {
     direct[0] = (pen_real_t)2;
     test[0].innovation = (pen_real_t)2; /* 2 */
     (void)step();
     sample.advanced = false;
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, step());
+    TEST_ASSERT_TRUE(same((pen_real_t)2, sums[0].sum));
     s[0] = (pen_real_t)3;
     phi[0] = (pen_real_t)7;
     effect[ALL] = (pen_real_t)9;
@@ -217,7 +249,7 @@ void test_what_is_no_number_is_not_taken_over(void)
 
     for (size_t k = 0U; k < 4U; k++) {
         effect[ALL] = (k == 0U) ? big : (pen_real_t)0;
-        phi[3] = (k == 1U) ? (big - big) : (pen_real_t)1;
+        phi[N + 1U] = (k == 1U) ? (big - big) : (pen_real_t)1;
         direct[2] = (k == 2U) ? big : (pen_real_t)0;
         test[1].ratio = (k == 3U) ? big : (pen_real_t)0;
         s[0] = (pen_real_t)3;
@@ -227,8 +259,43 @@ void test_what_is_no_number_is_not_taken_over(void)
         for (size_t i = 0U; i <= CAUSES; i++) {
             TEST_ASSERT_TRUE(same((pen_real_t)0, sums[i].sum));
         }
-        TEST_ASSERT_TRUE(same((pen_real_t)3, s[0]) && same((pen_real_t)0, s[3]) && same((pen_real_t)0, effect[0]));
+        TEST_ASSERT_TRUE(same((pen_real_t)3, s[0]) && same((pen_real_t)0, s[N]) && same((pen_real_t)0, effect[0]));
     }
+}
+
+/* A score that overflows, of a sensitivity that is finite. */
+void test_a_score_that_overflows_is_not_added(void)
+{
+    direct[0] = (pen_real_t)4;
+    direct[TESTS] = (pen_real_t)0.5;
+    test[0].innovation = PEN_REAL_MAX;
+    test[0].variance = (pen_real_t)1;
+    test[1].verdict = PEN_EKF_IS_MISSING;
+    TEST_ASSERT_EQUAL_HEX32(PEN_MONITOR_CAUSE | PEN_MONITOR_NONFINITE, step()); /* the other cause is right */
+    TEST_ASSERT_TRUE(same((pen_real_t)0, sums[0].sum) && same((pen_real_t)4, sums[1].sum));
+    TEST_ASSERT_EQUAL_UINT32(0U, sums[0].raised);
+}
+
+/* A sensitivity that overflows in the last measurement, which the score does not meet any more. */
+void test_a_score_without_a_sensitivity_is_not_added(void)
+{
+    direct[TESTS + 1U] = (pen_real_t)2;
+    test[1].innovation = (pen_real_t)3; /* 4 */
+    gain[N] = PEN_REAL_MAX;
+    TEST_ASSERT_EQUAL_HEX32(PEN_MONITOR_NONFINITE, step());
+    TEST_ASSERT_TRUE(same((pen_real_t)0, sums[1].sum) && same((pen_real_t)0, s[N]));
+}
+
+/* A sensitivity that overflows while nothing is measured. */
+void test_a_sensitivity_that_overflows_is_not_taken_over(void)
+{
+    test[0].verdict = PEN_EKF_IS_MISSING;
+    test[1].verdict = PEN_EKF_NOT_OFFERED;
+    phi[0] = (pen_real_t)2;
+    s[N] = PEN_REAL_MAX;
+    TEST_ASSERT_EQUAL_HEX32(PEN_MONITOR_NONFINITE, step());
+    TEST_ASSERT_TRUE(same(PEN_REAL_MAX, s[N]));
+    TEST_ASSERT_EQUAL_UINT32(1U, monitor.nonfinite);
 }
 
 void test_no_cause_at_all(void)

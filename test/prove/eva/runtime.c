@@ -15,6 +15,7 @@
 #include "penode/pen_elementary.h"
 #include "penode/pen_fold.h"
 #include "penode/pen_math.h"
+#include "penode/pen_monitor.h"
 #include "penode/pen_net.h"
 #include "penode/pen_net16.h"
 #include "penode/pen_selftest.h"
@@ -306,6 +307,35 @@ void filters(void)
     seen = pen_ekf_deviation(STATES, f, END(y, STATES));
 }
 
+#define CAUSES 2U
+
+/* Any numbers in a monitor of fixed sizes, damaged verdicts and tests among them. */
+void monitors(void)
+{
+    static pen_real_t phi[STATES * STATES];
+    static pen_real_t row[2U * TESTS * STATES];
+    static pen_real_t direct[CAUSES * TESTS];
+    static pen_real_t sensed[2U * CAUSES * STATES];
+    static pen_real_t effect[2U * CAUSES * STATES];
+    static pen_ekf_test_t test[TESTS];
+    static pen_monitor_test_t sum[CAUSES + 1U];
+    static pen_monitor_t self;
+    const pen_monitor_model_t model = { 1U, STATES, TESTS, CAUSES, number(), number(), number(), number() };
+    const pen_monitor_sample_t sample = { phi, row, &row[TESTS * STATES], direct, test, (any & 1U) != 0U };
+
+    fill(phi, sizeof phi);
+    fill(row, sizeof row);
+    fill(direct, sizeof direct);
+    fill(sensed, sizeof sensed);
+    fill(effect, sizeof effect);
+    fill(test, sizeof test);
+    fill(sum, sizeof sum);
+    fill(&self, sizeof self);
+    seen = (pen_real_t)pen_monitor_step(&model, &self, &sample, sensed, effect, sum);
+    pen_monitor_start(&model, &self, sensed, effect, sum);
+    seen = (pen_real_t)pen_monitor_step(&model, &self, &sample, sensed, effect, sum);
+}
+
 void selftest(void)
 {
     seen = (pen_real_t)pen_selftest_of(any);
@@ -321,6 +351,7 @@ void runtime(void)
     networks_of_16();
     systems();
     filters();
+    monitors();
     folding();
     sets();
     serial();
