@@ -108,26 +108,26 @@ pen_status_t pen_monitor_step(const pen_monitor_model_t *model, pen_monitor_t *s
     static const pen_status_t of_rest[2] = { PEN_OK, PEN_MONITOR_OTHER };
     static const pen_status_t of_held[2] = { PEN_MONITOR_NONFINITE, PEN_OK };
     const size_t n = model->n_x;
-    const size_t all = model->n_causes * n;
+    const size_t total = model->n_causes * n;
     const uint32_t advanced = sample->advanced ? 1U : 0U;
     const pen_real_t half = pen_where(self->running != 0U, model->half_time, ZERO);
     const pen_real_t rest = score_of_rest(model, sample->test);
-    uint32_t finite = sound(1U, &rest) & sound(all, &effect[all]);
+    uint32_t finite = sound(1U, &rest) & sound(total, &effect[total]);
     uint32_t found = 0U;
 
     for (size_t c = 0U; c < model->n_causes; c++) {
         const size_t at = c * n;
-        carry(model, sample->phi, half, &s[at], &effect[at], &effect[all + at], &s[all + at]);
-        const pen_real_t score = score_of(model, sample, &sample->direct[c * model->n_z], &s[all + at]);
-        const uint32_t own = sound(1U, &score) & sound(n, &s[all + at]);
+        carry(model, sample->phi, half, &s[at], &effect[at], &effect[total + at], &s[total + at]);
+        const pen_real_t score = score_of(model, sample, &sample->direct[c * model->n_z], &s[total + at]);
+        const uint32_t own = sound(1U, &score) & sound(n, &s[total + at]);
         finite &= own;
         found |= take(model, score, advanced & own, &test[c]);
     }
     const uint32_t others = take(model, rest, advanced & sound(1U, &rest), &test[model->n_causes]);
     const uint32_t good = advanced & finite;
-    const pen_real_t *const new_s = &s[good * all];
-    const pen_real_t *const new_effect = &effect[good * all];
-    for (size_t i = 0U; i < all; i++) {
+    const pen_real_t *const new_s = &s[good * total];
+    const pen_real_t *const new_effect = &effect[good * total];
+    for (size_t i = 0U; i < total; i++) {
         s[i] = new_s[i];
         effect[i] = new_effect[i];
     }

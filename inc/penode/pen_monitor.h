@@ -35,7 +35,7 @@ extern "C" {
 /* Returned by a step of a monitor, beside no flag of the filter. */
 #define PEN_MONITOR_CAUSE     UINT32_C(0x20000000) /* the test for a named cause is raised                          */
 #define PEN_MONITOR_OTHER     UINT32_C(0x40000000) /* the test for anything else is raised                          */
-#define PEN_MONITOR_NONFINITE UINT32_C(0x80000000) /* sums would be NaN or Inf; the last good ones are kept         */
+#define PEN_MONITOR_NONFINITE 0x80000000U          /* sums would be NaN or Inf; the last good ones are kept         */
 
 /** What the runtime needs to know of a monitor. Constant, in flash. */
 typedef struct {

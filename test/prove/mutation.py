@@ -41,7 +41,7 @@ SOURCES = sorted((gate.ROOT / "src").glob("*.c"))
 HEADERS = [gate.ROOT / "inc" / "penode" / "pen_ekf.h"]  # an algorithm in inline functions: its own tests are made again for each fault
 FLAGS = ["-std=c99", "-ffp-contract=off", "-fPIC", "-Werror=implicit-function-declaration", "-Iinc", "-Iport/gnu", "-Isrc"]
 SANITIZE = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
-KEEP = {"gcc": "-fkeep-inline-functions", "clang-19": "-femit-all-decls"}  # of headers
+KEEP = "-Dinline=__attribute__((used))"  # of headers: what nothing calls is compiled, too
 # A fault that makes the same code as none, however it is compiled, changes nothing.
 COMPILERS = (["gcc", "-O2"], ["gcc", "-O3"], ["clang-19", "-O2"])
 
@@ -68,7 +68,7 @@ class Bench:
 
 def compiled(text: str, compiler: list[str], header: bool) -> bytes | None:
     """The object made of a source, or of a header with its inline functions; None if the compiler refuses."""
-    out, keep = WORK / "compiled.o", [KEEP[compiler[0]]] * header
+    out, keep = WORK / "compiled.o", [KEEP] * header
     words = ["timeout", "60", *compiler, *FLAGS, *keep, "-g0", "-x", "c", "-c", "-o", out, "-"]
     done = subprocess.run(words, cwd=gate.ROOT, input=text.encode(), capture_output=True, check=False)
     return out.read_bytes() if done.returncode == 0 else None
@@ -233,6 +233,8 @@ def main() -> int:
             continue
         mine = {fault for fault in may_live if fault.file == source.name}
         alive, total, same, wrong = [], 0, 0, []
+        for place in benches if source.suffix == ".h" else ():
+            link(place, SOURCES[0].name, SOURCES[0])  # the library without the last fault of a source
         for found, mutant in faults(source, options.share, options.first, mine):
             total += 1
             if lives(mutant, source.name, benches):

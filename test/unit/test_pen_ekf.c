@@ -295,4 +295,7 @@ void test_deviation(void)
     expect_close((pen_real_t)68, pen_ekf_deviation(N, f, c) * pen_ekf_deviation(N, f, c), (pen_real_t)68);
     f[N] = (pen_real_t)2;
     expect_close((pen_real_t)68, pen_ekf_deviation(N, f, first) * pen_ekf_deviation(N, f, first), (pen_real_t)68);
+    f[2U * N] = (pen_real_t)0.5;
+    f[(2U * N) + 1U] = (pen_real_t)0.25; /* U' c = 3, 5, 1.75 */
+    expect_close((pen_real_t)632, pen_ekf_deviation(N, f, c) * pen_ekf_deviation(N, f, c), (pen_real_t)632);
 }

@@ -180,6 +180,49 @@ void test_room_narrower_than_rounding_ends_at_the_point_inside(void)
     }
 }
 
+/* From inside by 4 (n + 2) EPSILON of the sizes of sum and bound: 20 EPSILON (2 + 1), and the same from below. */
+void test_a_bound_is_aimed_at_from_inside(void)
+{
+    start[0] = (pen_real_t)1;
+    pen_ekf_start(&model, &filter, f, count);
+    model.n_limits = 1U;
+    most[0] = (pen_real_t)1;
+    x[0] = (pen_real_t)2;
+    TEST_ASSERT_EQUAL_HEX32(PEN_EKF_LIMITED, pen_ekf_limit(&model, f, x, work));
+    TEST_ASSERT_TRUE(same((pen_real_t)1 - ((pen_real_t)60 * PEN_REAL_EPSILON), x[0]));
+    least[0] = (pen_real_t)2;
+    most[0] = (pen_real_t)9;
+    inside[0] = (pen_real_t)3;
+    x[0] = (pen_real_t)1;
+    TEST_ASSERT_EQUAL_HEX32(PEN_EKF_LIMITED, pen_ekf_limit(&model, f, x, work));
+    TEST_ASSERT_TRUE(same((pen_real_t)2 + ((pen_real_t)60 * PEN_REAL_EPSILON), x[0]));
+}
+
+/* The last resort. No limit that can be kept leads there; the second of these cannot be, as `inside` is outside. */
+void test_where_nothing_else_is_known_the_state_is_the_point_inside(void)
+{
+    pen_ekf_start(&model, &filter, f, count);
+    for (size_t i = 0U; i < N; i++) {
+        inside[i] = (pen_real_t)1;
+        limit[N + i] = (pen_real_t)1;
+        x[i] = (pen_real_t)9;
+    }
+    least[1] = (pen_real_t)2;
+    most[1] = (pen_real_t)2;
+    TEST_ASSERT_EQUAL_HEX32(PEN_EKF_LIMITED, pen_ekf_limit(&model, f, x, work));
+    for (size_t i = 0U; i < N; i++) {
+        TEST_ASSERT_TRUE(same((pen_real_t)1, x[i]));
+    }
+}
+
+void test_what_is_no_number_is_not_called_limited(void)
+{
+    pen_ekf_start(&model, &filter, f, count);
+    x[1] = PEN_REAL_MAX * (pen_real_t)2;
+    x[1] -= x[1];
+    TEST_ASSERT_EQUAL_HEX32(PEN_OK, pen_ekf_limit(&model, f, x, work));
+}
+
 /* ---- finish ---- */
 
 static void prepare_finish(void)
