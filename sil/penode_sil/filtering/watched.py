@@ -102,6 +102,7 @@ def sentences(entry: dict[str, Any]) -> list[str]:
     """A summary in lines."""
     lines = []
     for name, test in entry.get("monitor", {}).items():
-        first = "not raised" if test["first"] is None else f"raised first at {test['first']:.6g} s, {test['raised']} times"
-        lines.append(f"  monitor {name}: {first}; highest {test['highest']:.3g} thresholds")
+        often = "once" if test["raised"] == 1 else f"{test['raised']} times"
+        found = "not raised" if test["first"] is None else f"raised first at {test['first']:.6g} s, {often}"
+        lines.append(f"  monitor {name}: {found}; highest sum {test['highest']:.3g} of the threshold")
     return lines
