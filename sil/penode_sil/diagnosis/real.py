@@ -273,10 +273,10 @@ def _values_of(bench: Bench, term: Term) -> list[Free]:
 
 
 def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[list[Cause], list[str]]:
-    """Sensor offsets that the recordings show. An offset is a cause if it is surely above 7 % of the signal's rms and below 100 %. Smaller
-    ones, larger ones and those near 1 g become notes, as do all if a named cause also shifts the rest position (`loaded`). Nothing where
-    start states have the same effect: a plant without a spring to ground has no zero, and its sensors are off against each other at
-    most."""
+    """Sensor offsets that the recordings show. An offset is a cause if it is surely above the share of the signal's rms that has a name
+    (`worth.least`) and below 100 %. Smaller ones, larger ones and those near 1 g become notes, as do all if a named cause also shifts the
+    rest position (`loaded`). Nothing where start states have the same effect: a plant without a spring to ground has no zero, and its
+    sensors are off against each other at most."""
     causes, notes = [], []
     biases = [bias(s.name) for s in model.sensors]
     shares, mixed = own_of_sensors(bench.model, bench.fit, biases), confounded(bench.model, bench.fit, biases)
@@ -288,14 +288,9 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         if alone * abs(value) <= 3.0 * sd or bias(s.name) in mixed:
             continue
-        sd = float(
-            np.hypot(sd, systematic(bench.level.size) * shown / alone)
-        )  # collinearity with other free values amplifies the effect of model error
-        large = (
-            least(bench.level.size, 0.0) * shown < abs(value) - Z_95 * sd
-            and abs(value) < shown
-            and abs(abs(value) / constants.g - 1.0) > WORTH
-        )
+        # collinearity with other free values amplifies the effect of model error
+        sd, size = float(np.hypot(sd, systematic(bench.level.size) * shown / alone)), abs(value)
+        large = least(bench.level.size, 0.0) * shown < size - Z_95 * sd and size < shown and abs(size / constants.g - 1.0) > WORTH
         if bench.places and not loaded and large:  # without places it may stand for any law
             causes.append(
                 _load(model, bench, probe, s.name, value, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit))
