@@ -135,7 +135,7 @@ def test_what_is_no_more_than_noise_is_not_wild():
     study = Simple(experiments=[recording(y)], levels=[np.ones((5, 2))])
     for before, after, said in ((10.0, 9.0, True), (10.0, 5.0, False), (1.2, 1.0, False), (10.0, 0.9 * WILD, False)):
         study.null = Simple(simulated=[np.full((N, 2), before)])
-        (found,) = still_wild(study, Simple(fit=Simple(simulated=[np.full((N, 2), after)])), [wild])
+        (found,) = still_wild(study, Simple(simulated=[np.full((N, 2), after)]), [wild])
         assert found.tolist() == [[said, False]]
 
 

@@ -75,14 +75,26 @@ def test_half_a_sample_takes_no_noise_away(late: float) -> None:
     assert power * UPDATE == pytest.approx(1.0, rel=4.5 * np.sqrt(2.0 * UPDATE / COUNT))
 
 
-def test_a_tone_between_samples() -> None:
-    """Its turn at the end rings, by 1/(pi k) of its jump in slope k samples away, squared; the end was not seen."""
+@pytest.mark.parametrize("start", (0.0, 0.3))
+def test_a_tone_between_samples(start: float) -> None:
+    """Its ends are reflected in: what bends there, of a tone with a value there at most 0.2 of it, rings by 0.2/k^2 at most, k samples away.
+    The end was not seen."""
     t = np.arange(300.0)
-    found = earlier(np.sin(0.4 * np.pi * t), np.array([0.0, 0.5, 3.3]))
+    found = earlier(np.sin(0.4 * np.pi * t + start), np.array([0.0, 0.5, 3.3]))
+    away = np.minimum(t, 299.0 - t)
     for row, late in zip(found, (0.0, 0.5, 3.3), strict=True):
-        inside = slice(25, 270)
-        assert row[inside] == pytest.approx(np.sin(0.4 * np.pi * (t + late))[inside], abs=0.004)
+        inside = slice(1, 295)
+        error = np.abs(row - np.sin(0.4 * np.pi * (t + late) + start))[inside]
+        assert np.all(error <= 0.2 / np.maximum(away[inside] - late, 1.0) ** 2 + 1e-9)
     assert np.isnan(found[2, -4:]).all() and np.isfinite(found[2, :-4]).all()
+
+
+def test_a_start_in_motion_is_no_delay() -> None:
+    """A ramp that bends slowly: reflection as a mirror has it would bend it by twice its slope at its ends, 10 % of a sample's step away."""
+    t = np.arange(400.0)
+    x = 0.2 * t + np.cos(0.01 * t)
+    late = earlier(x, np.array([0.5]))[0]
+    assert late[:-1] == pytest.approx((0.2 * (t + 0.5) + np.cos(0.01 * (t + 0.5)))[:-1], abs=1e-5)
 
 
 def test_what_was_not_measured_stays_so() -> None:

@@ -31,13 +31,13 @@ def still_broken(
 ) -> list[Cause]:
     """Sensors that clip or drop out beside a fit of what explains the recordings: bursts and spikes that it explains were none. One with a
     rail among the `faults` before has no drop-outs: a cause may clip as well, and then a rail looks like one."""
-    kept = [b & wild for b, wild in zip(bursts, _still_wild(study, fit, bursts), strict=True)]
+    kept = [b & wild for b, wild in zip(bursts, still_wild(study, fit, bursts), strict=True)]
     rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
     again = broken_sensors(study.model, train, study, fit.simulated, kept)
     return [f for f in again if f.kind != "sensor_dropout" or f.where not in rails]
 
 
-def _still_wild(study: Study, fit: Fit, bursts: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
+def still_wild(study: Study, fit: Fit, bursts: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
     """Per recording, whether the bursts of each sensor [1, n_z] are as wild beside a fit as they were without."""
     found = []
     for k, b in enumerate(bursts):

@@ -310,7 +310,12 @@ def earlier(y: Array, samples: Array) -> Array:
 
 
 def _limited(x: Array, samples: float) -> Array:
-    """A signal [n] so many samples earlier, by the phases of its spectrum; turned round at its end, so that it has no jump there."""
-    both = np.concatenate([x, x[::-1]])
+    """A signal [n] so many samples earlier, by the phases of its spectrum: about the line through its ends, and reflected in them, so that
+    neither value nor slope jumps there."""
+    if len(x) < 2:
+        return x
+    slope, at = (x[-1] - x[0]) / (len(x) - 1), np.arange(len(x))
+    rest = x - x[0] - slope * at
+    both = np.concatenate([rest, -rest[-2:0:-1]])
     turn = np.exp(2j * np.pi * np.fft.rfftfreq(len(both)) * samples)
-    return np.fft.irfft(np.fft.rfft(both) * turn, len(both))[: len(x)]
+    return x[0] + slope * (at + samples) + np.fft.irfft(np.fft.rfft(both) * turn, len(both))[: len(x)]
