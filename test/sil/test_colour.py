@@ -77,8 +77,8 @@ def test_half_a_sample_takes_no_noise_away(late: float) -> None:
 
 @pytest.mark.parametrize("start", (0.0, 0.3))
 def test_a_tone_between_samples(start: float) -> None:
-    """Its ends are reflected in: what bends there, of a tone with a value there at most 0.2 of it, rings by 0.2/k^2 at most, k samples away.
-    The end was not seen."""
+    """Its ends are reflected in: what bends there, of a tone with a value there at most 0.2 of it, rings by 0.2/k^2 at most, k samples
+    away. The end was not seen."""
     t = np.arange(300.0)
     found = earlier(np.sin(0.4 * np.pi * t + start), np.array([0.0, 0.5, 3.3]))
     away = np.minimum(t, 299.0 - t)
@@ -90,7 +90,7 @@ def test_a_tone_between_samples(start: float) -> None:
 
 
 def test_a_start_in_motion_is_no_delay() -> None:
-    """A ramp that bends slowly: reflection as a mirror has it would bend it by twice its slope at its ends, 10 % of a sample's step away."""
+    """A ramp that bends slowly: reflection as a mirror has it would bend it by twice its slope at its ends."""
     t = np.arange(400.0)
     x = 0.2 * t + np.cos(0.01 * t)
     late = earlier(x, np.array([0.5]))[0]

@@ -312,9 +312,7 @@ def earlier(y: Array, samples: Array) -> Array:
 def _limited(x: Array, samples: float) -> Array:
     """A signal [n] so many samples earlier, by the phases of its spectrum: about the line through its ends, and reflected in them, so that
     neither value nor slope jumps there."""
-    if len(x) < 2:
-        return x
-    slope, at = (x[-1] - x[0]) / (len(x) - 1), np.arange(len(x))
+    slope, at = (x[-1] - x[0]) / max(len(x) - 1, 1), np.arange(len(x))
     rest = x - x[0] - slope * at
     both = np.concatenate([rest, -rest[-2:0:-1]])
     turn = np.exp(2j * np.pi * np.fft.rfftfreq(len(both)) * samples)
