@@ -79,11 +79,11 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
     search explains nothing, innovations answer where they explain the recordings, or have causes and leave more than UNMODELLED. If they
     were not asked before, they answer where they follow the recordings better, name the same, or find an input at fault; where neither has
     a name, parameters that predict the hold-out better stay."""
-    faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
-    broken = partial(still_broken, case.train, study, faults=faults, bursts=bursts)
     unknown = weighed.supports(study.model) and bool(guessed(study.model))
     if unknown or (not study.model.inputs and weighed.misfit(study, study.null, case.log).size):
-        return by_innovations(case, _weighed(case, study), None, broken)
+        return by_innovations(case, _weighed(case, study), None, lambda fit: ())  # without a motion that is about right, samples show none
+    faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
+    broken = partial(still_broken, case.train, study, faults=faults, bursts=bursts)
     case.tell(SEARCH[0], "looking for causes")
     study, beam = search.first(study, case.log)
     w = None
