@@ -13,9 +13,9 @@
  * and the logarithm of the likelihood ratio of a measurement is l = m (v - m/2) / S. A last test, for anything else, has
  *   l = (1 - 1/c^2)/2 v^2/S - log(c): innovations that are c times as wide.
  * Each test sums l, from 0 to the threshold a (Page's CUSUM). It is raised once the sum reaches a, and falls once it is
- * back at 0: on as much evidence against the fault as there was for it. Without a fault the mean of exp(l), given all measurements before, is 1. So the mean number of samples
- * until one of n tests is raised is at least exp(a) / n (Lorden 1971), whatever the excitation: a = log(n T/h) for a mean
- * time of T between false alarms. What holds for v holds as far as the noises of the filter are right.
+ * back at 0: on as much evidence against the fault as there was for it. Without a fault the likelihood ratio e^l has the
+ * mean 1, given all measurements before. So the mean number of samples until one of n tests is raised is at least e^a / n
+ * (Lorden 1971), whatever the excitation: a = log(n T/h) for a mean time of T between false alarms. What holds for v holds as far as the noises of the filter are right.
  */
 #ifndef PEN_MONITOR_H
 #define PEN_MONITOR_H

@@ -102,13 +102,13 @@ def test_steady_gain_is_that_of_the_recursion():
 
 
 def test_filter_predicts_a_mean_over_samples():
-    """One state that stays (a = 0) under a wandering rate, seen by means over 8 samples: the closed loop, run sample by sample in
+    """One state that stays (a = 0) under a rate driven by noise, seen by means over 8 samples: the closed loop, run sample by sample in
     Python, is stable, and its innovations are white: their correlation from one to the next is within 4/sqrt(n) of zero."""
     dt, samples, tau = 0.01, 8, 0.02
     a, c = np.array([[0.0, 1.0], [0.0, -1.0 / tau]]), np.array([[1.0, 0.0]])
     nothing = np.zeros((2, 0)), np.zeros((1, 0))
     linear = plant.Linear(a, nothing[0], nothing[0], c, nothing[1], nothing[1], 0, 1)
-    names = "x", "wander0_f"
+    names = "x", "unmodelled0_f"
     gains = Gains(names, names, linear, np.zeros(0), np.array([1.0]), np.array([0.01]), samples * dt, samples)
     k = gains.at(Level(0.5, tau)).gain
     step = linalg.expm(a * dt)
@@ -219,7 +219,7 @@ def test_a_constant_torque_is_worth_a_name(tmp_path, share, named, show):
         assert low < -share * 0.64 * 0.5 < high
 
 
-def test_nothing_wanders_where_nothing_is_missing(tmp_path):
+def test_no_force_is_unmodelled_where_none_is_missing(tmp_path):
     """Made-up data of the model itself: a free run is the likeliest observer, and sensor noise alone may judge."""
     model, experiments = swing(tmp_path, lambda s, v: 0.0)
     study, _ = begin(with_tolerances(model), experiments)
@@ -276,6 +276,6 @@ def test_noise_of_a_sample_is_what_neighbours_show():
 
 
 def test_dressed_model_is_the_model(tmp_path):
-    """With biases of 0, scales of 1 and nothing that wanders, to the bit."""
+    """With biases of 0, scales of 1 and no unmodelled force, to the bit."""
     model, (e,) = swing(tmp_path, lambda s, v: 0.0, seconds=0.4)
     assert np.array_equal(Batch(model).run(e.u).z, Batch(augmented(model, plant.places(model))).run(e.u).z)

@@ -15,6 +15,7 @@ from penode_gen.model import Model
 
 from ..recordings.measured import Measured
 from . import dropouts
+from .catalogue import others
 from .fit import Fit
 from .result import Cause, Value
 from .study import Study
@@ -32,9 +33,7 @@ def still_broken(
     """Sensors that clip or drop out beside a fit of what explains the recordings: bursts and spikes that it explains were none. One with a
     rail among the `faults` before has no drop-outs: a cause may clip as well, and then a rail looks like one."""
     kept = [b & wild for b, wild in zip(bursts, still_wild(study, fit, bursts), strict=True)]
-    rails = {f.where for f in faults if f.kind == "sensor_clipping"} - {f.where for f in faults if f.kind == "sensor_dropout"}
-    again = broken_sensors(study.model, train, study, fit.simulated, kept)
-    return [f for f in again if f.kind != "sensor_dropout" or f.where not in rails]
+    return others.still_at_fault(broken_sensors(study.model, train, study, fit.simulated, kept), faults)
 
 
 def still_wild(study: Study, fit: Fit, bursts: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:

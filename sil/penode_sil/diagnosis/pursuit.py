@@ -16,7 +16,7 @@ from .score import Candidate, Regression
 from .study import Study
 
 TERMS = 3  # elementary laws of one kind
-WANDERING = 5  # and of a bias, which may have any slow course
+DRIFTING = 5  # and of a bias, which may have any slow course
 OCTAVE = 2.0  # factor of frequency, within which another form of a hidden mass is seen
 PART = 0.1  # of the size a law has alone: left to it where its companions do the rest
 
@@ -31,7 +31,7 @@ def pools(r: Regression) -> dict[Group, list[int]]:
 
 def room(kind: str) -> int:
     """How many elementary laws a kind may take at first."""
-    return WANDERING if kind == "sensor_bias" else TERMS
+    return DRIFTING if kind == "sensor_bias" else TERMS
 
 
 def pursue(r: Regression, pool: Sequence[int], base: Sequence[int] = (), terms: int = TERMS, alone: bool = True) -> tuple[float, list[int]]:

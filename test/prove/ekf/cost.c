@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "board.h"
+#include "counting.h"
 #include "penode/pen_serial.h"
 
 #include EKF_HEADER
@@ -23,23 +24,6 @@ static const char *const NAME[KINDS] = { "measured", "not offered", "missing", "
 static const pen_status_t WANTED[KINDS] = { PEN_OK, PEN_OK, PEN_EKF_MISSING, PEN_EKF_MISSING, PEN_EKF_REFUSED, PEN_OK };
 
 static MODEL(ekf_t) filter;
-static uint32_t noise = 1U;
-
-static pen_real_t next(void)
-{
-    noise = (noise * UINT32_C(1664525)) + UINT32_C(1013904223);
-    return ((pen_real_t)(noise >> 8U) * (pen_real_t)0x1p-23) - (pen_real_t)1;
-}
-
-static void line(const char *name, uint32_t least, uint32_t most)
-{
-    board_print(name);
-    board_print(" ");
-    board_print_number(least);
-    board_print(" ");
-    board_print_number(most);
-    board_print("\n");
-}
 
 int main(void)
 {

@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "board.h"
+#include "counting.h"
 #include "monitored_monitor.h"
 #include "monitored_sets.h"
 #include "penode/pen_serial.h"
@@ -24,23 +25,6 @@ static const char *const NAME[KINDS] = { "measured", "not offered", "missing", "
 
 static monitored_ekf_t filter;
 static monitored_monitor_t monitor;
-static uint32_t noise = 1U;
-
-static pen_real_t next(void)
-{
-    noise = (noise * UINT32_C(1664525)) + UINT32_C(1013904223);
-    return ((pen_real_t)(noise >> 8U) * (pen_real_t)0x1p-23) - (pen_real_t)1;
-}
-
-static void line(const char *name, uint32_t least, uint32_t most)
-{
-    board_print(name);
-    board_print(" ");
-    board_print_number(least);
-    board_print(" ");
-    board_print_number(most);
-    board_print("\n");
-}
 
 int main(void)
 {

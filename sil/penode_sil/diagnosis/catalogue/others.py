@@ -2,6 +2,10 @@
 # Copyright (c) 2026 the penode authors
 """Causes without a law: what parameters, sensors, networks and numerics are off by. Other rooms find them."""
 
+from collections.abc import Sequence
+
+from ..result import Cause
+
 MEANING = {
     "wrong_parameter": "A parameter of the model file is off by more than its tolerance.",
     "differs_between_recordings": "The parameter has another value in each recording: another load, another setting.",
@@ -21,6 +25,8 @@ PARAMETERS = {  # what each number of a report means
     "sensor_dropout": {"share": "of the samples that are lost"},
     "integration_error": {"rms_error_SENSOR": "of each sensor that the step misses"},
 }
+_CLIPPING, _DROPOUT = "sensor_clipping", "sensor_dropout"
+
 WHERE = {
     "wrong_parameter": "a parameter",
     "differs_between_recordings": "a parameter",
@@ -28,3 +34,9 @@ WHERE = {
     "integration_error": "the model",
     "outside_taxonomy": "none",
 }
+
+
+def still_at_fault(again: Sequence[Cause], before: Sequence[Cause]) -> list[Cause]:
+    """Faults of sensors found `again` beside an explanation, without drop-outs of a sensor that only had a rail `before`."""
+    rails = {f.where for f in before if f.kind == _CLIPPING} - {f.where for f in before if f.kind == _DROPOUT}
+    return [f for f in again if f.kind != _DROPOUT or f.where not in rails]

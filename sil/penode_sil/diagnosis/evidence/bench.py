@@ -16,7 +16,7 @@ from ..fit import Free
 from ..plant import Place
 from .colour import Colour, is_white
 from .fit import Fit, Problem, likelihood
-from .gain import Gains, Level, linear, wandering
+from .gain import Gains, Level, driven_by_noise, linear
 from .observer import MAX_TURN, MIN_STEPS, Filter, Predictor, Record, augmented, bias, scale
 from .prior import SHARE, Stated
 
@@ -120,7 +120,7 @@ def build(
     plain = Fit((), Filter.none(0, 0), *(np.zeros(0),) * 2, np.zeros(0, bool), np.zeros(0), 0.0, 0.0)
     longest = sum(map(len, records)) * records[0].step
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
-    base, forces = like.base if like else augmented(model, places), np.ones(len(wandering(wide.states)))
+    base, forces = like.base if like else augmented(model, places), np.ones(len(driven_by_noise(wide.states)))
     bench = Bench(wide, set_name, tuple(places), tuple(records), base, (), first, forces, noise, fastest, Level(0.0, 1.0), plain)
     if like:
         bench = replace(bench, update=like.update, forces=like.forces, fastest=like.fastest, colour=like.colour)
@@ -187,9 +187,9 @@ def _guess(bench: Bench, model: Model, spans: Array) -> Array:
     if not model.bodies:
         return np.full(len(bench.forces), float(np.max(spans)) / (1.0 if bench.places else UPDATES * bench.update * bench.step))
     gains = bench.gains()
-    wanders, step = wandering(gains.names), gains.period
-    reach = np.abs(gains.plant.c @ np.linalg.matrix_power(np.eye(len(gains.plant.a)) + gains.plant.a * step, 3)[:, wanders])
-    return np.array([float(np.min(spans / np.maximum(reach[:, k], 1e-300))) for k in range(len(wanders))])
+    noisy, step = driven_by_noise(gains.names), gains.period
+    reach = np.abs(gains.plant.c @ np.linalg.matrix_power(np.eye(len(gains.plant.a)) + gains.plant.a * step, 3)[:, noisy])
+    return np.array([float(np.min(spans / np.maximum(reach[:, k], 1e-300))) for k in range(len(noisy))])
 
 
 def smooth(x: Array, width: int) -> Array:

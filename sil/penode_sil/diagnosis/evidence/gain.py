@@ -16,7 +16,7 @@ from scipy import linalg
 from penode_gen.model import Model
 
 from ..plant import Linear, linearise
-from .observer import WANDER, Filter
+from .observer import UNMODELLED, Filter
 
 Array = NDArray[np.float64]
 FORGETTING = 1e-6  # by which states decay at an update: one that no sensor shows then has a bounded variance
@@ -48,8 +48,8 @@ class Gains:
     samples: int
 
     @cached_property
-    def _wanders(self) -> list[int]:
-        return wandering(self.names)
+    def _noisy(self) -> list[int]:
+        return driven_by_noise(self.names)
 
     def at(self, level: Level) -> Filter:
         """The steady filter: what an update does with the mean innovation since the one before."""
@@ -58,7 +58,7 @@ class Gains:
             return Filter.none(len(self.into), n_z)
         a = self.plant.a.copy()
         drive = np.zeros((n_x, n_x))
-        for i, force in zip(self._wanders, self.forces, strict=True):
+        for i, force in zip(self._noisy, self.forces, strict=True):
             if is_force(self.names[i]):
                 a[i, i] = -1.0 / level.tau
                 drive[i, i] = 2.0 * (level.size * force) ** 2 / level.tau
@@ -84,10 +84,10 @@ class Gains:
 
 def is_force(state: str) -> bool:
     """Is a state of an augmented model a random force?"""
-    return re.fullmatch(rf"{WANDER}\d+_f", state) is not None
+    return re.fullmatch(rf"{UNMODELLED}\d+_f", state) is not None
 
 
-def wandering(states: Sequence[str]) -> list[int]:
+def driven_by_noise(states: Sequence[str]) -> list[int]:
     """Numbers of the states that are driven by noise: unmodelled forces of an augmented model, or all where it has none."""
     return [i for i, n in enumerate(states) if is_force(n)] or list(range(len(states)))
 

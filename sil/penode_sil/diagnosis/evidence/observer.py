@@ -23,7 +23,7 @@ from ..plant import Place, anonymous, extend, external, rotational_unit
 from . import samples
 
 Array = NDArray[np.float64]
-WANDER = "wander"  # stem of the unmodelled forces and of their states
+UNMODELLED = "unmodelled"  # stem of the unmodelled forces and of their states
 MAX_TURN = 0.15  # of a period of the fastest mode, in one step of the integration: Runge-Kutta of order 4 then errs by 1e-4 of it a step
 MOST_STEPS = 50_000  # integration steps, over all recordings, up to which edges are steepened; a fit of a form then takes half a second
 MIN_STEPS = 5  # steps between updates: the edge of a friction, 0.02 of the rms rate wide, then damps less than Runge-Kutta bears
@@ -71,20 +71,20 @@ def scale(sensor: str) -> str:
 
 def augmented(model: Model, places: Sequence[Place]) -> Model:
     """The model with a bias and a scale of each sensor as parameters, and with an unmodelled acceleration w of each body, a
-    first-order Gauss-Markov process w' = -w/tau + noise; without bodies, with such a force at each place. The parameter wander_tau is tau
-    [s]. It is an acceleration because the observer then does not change if all masses and forces are scaled by one factor, which sensors
+    first-order Gauss-Markov process w' = -w/tau + noise; without bodies, with such a force at each place. The parameter unmodelled_tau is
+    tau [s]. It is an acceleration because the observer then does not change if all masses and forces are scaled by one factor, which sensors
     of motion cannot show."""
     free = {bias(s.name): Parameter(bias(s.name), 0.0, s.unit) for s in model.sensors}
     free |= {scale(s.name): Parameter(scale(s.name), 1.0, "1") for s in model.sensors}
-    free[f"{WANDER}_tau"] = Parameter(f"{WANDER}_tau", 1.0, "s")
+    free[f"{UNMODELLED}_tau"] = Parameter(f"{UNMODELLED}_tau", 1.0, "s")
     ends = [(b.name, GROUND) for b in model.bodies] or [p.ends for p in places]
     where = [] if model.bodies else list(places)
     units = [rotational_unit(model, e, "m/s^2" if model.bodies else "N") for e in ends]
-    names = [f"{WANDER}{k}" for k in range(len(ends))]
+    names = [f"{UNMODELLED}{k}" for k in range(len(ends))]
     masses = [f"{b.mass}*" for b in model.bodies] or [""] * len(ends)
     forces = [Element(name, e, "expression", expression=f"{mass}{name}_f") for name, e, mass in zip(names, ends, masses, strict=True)]
     states = [State(f"{name}_f", u) for name, u in zip(names, units, strict=True)]
-    laws = [Equation(name, f"der({name}_f)*{WANDER}_tau = -{name}_f") for name in names]
+    laws = [Equation(name, f"der({name}_f)*{UNMODELLED}_tau = -{name}_f") for name in names]
     wide = replace(
         model, parameters={**model.parameters, **free}, extra_states=(*model.extra_states, *states), equations=(*model.equations, *laws)
     )
@@ -179,7 +179,7 @@ class Predictor:
         nus, seen, moved, sane = [], [], [], np.ones(len(shifts), bool)
         for e in range(len(self.records)):
             start, parameters, u, y = self._given(e, free, shifts)
-            parameters[f"{WANDER}_tau"] = by.tau
+            parameters[f"{UNMODELLED}_tau"] = by.tau
             u = self._finer(e, u)
             if e in extra:
                 more = joined(straight(extra[e], self.fine), extra[e])
