@@ -72,8 +72,8 @@ def scale(sensor: str) -> str:
 def augmented(model: Model, places: Sequence[Place]) -> Model:
     """The model with a bias and a scale of each sensor as parameters, and with an unmodelled acceleration w of each body, a
     first-order Gauss-Markov process w' = -w/tau + noise; without bodies, with such a force at each place. The parameter unmodelled_tau is
-    tau [s]. It is an acceleration because the observer then does not change if all masses and forces are scaled by one factor, which sensors
-    of motion cannot show."""
+    tau [s]. It is an acceleration because the observer then does not change if all masses and forces are scaled by one factor, which
+    sensors of motion cannot show."""
     free = {bias(s.name): Parameter(bias(s.name), 0.0, s.unit) for s in model.sensors}
     free |= {scale(s.name): Parameter(scale(s.name), 1.0, "1") for s in model.sensors}
     free[f"{UNMODELLED}_tau"] = Parameter(f"{UNMODELLED}_tau", 1.0, "s")
