@@ -11,7 +11,9 @@ import pytest
 
 from penode_sil.diagnosis.evidence import prior
 from penode_sil.diagnosis.fit import Free
-from penode_sil.diagnosis.worth import own
+from penode_sil.diagnosis.evidence.colour import Colour
+from penode_sil.diagnosis.real import _shifts
+from penode_sil.diagnosis.worth import own, remaining
 
 
 def fit(columns, free):
@@ -68,3 +70,47 @@ def test_what_a_file_states_costs_no_more_than_a_cause():
     assert prior.cost(far) == pytest.approx(2.5 * np.log(13.8))
     assert prior.cost(Free("p", 7.0, 0.1)) == 0.0
     assert prior.stated([near, far, Free("q", 9.0, 1.0, sigma=0.1)]) == prior.cost(near) + prior.cost(far)
+
+
+def bench(y, colour, level=0.001):
+    """A bench of one sensor with a signal y [n], noise 0.1, updated every 4 samples, whose free run is off by `nu`."""
+
+    def problem(nu):
+        predictor = SimpleNamespace(predict=lambda free, shifts, by: (SimpleNamespace(nu=[nu[None, :, None]]),))
+        return SimpleNamespace(predictor=predictor)
+
+    run = SimpleNamespace(free=(), by=None)
+    record, noise = SimpleNamespace(y=y[:, None]), np.array([0.1])
+    made = SimpleNamespace(level=SimpleNamespace(size=level), colour=colour, noise=noise, update=4, records=(record,))
+    return lambda nu: (SimpleNamespace(**vars(made), problem=lambda: problem(nu)), run)
+
+
+SIGNAL = 3.0 * np.sqrt(2.0) * np.sin(0.01 * np.pi * np.arange(20_000))  # rms 3
+
+
+@pytest.mark.parametrize("colour, stated, remains", [(None, 0.1, 0.05), (0.5, 0.1, 0.0401), (0.5, 0.2, 0.001)])
+def test_what_remains_is_what_a_free_run_misses_beyond_noise(colour, stated, remains):
+    """5000 means of noise (0.05), and a slow miss of 0.05 of the signal, 0.15, which an observer would follow. White noise is known to
+    three deviations of its power, 6 % of it: 0.0225 + 0.0025 - 0.00265 is 0.0498 of the signal. Coloured noise may be all that is stated:
+    of 0.025 in all, 0.0144 is beyond the power of 0.1, 0.0401 of the signal, and nothing beyond that of 0.2."""
+    nu = 0.05 * np.random.default_rng(1).standard_normal(5000) + 0.15 * np.sqrt(2.0) * np.sin(0.004 * np.pi * np.arange(5000))
+    taps = Colour(np.full((1, 1), colour), np.array([1e-3])) if colour else None
+    assert remaining(*bench(SIGNAL, taps)(nu), np.array([stated])) == pytest.approx(remains, rel=0.03)
+
+
+def test_only_noise_remains_of_a_sound_model():
+    """The level of the bench then."""
+    nu = 0.05 * np.random.default_rng(2).standard_normal(5000)
+    assert remaining(*bench(SIGNAL, None)(nu), np.array([0.1])) == 0.001
+
+
+def test_curves_that_cancel_each_other_shift_a_mean_both():
+    """Two springs that move the mean by 3 and by -2 units of their values, which are 0.5 and 1.5 units: 4.5, twice that behind a filter that
+    leaves half of a mean; shapes (log) and parameters do not count."""
+    free = [Free("a", 0.5, 1.0), Free("b", 0.75, 0.5), Free("gap", 2.0, 1.0, log=True, origin=1.0), Free("k", 7.0, 1.0)]
+    slopes = np.tile([3.0, -2.0, 5.0, 11.0], (6, 1, 1)) + np.linspace(-1.0, 1.0, 6)[:, None, None]
+    run = SimpleNamespace(free=tuple(free), slopes=slopes, used=np.ones((6, 1), bool))
+    terms = [SimpleNamespace(free=free[:1]), SimpleNamespace(free=free[1:3])]
+    assert _shifts(SimpleNamespace(colour=None), run, terms) == pytest.approx([4.5])
+    half = Colour(np.full((1, 1), 0.5), np.array([1.0]))
+    assert _shifts(SimpleNamespace(colour=half), run, terms) == pytest.approx([9.0])

@@ -7,26 +7,34 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from .evidence.bench import Bench
 from .evidence.blocks import Blocks
-from .evidence.observer import Filter
+from .evidence.fit import Fit
+from .evidence.observer import Filter, bias
 from .propose import FREE_RUN
 from .reconsider import reconsidered
-from .rounds import Accepted, Grown, Rounds, name_of, terms_of
+from .rounds import Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term
-from .worth import least, mostly
+from .worth import Z_95, least, mostly, remaining
+
+LAST_RUN = 20  # iterations of the free run that is written
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
     """What a search has found: its `rounds` and their `end`; `plain`, a bench with only the forms worth naming (`named`, with their terms
-    there); and `small`, the other forms."""
+    there); `small`, the other forms; the free `run` that fits best, with those sensor offsets that are surely none of noise; and the
+    unmodelled `level` that remains, see `remaining`."""
 
     rounds: Rounds
     end: Grown
     plain: Bench
     named: tuple[Accepted, ...]
     small: tuple[Accepted, ...]
+    run: Fit
+    level: float
 
     @property
     def bench(self) -> Bench:
@@ -41,41 +49,48 @@ class Found:
     def naming(self, more: Sequence[Accepted]) -> Found:
         """The same with some of the small forms named too."""
         numbers = {a.number for a in (*self.named, *more)}
-        return _found(self.rounds, self.end, [a.number in numbers for a in self.end.accepted])
+        return _found(self.rounds, self.end, [a.number in numbers for a in self.end.accepted], self.run, self.level)
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own."""
     rounds = Rounds(bench, Blocks.of([len(r) // bench.update for r in bench.records]), log)
-    end = _run_free(reconsidered(rounds, rounds.grow()), log)
-    return _found(rounds, end, end.large)
+    end = reconsidered(rounds, rounds.grow())
+    after, sensors = end.bench, [bias(s.name) for s in bench.model.sensors]
+    none = [b for b in sensors if abs(after.fit.value(b)) <= Z_95 * after.fit.deviation(b)]
+    run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), LAST_RUN)
+    level = remaining(after, run, np.array([s.noise for s in bench.model.sensors]))
+    log(f"what remains: {level:.3g} of all forces")
+    end = _run_free(end, level, log)
+    return _found(rounds, end, end.large, run, level)
 
 
-def _run_free(end: Grown, log: Callable[[str], None]) -> Grown:
-    """The end of a search, with those small forms large that take most of what a free run misses beside all others: what changes slowly the
-    observer follows, so that innovations show little of it."""
+def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
+    """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. Those that are small by the
+    level of the search, or would be, count by what a free run of all others misses of a sensor: what changes slowly the observer follows,
+    so that innovations show little of it."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
-    if all(end.large):
-        return end
+    accepted, large = list(end.accepted), [is_large(a.trial, least(level, a.trial.whole)) for a in end.accepted]
+    if all(large):
+        return replace(end, large=tuple(large))
     problem = bench.problem()
     whole = problem.solve(bench.fit.free, still, FREE_RUN)
-    accepted, large = list(end.accepted), list(end.large)
     for k, a in enumerate(end.accepted):
         if large[k]:
             continue
         own = {f.target for t in a.terms for f in t.free}
         starts = [[f for f in fit.free if f.target not in own] for fit in (bench.fit, whole)]
         without = max((problem.solve(free, still, FREE_RUN) for free in starts), key=lambda f: f.cost)
-        taken = without.taken_whole(whole, problem.floor)
-        log(f"{name_of(a.trial)} takes {taken:.1%} of what a free run misses without it")
+        taken = float(np.max(without.taken(whole, problem.floor)))
+        log(f"{name_of(a.trial)} takes {taken:.1%} of what a free run misses of a sensor without it")
         if mostly(taken):
             accepted[k] = replace(a, trial=replace(a.trial, whole=max(taken, a.trial.whole)))
-            large[k] = a.trial.share >= least(bench.level.size, taken)
+            large[k] = a.trial.share >= least(level, taken)
     return replace(end, accepted=tuple(accepted), large=tuple(large))
 
 
-def _found(rounds: Rounds, end: Grown, worth_naming: Sequence[bool]) -> Found:
+def _found(rounds: Rounds, end: Grown, worth_naming: Sequence[bool], run: Fit, level: float) -> Found:
     named = [a for a, worth in zip(end.accepted, worth_naming, strict=True) if worth]
     small = tuple(a for a, worth in zip(end.accepted, worth_naming, strict=True) if not worth)
     plain, _, named = rounds.beside(named) if small else (end.bench, end.scores, named)
-    return Found(rounds, end, plain, tuple(named), small)
+    return Found(rounds, end, plain, tuple(named), small, run, level)

@@ -15,7 +15,7 @@ from penode_gen import units
 from penode_gen.model import GROUND, Model
 
 from . import catalogue, innovate, parameters
-from .catalogue import drives, friction, loads
+from .catalogue import drives, friction
 from .catalogue.form import Form, Motion, Sizes
 from .evidence.bench import Bench, build
 from .evidence.blocks import posterior
@@ -31,7 +31,7 @@ from .propose import FREE_RUN, SMALL, motions
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
 from .rounds import MIN_TAKEN, name_of, terms_of
 from .terms import Term, Trial
-from .worth import RIGHT, SYSTEMATIC, WORTH, Z_95, confounded, least, own_of_sensors, share, systematic, undetermined
+from .worth import RIGHT, WORTH, Z_95, confounded, least, own_of_sensors, share, systematic, undetermined
 
 Array = NDArray[np.float64]
 RIVAL = (
@@ -103,10 +103,10 @@ def answer(
     names = {name_of(a.trial) for a in found.named}
     chances = {a.trial: _weighed([t for t in a.trials if name_of(t) not in names - {name_of(a.trial)}]) for a in found.named}
     for a, term in [(accepted, term) for accepted in found.named for term in accepted.terms]:
-        enough, chance, first = least(after.level.size, a.trial.whole), chances[a.trial], term is a.terms[0]
+        enough, chance, first = least(found.level, a.trial.whole), chances[a.trial], term is a.terms[0]
         size = share(plain, [t for t in named if name_of(t) == name_of(term)], plain.fit, moved)
         rivals = _rivals(chance, term) if first else _loads(model, bench.places[term.form.index])
-        cause = _cause(model, plain, term, size, rivals, _sure(chance, a.trial.form))
+        cause = _cause(model, plain, term, size, rivals, _sure(chance, a.trial.form), found.level)
         log(f"{cause.kind} at {cause.where}: {size:.1%} of the force there")
         if size >= enough and not cause.may_be_nothing:
             causes = _merged(causes, cause)
@@ -120,13 +120,13 @@ def answer(
             else f"{a.trial.share:.1%} of the force there"
         )
         notes.append(_small(a.terms[0], what))
-        withheld.append(_cause(model, after, a.terms[0], a.trial.share, (), _sure(_weighed(a.trials), a.trial.form)))
+        withheld.append(_cause(model, after, a.terms[0], a.trial.share, (), _sure(_weighed(a.trials), a.trial.form), found.level))
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
-    biased, remarks = _offsets(model, after, Probe.of(after), any(c.kind in (*loads.KINDS, *stopped) for c in causes))
+    shifts = np.full(len(noise), np.inf) if any(c.kind in stopped for c in causes) else _shifts(after, found.run, found.terms)
+    biased, remarks = _offsets(model, after, Probe.of(after), found.level, shifts)
     notes += [*judged.notes, *remarks]
-    offsets = [s.name for s in model.sensors if abs(after.fit.value(bias(s.name))) > Z_95 * after.fit.deviation(bias(s.name))]
-    none = {bias(s.name) for s in model.sensors if s.name not in offsets}
-    run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 20)
+    run = found.run
+    offsets = [s.name for s in model.sensors if any(f.target == bias(s.name) for f in run.free)]
     notes += parameters.notes_on_guessed(model, run)
     powers = [np.nansum(np.where(r.used, r.nu, 0.0) ** 2, axis=0) for r in (alone, run)]
     taken = max(1.0 - float(np.mean(powers[1] / np.maximum(powers[0], 1e-300))), bench.fit.taken_whole(after.fit, bench.problem().floor))
@@ -140,7 +140,7 @@ def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[F
 
     def judged(found: Found) -> tuple[Found, list[Motion], parameters.Judged]:
         moved = motions(Probe.of(found.plain))
-        return found, moved, parameters.judge(model, found, moved, RIGHT, log)
+        return found, moved, parameters.judge(model, found, moved, found.level, RIGHT, log)
 
     first = judged(innovate.search(bench, log))
     large = [a for a in first[0].small if a.trial.share >= WORTH]
@@ -209,8 +209,9 @@ def _explanations(named: Sequence[tuple[Term, Sequence[tuple[Form, float]]]]) ->
     return tuple((names, p / whole) for names, p in sets)
 
 
-def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Named, ...], sure: float) -> Cause:
-    """A term as a cause with sizes and intervals; `sure`: posterior of its name among the forms of the catalogue."""
+def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Named, ...], sure: float, level: float) -> Cause:
+    """A term as a cause with sizes and intervals; `sure`: posterior of its name among the forms of the catalogue;
+    `level`: the unmodelled force that remains."""
     form = term.form
     file = catalogue.OF.get(form.kind, drives)
     own = {t.target for t in term.free}
@@ -244,7 +245,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
             moved = sizes({**values, f.target: float(f.value * np.exp(step) if f.log else f.value + step * f.unit)})
             for key in found:
                 slopes[key][i] = (moved[key][1] - found[key][1]) / step
-    wider = _wider(bench, term, size)
+    wider = _wider(bench, term, size, level)
     given = {}
     for key, (unit, value) in found.items():
         sd = wider * float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
@@ -255,7 +256,7 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
     return Cause(form.kind, form.where, given, RIGHT * min(max(sure, 0.0), 1.0), rivals)
 
 
-def _wider(bench: Bench, term: Term, size: float) -> float:
+def _wider(bench: Bench, term: Term, size: float, level: float) -> float:
     """Factor of the deviations of a term of this share of the force there: noise alone makes less of them than unmodelled forces."""
     cut = term.form.how == "clip"  # the size of which is its limit itself
     ratios = undetermined(bench.model, bench.fit)
@@ -264,7 +265,8 @@ def _wider(bench: Bench, term: Term, size: float) -> float:
         for f in _values_of(bench, term)
         if cut or not f.log
     )
-    return float(np.hypot(1.0, SYSTEMATIC / max(size, SYSTEMATIC) / max(known, 1e-12)))
+    bent = systematic(level)
+    return float(np.hypot(1.0, bent / max(size, bent, 1e-300) / max(known, 1e-12)))
 
 
 def _values_of(bench: Bench, term: Term) -> list[Free]:
@@ -272,11 +274,11 @@ def _values_of(bench: Bench, term: Term) -> list[Free]:
     return [f for f in bench.fit.free if f.target in {t.target for t in term.free}]
 
 
-def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[list[Cause], list[str]]:
+def _offsets(model: Model, bench: Bench, probe: Probe, level: float, shifts: Array) -> tuple[list[Cause], list[str]]:
     """Sensor offsets that the recordings show. An offset is a cause if it is surely above the share of the signal's rms that has a name
-    (`worth.least`) and below 100 %. Smaller ones, larger ones and those near 1 g become notes, as do all if a named cause also shifts the
-    rest position (`loaded`). Nothing where start states have the same effect: a plant without a spring to ground has no zero, and its
-    sensors are off against each other at most."""
+    (`worth.least`, beside the unmodelled `level` that remains) and below 100 %, and above the shift [n_z] of the signal's mean by what else
+    was found, the curves of which are not known that well. Others, and those near 1 g, become notes. Nothing where start states have the
+    same effect: a plant without a spring to ground has no zero, and its sensors are off against each other at most."""
     causes, notes = [], []
     biases = [bias(s.name) for s in model.sensors]
     shares, mixed = own_of_sensors(bench.model, bench.fit, biases), confounded(bench.model, bench.fit, biases)
@@ -284,20 +286,28 @@ def _offsets(model: Model, bench: Bench, probe: Probe, loaded: bool) -> tuple[li
     if any(abs(mixed.get(b, 0.0)) > WORTH * shown for b, shown in zip(biases, rms, strict=True)):
         off = ", ".join(s.name for s in model.sensors if bias(s.name) in mixed)
         notes.append(f"the offsets of {off} differ; the recordings do not tell which is wrong")
-    for s, alone, shown in zip(model.sensors, shares[:-1], rms, strict=True):
+    for s, alone, shown, shift in zip(model.sensors, shares[:-1], rms, shifts, strict=True):
         value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
         if alone * abs(value) <= 3.0 * sd or bias(s.name) in mixed:
             continue
         # collinearity with other free values amplifies the effect of model error
-        sd, size = float(np.hypot(sd, systematic(bench.level.size) * shown / alone)), abs(value)
-        large = least(bench.level.size, 0.0) * shown < size - Z_95 * sd and size < shown and abs(size / constants.g - 1.0) > WORTH
-        if bench.places and not loaded and large:  # without places it may stand for any law
+        sd, size = float(np.hypot(sd, systematic(level) * shown / alone)), abs(value)
+        large = least(level, 0.0) * shown < size - Z_95 * sd and size < shown and abs(size / constants.g - 1.0) > WORTH
+        if bench.places and size > shift and large:  # without places it may stand for any law
             causes.append(
                 _load(model, bench, probe, s.name, value, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit))
             )
         else:
             notes.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
     return causes, notes
+
+
+def _shifts(bench: Bench, run: Fit, terms: Sequence[Term]) -> Array:
+    """By how much terms shift the mean of each sensor [n_z] in a free run, by its slopes, each in its own direction."""
+    own = {f.target for t in terms for f in t.free if not f.log}
+    sizes = np.array([abs(f.value - f.origin) / f.unit * (f.target in own) for f in run.free])
+    whitened = 1.0 if bench.colour is None else np.abs(1.0 - bench.colour.taps.sum(axis=0))  # of a mean, is left
+    return np.abs(np.nanmean(np.where(run.used[:, :, None], run.slopes, np.nan), axis=0)) @ sizes / whitened
 
 
 def _constant(kind: str, where: str, name: str, value: float, sd: float, unit: str, alike: tuple[Named, ...] = ()) -> Cause:

@@ -71,7 +71,7 @@ class Rounds:
         while none is large, enough that little may remain: one more cause may explain the rest. If it does, all forms are judged again by
         the smaller level that remains."""
         bench, scores, found = self.beside(accepted)
-        large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
+        large = [is_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
         hides = not found or large[-1] or any(_hidden(t, found[-1].trial) for t in found[-1].trials)
         while good := self.good(bench, scores, found):
             best = simplest(good, scores, terms_of(found))
@@ -81,13 +81,13 @@ class Rounds:
             bench, terms = adopt(bench, best, number)
             bench, scores = _based(bench, self.blocks)
             found.append(Accepted(best, number, tuple(terms), good))
-            large.append(_large(best, least(bench.level.size, best.whole)))
+            large.append(is_large(best, least(bench.level.size, best.whole)))
             hides = large[-1] or any(_hidden(t, best) for t in good)
             if not hides and not mostly(best.whole) and not _may_remain(bench, large, best):
                 good = ()
                 break
         if found and (alone(found[-1].trial.whole) or least(bench.level.size, 0.0) < WORTH):
-            large = [_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
+            large = [is_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
         return Grown(bench, scores, tuple(found), tuple(large), good)
 
     def beside(self, accepted: Sequence[Accepted]) -> tuple[Bench, Array, list[Accepted]]:
@@ -144,10 +144,10 @@ def _may_remain(bench: Bench, large: Sequence[bool], best: Trial) -> bool:
 
 def _matters(t: Trial) -> bool:
     """Is a form large, or, as small as it is, nearly all that is missed?"""
-    return _large(t, WORTH) or alone(t.whole)
+    return is_large(t, WORTH) or alone(t.whole)
 
 
-def _large(t: Trial, least_share: float) -> bool:
+def is_large(t: Trial, least_share: float) -> bool:
     """Is a form more than one of many small deviations? A large force that changes little stands for what others do as well."""
     return t.share >= least_share and t.taken >= MIN_TAKEN
 

@@ -77,7 +77,7 @@ def free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
         case "scale":
             return (Free(scale(form.where), 1.0, 0.01, sigma=0.3, origin=1.0),)
         case "late":
-            return (Free((form.how, form.index), 0.2 * bench.step, 0.1 * step, sigma=step, low=0.0),)
+            return (Free((form.how, form.index), 0.0, 0.1 * step, sigma=step, low=0.0),)
     v = ACTUATORS[form.how].fitted(drive(bench, form.index))
     return (Free((form.how, form.index), form.limit or v.start, v.unit, sigma=v.sigma, low=v.low, high=v.high),)
 

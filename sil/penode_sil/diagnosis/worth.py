@@ -43,6 +43,24 @@ def systematic(level: float) -> float:
     return SYSTEMATIC * min(2.0 * level / WORTH, 1.0)
 
 
+def remaining(bench: Bench, run: Fit, stated: Array) -> float:
+    """The unmodelled level beside all that was found, for `least` and `systematic`: that of the bench, or the largest share of a sensor's
+    rms by which a free `run` misses it beyond noise, if that is more. In a free run a small force that lasts shows, which an observer
+    follows. Of white noise the means between updates have the less; of coloured noise [n_z], no more than is `stated`."""
+    white = bench.colour is None or not len(bench.colour.taps)
+    floor = bench.noise**2 / bench.update if white else np.maximum(stated, bench.noise) ** 2
+    predictor = bench.problem().predictor
+    nu = np.concatenate(predictor.predict(run.free, np.zeros((1, len(run.free))), run.by)[0].nu, axis=1)[0]
+    signals = [np.concatenate([r.y[:, j] for r in bench.records]) for j in range(len(floor))]
+    shares = [bench.level.size]
+    for x, y, noise in zip(nu.T, signals, floor, strict=True):
+        x, power = x[np.isfinite(x)], float(np.nanvar(y)) if np.isfinite(y).any() else 0.0
+        if len(x) and power > 0.0:
+            beyond = float(np.mean(x**2)) - noise * (1.0 + 3.0 * np.sqrt(2.0 / len(x)))
+            shares.append(float(np.sqrt(max(beyond, 0.0) / power)))
+    return max(shares)
+
+
 def mostly(taken: float) -> bool:
     """Does a term that takes this share of the power take more than it leaves?"""
     return taken > 0.5
