@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from penode_sil.diagnosis.evidence import prior
-from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.evidence.colour import Colour
+from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.real import _shifts
 from penode_sil.diagnosis.worth import own, remaining
 
@@ -105,7 +105,7 @@ def test_only_noise_remains_of_a_sound_model():
 
 
 def test_curves_that_cancel_each_other_shift_a_mean_both():
-    """Two springs that move the mean by 3 and by -2 units of their values, which are 0.5 and 1.5 units: 4.5, twice that behind a filter that
+    """Two springs that move the mean by 3 and by -2 units of their values, of 0.5 and 1.5 units: 4.5, twice that behind a filter that
     leaves half of a mean; shapes (log) and parameters do not count."""
     free = [Free("a", 0.5, 1.0), Free("b", 0.75, 0.5), Free("gap", 2.0, 1.0, log=True, origin=1.0), Free("k", 7.0, 1.0)]
     slopes = np.tile([3.0, -2.0, 5.0, 11.0], (6, 1, 1)) + np.linspace(-1.0, 1.0, 6)[:, None, None]

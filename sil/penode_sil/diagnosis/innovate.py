@@ -67,7 +67,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
 
 def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. Those that are small by the
-    level of the search, or would be, count by what a free run of all others misses of a sensor: what changes slowly the observer follows,
+    level of the search, or would be, count by what a free run of all others misses: what changes slowly the observer follows,
     so that innovations show little of it."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
     accepted, large = list(end.accepted), [is_large(a.trial, least(level, a.trial.whole)) for a in end.accepted]
@@ -81,8 +81,8 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
         own = {f.target for t in a.terms for f in t.free}
         starts = [[f for f in fit.free if f.target not in own] for fit in (bench.fit, whole)]
         without = max((problem.solve(free, still, FREE_RUN) for free in starts), key=lambda f: f.cost)
-        taken = float(np.max(without.taken(whole, problem.floor)))
-        log(f"{name_of(a.trial)} takes {taken:.1%} of what a free run misses of a sensor without it")
+        taken = without.taken_whole(whole, problem.floor)
+        log(f"{name_of(a.trial)} takes {taken:.1%} of what a free run misses without it")
         if mostly(taken):
             accepted[k] = replace(a, trial=replace(a.trial, whole=max(taken, a.trial.whole)))
             large[k] = a.trial.share >= least(level, taken)
