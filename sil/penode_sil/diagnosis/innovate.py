@@ -19,8 +19,6 @@ from .rounds import Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term
 from .worth import Z_95, least, mostly, remaining
 
-LAST_RUN = 20  # iterations of the free run that is written
-
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -58,7 +56,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
     end = reconsidered(rounds, rounds.grow())
     after, sensors = end.bench, [bias(s.name) for s in bench.model.sensors]
     none = [b for b in sensors if abs(after.fit.value(b)) <= Z_95 * after.fit.deviation(b)]
-    run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), LAST_RUN)
+    run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 2 * FREE_RUN)
     level = remaining(after, run, np.array([s.noise for s in bench.model.sensors]))
     log(f"what remains: {level:.3g} of all forces")
     end = _run_free(end, level, log)

@@ -27,8 +27,6 @@ Array = NDArray[np.float64]
 UNMODELLED = "unmodelled"  # stem of the unmodelled forces and of their states
 MAX_TURN = 0.15  # of a period of the fastest mode, in one step of the integration: Runge-Kutta of order 4 then errs by 1e-4 of it a step
 MOST_STEPS = 50_000  # integration steps, over all recordings, up to which edges are steepened; a fit of a form then takes half a second
-SEGMENTS = 64  # of a spectrum: a mean over one of them stands for its noise
-MOTION = 2.0  # times the power of the quietest segment of a spectrum: more shows motion
 MIN_STEPS = 5  # steps between updates: the edge of a friction, 0.02 of the rms rate wide, then damps less than Runge-Kutta bears
 MAX_INNOVATION = 1e15  # innovation of a run that left all bounds
 
@@ -312,14 +310,16 @@ def earlier(y: Array, samples: Array) -> Array:
     return np.where(seen & near, _limited(filled, each)[at], np.nan)
 
 
-def _limited(x: Array, samples: Array) -> Array:
-    """A signal [n] so many samples earlier [shifts], by the phases of its spectrum: about the line through its ends, and reflected in them,
-    so that neither value nor slope jumps there. Frequencies that show nothing but noise stay as they are: its derivative is no
-    evidence of a delay, and would hide what is."""
+def _limited(x: Array, shifts: Array) -> Array:
+    """A signal [n] earlier by so many samples, `shifts` [.], by the phases of its spectrum: about the line through its ends, and reflected
+    in them, so that neither value nor slope jumps there. Frequencies with less than twice the power of the quietest part of the spectrum
+    show noise and stay as they are: its derivative is no evidence of a delay, and would hide what is."""
     slope, at = (x[-1] - x[0]) / max(len(x) - 1, 1), np.arange(len(x))
     rest = x - x[0] - slope * at
     spectrum = np.fft.rfft(np.concatenate([rest, -rest[-2:0:-1]]))
-    power = ndimage.uniform_filter1d(np.abs(spectrum) ** 2, max(len(spectrum) // SEGMENTS, 1))
-    moving = power > MOTION * np.min(power)
-    turn = np.exp(2j * np.pi * moving * np.fft.rfftfreq(2 * len(x) - 2) * samples[:, None])
-    return x[0] + slope * (at + samples[:, None]) + np.fft.irfft(spectrum * turn, 2 * len(x) - 2)[:, : len(x)]
+    width = max(len(spectrum) // samples.SEGMENT, 1)
+    power = ndimage.uniform_filter1d(np.abs(spectrum) ** 2, width)
+    noise = 2.0 * np.min(power)  # means of noise scatter by less than that
+    moving = power > noise
+    turn = np.exp(2j * np.pi * moving * np.fft.rfftfreq(2 * len(x) - 2) * shifts[:, None])
+    return x[0] + slope * (at + shifts[:, None]) + np.fft.irfft(spectrum * turn, 2 * len(x) - 2)[:, : len(x)]
