@@ -73,20 +73,17 @@ def outputs(model: Any) -> list[str]:
 
 def sil(of: Filtered, mask: np.ndarray | None = None, exchange: int | None = None) -> np.ndarray:
     """The same of SiL, sample by sample; another set from the sample `exchange` on. The last column is the status."""
-    own, rows = Compiled(of.model), []
-    one, two = own.filter(), CompiledMonitor(own, "default") if of.model.monitor else None
+    compiled, rows = Compiled(of.model), []
+    own = CompiledMonitor(compiled, "default") if of.model.monitor else compiled.filter()
     at = [column for column, _, _ in named(of.model)]
     for part in (slice(0, exchange), slice(exchange, None)) if exchange else (slice(None),):
         if part.start:
-            one.select(SET)
-            two.filter.select(SET) if two else None
-        given = (of.u[part], of.z[part], None if mask is None else mask[part])
-        found = one.run(*given)[0]
-        columns, status = [found.values[:, at], found.deviations[:, at], found.ratio], found.status
-        if two:
-            seen, status = two.run(*given)
-            columns += [seen.sums, seen.raised]
-        rows.append(np.column_stack([*columns, status]).astype(float))
+            own.select(SET)
+        found = own.run(of.u[part], of.z[part], None if mask is None else mask[part])[0]
+        columns = [found.values[:, at], found.deviations[:, at], found.ratio]
+        if isinstance(own, CompiledMonitor):
+            columns += [own.watched().sums, own.watched().raised]
+        rows.append(np.column_stack([*columns, found.status]).astype(float))
     return np.concatenate(rows)
 
 
