@@ -50,7 +50,7 @@ site: setup build/setup/docs ## The manual as HTML, into build/site; warnings ar
 	$(Q)cp sil/manual/start.html build/site/index.html
 	@echo "build/site/index.html"
 
-test: setup build/setup/docs ## All checks; the last line adds them up
+test: setup build/setup/docs build/watched/watched.h ## All checks; the last line adds them up
 	$(Q)$(PYTHON) test/tally.py -j $$(nproc) --python $(FOLDERS) -- $(GATES)
 
 nightly: setup build/setup/mujoco ## What `make test` takes a sample of: 36 fresh recordings with something hidden, and all tests marked as long

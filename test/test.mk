@@ -58,8 +58,7 @@ build/objects/$(1)/%.o: %.c $(COMMANDS) | $(READY)
 	$(Q)$(2) $(INCLUDE) -MMD -MP -c -o $$@ $$<
 endef
 $(WATCHED): sil/filter/watched.toml sil/filter/quarter.toml $(wildcard gen/nqvm/*.toml) $(shell find gen/penode_gen -name '*.py' -o -name '*.j2') | $(READY)
-	@rm -rf $(@D)
-	$(Q)$(PENODE) generate $< -o $(@D) >/dev/null
+	$(Q)$(PENODE) generate $< -o $(@D) >/dev/null # whole files, also where two gates of `make test` do it at once
 LEVELS := -O2 -Os -O3
 $(foreach c,$(COMPILERS),$(foreach r,float double,$(foreach l,$(LEVELS),$(eval \
     $(call tree,$c-$r$l,$(CC.$c) -std=c99 $l $(TRIES.$c) $(WARNINGS) $(REAL.$r) $(TOLD))))))
