@@ -36,6 +36,11 @@ run: setup ## The main job: recalibration while it runs, on the host and a Corte
 	$(Q)$(PENODE) diagnose $(RECORDED)/model.toml --data $(RECORDED)/train.csv --holdout $(RECORDED)/holdout.csv \
 	    -o build/run/diagnosis
 
+watch: build/watched/watched.h ## A filter and a fault monitor at 1 kHz on an emulated Cortex-M4F: its status lines (sil/firmware/watch.c)
+	$(Q)port/cortex-m/cc mps2-an386 -std=c99 -O2 -Ibuild/watched -o build/watched/watch.elf sil/firmware/watch.c \
+	    build/watched/watched{,_params,_ekf,_monitor}.c src/*.c
+	$(Q)SHIFT=2 port/cortex-m/run mps2-an386 build/watched/watch.elf
+
 pythons: setup build/setup/pythons ## Packages for other interpreters that are installed here, so that python-install tries the wheel with them too
 
 site: setup build/setup/docs ## The manual as HTML, into build/site; warnings are errors
@@ -45,7 +50,7 @@ site: setup build/setup/docs ## The manual as HTML, into build/site; warnings ar
 	$(Q)cp sil/manual/start.html build/site/index.html
 	@echo "build/site/index.html"
 
-test: setup build/setup/docs ## All checks; the last line adds them up
+test: setup build/setup/docs build/watched/watched.h ## All checks; the last line adds them up
 	$(Q)$(PYTHON) test/tally.py -j $$(nproc) --python $(FOLDERS) -- $(GATES)
 
 nightly: setup build/setup/mujoco ## What `make test` takes a sample of: 36 fresh recordings with something hidden, and all tests marked as long
@@ -135,7 +140,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run pythons test nightly prove figures bench bench-filters train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-values searches campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
+.PHONY: help setup run watch pythons test nightly prove figures bench bench-filters train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-values searches campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

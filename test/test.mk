@@ -18,7 +18,7 @@ RUNTIME  := $(wildcard src/*.c)
 MODEL    := $(wildcard gen/nqvm/c/*.c)
 MODELS   := $(filter-out %_sets,$(patsubst gen/nqvm/c/%.h,%,$(wildcard gen/nqvm/c/*.h)))
 LIBRARY  := $(RUNTIME) $(MODEL)
-INCLUDE  := -Igen/nqvm/c
+INCLUDE  := -Igen/nqvm/c -Ibuild/watched
 
 .SECONDARY:
 .PHONY: $(SUITES) python hidden hidden-nightly mujoco-nightly misra-long python-long
@@ -37,6 +37,7 @@ WARNINGS := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wd
             -Wstrict-prototypes -Wfloat-equal -Wcast-qual -Wcast-align -Wundef -Wswitch-enum -Wvla -Wredundant-decls \
             -Wwrite-strings -Werror
 FIRMWARE := $(if $(MODEL),$(filter-out %/exact.c,$(wildcard sil/firmware/*.c)))
+WATCHED  := build/watched/watched.h # with the rest of the C that sil/firmware/watch.c is written for
 TOLD     := '-DMODEL_HEADER="nqvm.h"' '-DMODEL(name)=nqvm_\#\#name' '-DMODEL_SIZE(name)=NQVM_\#\#name' \
             '-DMODEL_SETS=&nqvm_set_default' -DBOARD_TICK_MHZ=25U -DEXACT_WIDTH=16U -Iport/xcp -Iport/cortex-m
 BOARD.gcc   := $(wildcard port/host/*.c) sil/firmware/exact.c # which no target runs
@@ -56,6 +57,8 @@ build/objects/$(1)/%.o: %.c $(COMMANDS) | $(READY)
 	@mkdir -p $$(@D)
 	$(Q)$(2) $(INCLUDE) -MMD -MP -c -o $$@ $$<
 endef
+$(WATCHED): sil/filter/watched.toml sil/filter/quarter.toml $(wildcard gen/nqvm/*.toml) $(shell find gen/penode_gen -name '*.py' -o -name '*.j2') | $(READY)
+	$(Q)$(PENODE) generate $< -o $(@D) >/dev/null # whole files, also where two gates of `make test` do it at once
 LEVELS := -O2 -Os -O3
 $(foreach c,$(COMPILERS),$(foreach r,float double,$(foreach l,$(LEVELS),$(eval \
     $(call tree,$c-$r$l,$(CC.$c) -std=c99 $l $(TRIES.$c) $(WARNINGS) $(REAL.$r) $(TOLD))))))
@@ -70,6 +73,7 @@ define warnings
 .PHONY: warnings-$(1)-$(2)
 warnings-$(1)-$(2): $(call objects,$(1)-$(2)-O2,$(LIBRARY) $(FIRMWARE) $(BOARD.$(1)))
 	@echo "ok    warnings $(1) $(2)"
+$(call objects,$(1)-$(2)-O2,sil/firmware/watch.c): $(WATCHED)
 endef
 $(foreach c,$(COMPILERS),$(foreach r,float double,$(eval $(call warnings,$c,$r))))
 
@@ -117,7 +121,7 @@ HEADERS      := $(wildcard inc/penode/*.h) port/template/pen_port_target.h sil/f
 
 # The runtime is read with the first model. The others, read against its headers, are programs of `make misra-long`.
 FIRST := nqvm
-GATES.misra := misra-gnuc misra-plain-$(FIRST) $(patsubst %,misra-model-%,$(filter-out $(FIRST),$(MODELS))) misra-canary misra-table
+GATES.misra := misra-gnuc misra-plain-$(FIRST) $(patsubst %,misra-model-%,$(filter-out $(FIRST),$(MODELS))) misra-watch misra-canary misra-table
 misra: $(GATES.misra) ## cppcheck with its MISRA addon: nothing in the library, much in a bad file
 GATES.misra-long := $(MODELS:%=misra-plain-%)
 misra-long: $(GATES.misra-long) ## Each model with the whole runtime, as the program that it is part of
@@ -132,6 +136,11 @@ misra-plain-%: build/misra/%.c | $(READY)
 	@test/check "misra $*" test/misra/check clean $(call own_sources_of,$*) $(SETS) $(RUNTIME) $(PROGRAM.$*)
 misra-model-%: build/misra/%.c | $(READY)
 	@test/check "misra $*, without the runtime" test/misra/check clean $(call own_sources_of,$*)
+misra-watch: $(WATCHED) $(HEADERS) test/misra/every_entry | $(READY) # the example with filter and monitor, and what is generated for it
+	@mkdir -p build/misra
+	$(Q)test/misra/every_entry build/watched/*.h $(HEADERS) >build/misra/watched.c
+	@OPTIONS=-Ibuild/watched test/check "misra filter, monitor and their example" test/misra/check clean build/misra/watched.c \
+	    build/watched/watched{,_selftest,_ekf,_monitor}.c sil/firmware/watch.c
 misra-gnuc: build/misra/$(FIRST).c | $(READY) # the branches that only a compiler sees are in headers which any file reads
 	@test/check "misra branches of compilers are in pen_exact.h, pen_real.h" test/misra/check compilers
 	@OPTIONS='-D__GNUC__ -D__FP_FAST_FMA -D__OPTIMIZE_SIZE__ -D__thumb2__' test/check "misra -D__GNUC__" test/misra/check every $(call own_sources_of,$(FIRST))

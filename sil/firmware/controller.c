@@ -15,7 +15,14 @@
 
 pen_xcp_t controller_xcp;
 
+#ifdef EKF_HEADER /* the model file has a filter: what is calibrated is the model in it */
+#include "controller_filter.h"
+#define CONTROLLED filter.model
+#else
 static MODEL(t) controller;
+#define CONTROLLED controller
+#endif
+
 static MODEL(banks_t) banks;
 static pen_xcp_daq_t daq;
 
@@ -29,6 +36,9 @@ static struct {
 #ifdef MODEL_SENSORS
     MODEL(z_t) sensors;
 #endif
+#ifdef EKF_HEADER
+    MODEL(ekf_estimate_t) estimate;
+#endif
 } shown;
 
 #define TEXT_OF(name)  TEXT_OF_(name)
@@ -38,20 +48,20 @@ static const char name_text[] = TEXT_OF(MODEL()); /* the model's name, which its
 
 static pen_status_t commit(void)
 {
-    return MODEL(tune_commit)(&controller);
+    return MODEL(tune_commit)(&CONTROLLED);
 }
 static pen_status_t choose(const pen_set_t *set)
 {
-    return MODEL(tune_select)(&controller, set);
+    return MODEL(tune_select)(&CONTROLLED, set);
 }
 
-#define REGIONS 3U
+#define REGIONS 4U
 static pen_xcp_region_t region[REGIONS];
 static pen_xcp_region_t name_region;
 static pen_xcp_region_t epk_region;
 static pen_xcp_region_t a2l_region;
 static pen_xcp_config_t xcp_config = {
-    .instance = &controller.head,
+    .instance = &CONTROLLED.head,
     .layout = MODEL_SIZE(LAYOUT),
     .length = MODEL_SIZE(SET_LENGTH),
     .reference = &MODEL(set_default),
@@ -83,7 +93,14 @@ static void declare(const void *at, uint32_t size)
 
 static void declare_all(const controller_config_t *config)
 {
+#ifdef EKF_HEADER
+    declare(&filter, sizeof(filter));
+#else
     declare(&controller, sizeof(controller));
+#endif
+#ifdef MONITOR_HEADER
+    declare(&monitor, sizeof(monitor));
+#endif
     declare(&shown, sizeof(shown));
     declare(penode_epk, sizeof(penode_epk));
     name_region = region_of(name_text, sizeof(name_text) - 2U);
@@ -133,22 +150,31 @@ bool controller_start(const controller_config_t *config)
     xcp_config.quiet = config->quiet;
     shown.set_in_force = MODEL(set_default).head.id;
     start_lists(config);
-    return (MODEL(init)(&controller, &MODEL(set_default), &banks) == PEN_OK) && (pen_xcp_init(&controller_xcp, &xcp_config) == PEN_OK);
+#ifdef EKF_HEADER
+    const pen_status_t status = filter_start(&banks);
+#else
+    const pen_status_t status = MODEL(init)(&controller, &MODEL(set_default), &banks);
+#endif
+    return (status == PEN_OK) && (pen_xcp_init(&controller_xcp, &xcp_config) == PEN_OK);
 }
 
 void controller_step(const MODEL(u_t) *u, bool late)
 {
     const uint32_t now = shown.sample + 1U;
+#ifdef EKF_HEADER
+    const pen_status_t status = filter_step(u, &shown.sensors, &shown.estimate);
+#else
     MODEL(y_t) y;
     const pen_status_t status = MODEL(step)(&controller, u, &y);
+#endif
 
     if ((status & PEN_ADOPTED) != PEN_OK) {
         pen_set_head_t running;
-        (void)MODEL(tune_running)(&controller, &running);
+        (void)MODEL(tune_running)(&CONTROLLED, &running);
         shown.set_in_force = running.id;
         shown.adopted_at = now;
     }
-#ifdef MODEL_SENSORS
+#if defined(MODEL_SENSORS) && !defined(EKF_HEADER)
     (void)MODEL(sensors)(&controller, &shown.sensors);
 #endif
     shown.step_status = status;

@@ -3,7 +3,8 @@
 
 /**
  * A controller that a calibration tool connects to: one instance of any generated model, an XCP slave, and what may be read.
- * The compiler is told which model by the options of sample.h, and by CONTROLLER_EPK, a text, which program it is.
+ * The compiler is told which model by the options of sample.h, and by CONTROLLER_EPK, a text, which program it is. Where the model file
+ * has a filter, the controller steps that: controller_filter.h.
  *
  * Addresses are those of the program: on a host, link it with -no-pie.
  */

@@ -21,6 +21,28 @@ const uint32_t sil_ekf_sizes[EKF_SIZE_COUNT] = {
     (uint32_t)sizeof(MODEL(ekf_estimate_t)),
 };
 
+/* What a caller wants to see after a step, in row k of each. See sil_ekf_run. */
+static void sil_ekf_look(const MODEL(ekf_t) *self, uint32_t k, pen_real_t x[], pen_real_t f[], MODEL(ekf_estimate_t) estimate[],
+                         pen_ekf_test_t test[])
+{
+    const size_t states = MODEL_SIZE(EKF_N);
+    const size_t measured = MODEL_SIZE(EKF_N_Z);
+
+    if (estimate != NULL) {
+        (void)MODEL(ekf_estimate)(self, &estimate[k]);
+    }
+    for (size_t i = 0U; (x != NULL) && (i < states); i++) {
+        x[(k * states) + i] = self->x[0][i];
+    }
+    for (size_t i = 0U; (f != NULL) && (i < (states * states)); i++) {
+        f[(k * states * states) + i] = self->f[0][i];
+    }
+    for (size_t i = 0U; i < measured; i++) {
+        uint32_t count[PEN_EKF_VERDICTS];
+        (void)MODEL(ekf_test)(self, (uint32_t)i, &test[(k * measured) + i], count);
+    }
+}
+
 /**
  * Step through n samples.
  * @param u, z, mask  [n]
@@ -34,24 +56,9 @@ void sil_ekf_run(MODEL(ekf_t) *self, uint32_t n, const MODEL(u_t) u[], const MOD
 void sil_ekf_run(MODEL(ekf_t) *self, uint32_t n, const MODEL(u_t) u[], const MODEL(ekf_z_t) z[], const uint32_t mask[], pen_real_t x[],
                  pen_real_t f[], MODEL(ekf_estimate_t) estimate[], pen_ekf_test_t test[], uint32_t status[])
 {
-    const size_t states = MODEL_SIZE(EKF_N);
-    const size_t measured = MODEL_SIZE(EKF_N_Z);
-
     for (uint32_t k = 0U; k < n; k++) {
         status[k] = MODEL(ekf_step)(self, &u[k], &z[k], mask[k]);
-        if (estimate != NULL) {
-            (void)MODEL(ekf_estimate)(self, &estimate[k]);
-        }
-        for (size_t i = 0U; (x != NULL) && (i < states); i++) {
-            x[(k * states) + i] = self->x[0][i];
-        }
-        for (size_t i = 0U; (f != NULL) && (i < (states * states)); i++) {
-            f[(k * states * states) + i] = self->f[0][i];
-        }
-        for (size_t i = 0U; i < measured; i++) {
-            uint32_t count[PEN_EKF_VERDICTS];
-            (void)MODEL(ekf_test)(self, (uint32_t)i, &test[(k * measured) + i], count);
-        }
+        sil_ekf_look(self, k, x, f, estimate, test);
     }
 }
 

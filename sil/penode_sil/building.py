@@ -84,6 +84,22 @@ def model_options(model: Model) -> list[str]:
     ]
 
 
+def filter_options(model: Model) -> list[str]:
+    """Compiler options that tell the programs of sil/firmware of the filter and the monitor of a model; none without them."""
+    if model.filter is None:
+        return []
+    names = [sensor.name for sensor in model.sensors]
+    measured = ",".join(f"{names.index(sensor.name)}U" for sensor in model.filter.sensors)
+    monitor = [f'-DMONITOR_HEADER="{model.name}_monitor.h"'] if model.monitor else []
+    return [f'-DEKF_HEADER="{model.name}_ekf.h"', f"-DMODEL_MEASURED={measured}", *monitor]
+
+
+def code_of(model: Model, source: Path) -> list[Path]:
+    """The C of a model in a folder: step, sets, filter, monitor."""
+    parts = [*(["_ekf"] if model.filter else []), *(["_monitor"] if model.monitor else [])]
+    return [source / f"{model.name}.c", source / f"{model.owner}_params.c", *(source / f"{model.name}{part}.c" for part in parts)]
+
+
 def missing_tool(name: str) -> ToolMissing:
     """What to raise where a compiler or an emulator is not installed."""
     return ToolMissing(not_installed(name))
@@ -121,14 +137,10 @@ def compiler_version(compiler: str) -> bytes:
 def build_library(model: Model, dtype: type = np.float32, compiler: Sequence[str] = ("gcc", "-O2"), source: Path | None = None) -> Path:
     """The shared library of a model; `source` is a folder with its C if it is not to be generated."""
     source = source or generated(model)
-    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
+    code, runtime = code_of(model, source), sources_in(("src", "*.c"))
     shim = native("sil", "firmware", "sil.c")
-    code += [source / f"{model.name}_ekf.c"] if model.filter else []
-    code += [source / f"{model.name}_monitor.c"] if model.monitor else []
     options = [*compiler, *FLAGS, "-fPIC", *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []), *include("inc", "port/gnu")]
     read: list[Part] = [compiler_version(compiler[0]), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]
     same = build_once("runtime", ".o", [*options, "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
-    own = ["-shared", *model_options(model), f"-I{source}", *map(str, [shim, *code, same])]
-    own += [f'-DEKF_HEADER="{model.name}_ekf.h"'] if model.filter else []
-    own += [f'-DMONITOR_HEADER="{model.name}_monitor.h"'] if model.monitor else []
+    own = ["-shared", *model_options(model), *filter_options(model), f"-I{source}", *map(str, [shim, *code, same])]
     return build_once(model.name, ".so", [*options, *own], [*read, shim, *code, *sorted(source.glob(f"{model.name}*.h")), same])

@@ -54,19 +54,25 @@ def rubbed():
 def test_monitor_is_that_of_the_independent_one(rubbed) -> None:
     model, z = rubbed
     u = np.zeros((len(z), 1))
-    wanted = exact_monitor.run(model, "default", u, z, None, {}, lambda n: None)
-    found, status = CompiledMonitor(Compiled(model, np.float64), "default").run(u, z)
-    single, _ = CompiledMonitor(Compiled(model), "default").run(u, z)
+    own, wanted = exact_monitor.run(model, "default", u, z, None, {}, lambda n: None)
+    double, float_ = (CompiledMonitor(Compiled(model, real), "default") for real in (np.float64, np.float32))
+    status, plain = double.run(u, z)[0].status, Compiled(model).filter().run(u, z)[0]
+    beside, found, single = float_.run(u, z)[0], double.watched(), float_.watched()
     assert wanted.raised[:400].sum() == 0 and wanted.raised[400:800].any(axis=0).all()
     np.testing.assert_allclose(found.sums, wanted.sums, atol=1e-4)  # differences against exact derivatives
     np.testing.assert_allclose(single.sums, found.sums, atol=1e-3)
     np.testing.assert_array_equal(status & FLAGS["cause"] > 0, found.raised[:, 0])
     np.testing.assert_array_equal(status & FLAGS["other"] > 0, found.raised[:, 1])
+    np.testing.assert_array_equal(own.status, status)
+    for part in ("values", "deviations", "ratio", "counts"):  # a monitor changes nothing of its filter
+        np.testing.assert_array_equal(getattr(beside, part), getattr(plain, part))
 
 
 def test_missing_measurements_say_nothing(rubbed) -> None:
     model, z = rubbed
-    found, _ = CompiledMonitor(Compiled(model), "default").run(np.zeros((len(z), 1)), z, np.zeros(len(z)))
+    own = CompiledMonitor(Compiled(model), "default")
+    own.run(np.zeros((len(z), 1)), z, np.zeros(len(z)))
+    found = own.watched()
     assert not found.sums.any() and not found.raised.any()
 
 

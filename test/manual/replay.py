@@ -3,9 +3,9 @@
 """
 A tutorial, run: its files saved, its commands given, what they print compared.
 
-A page has in order: "Save as `NAME`" before a fence, which is that file; lines indented by four blanks that begin with `penode ` or
-`python3 `, which are commands; a ```text fence right behind a command, which is what it prints; `NAME` in the line before any other fence,
-which is the beginning of a file. In what is printed, ", N s" stands for any time.
+A page has in order: "Save as `NAME`" before a fence, which is that file; lines indented by four blanks that begin with `penode `,
+`python3 ` or, in the checkout, `make `, which are commands; a ```text fence right behind a command, which is what it prints; `NAME` in the
+line before any other fence, which is the beginning of a file. In what is printed, ", N s" stands for any time.
 
 replay.py --take-over PAGE [FILE...] rewrites what commands print and files hold to what they do now; FILEs are there already.
 """
@@ -24,9 +24,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+COMMAND = r"(?:penode|python3|make) "
 STEP = re.compile(
     r"^Save as `(?P<name>[\w./-]+)`[^\n]*\n\n```\w+\n(?P<text>.*?)^```$"
-    r"|^    (?P<command>(?:penode|python3) [^\n]*)\n(?:\n```text\n(?P<printed>.*?)^```$)?"
+    rf"|^    (?P<command>{COMMAND}[^\n]*)\n(?:\n```text\n(?P<printed>.*?)^```$)?"
     r"|^[^\n]*`(?P<file>[\w./-]+\.\w+)`[^\n]*:?\n\n```\w+\n(?P<holds>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
@@ -51,8 +52,9 @@ class Step:
 def run(command: str, folder: Path) -> str:
     """What a command prints to stdout in a folder; AssertionError with the whole output if it fails."""
     words = shlex.split(command)
-    program = {"penode": [sys.executable, "-m", "penode_sil"], "python3": [sys.executable]}[words[0]]
-    done = subprocess.run([*program, *words[1:]], cwd=folder, capture_output=True, text=True, env=os.environ | {"COLUMNS": "100"})
+    program = {"penode": [sys.executable, "-m", "penode_sil"], "python3": [sys.executable], "make": ["make", "-s"]}[words[0]]
+    place = ROOT if words[0] == "make" else folder
+    done = subprocess.run([*program, *words[1:]], cwd=place, capture_output=True, text=True, env=os.environ | {"COLUMNS": "100"})
     assert done.returncode == 0, (command, done.stdout, done.stderr)
     return done.stdout
 

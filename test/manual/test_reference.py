@@ -16,6 +16,7 @@ import pytest
 import schemas
 import targets
 
+import penode_gen
 from penode_sil import scenario
 from penode_sil.diagnosis import catalogue
 from penode_sil.errors import RecordingError
@@ -66,6 +67,30 @@ def test_every_make_target() -> None:
 @pytest.mark.parametrize("header", [h for h in c_api.headers() if re.match(r"inc/(?!.*pen_ekf)", h)])  # that of the filter lacks one
 def test_every_function_of_the_runtime_has_a_comment(header: str) -> None:
     assert [f.name for f in c_api.functions((ROOT / header).read_text(encoding="utf-8")) if not f.comment.strip()] == []
+
+
+PROMISED = """[model]
+extends = "ROOT/gen/nqvm/nqvm_folded.toml"
+name = "promised"
+trial = 100
+
+[networks]
+spring_net = { inputs = ["m"], output = "N", max_slope = "130000 N/m" }
+"""
+
+
+@pytest.mark.parametrize("text", [(ROOT / "sil/filter/watched.toml").read_text(encoding="utf-8"), PROMISED], ids=["monitor", "promises"])
+def test_every_function_of_generated_headers_has_a_comment_of_its_own(text: str, tmp_path: Path) -> None:
+    """With what it returns, and that of a step or a set with its context."""
+    model = text.replace("ROOT", str(ROOT)).replace('"quarter.toml"', f'"{ROOT}/sil/filter/quarter.toml"')
+    (tmp_path / "model.toml").write_text(model, encoding="utf-8")
+    penode_gen.generate(penode_gen.load(tmp_path / "model.toml"), tmp_path)
+    found = [f for path in sorted(tmp_path.glob("*.h")) for f in c_api.functions(path.read_text(encoding="utf-8"))]
+    comments = [f.comment for f in found]
+    assert len(found) > 25 and [f.name for f in found if "@return" not in f.comment] == []
+    assert [f.name for f in found if comments.count(f.comment) > 1 and "@return as" not in f.comment] == []
+    own = [f for f in found if not re.search(r"_ekf_|_monitor_|_step_jacobian$|_selftest$", f.name)]
+    assert [f.name for f in own if "ontext: " not in f.comment] == []
 
 
 def test_every_function_of_the_headers(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 import schemas
-from replay import ROOT, STEP, Step, replay
+from replay import COMMAND, ROOT, STEP, Step, replay
 
 PAGES = {
     p.stem: p.read_text(encoding="utf-8")
@@ -47,7 +47,7 @@ def test_nothing_is_left_out(page: str) -> None:
     """Each command and each fence of a page is a step, and the way to the cause is short."""
     text = PAGES[page]
     steps = list(STEP.finditer(text))
-    assert sum(bool(m["command"]) for m in steps) == len(re.findall(r"^    (?:penode|python3) ", text, re.MULTILINE))
+    assert sum(bool(m["command"]) for m in steps) == len(re.findall(f"^    {COMMAND}", text, re.MULTILINE))
     assert sum(bool(m["name"] or m["printed"] or m["holds"]) for m in steps) == text.count("\n```\n") == text.count("```") / 2
     before = text.split("The cause is named")[0]
     assert len(re.findall(r"^    (?:penode|python3|pip) ", before, re.MULTILINE)) <= MOST_COMMANDS

@@ -18,7 +18,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = ROOT / "build" / "check"
 TIDIED = ("src/", "port/host/", "port/xcp/", "sil/firmware/")
-FOLDERS = ("inc", "port/gnu", "port/xcp", "port/cortex-m", "sil/firmware", "gen/nqvm/c")
+FOLDERS = ("inc", "port/gnu", "port/xcp", "port/cortex-m", "sil/firmware", "gen/nqvm/c", "build/watched")
 MODEL = ['-DMODEL_HEADER="nqvm.h"', "-DMODEL(name)=nqvm_##name", "-DMODEL_SIZE(name)=NQVM_##name", "-DMODEL_SETS=&nqvm_set_default"]
 FLAGS = ["-std=c99", "-ffp-contract=off", *(f"-I{folder}" for folder in FOLDERS), *MODEL, "-DBOARD_TICK_MHZ=25U", "-DEXACT_WIDTH=16U"]
 

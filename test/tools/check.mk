@@ -24,7 +24,7 @@ check-changelog: | $(READY)
 	@test/check "fragments of the changelog" $(PYTHON) sil/manual/changelog.py
 check-structure: | $(READY)
 	@test/check "counts of structure.json" $(PYTHON) test/tools/structure.py
-check-c: | $(READY)
+check-c: $(WATCHED) | $(READY)
 	@$(PYTHON) test/tools/c_check.py
 
 format: | $(READY) ## Lay out the Python and the C, and sort imports

@@ -175,22 +175,95 @@ pen_status_t nqvm_euler_sensors_jacobian(const nqvm_euler_t *self, nqvm_euler_se
 /** Flags raised since the last call, with counts. Context: any. @return PEN_OK; PEN_BADARG (nothing written) */
 pen_status_t nqvm_euler_status(nqvm_euler_t *self, pen_status_report_t *report);
 
-/* Parameter sets. Context: tuning, unless another is named. penode/pen_set.h describes the calls and what they
-   return. A refused call changes nothing but the counters. */
+/* Parameter sets, whose states penode/pen_set.h describes. A refused call changes nothing but the counters; with NULL,
+   or an instance that is not initialised, each returns PEN_SET_BADARG. */
+
+/**
+ * Open a bank for a new set; one that is open is dropped. The rollback set is kept if a bank is free. Context: tuning.
+ * @param head  of the new set; its checksum is compared by commit
+ * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT; PEN_SET_BADARG: also without banks, or with a damaged address of one
+ */
 pen_status_t nqvm_euler_tune_begin(nqvm_euler_t *self, const pen_set_head_t *head);
-pen_status_t nqvm_euler_tune_begin_copy(nqvm_euler_t *self, uint32_t id); /* opens with the values of the running set */
+
+/**
+ * The same with the values of the running set: write those that differ, in any order, and set the new checksum.
+ * Context: tuning. Cost: one copy of the set.
+ * @param id  of the new set
+ * @return as nqvm_euler_tune_begin
+ */
+pen_status_t nqvm_euler_tune_begin_copy(nqvm_euler_t *self, uint32_t id);
+
+/**
+ * Write values [offset, offset + n) of the open set: SI units, places of nqvm_sets.h.
+ * In order; a chunk may be sent again, a gap is refused. Context: tuning.
+ * @return PEN_OK; PEN_SET_CLOSED, also if the address of the bank is damaged; PEN_SET_RANGE; PEN_SET_BADARG
+ */
 pen_status_t nqvm_euler_tune_write(nqvm_euler_t *self, uint32_t offset, const pen_real_t value[], uint32_t n);
-/* in serial form */
+
+/**
+ * The same in bytes of the serial form (penode/pen_serial.h): offset and n count bytes, nothing need be aligned.
+ * Context: tuning.
+ * @return as nqvm_euler_tune_write
+ */
 pen_status_t nqvm_euler_tune_write_bytes(nqvm_euler_t *self, uint32_t offset, const uint8_t byte[], uint32_t n);
-pen_status_t nqvm_euler_tune_expect(nqvm_euler_t *self, uint32_t checksum); /* for commit */
+
+/**
+ * Set the checksum of the open set, which commit compares: CRC-32 of its values (pen_set_checksum). Context: tuning.
+ * @return PEN_OK; PEN_SET_CLOSED; PEN_SET_BADARG
+ */
+pen_status_t nqvm_euler_tune_expect(nqvm_euler_t *self, uint32_t checksum);
+
+/**
+ * Check the open set, and hand it to the next step. A refused one stays open: write the wrong part again, or abort.
+ * Context: tuning. Cost: about 10 operations a byte of the set.
+ * @return PEN_OK; PEN_SET_CLOSED; PEN_SET_SHORT; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE;
+ *         PEN_SET_BADARG
+ */
 pen_status_t nqvm_euler_tune_commit(nqvm_euler_t *self);
+
+/** Drop the open set. Context: tuning. @return PEN_OK; PEN_SET_CLOSED; PEN_SET_BADARG */
 pen_status_t nqvm_euler_tune_abort(nqvm_euler_t *self);
+
+/**
+ * Check a whole set, in flash say, and hand it to the next step without a copy; an open set is dropped.
+ * Context: tuning. Cost: as nqvm_euler_tune_commit.
+ * @param set  must stay unchanged as long as it runs, or may be rolled back to
+ * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE;
+ *         PEN_SET_BADARG
+ */
 pen_status_t nqvm_euler_tune_select(nqvm_euler_t *self, const pen_set_t *set);
+
+/**
+ * Hand the set that ran before the running one to the next step; an open set is dropped.
+ * Context: tuning. Cost: as nqvm_euler_tune_commit.
+ * @return PEN_OK; PEN_SET_BUSY; PEN_SET_NO_PREVIOUS; if it was changed PEN_SET_LAYOUT, PEN_SET_CHECKSUM;
+ *         PEN_SET_BADARG
+ */
 pen_status_t nqvm_euler_tune_rollback(nqvm_euler_t *self);
-pen_status_t nqvm_euler_tune_withdraw(nqvm_euler_t *self); /* asks the next step not to adopt a pending set */
-pen_status_t nqvm_euler_tune_hold(nqvm_euler_t *self, bool hold); /* true: steps hold state and outputs; false: go on */
-pen_status_t nqvm_euler_tune_pending(const nqvm_euler_t *self, bool *pending); /* Context: any */
-/* Context: any but the step's on another core */
+
+/**
+ * Ask the next step not to adopt the set that waits. It may adopt it before it sees the request: once nothing is
+ * pending, ask which set is in force. Context: tuning.
+ * @return PEN_OK: requested; PEN_SET_IDLE; PEN_SET_BADARG
+ */
+pen_status_t nqvm_euler_tune_withdraw(nqvm_euler_t *self);
+
+/**
+ * true: steps hold state and outputs, from the next one on; false: they go on from there. Context: tuning.
+ * @return PEN_OK; PEN_SET_BADARG
+ */
+pen_status_t nqvm_euler_tune_hold(nqvm_euler_t *self, bool hold);
+
+/**
+ * Does a set, or the request to withdraw it, wait for the next step? Context: any.
+ * @return PEN_OK; PEN_SET_BADARG (nothing written, nothing counted)
+ */
+pen_status_t nqvm_euler_tune_pending(const nqvm_euler_t *self, bool *pending);
+
+/**
+ * The head of the set in force. Context: any but the step's on another core.
+ * @return PEN_OK; PEN_SET_BADARG (nothing written, nothing counted)
+ */
 pen_status_t nqvm_euler_tune_running(const nqvm_euler_t *self, pen_set_head_t *head);
 
 /**
@@ -201,11 +274,17 @@ pen_status_t nqvm_euler_tune_running(const nqvm_euler_t *self, pen_set_head_t *h
 pen_status_t nqvm_euler_verify(nqvm_euler_t *self, uint32_t n);
 
 /**
- * Save an instance as bytes without addresses; restore it into one that was initialised with the same set. The
- * restored one continues with the same bits. Context: stopped. penode/pen_saved.h names the sets that can be saved.
- * @return PEN_OK; PEN_SET_BADARG; restore: PEN_SET_LAYOUT, PEN_SET_CHECKSUM (nothing changed)
+ * Save an instance as bytes without addresses, little endian. penode/pen_saved.h names the sets that can be saved.
+ * Context: stopped.
+ * @return PEN_OK; PEN_SET_BADARG
  */
 pen_status_t nqvm_euler_save(const nqvm_euler_t *self, uint8_t byte[NQVM_EULER_SAVED]);
+
+/**
+ * Restore what was saved, into an instance that was initialised with the same set, and with banks if the saved one
+ * had banks: it continues with the same bits. Context: stopped. A refused call changes nothing.
+ * @return PEN_OK; PEN_SET_BADARG; PEN_SET_LAYOUT: of another model, real type or set given to init; PEN_SET_CHECKSUM
+ */
 pen_status_t nqvm_euler_restore(nqvm_euler_t *self, const uint8_t byte[NQVM_EULER_SAVED]);
 
 /**
@@ -213,6 +292,7 @@ pen_status_t nqvm_euler_restore(nqvm_euler_t *self, const uint8_t byte[NQVM_EULE
  * States and outputs must equal, to the bit, those that the generator computed without this code. Calls
  * pen_selftest().
  * @param lent  an instance that nothing else uses; has to be initialised (again) afterwards
+ * @param type  PEN_SELFTEST_TYPE of the caller
  * @return 0, or flags of penode/pen_selftest.h, including those of pen_selftest(). PEN_SELFTEST_ANSWER: a result
  *         differs; PEN_SELFTEST_SET: the set is refused; PEN_SELFTEST_REAL: the caller has another pen_real_t, and
  *         PEN_SELFTEST_BADARG: lent is NULL (nothing is written in these two cases)
@@ -221,6 +301,7 @@ pen_status_t nqvm_euler_restore(nqvm_euler_t *self, const uint8_t byte[NQVM_EULE
  */
 uint32_t nqvm_euler_selftest_of(nqvm_euler_t *lent, uint32_t type);
 
+/** The same with the caller's pen_real_t: what an application calls. @return as nqvm_euler_selftest_of */
 static inline uint32_t nqvm_euler_selftest(nqvm_euler_t *lent)
 {
     return nqvm_euler_selftest_of(lent, PEN_SELFTEST_TYPE);

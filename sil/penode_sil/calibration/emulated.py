@@ -18,7 +18,18 @@ from numpy.typing import NDArray
 from penode_gen.model import Model
 from penode_gen.resources import native
 
-from ..building import FLAGS, build_once, compiler_version, generated, include, missing_tool, model_options, sources_in
+from ..building import (
+    FLAGS,
+    build_once,
+    code_of,
+    compiler_version,
+    filter_options,
+    generated,
+    include,
+    missing_tool,
+    model_options,
+    sources_in,
+)
 from ..errors import ModelError, ScenarioError, TargetError, WrongUse, hint
 from ..targets import MACHINES, PORT, _included, cross
 from .codes import Slave
@@ -42,7 +53,7 @@ def build(model: Model, machine: str) -> Path:
             ]
         )
     source, firmware = generated(model), native("sil", "firmware")
-    code = [source / f"{model.name}.c", source / f"{model.owner}_params.c", *sources_in(("src", "*.c"))]
+    code = [*code_of(model, source), *sources_in(("src", "*.c"))]
     own = [firmware / "serve_uart.c", firmware / "controller.c", PORT / "uart.c", native("port", "xcp", "xcp_frame.c")]
     command = [
         *cross(MACHINES[machine]),
@@ -53,11 +64,12 @@ def build(model: Model, machine: str) -> Path:
         f"-I{PORT}",
         f"-I{source}",
         *model_options(model),
+        *filter_options(model),
         f'-DCONTROLLER_EPK="{identity(model)} {machine}"',
         f"-DCONTROLLER_PERIOD={between}ULL",
         *map(str, [*own, *code]),
     ]
-    headers = [*sources_in(("port/xcp", "*.h"), ("sil/firmware", "*.h")), source / f"{model.name}.h"]
+    headers = [*sources_in(("port/xcp", "*.h"), ("sil/firmware", "*.h")), *sorted(source.glob(f"{model.name}*.h"))]
     return build_once(
         f"{model.name}-uart-{machine}", ".elf", command, [compiler_version("arm-none-eabi-gcc"), *_included(), *headers, *own, *code]
     )

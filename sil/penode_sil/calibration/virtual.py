@@ -24,7 +24,7 @@ from penode_gen.model import Model
 from penode_gen.resources import native
 
 from .. import scenario as scenarios
-from ..building import FLAGS, Part, build_once, compiler_version, generated, include, model_options, sources_in
+from ..building import FLAGS, Part, build_once, code_of, compiler_version, filter_options, generated, include, model_options, sources_in
 from ..console import note
 from ..errors import ModelError, TargetError, WrongUse
 from .codes import Slave
@@ -56,7 +56,7 @@ def period(model: Model) -> int:
 def build(model: Model) -> Path:
     """The virtual controller of a model. Raises UserError."""
     source, firmware = generated(model), native("sil", "firmware")
-    code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
+    code, runtime = code_of(model, source), sources_in(("src", "*.c"))
     own = [
         *(native("port", "host", name) for name in ("serve.c", "serve_line.c")),
         firmware / "controller.c",
@@ -70,13 +70,14 @@ def build(model: Model) -> Path:
     ]
     same = build_once("runtime-serve", ".o", [*options[:-1], "-r", "-nostdlib", *map(str, runtime)], [*read, *runtime])  # for every model
     told = [f'-DCONTROLLER_EPK="{identity(model)}"', f"-DCONTROLLER_PERIOD={period(model)}ULL"]
-    command = [*options, "-no-pie", "-pthread", *model_options(model), *told, *map(str, [*own, *code, same])]
-    return build_once(f"{model.name}-serve", ".elf", command, [*read, *own, *code, source / f"{model.name}.h", same])
+    command = [*options, "-no-pie", "-pthread", *model_options(model), *filter_options(model), *told, *map(str, [*own, *code, same])]
+    return build_once(f"{model.name}-serve", ".elf", command, [*read, *own, *code, *sorted(source.glob(f"{model.name}*.h")), same])
 
 
 def describe(model: Model, program: Path, transport: str) -> str:
     """The A2L of a virtual controller."""
-    return exports.export(model, "a2l", Path("served.a2l"), {"elf": program, "measure": MEASURED, "transport": transport}).decode()
+    options = {"elf": program, "instance": "filter.model" if model.filter else "controller", "measure": MEASURED, "transport": transport}
+    return exports.export(model, "a2l", Path("served.a2l"), options).decode()
 
 
 def inputs(model: Model, scenario: Path | None) -> NDArray[np.float32]:

@@ -40,7 +40,7 @@ OPTIONS = (
     Shown("schedule", 'ssp: exchanges of sets in time, "2:altered_friction, 7:default" in seconds'),
     Shown("elf", "a2l: Linked program, compiled with -g; it has the addresses.", kind="file"),
     Shown("instance", "a2l: Variable that is the model's instance (default: the only one of its type)."),
-    Shown("measure", "a2l: More variables to measure, separated by commas (default: those of the sensors)."),
+    Shown("measure", "a2l: More variables to measure, separated by commas (default: those of the sensors and of the filter's estimates)."),
     Shown("transport", "a2l: XCP transport: tcp:HOST:PORT, udp:HOST:PORT, serial:BAUD, can:ID:ID or canfd:ID:ID."),
     Shown("max_cto", "a2l: Bytes of the longest XCP packet (default: 8 on CAN, 64 on CAN FD, else 252).", kind="number"),
     Shown("epk", "a2l: Variable with the text that identifies the program (default: penode_epk, if the program has it)."),

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,19 @@ from ..results import Result
 from ..scenario import Instance
 from . import compiled, exact, exact_monitor, results, watched
 from .estimates import Estimates, named, of
+from .watched import Watched
 
 RUN = {"mil": exact.run, "sil": compiled.run}
-WATCH = {"mil": exact_monitor.run, "sil": watched.run}
+_WATCH = {"mil": exact_monitor.run, "sil": watched.run}
 SEED = "filter"  # of the noise of a simulation: its bytes
+
+
+def run(
+    place: str, model: Model, set_name: str, u: Any, z: Any, mask: Any, exchanges: dict[int, str], tell: Callable[[int], None]
+) -> tuple[Estimates, Watched | None]:
+    """The filter, with its monitor if the model has one, over samples; `exchanges`: from which sample on another set is in force."""
+    given = (model, set_name, u, z, mask, exchanges, tell)
+    return _WATCH[place](*given) if model.monitor else (RUN[place](*given), None)
 
 
 def check_signal(model: Model, signal: str | None) -> None:
@@ -47,11 +57,7 @@ class Beside:
         driven = u + np.array([noise.get(i.name, 0.0) for i in model.inputs]) * rng.standard_normal(u.shape)
         exchanges = _exchanges(result.instance, result.adopted)
         with progress(f"{name}: filter on {place}", len(z)) as tell:
-            self.found: Estimates = RUN[place](model, result.instance.set, driven, z, None, exchanges, tell)
-        self.watched = None
-        if model.monitor is not None:
-            with progress(f"{name}: monitor on {place}", len(z)) as tell:
-                self.watched = WATCH[place](model, result.instance.set, driven, z, None, exchanges, tell)
+            self.found, self.watched = run(place, model, result.instance.set, driven, z, None, exchanges, tell)
         self.truth: dict[str, NDArray[Any]] = dict(zip((i.name for i in model.inputs), u.T, strict=True))
         self.truth |= dict(zip(model.states, result.x.T, strict=True))
         self.truth |= {s.name: v for s, v in zip((*model.outputs, *model.sensors), (*result.y.T, *result.z.T), strict=True)}

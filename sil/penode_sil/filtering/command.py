@@ -18,7 +18,7 @@ from ..mdf_write import write_mf4
 from ..output import Column, write_csv
 from ..simulate import Asked
 from . import recorded, results, watched
-from .beside import RUN, WATCH, check_signal
+from .beside import check_signal, run
 from .estimates import named, of
 
 
@@ -45,11 +45,7 @@ def over_recordings(
     summaries = []
     for one, path in zip(given, outputs, strict=True):
         with progress(f"{one.replay.plan.path.name} on {target}", len(one.z)) as tell:
-            found = RUN[target](loaded, set_name or next(iter(loaded.sets)), one.u, one.z, one.mask, {}, tell)
-        watch = None
-        if loaded.monitor is not None:
-            with progress(f"{one.replay.plan.path.name}: monitor on {target}", len(one.z)) as tell:
-                watch = WATCH[target](loaded, set_name or next(iter(loaded.sets)), one.u, one.z, one.mask, {}, tell)
+            found, watch = run(target, loaded, set_name or next(iter(loaded.sets)), one.u, one.z, one.mask, {}, tell)
         times = one.replay.times + one.replay.offset
         time = Column("time", "s", times, "%.12g")
         path.parent.mkdir(parents=True, exist_ok=True)

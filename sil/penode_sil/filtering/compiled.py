@@ -96,13 +96,17 @@ class CompiledFilter:
         for begin in range(0, n, stretch):
             some = slice(begin, begin + stretch)
             at = [part[some].ctypes.data if part.size else None for part in (u, z, offered, x, f, found, test, status)]
-            owner.library.sil_ekf_run(self.address, ctypes.c_uint32(len(z[some])), *map(ctypes.c_void_p, at))
+            self._steps(begin, len(z[some]), at)
             progress(min(begin + stretch, n))
         counts = np.zeros((owner.n_z, len(VERDICTS)), np.uint32)
         owner.library.sil_ekf_counts(self.address, ctypes.c_void_p(counts.ctypes.data))
         values, deviations = self._columns(found)
         tests = (test["innovation"], test["variance"], test["ratio"], test["verdict"])
         return Estimates(values, deviations, *tests, status, counts), x, f
+
+    def _steps(self, begin: int, n: int, at: list[int | None]) -> None:
+        """n samples from `begin` on; `at`: where they are, and where what they give goes."""
+        self.owner.library.sil_ekf_run(self.address, ctypes.c_uint32(n), *map(ctypes.c_void_p, at))
 
     def _columns(self, found: Array) -> tuple[Array, Array]:
         """Values and deviations, without the input that a model without inputs has in its C."""

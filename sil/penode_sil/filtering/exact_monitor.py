@@ -20,9 +20,10 @@ import penode_gen
 from penode_gen.errors import ModelError
 from penode_gen.model import Model, MonitorCause
 
-from .estimates import VERDICTS
+from . import estimates
+from .estimates import VERDICTS, Estimates
 from .exact import Array, Exact, derivatives
-from .watched import Watched, joined
+from .watched import FLAGS, Watched, joined
 
 SHARE = np.cbrt(np.finfo(float).eps)  # of a change: what the differences are taken over
 
@@ -115,14 +116,18 @@ class Monitor(Exact):
         return Watched(sums, raised)
 
 
-def run(model: Model, set_name: str, u: Any, z: Any, mask: Any, exchanges: dict[int, str], progress: Callable[[int], None]) -> Watched:
-    """A whole run; `exchanges`: the sample from which on another set is in force."""
-    own, found = Monitor(model, set_name), []
+def run(
+    model: Model, set_name: str, u: Any, z: Any, mask: Any, exchanges: dict[int, str], progress: Callable[[int], None]
+) -> tuple[Estimates, Watched]:
+    """A whole run; `exchanges`: the sample from which on another set is in force. The status is that of filter and monitor."""
+    own, parts, watched = Monitor(model, set_name), [], []
     for begin, end in itertools.pairwise([0, *sorted(exchanges), len(z)]):
         if begin in exchanges:
             own.select(exchanges[begin])
         part = slice(begin, end)
-        own.run(u[part], z[part], None if mask is None else mask[part])
-        found.append(own.watched())
+        parts.append(own.run(u[part], z[part], None if mask is None else mask[part]))
+        watched.append(own.watched())
         progress(end)
-    return joined(found)
+    found, raised = estimates.joined(parts), joined(watched)
+    flags = FLAGS["cause"] * raised.raised[:, :-1].any(axis=1) | FLAGS["other"] * raised.raised[:, -1]
+    return replace(found, status=(found.status | flags).astype(np.uint32)), raised

@@ -11,14 +11,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from penode_gen.algebra import placeholder
 from penode_gen.flags import FILTER_FLAGS, FLAGS as STEP_FLAGS, MONITOR_FLAGS
 from penode_gen.model import Model
 
 from ..output import Column
-from .compiled import Compiled
+from . import estimates
+from .compiled import Compiled, CompiledFilter
+from .estimates import Estimates
 
 Array = NDArray[Any]
 OTHER = "other"  # the test for what no named cause is
@@ -38,37 +39,44 @@ def names(model: Model) -> list[str]:
     return [*(c.name for c in model.monitor.causes), OTHER] if model.monitor else []
 
 
-class CompiledMonitor:
-    """A monitor and its filter, from their start; run() goes on where it was."""
+class CompiledMonitor(CompiledFilter):
+    """A filter with its monitor, from their start: run() steps both, and the status it gives is that of both."""
 
     def __init__(self, owner: Compiled, set_name: str):
-        self.owner, self.filter = owner, owner.filter(set_name)
-        size, self.n = list((ctypes.c_uint32 * 2).in_dll(owner.library, "sil_monitor_sizes"))
-        self._memory = np.zeros(size // 8 + 1)
-        getattr(owner.library, f"{owner.model.name}_monitor_init")(ctypes.c_void_p(self._memory.ctypes.data))
+        super().__init__(owner, set_name)
+        size, self.tests = list((ctypes.c_uint32 * 2).in_dll(owner.library, "sil_monitor_sizes"))
+        self._monitor = np.zeros(size // 8 + 1)
+        self._function("monitor_init")(ctypes.c_void_p(self._monitor.ctypes.data))
+        self._sums, self._raised = np.zeros((0, self.tests), owner.dtype), np.zeros((0, self.tests), np.uint32)
 
-    def run(self, u: Array, z: Array, mask: Array | None = None) -> tuple[Watched, NDArray[np.uint32]]:
-        """Step through inputs u [n, n_u] and measurements z [n, n_z]; and the status [n] of filter and monitor."""
-        owner, n = self.owner, len(z)
-        z = np.ascontiguousarray(z, owner.dtype)
-        u = np.ascontiguousarray(placeholder.columns(owner.model, np.asarray(u, float).reshape(n, -1)), owner.dtype)
-        offered = np.full(n, 2**owner.n_z - 1, np.uint32) if mask is None else np.ascontiguousarray(mask, np.uint32)
-        sums, raised, status = np.zeros((n, self.n), owner.dtype), np.zeros((n, self.n), np.uint32), np.zeros(n, np.uint32)
-        own = [self.filter.address, ctypes.c_void_p(self._memory.ctypes.data), ctypes.c_uint32(n)]
-        owner.library.sil_monitor_run(*own, *(ctypes.c_void_p(a.ctypes.data) for a in (u, z, offered, sums, raised, status)))
-        return Watched(sums, raised != 0), status
+    def run(self, u: ArrayLike, z: ArrayLike, mask: ArrayLike | None = None, **options: Any) -> tuple[Estimates, Array, Array]:
+        """As that of the filter."""
+        n = np.size(z) // self.owner.n_z
+        self._sums, self._raised = np.zeros((n, self.tests), self.owner.dtype), np.zeros((n, self.tests), np.uint32)
+        return super().run(u, z, mask, **options)
+
+    def _steps(self, begin: int, n: int, at: list[int | None]) -> None:
+        own = (self._monitor, self._sums[begin:], self._raised[begin:])
+        places = map(ctypes.c_void_p, (*at, *(part.ctypes.data for part in own)))
+        self.owner.library.sil_monitor_run(self.address, ctypes.c_uint32(n), *places)
+
+    def watched(self) -> Watched:
+        """What the monitor found in the last run()."""
+        return Watched(self._sums, self._raised != 0)
 
 
-def run(model: Model, set_name: str, u: Any, z: Any, mask: Any, exchanges: dict[int, str], progress: Callable[[int], None]) -> Watched:
+def run(
+    model: Model, set_name: str, u: Any, z: Any, mask: Any, exchanges: dict[int, str], progress: Callable[[int], None]
+) -> tuple[Estimates, Watched]:
     """A whole run; `exchanges`: the sample from which on another set is in force."""
-    own, found = CompiledMonitor(Compiled(model), set_name), []
+    own, parts = CompiledMonitor(Compiled(model), set_name), []
     for begin, end in itertools.pairwise([0, *sorted(exchanges), len(z)]):
         if begin in exchanges:
-            own.filter.select(exchanges[begin])
+            own.select(exchanges[begin])
         part = slice(begin, end)
-        found.append(own.run(u[part], z[part], None if mask is None else mask[part])[0])
+        parts.append((own.run(u[part], z[part], None if mask is None else mask[part])[0], own.watched()))
         progress(end)
-    return joined(found)
+    return estimates.joined([e for e, _ in parts]), joined([w for _, w in parts])
 
 
 def joined(parts: list[Watched]) -> Watched:

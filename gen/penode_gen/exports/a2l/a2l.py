@@ -12,6 +12,7 @@ from ...model import Model
 from ...version import VERSION
 from ..interface import Exporter, ExportError, Option, Options
 from ..templating import render
+from . import filtered
 from .elf_types import Place, Program, read_program
 from .entries import Characteristic, Measurement, Measurements, characteristics, instance_of, page
 from .lists import static_lists
@@ -63,12 +64,13 @@ def _measured(model: Model, program: Program, instance: str, named: str | None) 
     problems = []
     try:
         found.of_model(model, instance)
+        filtered.add(found, model)
     except KeyError as exc:
         raise ExportError(
             f"{program.path}: {exc.args[0]} is not there; generate the C of {model.path.name} again with penode {VERSION}"
         ) from exc
-    sensors = program.names(f"{model.name}_z_t")
-    for name in others or sensors[:1]:
+    shown = [*program.names(f"{model.name}_z_t")[:1], *program.names(f"{model.name}_ekf_estimate_t")[:1]]
+    for name in others or shown:
         try:
             found.of_variable(model, name)
         except KeyError as exc:
@@ -176,7 +178,7 @@ EXPORTER = Exporter(
     (
         Option("elf", "Linked program, compiled with -g; it has the addresses.", "file"),
         Option("instance", "Variable that is the model's instance (default: the only one of its type)."),
-        Option("measure", "More variables to measure, separated by commas (default: those of the sensors)."),
+        Option("measure", "More variables to measure, separated by commas (default: those of the sensors and of the filter's estimates)."),
         Option("transport", f"XCP transport: {_TRANSPORTS}.", default="tcp:127.0.0.1:5555"),
         Option("max_cto", "Bytes of the longest XCP packet (default: 8 on CAN, 64 on CAN FD, else 252).", "number"),
         Option("epk", "Variable with the text that identifies the program (default: penode_epk, if the program has it)."),

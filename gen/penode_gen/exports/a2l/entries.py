@@ -14,6 +14,7 @@ from ... import units
 from ...flags import FLAGS
 from ...model import Model
 from ...sets import layout, packing
+from .. import filtered
 from ..interface import ExportError
 from .elf_types import Place, Program, type_name
 
@@ -160,7 +161,7 @@ class Measurements:
         whole = self.program.find(variable)
         for place in self.program.numbers(whole):
             member = place.path[len(whole.path) :].lstrip(".")
-            if not self._of_sensors(model, place):
+            if not self._of_estimate(model, place) and not self._of_sensors(model, place):
                 self.add("program", _plain(member) if member else variable, place.path)
 
     def _of_sensors(self, model: Model, place: Place) -> bool:
@@ -175,6 +176,18 @@ class Measurements:
             self.add("sensor", sensor.name, place.path, sensor.unit, sensor.description)
         return bool(found)
 
+    def _of_estimate(self, model: Model, place: Place) -> bool:
+        """Is it a number of what NAME_ekf_estimate writes? Then it is an estimate or a standard deviation; each quantity is one once."""
+        whole, part, member = ("", "", *place.path.rsplit(".", 2))[-3:]
+        if not whole or type_name(self.program.find(whole).type) != f"{model.name}_ekf_estimate_t":
+            return False
+        for e in filtered.estimates(model):
+            if (part, member) == (e.part, e.member):
+                self.add("filter", e.name, place.path, e.unit, e.text)
+            elif (part, member) == (f"{e.part}_deviation", e.member):
+                self.add("filter", filtered.deviation(e.name), place.path, e.unit, f"standard deviation of {e.text}")
+        return True
+
 
 def _plain(path: str) -> str:
     """A path as an identifier of A2L."""
@@ -188,9 +201,9 @@ def _state_units(model: Model) -> Iterator[str]:
 
 
 def instance_of(model: Model, program: Program, named: str | None) -> str:
-    """The instance: the variable that is named, or the only one of its type. Raises ExportError."""
+    """The instance: the variable that is named, or the only one of its type; that of a filter is `model` in it. Raises ExportError."""
     kind = f"{model.name}_t"
-    known = program.names(kind)
+    known = [*program.names(kind), *(f"{name}.model" for name in program.names(f"{model.name}_ekf_t"))]
     if named is None and len(known) == 1:
         return known[0]
     if named is None:

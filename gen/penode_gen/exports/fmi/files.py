@@ -24,7 +24,7 @@ from ...tools import not_installed
 from ...version import VERSION
 from ..interface import ExportError, Option, Options
 from ..templating import render as template
-from . import variables as fv
+from . import filtered, variables as fv
 from .functions import functions
 
 OPTIONS = (
@@ -103,7 +103,7 @@ def context(model: Model, options: Options, fmi: int) -> dict[str, Any]:
         "real": options["real"],
         "provided": _provided(fmi),
         "xcp": options["xcp"],
-    }
+    } | filtered.context(model)
 
 
 def _provided(fmi: int) -> set[str]:
@@ -130,7 +130,8 @@ def sources(model: Model, context: dict[str, Any], interface: tuple[str, ...]) -
     texts = runtime(model)
     header = texts[f"{model.name}.h"]
     derived = {"uses_input_rate": "y_u_before[" in header, "stepped": _stepped(header, model.name)}
-    for name in ("fmu_core.h", "fmu_core.c", "fmu_samples.c", "fmu_sets.h", "fmu_sets.c", "fmu_model.c", *interface):
+    own = ("fmu_core.h", "fmu_core.c", "fmu_samples.c", "fmu_sets.h", "fmu_sets.c", "fmu_model.c")
+    for name in (*own, *(("fmu_filter.c",) if model.filter else ()), *interface):
         texts[name] = template(f"fmi/{name}.j2", **context, **derived)
     return {name: flat(text, context["real"]) for name, text in texts.items()}
 

@@ -5,11 +5,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from itertools import product, repeat
-from math import prod
-from typing import TypedDict, Unpack
+from collections.abc import Iterable
+from typing import TypedDict
 
 import numpy as np
 
@@ -17,112 +14,28 @@ from ... import units
 from ...model import Model
 from ...sets import layout, packing
 from ..interface import ExportError
+from . import filtered
+from .table import More, Table, Variable, number
+
+__all__ = ["Variable", "groups", "identifier", "number", "unit_definitions", "variables"]
 
 BETWEEN = ("held", "linear")  # choices of input_between_samples
 
 
-@dataclass(frozen=True)
-class Variable:
-    """
-    A variable; its elements, row by row, have the places [first, first + count) of templates/fmu_core.h.j2.
-
-    `kind` is "real", "whole" or "choice" (of `choices`, from 1); `start` is None where the FMU computes the value.
-    """
-
-    key: str  # its group
-    name: str
-    first: int
-    causality: str
-    variability: str
-    description: str
-    unit: str = ""
-    shape: tuple[int, ...] = ()
-    start: tuple[float, ...] | None = None
-    kind: str = "real"
-    choices: tuple[str, ...] = ()
-    minimum: float | None = None
-    maximum: float | None = None
-
-    @property
-    def count(self) -> int:
-        return prod(self.shape)
-
-    @property
-    def initial(self) -> str:
-        """As in the standard; empty for the independent variable and for inputs, whose start is always exact."""
-        return "" if self.causality in ("independent", "input") else "calculated" if self.start is None else "exact"
-
-    @property
-    def letter(self) -> str:
-        return {"real": "r", "whole": "u", "choice": "e"}[self.kind]
-
-    @property
-    def start_text(self) -> str:
-        """The start values with a blank between."""
-        return " ".join(number(v, self.kind) for v in self.start or ())
-
-    def elements(self) -> Iterator[tuple[str, int, float | None]]:
-        """Name, place and start of each element: W[1,2] as FMI 2 and Modelica write it."""
-        starts = repeat(None) if self.start is None else self.start
-        indices = product(*([str(k + 1) for k in range(n)] for n in self.shape))
-        names = (f"{self.name}[{','.join(index)}]" for index in indices) if self.shape else (self.name,)
-        yield from zip(names, range(self.first, self.first + self.count), starts, strict=False)  # None is repeated without end
-
-    def scalars(self, head: str, body: str) -> str:
-        """
-        The lines of all elements in FMI 2, with what they share: attributes, and the element inside.
-
-        200 000 of them are too many for a template's loop.
-        """
-        before, between = '    <ScalarVariable name="', f" {head}><{body}"
-        if self.start is None:
-            return "".join(f'{before}{name}" valueReference="{place}"{between}/></ScalarVariable>\n' for name, place, _ in self.elements())
-        kind = "choice" if self.kind == "choice" else "real"
-        return "".join(
-            f'{before}{name}" valueReference="{place}"{between} start="{number(start, kind)}"/></ScalarVariable>\n'
-            for (name, place, _), start in zip(self.elements(), self.start, strict=True)
-        )
-
-
-def number(value: float, kind: str = "real") -> str:
-    """The shortest text that is read as the same double."""
-    return repr(float(value)) if kind == "real" else str(int(value))
-
-
-class _More(TypedDict, total=False):
-    """Fields of a Variable that have a default."""
-
-    unit: str
-    shape: tuple[int, ...]
-    start: tuple[float, ...] | None
-    kind: str
-    choices: tuple[str, ...]
-    minimum: float | None
-    maximum: float | None
-
-
-class _Table:
-    def __init__(self) -> None:
-        self.variables: list[Variable] = []
-        self.end = 0
-
-    def add(self, key: str, name: str, causality: str, variability: str, description: str, **more: Unpack[_More]) -> None:
-        self.variables.append(Variable(key, name, self.end, causality, variability, description, **more))
-        self.end += self.variables[-1].count
-
-
 def variables(model: Model, dtype: packing.RealType = np.float32) -> list[Variable]:
     """All variables by place. Raises ExportError where two have one name."""
-    table = _Table()
+    table = Table()
     _common(table, model)
+    filtered.status(table, model)
     _signals(table, model)
     _jacobians(table, model)
+    filtered.outputs(table, model)
     _tunables(table, model, dtype)
     _check_names(table.variables)
     return table.variables
 
 
-def _common(table: _Table, model: Model) -> None:
+def _common(table: Table, model: Model) -> None:
     """What every FMU has: time, choices, and what is known of the set in force."""
     table.add("time", "time", "independent", "continuous", "simulation time", unit="s")
     table.add(
@@ -150,16 +63,17 @@ def _common(table: _Table, model: Model) -> None:
     table.add("checksum", "set_checksum", "output", "discrete", "CRC-32 of the set in force", kind="whole")
 
 
-def _signals(table: _Table, model: Model) -> None:
+def _signals(table: Table, model: Model) -> None:
     """Inputs, outputs, sensors, states and constants."""
     for i in model.inputs:
         start = min(max(0.0, i.minimum if i.minimum is not None else 0.0), i.maximum if i.maximum is not None else np.inf)
-        more: _More = {"unit": units.si(i.unit), "start": (float(start),), "minimum": i.minimum, "maximum": i.maximum}
+        more: More = {"unit": units.si(i.unit), "start": (float(start),), "minimum": i.minimum, "maximum": i.maximum}
         table.add("input", i.name, "input", "continuous", i.description, **more)
     for i in model.inputs:
         words = f"{i.name} at the end of the next communication step; read where input_between_samples is linear"
         same = table.variables[-len(model.inputs)].start
         table.add("early", f"early.{i.name}", "input", "continuous", words, unit=units.si(i.unit), start=same)
+    filtered.inputs(table, model)
     shown = {o.name for o in model.outputs}
     for o in model.outputs:
         table.add("output", o.name, "output", "continuous", o.description, unit=units.si(o.unit))
@@ -174,7 +88,7 @@ def _signals(table: _Table, model: Model) -> None:
             table.add("constant", p.name, "local", "constant", p.description, unit=units.si(p.unit), start=(float(p.value),))
 
 
-def _jacobians(table: _Table, model: Model) -> None:
+def _jacobians(table: Table, model: Model) -> None:
     """Derivatives of the state over a communication step."""
     n_x, n_u = len(model.states), len(model.inputs)
     if n_x:
@@ -197,7 +111,7 @@ def _jacobians(table: _Table, model: Model) -> None:
         )
 
 
-def _tunables(table: _Table, model: Model, dtype: packing.RealType) -> None:
+def _tunables(table: Table, model: Model, dtype: packing.RealType) -> None:
     """The arrays of the layout table, with the values of the set default."""
     values = packing.set_values(model, "default", dtype)
     described = {p.name: p.description for p in model.tunable} | {n: p.description for n, p in model.networks.items()}
@@ -253,14 +167,17 @@ def groups(found: list[Variable]) -> list[Group]:
         "set_id",
         "status",
         "checksum",
+        "filter_status",
         "input",
         "early",
+        "measured",
         "output",
         "sensor",
         "state",
         "constant",
         "state_state",
         "state_input",
+        "filtered",
         "tunable",
     )
     first: dict[str, int] = {}

@@ -22,6 +22,7 @@ from ...tools import not_installed
 from ..a2l.a2l import describe, epk, transport
 from ..a2l.elf_types import Program, read_program
 from ..a2l.entries import Measurements
+from ..a2l.filtered import add_filter, add_monitor
 from ..interface import ExportError
 from ..templating import render
 from .files import binaries
@@ -77,5 +78,9 @@ def _text(model: Model, program: Program, addresses: bool) -> str:
     measured = Measurements(program)
     measured.of_model(model, f"{_ONLY}.self")
     measured.add("set", "samples", f"{_ONLY}.data.samples", text="samples since the start time")
+    if model.filter:
+        add_filter(measured, model, f"{_ONLY}.filter")
+    if model.monitor:
+        add_monitor(measured, model, f"{_ONLY}.monitor")
     values = program.find(f"{_ONLY}.data.staged")
     return describe(model, program, values, measured, transport(_WIRE), epk(program, None), pages=False, addresses=addresses)
