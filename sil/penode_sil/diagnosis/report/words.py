@@ -11,7 +11,6 @@ import numpy as np
 
 from .. import catalogue
 from ..advice import doubts
-from ..reliability import line
 from ..residual import Channel
 from ..result import OUTSIDE, Cause, Diagnosis, place, plain, sigmas
 from . import figure as fig
@@ -159,7 +158,7 @@ def key_figures(d: Diagnosis) -> list[tuple[str, str, str]]:
     if named := known(d):
         found.append(("Explained", percent(d.explained), "of the avoidable residual, in training"))
         least = min(c.confidence for c in named)
-        found.append(("Confidence", sure(least), f"against the next best answer. {sentence(line(d.reliability, least))}"))
+        found.append(("Confidence", sure(least), "against the next best answer"))
     return [*found, cost(d)]
 
 
