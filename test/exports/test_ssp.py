@@ -179,7 +179,7 @@ def changed(path: Path, to: Path, name: str, *swap: tuple[str, str]) -> Path:
 def test_what_is_wrong_in_an_ssp_is_one_line(ssp: Path, tmp_path: Path) -> None:
     to = tmp_path / "wrong.ssp"
     for name, swap, line in (
-        ("extra/penode/schedule.xml", ('time="1.0"', 'time="soon"'), "extra/penode/schedule.xml: 'soon' is not a number; mend it"),
+        ("extra/penode/schedule.xml", ('time="1.0"', 'time="soon"'), "extra/penode/schedule.xml: 'soon' is not a number; correct it"),
         (
             "extra/penode/schedule.xml",
             ('time="1.0"', 'time="9"'),

@@ -77,7 +77,7 @@ def test_a_load_pays_for_looking_like_a_bias_only_once():
 
 
 def test_form_is_a_part_of_what_formulas_leave():
-    """A load takes 150 000 and has no form to mend; a second cause that gains 1 000 beside it is worth nearly that."""
+    """A load takes 150 000 and has no form to correct; a second cause that gains 1 000 beside it is worth nearly that."""
     alone, both = (
         explanation("constant_force", gain=150_000.0),
         explanation("constant_force", "tyre_liftoff", gain=151_000.0, formulas=150_000.0),

@@ -80,7 +80,7 @@ class _Reduction:
         left = [e for e in self.equations if e != 0]
         for e in left:
             if not {str(s) for s in e.free_symbols} - self.constant:
-                raise ImportProblem(f"{self.where}: the equations contradict each other: {str(e)[:60]} = 0; mend the model")
+                raise ImportProblem(f"{self.where}: the equations contradict each other: {str(e)[:60]} = 0; correct the model")
         self.equations = left
 
     def candidates(self, e: sympy.Expr, names: set[str]) -> list[str]:

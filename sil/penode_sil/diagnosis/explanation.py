@@ -53,7 +53,7 @@ Group = tuple[str, str]
 @dataclass(frozen=True, eq=False)
 class Explanation:
     """Some causes, fitted. `gain`: fall of the loss against the null fit, `formulas` the part of it that causes had taken which are
-    formulas and leave no form to mend; `score`: gain less what the freedom is worth."""
+    formulas and leave no form to correct; `score`: gain less what the freedom is worth."""
 
     terms: tuple[Term, ...]
     built: Extended

@@ -116,7 +116,7 @@ def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: 
 
 def _contact(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float) -> float:
     """Deflection where stops come into contact, on the side where they do later; `reach` without any. Laws with a smaller part of
-    the force there mend the form of others."""
+    the force there correct the form of others."""
     stops = [(t, n) for t, n in zip(terms, names, strict=True) if t.candidate.kind == "bump_stop"]
     ends = np.array([-reach, reach])
     forces = np.array([np.abs(Curve([t], [n])(ends, np.zeros(2), values)) for t, n in stops]).reshape(-1, 2)

@@ -124,7 +124,7 @@ def _mass(name: str) -> Parameters:
 
 
 def having(terms: Sequence[Term], *shapes: str) -> list[int]:
-    """Which terms have one of these shapes; others only mend their form."""
+    """Which terms have one of these shapes; others only correct their form."""
     return [i for i, t in enumerate(terms) if not t.candidate.what.shapes.keys().isdisjoint(shapes)]
 
 

@@ -100,6 +100,12 @@ def unit(text: str, units: Units, texts: Texts) -> str | None:
     return meant(text, units, texts)[0].unit
 
 
+def unit_of(key: str, aliases: Mapping[str, str], units: Units, texts: Texts) -> str | None:
+    """The unit that any alias gives a column; None if none does."""
+    given = [meant(text, units, texts) for text in aliases.values()]
+    return next((one.unit for one, found in given if key in found and one.unit is not None), None)
+
+
 def with_unit(text: str, given: str, units: Units, texts: Texts) -> str:
     """An alias with this unit in place of the one that it has."""
     one, _ = meant(text, units, texts)
