@@ -57,7 +57,7 @@ class Body:
 
     @property
     def unit(self) -> str:
-        """Of its position."""
+        """Unit of its position."""
         return "rad" if self.rotational else "m"
 
 
@@ -238,7 +238,7 @@ class Filter:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of its states."""
+        """Names of its states."""
         return (*(s.name for s in self.states), *(i.name for i in self.inputs))
 
 

@@ -111,13 +111,13 @@ def known() -> dict[str, Known]:
 
 
 def meanings() -> dict[str, dict[str, str]]:
-    """Of each kind, what its numbers mean."""
+    """Meaning of the parameters of each kind."""
     files = (*catalogue.FILES, drives, channels, others)
     return {kind: text for file in files for kind, text in getattr(file, "PARAMETERS", {}).items()}
 
 
 def rates() -> dict[str, tuple[int, int]]:
-    """Of each kind that the kept campaign hid by itself: how often it was named rightly, of how many."""
+    """For each kind that the kept campaign hid by itself: cases in which it was named rightly, and all cases."""
     block = re.split(r"^## ", CAMPAIGN.read_text(encoding="utf-8"), flags=re.MULTILINE)[1]
     table = block.split("\nkind ", 1)[1].split("\n\n", 1)[0]
     found = {}

@@ -79,7 +79,7 @@ def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, tuple[
 
 
 def _start(system: ssp_file.System, fmu: _Fmu, name: str) -> float:
-    """Of an input of the system: what the SSP binds to it, or else the FMU's own."""
+    """Start value of an input of the system: what the SSP binds to it, or else the FMU's own."""
     bound = system.start.get(system.wires[name])
     return bound[0] if bound else fmu.get(system.wires[name])
 

@@ -48,7 +48,7 @@ def steeper(sil, factor):
 
 
 def force(sil, s):
-    """Of the default set's spring network, in float64."""
+    """Force of the default set's spring network, in float64."""
     return sil.model.sets["default"].networks["spring_net"].evaluate(np.array([float(s)]))[0]
 
 

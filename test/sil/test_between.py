@@ -148,7 +148,7 @@ def term(how: str, where: str = "tau") -> Term:
 
 
 class Values:
-    """Of a fit, as far as a file needs them."""
+    """Values of a fit, as far as a file needs them."""
 
     values: ClassVar[dict[str, float]] = {}
 

@@ -22,7 +22,7 @@ from penode_sil.diagnosis import advice, catalogue, files, noise, reliability, r
 from penode_sil.diagnosis.report import changes, figure as fig, panels
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
-EXTENDED = """# What the recordings taught about car.toml: coulomb_friction at damper.
+EXTENDED = """# Extension of car.toml from recordings: coulomb_friction at damper.
 
 [model]
 extends = "car.toml"

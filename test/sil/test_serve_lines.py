@@ -174,7 +174,7 @@ def test_late_steps_are_told_while_it_runs(tmp_path: Path, capsys: pytest.Captur
 
 
 def timer(port: int) -> str:
-    """Of the server's end of the connection at a port."""
+    """The timer of the server's end of the connection at a port."""
     rows = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
     (found,) = [row[5][:2] for row in rows if int(row[1].split(":")[1], 16) == port and row[3] == "01"]
     return found

@@ -77,7 +77,7 @@ class Entry:
 
     @property
     def unit(self) -> str:
-        """Of what a tool shows."""
+        """Unit that a tool shows."""
         return self.method.unit
 
     def shown(self, numbers: NDArray[Any]) -> NDArray[Any]:
@@ -140,7 +140,7 @@ def _tree(text: str) -> Block:
 
 
 def _method(block: Block) -> Method:
-    """Of one that is neither identical nor linear: the number in memory, without a unit."""
+    """Conversion that is neither identical nor linear: shown as the number in memory, without a unit."""
     kind, unit = block.words[2], block.words[4]
     if kind == "LINEAR":
         scale, offset = (float(word) for word in block.after("COEFFS_LINEAR", 2))

@@ -137,7 +137,7 @@ def learn(network: Network, x: Array, wanted: Array) -> tuple[Network, float]:
 
 
 def derivatives(network: Network, x: Array) -> Array:
-    """Of the output with respect to all weights and biases of dense layers, in their order: [n, weights]."""
+    """Derivatives of the output with respect to all weights and biases of dense layers, in their order: [n, weights]."""
     inputs = [x]
     for layer in network.layers:
         inputs.append(layer_value(layer, inputs[-1]))
@@ -185,8 +185,8 @@ def write(study: Study, e: Explanation, learnt: list[Taught], beside: Path, outp
     """model_absorbed.toml and its networks into `output`; `beside` is the way from there to the nominal file."""
     values = {f.target: f.value for f in e.fit.free}
     lines = [
-        f"# The nominal model with one more parameter set, in which {', '.join(t.element for t in learnt)} knows what the recordings show.",
-        "# It has the layout of the nominal code: it can be staged in an ECU that runs that.",
+        f"# The nominal model with one more set, in which {', '.join(t.element for t in learnt)} includes what the recordings show.",
+        "# It has the layout of the nominal code: it can be staged into a running controller.",
         "",
         "[model]",
         f'extends = "{beside.as_posix()}"',

@@ -89,7 +89,7 @@ def _head(model: Model, terms: Sequence[Term], substeps: int) -> list[str]:
     """Lines of a file that extends the model's, down to the end of [model]."""
     learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
     return [
-        f"# What the recordings taught about {model.path.name}: {learnt or 'nothing but values'}.",
+        f"# Extension of {model.path.name} from recordings: {learnt or 'values only'}.",
         "",
         "[model]",
         extends(model.path.resolve()),

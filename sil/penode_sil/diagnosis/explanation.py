@@ -127,7 +127,7 @@ def numbers(e: Explanation) -> int:
 
 
 def weight(model: Model) -> float:
-    """Of all bodies [N], without any no bound. A load beyond it is a start in motion in disguise."""
+    """Weight of all bodies [N], inf without bodies. A larger load stands for a start in motion."""
     return constants.g * sum(model.parameters[b.mass].value for b in model.bodies) or np.inf
 
 

@@ -84,7 +84,7 @@ class Fit:
         return next(f.value for f in self.free if f.target == target)
 
     def covariance(self) -> Array:
-        """Of all free values, in their units (log: relative)."""
+        """Covariance of all free values, in their units (log: relative)."""
         priors = np.array([(f.unit / f.sigma) ** 2 for f in self.free])
         curvature = self.jacobian.T @ self.jacobian + np.diag(priors)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))

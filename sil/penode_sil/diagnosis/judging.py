@@ -77,7 +77,7 @@ def judge(
 
 
 def share(study: Study, e: Explanation, left: float = 0.0) -> float:
-    """Of the avoidable residual that an explanation takes away, 0 to 1; `left`: a lower bound of the chi2 that remains."""
+    """Share of the avoidable residual that an explanation takes away, 0 to 1; `left`: a lower bound of the chi2 that remains."""
     left, gained = max(e.fit.chi2 - explanation.rows(study), left), study.null.cost - e.fit.cost
     return gained / (gained + left) if gained + left > 0.0 else 1.0
 

@@ -173,7 +173,7 @@ def _ends(q: Array) -> tuple[float, float]:
 
 
 def _located(linear: Linear, acting: Sequence[int], rounding: float = 1e-6) -> list[bool]:
-    """Of each place: do the sensors show its deflection? Not where bodies may be moved and all rates and sensors stay the same, as a car on
+    """Do the sensors determine the deflection at each place? Not if bodies can be moved without a change of rates and sensors, as a car on
     a floor of which the speed is measured."""
     seen = np.vstack([linear.a, linear.c[: linear.n_sensors]])
     if not seen.size:

@@ -74,12 +74,12 @@ class Seen:
 
     @cached_property
     def _responses(self) -> Complex:
-        """Of one place after the other, [places, sensors, f]."""
+        """Responses to forces at each place, [places, sensors, f]."""
         return np.ascontiguousarray(self.response.T)
 
     @cached_property
     def _frees(self) -> Array:
-        """Of one state after the other, [x, numbers]."""
+        """Free motions from each state, [x, numbers]."""
         return np.ascontiguousarray(self.free.T).reshape(self.free.shape[2], -1).view(self.free.real.dtype)
 
     @property

@@ -25,7 +25,7 @@ from .score import Regression, Seen, smooth
 Array = NDArray[np.float64]
 SKEW = 0.001  # of a sample: channels are never sampled at exactly the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
-VAGUE = 0.5  # tolerance above which a parameter counts as a guess: it may change the behaviour of the plant entirely
+GUESSED_TOLERANCE = 0.5  # tolerance above which a parameter counts as a guess: it may change the behaviour of the plant entirely
 FEW = 4  # studies with other noise that are kept: the next step of a search may ask for one again
 
 
@@ -50,7 +50,7 @@ class Study:
 
 def guessed(model: Model) -> list[str]:
     """Parameters that the file hardly knows."""
-    return [name for name, p in model.parameters.items() if p.tolerance > VAGUE]
+    return [name for name, p in model.parameters.items() if p.tolerance > GUESSED_TOLERANCE]
 
 
 def uncertain(p: Parameter, guessed: float = 1e3) -> Free:

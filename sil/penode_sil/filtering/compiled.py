@@ -51,7 +51,7 @@ class CompiledFilter:
 
     @property
     def address(self) -> ctypes.c_void_p:
-        """Of NAME_ekf_t."""
+        """Address of the NAME_ekf_t."""
         return ctypes.c_void_p(self._memory.ctypes.data)
 
     def _function(self, name: str) -> Callable[..., int]:

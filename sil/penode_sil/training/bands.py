@@ -36,7 +36,7 @@ class Band:
 
     @property
     def deviations(self) -> Array:
-        """Of each unknown."""
+        """Standard deviation of each unknown."""
         return np.sqrt(np.maximum(np.diag(self.spread), 0.0) + self.away**2)
 
     def deviation(self, k: int) -> Callable[[Array], Array]:

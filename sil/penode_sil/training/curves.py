@@ -159,7 +159,7 @@ def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callab
 
 
 def covariance(problem: Problem, fit: Fit) -> Array:
-    """Of all unknowns, where a fit ended."""
+    """Covariance of all unknowns at the end of a fit."""
     curvature = fit.normal.curvature + problem.with_(tied=None).prior(fit.point)[0]
     scale = 1.0 / np.sqrt(np.diag(curvature))
     scaled = curvature * np.outer(scale, scale) + 1e-13 * np.eye(len(scale))

@@ -70,7 +70,7 @@ def predicted(found: list[Part], precision: Array, pull: Array) -> Array:
 
 
 def sizes(problem: Problem, point: Point) -> Array:
-    """Of each network's force, over that of the problem: the smallest that predicts no worse than the best by more than a standard
+    """Size of each network's force, over that of the problem: the smallest that predicts no worse than the best by more than a standard
     error."""
     found, factors = parts(problem, point), np.ones(len(problem.scale))
     if len(found) < 2:

@@ -337,7 +337,7 @@ def _deployed(after: Model, train_: Sequence[Measured], point: Point, problem: P
 
 
 def versions() -> dict[str, str]:
-    """Of the programs that the numbers of a training follow from."""
+    """Versions of the programs that determine the numbers of a training."""
     return {"penode": penode_gen.VERSION, "python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
 
 

@@ -122,7 +122,7 @@ class Program:
                         )
 
     def _address(self, unit: Any, die: Any) -> int | None:
-        """Of a static variable; None if it has none, or the linker has dropped it."""
+        """Address of a static variable; None if it has none, or the linker has dropped it."""
         location = die.attributes.get("DW_AT_location")
         if location is None or location.form not in ("DW_FORM_exprloc", "DW_FORM_block1", "DW_FORM_block"):
             return None

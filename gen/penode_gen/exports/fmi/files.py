@@ -210,5 +210,5 @@ def documentation(context: dict[str, Any], platforms: list[str]) -> dict[str, st
 
 
 def suffix(target: str) -> str:
-    """Of the shared library of a platform."""
+    """Suffix of a shared library on a platform."""
     return _COMPILERS[target][1]

@@ -43,7 +43,7 @@ class Doubt:
 
 
 def doubts(d: Diagnosis, model: Model | None = None) -> list[Doubt]:
-    """Of the named causes those that may as well be others: not what explanations with little posterior have in their place. `model`: the
+    """Named causes with alternatives that the recordings do not rule out; explanations with little posterior are ignored. `model`: the
     plant that the experiments are for."""
     found = []
     for c in d.causes:

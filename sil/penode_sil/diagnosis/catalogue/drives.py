@@ -85,7 +85,7 @@ def sensors(model: Model, count: int) -> Iterable[Form]:
 
 
 def plain(model: Model, sensor: str, time: Array, z: Array) -> dict[str, Array]:
-    """Of each thing that an extended model says is wrong with a sensor, by kind: what the sensor would show [n] without it at `time` [n], z
+    """By kind of sensor fault in an extended model: the signal [n] of the sensor without that fault at `time` [n], z
     [n] being what it shows."""
     bias, gain, delay = (model.parameters.get(f"{key}_{sensor}") for key in ("bias", "gain", "delay"))
     found = {"sensor_bias": z - bias.value} if bias else {}

@@ -58,12 +58,12 @@ class Motion:
 
     @property
     def rates(self) -> Array:
-        """Of all recordings [n]."""
+        """Rates in all recordings [n]."""
         return np.concatenate([p.v for p in self.parts])
 
     @property
     def longest(self) -> float:
-        """Of the recordings [s]."""
+        """Length of the longest recording [s]."""
         return float(max(p.t[-1] for p in self.parts))
 
 

@@ -114,7 +114,7 @@ def _metric(model: Model, e: Experiment) -> object:
 
 
 def _power(e: Experiment, j: int) -> float:
-    """Of a sensor about its mean; 1 of one that does not move."""
+    """Power of a sensor about its mean; 1 if it is constant."""
     y = e.y[e.good[:, j], j]
     return float(np.var(y)) or 1.0 if y.size else 1.0
 
