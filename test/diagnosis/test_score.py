@@ -285,7 +285,7 @@ def test_tables_add_up():
         ["4", "no_discrepancy"],
     ]
     assert (out["time"]["longest"], out["time"]["q90"]) == (19.0, 16.0)
-    first = [{**row, "compiling": 0.25} for row in rows("null", 10, 10)]  # what compilers took is told apart
+    first = [{**row, "compiling": 0.25} for row in rows("null", 10, 10)]  # time of compilers is listed apart
     assert score.summary(first)["time"] == {"median": 3.75, "q90": 7.75, "longest": 8.75, "compiling": 0.25}
     assert "18 of 20" in score.text(out) and "2x backlash at damper" in score.text(out)
 

@@ -124,7 +124,7 @@ def test_bad_state_is_refused_by_set_state(sil, bad, which):
 
 @pytest.mark.parametrize("bad", BAD)
 def test_bad_weight_is_flagged_and_held(sil, bad):
-    """Many weights in turn. A sample with a bad one is worth exactly a held one, on a twin that was told to hold.
+    """Many weights in turn. A sample with a bad one is worth exactly a held one, on a twin that holds.
 
     Only the bounds of trust envelopes are compared with and not computed with: then the step must advance to finite states.
     """

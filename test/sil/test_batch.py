@@ -133,7 +133,7 @@ def rich(
 
 
 def drive(samples: int, seed: int = 0) -> np.ndarray:
-    """A force and a foot that wander [samples, 2]."""
+    """A force and a foot as slow random walks [samples, 2]."""
     return np.cumsum(np.random.default_rng(seed).standard_normal((samples, 2)), axis=0) * [0.3, 0.002]
 
 

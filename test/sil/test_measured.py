@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Recordings with seeded trouble: what is sound comes through, the rest is masked, and every trouble is said."""
+"""Recordings with seeded trouble: good samples pass, others are masked, and every fault is reported."""
 
 from __future__ import annotations
 

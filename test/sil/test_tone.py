@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A tone in a residual is told from noise of any colour, and from what a model makes under a sine."""
+"""A tone in a residual is distinguished from noise of any colour, and from the response of a model to a sine."""
 
 from __future__ import annotations
 

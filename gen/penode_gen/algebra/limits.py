@@ -34,7 +34,7 @@ def complete(model: Model) -> tuple[Model, list[Problem]]:
 
 
 def _of_inputs(model: Model, given: Filter) -> list[Problem]:
-    """Inputs as states are told to the step sample by sample, which restarts what it remembers of them."""
+    """Inputs that are states are set in the step sample by sample, which restarts its memory of earlier samples."""
     where, names = ("filter", "inputs"), [i.name for i in given.inputs]
     if not names:
         return []

@@ -48,7 +48,7 @@ class Record:
     """Excitation of one recording at the solver's step: inputs as the file has them, as they act without effects, gusts; start state."""
 
     u: Array
-    error: Array  # [steps + 1, n_u], of unit size: what acts is u + scale * error
+    error: Array  # [steps + 1, n_u], of unit size: the acting input is u + scale * error
     gust: Array  # [steps + 1]
     start: Array
 
