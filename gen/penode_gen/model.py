@@ -194,7 +194,7 @@ class FilterSensor:
 
 @dataclass(frozen=True)
 class FilterState:
-    """A state of the model in the filter, SI: standard deviation at the start, and of what disturbs it within a second; bounds."""
+    """A state of the model in the filter, SI: standard deviation at the start, and of the disturbance within one second; bounds."""
 
     name: str
     start: float
@@ -205,7 +205,7 @@ class FilterState:
 
 @dataclass(frozen=True)
 class FilterInput:
-    """An input as a state of the filter, SI: `noise` is the standard deviation at the start, and `step` that of what each sample adds
+    """An input as a state of the filter, SI: `noise` is the standard deviation at the start, and `step` that of the change in each sample
     to `decay` times the last value. Of a `measured` one the state is the error of its measurement, else the input itself."""
 
     name: str

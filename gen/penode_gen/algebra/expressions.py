@@ -27,7 +27,7 @@ class ExpressionError(ValueError):
 
 
 class UnknownFunction(ExpressionError):
-    """A call of what is neither a function nor a network."""
+    """A call of a name that is neither a function nor a network."""
 
 
 class Softplus(sp.Function):

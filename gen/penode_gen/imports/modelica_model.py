@@ -146,7 +146,7 @@ class _Reduction:
         if any(derivative(name) in other.free_symbols for other in [*self.equations, *self.solved.values()]):
             if any(str(s).startswith("der(") for s in value.free_symbols):
                 raise ImportProblem(
-                    f"{self.where}: the second derivative of what {name} equals is needed, which is not read; declare it as a state"
+                    f"{self.where}: the second derivative of the value of {name} is needed, which is not supported; declare it as a state"
                 )
             by[derivative(name)] = differentiated(value, self.constant)
         self.equations = [sympy.expand(other.subs(by)) for other in self.equations]

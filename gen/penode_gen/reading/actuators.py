@@ -12,7 +12,7 @@ from .. import model as m
 from ..algebra import sampled
 from .ends import EndTables
 
-SOURCE = "{unit}"  # of an argument in the unit of what the actuator takes
+SOURCE = "{unit}"  # of an argument in the unit of the actuator's input
 LAWS = {  # arguments with their units
     "gain": {"gain": "1"},
     "lag": {"time": "s"},

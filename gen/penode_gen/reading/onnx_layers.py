@@ -28,7 +28,7 @@ class Step:
 
 class Chain:
     """
-    The layers so far, and the shape of what comes out of them: one batch axis of size `batch`, and `width` values for
+    The layers so far, and the shape of their output: one batch axis of size `batch`, and `width` values for
     each of its rows, in order.
     """
 

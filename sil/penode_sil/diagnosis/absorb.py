@@ -38,7 +38,7 @@ SET = "absorbed"
 
 @dataclass(frozen=True, eq=False)
 class Taught:
-    """A network with a law in it; `missing`: RMS of what it has not learnt over that of the law."""
+    """A network with a law in it; `missing`: RMS of its difference from the law over that of the law."""
 
     port: str
     element: str

@@ -31,7 +31,7 @@ FEW = 200  # samples of a sensor that are taken out one by one, sooner than by a
 
 class _Effects:
     """Effects in every recording: of forces at places and of faults of sensors. Forces along a motion are looked at every `every`
-    samples; samples of sensors that do not count are taken out of effects as they are of what was measured."""
+    samples; samples of sensors that do not count are removed from effects as from the measurements."""
 
     def __init__(self, experiments: Sequence[Experiment], metrics: Sequence[Metric], seen: Sequence[Seen]) -> None:
         self.experiments = experiments

@@ -237,7 +237,7 @@ class Problem:
         return z, skews, run.x
 
     def residuals(self, e: int, z: Array, skews: Array) -> Array:
-        """Whitened residuals [runs, rows] of what `sensors` gives."""
+        """Whitened residuals [runs, rows] of the result of `sensors`."""
         thin, good, measured = _thinned(self.experiments[e])
         with np.errstate(over="ignore", invalid="ignore"):  # some runs leave all bounds
             spectra = thin(z, good)  # [n_z, runs, f]

@@ -52,7 +52,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
 
 
 def _run_free(end: Grown, log: Callable[[str], None]) -> Grown:
-    """The end of a search, with those small forms large that take most of what a free run misses beside all others: what changes slowly the
+    """The end of a search; small forms that explain most of the error of a free run beside all others become large: what changes slowly the
     observer follows, so that innovations show little of it."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
     if all(end.large):
@@ -67,7 +67,7 @@ def _run_free(end: Grown, log: Callable[[str], None]) -> Grown:
         starts = [[f for f in fit.free if f.target not in own] for fit in (bench.fit, whole)]
         without = max((problem.solve(free, still, FREE_RUN) for free in starts), key=lambda f: f.cost)
         taken = without.taken_whole(whole, problem.floor)
-        log(f"{name_of(a.trial)} takes {taken:.1%} of what a free run misses without it")
+        log(f"{name_of(a.trial)} explains {taken:.1%} of the error of a free run without it")
         if mostly(taken):
             accepted[k] = replace(a, trial=replace(a.trial, whole=max(taken, a.trial.whole)))
             large[k] = a.trial.share >= least(bench.level.size, taken)

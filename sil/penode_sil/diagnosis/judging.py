@@ -37,7 +37,7 @@ def judge(
     study: Study, explanations: Sequence[Explanation], faults: list[Cause], alike: float, shared: float, pure: bool, changed: float = 0.0
 ) -> tuple[tuple[Cause, ...], str, float, float]:
     """Causes, verdict, share explained, and the evidence that there is anything at all; `alike`, `shared`: see
-    noise.correlation; `pure`: a tone is left; `changed`: chi2 of what changes with time, if that is beyond chance."""
+    noise.correlation; `pure`: a tone is left; `changed`: chi2 of changes with time, if that is beyond chance."""
     rows = explanation.rows(study)
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)

@@ -164,7 +164,7 @@ def _size(f: Array) -> float:
 
 
 class Curve:
-    """The force of a group of terms over deflection or rate, for any values of what is free."""
+    """The force of a group of terms over deflection or rate, for any values of the free parameters."""
 
     def __init__(self, terms: Sequence[Term], names: Sequence[str]):
         self.parts = [(t, n) for t, n in zip(terms, names, strict=True) if isinstance(t.candidate.what, Basis)]

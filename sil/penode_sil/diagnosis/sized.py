@@ -312,7 +312,7 @@ def _tyre_liftoff(c: _Cause) -> Parameters:
         return {"preload": ("N", lambda p: c0(p) * p[f"{names[main]}_static"])}
 
     def preload(p: Values) -> float:
-        """Where a bent curve has taken a twentieth of what it takes at last."""
+        """Where a curve has lost a twentieth of its final loss."""
         f = np.abs(curve(s, zero, p))
         return c0(p) * float(s[np.flatnonzero((s > 0.0) & (f > 0.05 * f[-1]))[0]])
 

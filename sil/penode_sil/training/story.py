@@ -139,7 +139,7 @@ def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin
 
 
 def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], Limits]]) -> tuple[Problem, Fit]:
-    """The fit with the colour of what it leaves, for its estimate and its band. What is louder than noise is what the model lacks: there
+    """The fit with the colour of its residuals, for its estimate and its band. Residuals above the noise are errors of the model: there
     the estimate stays that of least errors, and curves bend as held-out parts of the recordings allow."""
     loud = heldout.loud(problem, fit.point)
     if loud:

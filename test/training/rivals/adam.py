@@ -106,7 +106,7 @@ def by_diffrax(known: dict[str, float]) -> Callable[[Tree, jax.Array], jax.Array
 def loss_of(
     simulate: Callable[[Tree, jax.Array], jax.Array], road: jax.Array, y: jax.Array, noise: jax.Array
 ) -> Callable[[Tree], jax.Array]:
-    """Mean square of what is left over the noise: 1 is the best there is."""
+    """Mean square of the residual over the noise: 1 is the best possible."""
     return lambda p: jnp.mean(((simulate(p, road) - y) / noise) ** 2)
 
 

@@ -176,7 +176,7 @@ class Program:
 
     def pointed(self, place: Place, n: int = 0) -> Place | None:
         """
-        Element n of what a pointer of the program's file points to; None if it is NULL.
+        Element n of the array that a pointer in the program's file points to; None if it is NULL.
 
         Raises KeyError where it is no pointer to data.
         """

@@ -12,7 +12,7 @@ MEANING = {
     "sensor_bias": "The sensor reads a constant or slowly drifting amount too much.",
     "sensor_clipping": "The sensor is cut off beyond a limit.",
     "sensor_dropout": "The sensor lost samples.",
-    "network_extrapolation": "A network is used outside of what it was trained on.",
+    "network_extrapolation": "A network is used outside of the range that it was trained on.",
     "integration_error": "The physics is right; the deployed step integrates it too coarsely.",
     "outside_taxonomy": "A residual remains that is not noise and that no known kind explains.",
 }
