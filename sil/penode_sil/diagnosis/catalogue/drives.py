@@ -18,7 +18,7 @@ KINDS = (*INPUTS, "sensor_scale", "sensor_delay")
 MEANING = {
     "input_gain": "The input that drives the plant is larger, or smaller, than its recording by a factor.",
     "input_offset": "A constant acts on top of the recorded input.",
-    "input_delay": "The input acts later than the recording says.",
+    "input_delay": "The input acts later than recorded.",
     "input_lag": "The input acts with a lag: an actuator that the model does not have.",
     "input_hold": "The input acts in steps: its controller is slower than the recorder and holds the value in between.",
     "input_dead_zone": "Inputs below a width have no effect; of larger ones the part beyond it drives the plant.",
@@ -44,7 +44,18 @@ RIVALS = {
     ): "weigh a body, or measure the force of the actuator: motion alone shows only ratios of force to mass",
 }
 
-
+PARAMETERS = {
+    "input_gain": {"gain": "acting over recorded input"},
+    "input_offset": {"offset": "acting minus recorded input"},
+    "input_delay": {"delay": "from the recording to the effect"},
+    "input_lag": {"lag": "time constant of a first-order lag"},
+    "input_hold": {"period": "time between two steps of the input"},
+    "input_dead_zone": {"width": "magnitude below which the input has no effect"},
+    "input_saturation": {"limit": "largest magnitude of the acting input"},
+    "input_slew_limit": {"rate": "largest rate of the acting input"},
+    "sensor_scale": {"scale": "reading over true value"},
+    "sensor_delay": {"delay": "from the motion to the reading"},
+}
 ALIKE = {"input_delay": "sensor_delay", "sensor_delay": "input_delay", "input_gain": "sensor_scale", "sensor_scale": "input_gain"}
 ALIKE |= {"input_sign": "sensor_sign", "sensor_sign": "input_sign"}
 

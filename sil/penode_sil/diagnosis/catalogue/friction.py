@@ -22,7 +22,7 @@ MEANING = {
     "coulomb_friction": "Friction: a force against the motion that hardly depends on the rate.",
     "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",
     "bouc_wen": "Hysteresis: the force depends on the travel since the last reversal, elastic at first, then yielding.",
-    "position_dependent_friction": "Friction that is larger at one end of the travel than at the other, or at both than between.",
+    "position_dependent_friction": "Friction that depends on the position: larger at one end of the travel, or at both ends than between them.",
     "load_dependent_friction": "Friction that grows with the force that a bearing, a guide or a gear transmits.",
 }
 PARAMETERS = {  # what each number of a report means
