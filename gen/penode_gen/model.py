@@ -1,4 +1,4 @@
-"""The model as plain data: what a model file says, in SI units, before any mathematics is done to it."""
+"""The model as plain data: the contents of a model file in SI units."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ class FilterLimit:
 
 @dataclass(frozen=True)
 class Filter:
-    """What [filter] says: an extended Kalman filter beside the step (inc/penode/pen_ekf.h)."""
+    """Contents of [filter]: an extended Kalman filter beside the step (inc/penode/pen_ekf.h)."""
 
     sensors: tuple[FilterSensor, ...]
     states: tuple[FilterState, ...]  # all states of the model, in their order
@@ -252,7 +252,7 @@ class MonitorCause:
 
 @dataclass(frozen=True)
 class Monitor:
-    """What [monitor] says: tests on the innovations of the filter (inc/penode/pen_monitor.h). `mean_time` between false alarms [s], at
+    """Contents of [monitor]: tests on the innovations of the filter (inc/penode/pen_monitor.h). `mean_time` between false alarms [s], at
     least; `spread`: factor on the standard deviation of innovations that the test for anything else is made for."""
 
     mean_time: float

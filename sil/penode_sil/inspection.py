@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What `penode inspect` prints: what is in a recording, how good it is, and how it maps to a model."""
+"""The output of `penode inspect`: channels of a recording, their quality, and their signals in a model."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _KEPT = 4096  # parsed expressions: models that differ in one element share all 
 
 
 class ExpressionError(ValueError):
-    """A text that is no expression of the model; the message says what and where."""
+    """A text that is no expression of the model; the message states the error and its place."""
 
 
 class UnknownFunction(ExpressionError):

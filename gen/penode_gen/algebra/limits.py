@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Limits of a filter as sums of its states with constant coefficients, and what a filter cannot be made for."""
+"""Limits of a filter as sums of its states with constant coefficients, and models that cannot have a filter."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a model file says of mechanisms: bodies that move or turn, points, and what elements may act between."""
+"""Mechanisms of a model file: bodies that move or turn, points, and the ends of elements."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a model file says of its filter: [filter], and the tables in it."""
+"""The filter of a model file: [filter], and the tables in it."""
 
 from __future__ import annotations
 

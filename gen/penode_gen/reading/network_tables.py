@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a model file says of networks: their ports, the sets with a file for each, and whether they can be folded."""
+"""Networks of a model file: their ports, the sets with a file for each, and whether they can be folded."""
 
 from __future__ import annotations
 

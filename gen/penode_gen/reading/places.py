@@ -44,7 +44,7 @@ class Lines:
         return tuple(part.strip("\"'") for part in _KEY_PART.findall(key))
 
     def knows(self, path: tuple[str, ...]) -> bool:
-        """Does the file say anything under this path?"""
+        """Does the file have an entry under this path?"""
         return path[:2] in self._at
 
     def of(self, path: tuple[str, ...]) -> int:

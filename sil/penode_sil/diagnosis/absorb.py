@@ -82,7 +82,7 @@ def _fits(study: Study, what: object, element: Element) -> bool:
 def _lesson(
     study: Study, element: Element, network: Network, curve: Curve, values: Mapping[object, float], place: int
 ) -> tuple[Array, Array]:
-    """Inputs of the network, and what the law adds there [points]."""
+    """Inputs of the network, and the force that the law adds there [points]."""
     sense = next(sense for name, sense in study.places[place].elements if name == element.name)
     by_rate = element.network_inputs[0] == "rate"
     moved = np.concatenate([sense * (m.v if by_rate else m.s) for m in (s.motions[place] for s in study.seen)])
@@ -182,7 +182,7 @@ def as_json(network: Network) -> str:
 
 
 def write(study: Study, e: Explanation, learnt: list[Taught], beside: Path, output: Path) -> Path:
-    """model_absorbed.toml and its networks into `output`; `beside` is the way from there to the nominal file."""
+    """model_absorbed.toml and its networks into `output`; `beside` is the path from there to the nominal file."""
     values = {f.target: f.value for f in e.fit.free}
     lines = [
         f"# The nominal model with one more set, in which {', '.join(t.element for t in learnt)} includes what the recordings show.",

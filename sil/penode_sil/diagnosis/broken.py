@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Sensors that clip or drop out, by what their samples show and a simulation agrees with."""
+"""Sensors that clip or drop out, by their samples and a simulation that confirms it."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class _Counts:
 def broken_sensors(
     model: Model, train: Sequence[Measured], study: Study, simulated: Sequence[np.ndarray], bursts: Sequence[NDArray[np.bool_]]
 ) -> list[Cause]:
-    """Sensors that clip or drop out, by what their samples show and a simulation agrees with: it goes on where they stop."""
+    """Sensors that clip or drop out, by their samples and a simulation that confirms it: it continues where they stop."""
     found = []
     for j, sensor in enumerate(model.sensors):
         c = _Counts()

@@ -53,7 +53,7 @@ CLOCK = "clock_drift"  # kind of an effect that is not on the list, but looks li
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """One elementary fault of a sensor: `series` is what it adds to that sensor for gain 1, per recording."""
+    """One elementary fault of a sensor: `series` is its contribution to that sensor for gain 1, per recording."""
 
     kind: str
     sensor: int

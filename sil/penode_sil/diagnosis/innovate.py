@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The search by innovations for what a model lacks: the forms accepted, and those large enough to be named."""
+"""The search by innovations for missing effects of a model: the forms accepted, and those large enough to be named."""
 
 from __future__ import annotations
 

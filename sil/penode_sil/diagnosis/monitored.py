@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The model with a filter and a monitor for what a diagnosis named: the extended model, in which the causes have no size yet."""
+"""The model with a filter and a monitor for the diagnosed causes: the extended model with causes of size 0."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def sizes(element: Element) -> list[str]:
 
 
 def changes(nominal: Model, extended: Model) -> dict[str, dict[str, float]]:
-    """Causes by name: what their parameters have grown to from no effect, SI."""
+    """Causes by name: their parameters, which without the fault have no effect, SI."""
     known, found = {e.name for e in nominal.elements}, {}
     for element in extended.elements:
         own = sizes(element) if element.name not in known else []

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a fitted curve is called: friction, dampers, springs and tyres by what it does, not by the laws that it was put together from."""
+"""Names of fitted curves: friction, dampers, springs and tyres by their force, not by the laws that they are composed of."""
 
 from __future__ import annotations
 

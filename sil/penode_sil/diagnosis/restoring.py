@@ -46,7 +46,7 @@ class Surface:
     located: bool = True
 
     def unit(self, of_length: str) -> str:
-        """A unit of the force there: `of_length` as it is, or what stands for it where the ends turn."""
+        """A unit of the force there: `of_length`, or the rotational one where the ends turn."""
         return for_angles(of_length) if self.turns else of_length
 
     def grid(self, values: Array) -> Array:

@@ -139,7 +139,7 @@ def likely(e: Experiment, levels: Array, g: Complex, acting: int, r: Complex) ->
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One column of the regression and what it stands for."""
+    """One column of the regression and its hypothesis."""
 
     kind: str
     where: str

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The state of a diagnosis: a model against its recordings, with noise, places, and what is free within tolerance."""
+"""The state of a diagnosis: a model against its recordings, with noise, places, and values that are free within tolerance."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Study:
 
 
 def guessed(model: Model) -> list[str]:
-    """Parameters that the file hardly knows."""
+    """Parameters that are only guesses."""
     return [name for name, p in model.parameters.items() if p.tolerance > GUESSED_TOLERANCE]
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A first look into a recording: its channels, their clocks and quality, and what of a model they are."""
+"""A first look into a recording: its channels, their clocks and quality, and the signals of a model that they are."""
 
 from __future__ import annotations
 

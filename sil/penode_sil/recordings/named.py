@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a user calls columns: texts of --channel like `x=pos_mm`, `x=Weg 1 [mm]`, `a=a_body@10ms`, `z=z#2`, `time=@1ms`."""
+"""Names of columns by the user: texts of --channel like `x=pos_mm`, `x=Weg 1 [mm]`, `a=a_body@10ms`, `z=z#2`, `time=@1ms`."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Piecewise linear networks of one input by way of curves: straight lines first, then knots where the recordings want them."""
+"""Piecewise linear networks of one input by way of curves: straight lines first, then knots where the recordings require them."""
 
 from __future__ import annotations
 

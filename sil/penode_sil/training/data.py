@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Recordings as training sees them, and how loud and of which colour what is left of them is."""
+"""Recordings for training, and the level and colour of their residuals."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class Part:
 
 
 def loud(problem: Problem, point: Point) -> bool:
-    """Is what a sensor leaves louder than the noise that it states? Not where none is stated."""
+    """Is the residual of a sensor above its stated noise? False if none is stated."""
     found = left.of(problem, point)
     return found is not None and bool(found.above(SETTINGS.story_loud))
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a user must know of a fit, in sentences."""
+"""Notes on a fit for the user."""
 
 from __future__ import annotations
 

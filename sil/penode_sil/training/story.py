@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""One training from recordings to networks: which way each network goes, the fit, what is known of it afterwards."""
+"""One training from recordings to networks: the method for each network, the fit, its uncertainty."""
 
 from __future__ import annotations
 
@@ -206,7 +206,7 @@ def _is_rate(port: NetworkPort) -> bool:
 
 
 def _with_known(model: Model, options: Options) -> tuple[Model, tuple[str, ...]]:
-    """The model with what was measured, exact."""
+    """The model with the measured parameters exact."""
     changed = dict(model.parameters)
     for name, value in options.known:
         if name not in changed:

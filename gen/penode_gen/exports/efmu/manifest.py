@@ -58,7 +58,7 @@ def time_stamp() -> str:
 
 
 def shared(model: Model, dialect: str) -> dict[str, Any]:
-    """What every template sees."""
+    """The context of every template."""
     return {"model": model, "version": VERSION, "time": time_stamp(), "dialect": dialect, "xsd": list(DIALECTS[dialect].values())}
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Inputs that are not what drove the plant, and sensors that do not show what it does."""
+"""Inputs that differ from the excitation of the plant, and sensors that differ from its motion."""
 
 from collections.abc import Iterable
 
@@ -88,7 +88,7 @@ def bent(model: Model, index: int, drive: Drive) -> Iterable[Form]:
 
 
 def sensors(model: Model, count: int) -> Iterable[Form]:
-    """Forms of the first `count` sensors: what physics cannot do in any place."""
+    """Forms of the first `count` sensors: effects that no force in any place has."""
     for j, s in enumerate(model.sensors[:count]):
         yield Form("sensor_scale", s.name, "scale", j)
         if count > 1 or model.inputs:  # there is something to be late against

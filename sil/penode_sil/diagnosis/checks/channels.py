@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Before a search: is the sign of a channel the other one, or are two alike exchanged? What is found is mended in the model, for the search
+"""Before a search: is the sign of a channel the other one, or are two alike exchanged? A finding is corrected in the model, for the search
 to go on with, and is the first cause of its answer."""
 
 from __future__ import annotations

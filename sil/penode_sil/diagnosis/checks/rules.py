@@ -41,7 +41,7 @@ class Rule:
 
 
 def neutral(case: Case, end: End, table: Table) -> list[tuple[Cause, str]]:
-    """Causes whose interval holds what has no effect: 0, 1 of a scale, the nominal value of a parameter."""
+    """Causes whose interval includes the value without effect: 0, 1 of a scale, the nominal value of a parameter."""
     nominal = {p.name: p.value for p in case.model.parameters.values()}
     return [(c, MAY_BE_NOTHING) for c in _named(end) if c.neutral(nominal)]
 

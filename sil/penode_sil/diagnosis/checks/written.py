@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The model file with what was learnt, as it is written and read back."""
+"""The extended model file, written and read back."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What an extended model changes in the nominal file, and what it costs on a controller."""
+"""Changes of the nominal file by an extended model, and its cost on a controller."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Words and numbers of the report: the answer in a sentence, what matters most, what it costs."""
+"""Words and numbers of the report: the answer in a sentence, the key figures, the cost."""
 
 from __future__ import annotations
 
