@@ -64,7 +64,7 @@ def test_monitor_is_that_of_the_independent_one(rubbed) -> None:
     np.testing.assert_array_equal(status & FLAGS["other"] > 0, found.raised[:, 1])
 
 
-def test_missing_measurements_say_nothing(rubbed) -> None:
+def test_missing_measurements_change_nothing(rubbed) -> None:
     model, z = rubbed
     found, _ = CompiledMonitor(Compiled(model), "default").run(np.zeros((len(z), 1)), z, np.zeros(len(z)))
     assert not found.sums.any() and not found.raised.any()

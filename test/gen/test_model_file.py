@@ -558,7 +558,7 @@ def test_lines_are_found_in_any_layout(folder):
         assert [int(p.partition(":")[0]) for p in found] == expected, found
 
 
-def test_command_says_it_in_lines(folder, monkeypatch, capsys):
+def test_command_prints_errors_as_lines(folder, monkeypatch, capsys):
     """Exit code 2, a line for each problem on stderr, nothing on stdout, nothing written."""
     from penode_sil import cli
 

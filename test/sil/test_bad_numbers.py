@@ -175,7 +175,7 @@ def refused(instance, call, flag):
     assert bytes(instance.running()) == head
 
 
-def test_refused_sets_say_why_and_change_nothing(sil):
+def test_refused_sets_have_a_reason_and_change_nothing(sil):
     model, dtype = sil.model, sil.dtype
     instance, twin = sil.instance(), sil.instance()
     values, head = (penode_gen.set_values(model, "altered_friction", dtype), penode_gen.set_head(model, "altered_friction", dtype))

@@ -149,7 +149,7 @@ def test_a_model_that_predicts_worse_is_rejected(tmp_path):
         (Cause("constant_force", "spring", {"force": Value(4e9, "N", (3e9, 5e9))}, 0.9), "would have 4e+09 N, but no more than"),
     ],
 )
-def test_names_that_say_nothing_go(tmp_path, cause, note):
+def test_names_without_evidence_are_dropped(tmp_path, cause, note):
     """What may be nothing, and what is larger than all that acts, is a note; without a name something is still unexplained."""
     case, end = ended(tmp_path, FRICTION)
     found = final.checked(
