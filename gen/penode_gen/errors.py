@@ -15,7 +15,7 @@ What can go wrong, by what the caller can do about it. Each class has a `code`, 
         ToolMissing          "tool-missing": install the compiler, the emulator, or the Python package
         TargetError          "target": look after the board, the emulator, the compiler, the controller, or the line to it
         WrongUse             "usage": call the command otherwise: its options, its paths, its environment
-      InternalError          exit 3, "internal": a fault of penode; send us the traceback
+      InternalError          exit 3, "internal": a bug in penode; report it with the traceback
 
 The classes from RecordingError on are in penode_sil.errors.
 """
@@ -133,7 +133,7 @@ class ModelError(UserError):
 
 
 class InternalError(PenodeError):
-    """A fault of penode; `traceback` is the file that has it, None if none could be written."""
+    """A bug in penode; `traceback` is the file that has the traceback, None if none could be written."""
 
     code = "internal"
     exit = 3

@@ -258,7 +258,7 @@ def test_a_crash_is_one_line_and_a_file(tmp_path, monkeypatch, capsys):
     assert ended.value.code == 3
     (line,) = capsys.readouterr().err.splitlines()
     (path,) = tmp_path.iterdir()
-    assert str(path) in line and "KeyError" in line and "send us" in line
+    assert str(path) in line and "KeyError" in line and "report it with" in line
     assert "Traceback" in path.read_text() and "penode simulate 'a b.toml'" in path.read_text()
 
 
@@ -287,7 +287,7 @@ def test_a_crash_of_one_recording_is_a_line_too(tmp_path, monkeypatch):
         (tmp_path / name).touch()
     answer, line = folder.attempt(files.Job(tmp_path / "m.toml", (tmp_path / "r.csv",), (), tmp_path / "out"))
     (path,) = tmp_path.glob("penode-crash-*.txt")
-    assert answer is None and "\n" not in line and "ZeroDivisionError" in line and f"send us {path}" in line
+    assert answer is None and "\n" not in line and "ZeroDivisionError" in line and f"report this bug with {path}" in line
     assert "Traceback" in path.read_text()
 
 
