@@ -61,7 +61,7 @@ prove: setup build/setup/proof ## The proofs: all values, all orders, all statem
 
 ##@ Figures and campaigns
 
-figures: setup ## Measure what our steps cost; rewrite the tables of README.md and test/bench/
+figures: setup ## Measure what our steps cost; rewrite the tables and pictures of README.md and test/bench/ (a picture of the report needs Chromium)
 	$(Q)$(PYTHON) test/bench/bench.py --ours
 	$(Q)$(PYTHON) test/prove/promises.py
 

@@ -327,7 +327,7 @@ pen_status_t pen_fallback(const pen_model_t *model, pen_instance_t *self, uint32
     return status;
 }
 
-/* Banks that cannot be told from other memory are given up: else the guard would find them damaged again, without end. */
+/* Banks that cannot be distinguished from other memory are given up: the guard would find them damaged again and again. */
 static void give_up_banks(pen_tuning_t *tuning)
 {
     const bool good = pen_tuning_banks_known(tuning);

@@ -61,7 +61,7 @@ def group_of(nodeid: str) -> str:
 
 
 def seconds(path: Path) -> dict[str, float]:
-    """Of each test of the last run; nothing if there was none."""
+    """Seconds of each test of the last run; empty if there was none."""
     try:
         return json.loads(path.read_text())
     except (OSError, ValueError):

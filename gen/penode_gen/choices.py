@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What texts choose from, where the help of a command can read it without what is slow to load."""
+"""Choices of options, in a module that loads fast enough for the help of a command."""
 
 from __future__ import annotations
 

@@ -4,18 +4,18 @@
 What can go wrong, by what the caller can do about it. Each class has a `code`, which stays, and the exit code of the command.
 
     PenodeError              anything below
-      UserError              exit 2: the caller can mend it
-        ModelError           "model-file": mend the model file, or what it names
+      UserError              exit 2: the caller can correct it
+        ModelError           "model-file": correct the model file, or what it names
           ExportError        the same, or "usage" where options of the export are all that is wrong (penode_gen.exports)
           ImportProblem      the file that is to become a model or network file (penode_gen.imports)
         NetworkError         "network": export the network again, or name another file
-        RecordingError       "recording": mend the recording, or say by --channel what it means
-        ScenarioError        "scenario": mend the scenario file
+        RecordingError       "recording": correct the recording, or say by --channel what it means
+        ScenarioError        "scenario": correct the scenario file
         NotConverged         exit 4, "not-converged": no start of a training stayed within bounds; see what it says was tried
         ToolMissing          "tool-missing": install the compiler, the emulator, or the Python package
         TargetError          "target": look after the board, the emulator, the compiler, the controller, or the line to it
         WrongUse             "usage": call the command otherwise: its options, its paths, its environment
-      InternalError          exit 3, "internal": a fault of penode; send us the traceback
+      InternalError          exit 3, "internal": a bug in penode; report it with the traceback
 
 The classes from RecordingError on are in penode_sil.errors.
 """
@@ -111,7 +111,7 @@ class PenodeError(Exception):
 
 
 class UserError(PenodeError):
-    """Something the caller can mend: raised as one of the classes below."""
+    """Something the caller can correct: raised as one of the classes below."""
 
     code = "usage"
     exit = 2
@@ -133,7 +133,7 @@ class ModelError(UserError):
 
 
 class InternalError(PenodeError):
-    """A fault of penode; `traceback` is the file that has it, None if none could be written."""
+    """A bug in penode; `traceback` is the file that has the traceback, None if none could be written."""
 
     code = "internal"
     exit = 3

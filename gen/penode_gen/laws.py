@@ -84,7 +84,7 @@ LAWS: dict[str, Law] = {
     "bouc_wen": Law(
         "force*slip", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - (v*slip^2 + abs(v)*slip*abs(slip))/2)/presliding")}
     ),
-    # the same with other loops: bend 0 .. 1.4 for exponents 1 .. 2.5; share of what the rate's sign does, 1 for loops of Dahl
+    # the same with other loops: bend 0 .. 1.4 for exponents 1 .. 2.5; share that depends on the sign of the rate, 1 for Dahl
     "bouc_wen_loop": Law(
         "force*slip",
         {"force": "N", "presliding": "m", "bend": "1", "share": "1"},

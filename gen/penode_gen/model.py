@@ -1,4 +1,4 @@
-"""The model as plain data: what a model file says, in SI units, before any mathematics is done to it."""
+"""The model as plain data: the contents of a model file in SI units."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Body:
 
     @property
     def unit(self) -> str:
-        """Of its position."""
+        """Unit of its position."""
         return "rad" if self.rotational else "m"
 
 
@@ -194,7 +194,7 @@ class FilterSensor:
 
 @dataclass(frozen=True)
 class FilterState:
-    """A state of the model in the filter, SI: standard deviation at the start, and of what disturbs it within a second; bounds."""
+    """A state of the model in the filter, SI: standard deviation at the start, and of the disturbance within one second; bounds."""
 
     name: str
     start: float
@@ -205,7 +205,7 @@ class FilterState:
 
 @dataclass(frozen=True)
 class FilterInput:
-    """An input as a state of the filter, SI: `noise` is the standard deviation at the start, and `step` that of what each sample adds
+    """An input as a state of the filter, SI: `noise` is the standard deviation at the start, and `step` that of the change in each sample
     to `decay` times the last value. Of a `measured` one the state is the error of its measurement, else the input itself."""
 
     name: str
@@ -229,7 +229,7 @@ class FilterLimit:
 
 @dataclass(frozen=True)
 class Filter:
-    """What [filter] says: an extended Kalman filter beside the step (inc/penode/pen_ekf.h)."""
+    """Contents of [filter]: an extended Kalman filter beside the step (inc/penode/pen_ekf.h)."""
 
     sensors: tuple[FilterSensor, ...]
     states: tuple[FilterState, ...]  # all states of the model, in their order
@@ -238,7 +238,7 @@ class Filter:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of its states."""
+        """Names of its states."""
         return (*(s.name for s in self.states), *(i.name for i in self.inputs))
 
 
@@ -252,7 +252,7 @@ class MonitorCause:
 
 @dataclass(frozen=True)
 class Monitor:
-    """What [monitor] says: tests on the innovations of the filter (inc/penode/pen_monitor.h). `mean_time` between false alarms [s], at
+    """Contents of [monitor]: tests on the innovations of the filter (inc/penode/pen_monitor.h). `mean_time` between false alarms [s], at
     least; `spread`: factor on the standard deviation of innovations that the test for anything else is made for."""
 
     mean_time: float

@@ -16,5 +16,5 @@ PACKAGES = {
 
 
 def not_installed(program: str) -> str:
-    """Says that a program is missing, and what installs it."""
+    """The message for a missing program, with the package that installs it."""
     return f"{program} is not installed; install {f'it, on Debian: apt-get install {PACKAGES[program]}' if program in PACKAGES else 'it'}"

@@ -60,7 +60,7 @@ def factor(text: str) -> float:
 
 
 def si(text: str) -> str:
-    """The SI unit of what `text` measures: `text` itself if it is one, 'm' for 'mm'."""
+    """The SI unit for the quantity of `text`: `text` itself if it is one, 'm' for 'mm'."""
     return text.strip() or "1" if factor(text) == 1.0 else describe(dimension(text)).replace("no unit", "1")
 
 

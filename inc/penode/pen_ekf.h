@@ -63,7 +63,7 @@ typedef struct {
     const pen_real_t *inside;    /* [n_x] a state that keeps all limits                                         */
 } pen_ekf_model_t;
 
-/** What became of a measurement. */
+/** Result for a measurement. */
 #define PEN_EKF_NOT_OFFERED 0U
 #define PEN_EKF_USED        1U
 #define PEN_EKF_IS_MISSING  2U
@@ -289,8 +289,8 @@ static inline pen_status_t pen_ekf_update(const pen_ekf_model_t *model, size_t i
 }
 
 /**
- * Move x onto the limits: PEN_EKF_SWEEPS rounds of projections in the metric of P, one limit after the other; what
- * does not keep all limits then is drawn towards `inside`, in a straight line, until it does. On return every sum
+ * Move x onto the limits: PEN_EKF_SWEEPS rounds of projections in the metric of P, one limit after the other; a
+ * state that then breaks a limit is moved towards `inside`, in a straight line, until it keeps all. On return every sum
  * keeps its limits, as a number of pen_real_t summed in the order of the states, and exactly: each is aimed at from
  * inside by more than its rounding error. A state that keeps all limits is not changed.
  * @param f  [n_x][n_x] factors of P; @param x  [n_x]; @param work  [2 n_x]
@@ -300,7 +300,7 @@ static inline pen_status_t pen_ekf_update(const pen_ekf_model_t *model, size_t i
 pen_status_t pen_ekf_limit(const pen_ekf_model_t *model, const pen_real_t f[], pen_real_t x[], pen_real_t work[]);
 
 /**
- * Keep what was computed if it is good, else what was there; selected by index, always the same work. Counts.
+ * Keep the new values if they are good, else the previous ones; selected by index, always the same work. Counts.
  * @param status  of the step of the model and the calls above
  * @param f  [2][n_x][n_x] factors: of the last sample, new; @param x  [2][n_x] the same of the state
  * @param test  [2][n_z] the same of the tests; @param count  [n_z][PEN_EKF_VERDICTS]

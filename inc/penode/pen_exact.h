@@ -6,13 +6,13 @@
  * reveals contraction: GCC does it by default (-std=gnu17), clang within an expression. Every C file of the
  * library and of a model includes this header before anything else; then no flag is needed. Programs need not include it.
  *
- * What each compiler is told:
+ * Options and pragmas, by compiler:
  *
  * - GCC ignores the pragma of C99, so the option is set inside the file, where the core has such an instruction.
  *   That pragma resets all options and loses what -ffreestanding and -Os on Thumb-2 imply, so both are set again: loops
  *   stay loops (no copy becomes a call of memcpy), and registers are saved in one place. With this list the code is
  *   the same, instruction by instruction, as with -ffp-contract=off on the command line and without this header.
- * - clang is also told not to reorder sums and not to divide by reciprocals: no macro of clang reveals these flags; GCC
+ * - for clang also: no reordering of sums and no division by reciprocals: no macro of clang reveals these flags; GCC
  *   has one for each (see penode/pen_real.h).
  * - any other compiler gets the pragma of C99.
  *

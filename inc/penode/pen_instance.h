@@ -107,9 +107,9 @@ pen_status_t pen_tune_running(const pen_model_t *model, const pen_instance_t *se
 
 /* These three return the checked set in *ready; pen_tune_publish counts the result. */
 pen_status_t pen_tune_commit(const pen_model_t *model, pen_instance_t *self, pen_set_t *ready);
-/** A whole set, in flash say, without a copy; what is open is dropped. @return also PEN_SET_BUSY; PEN_SET_BADARG */
+/** A whole set, for example in flash, without a copy; an open set is dropped. @return also PEN_SET_BUSY; PEN_SET_BADARG */
 pen_status_t pen_tune_select(const pen_model_t *model, pen_instance_t *self, const pen_set_t *set, pen_set_t *ready);
-/** The set that ran before; what is open is dropped. @return also PEN_SET_BUSY; PEN_SET_NO_PREVIOUS */
+/** The set that ran before; an open set is dropped. @return also PEN_SET_BUSY; PEN_SET_NO_PREVIOUS */
 pen_status_t pen_tune_rollback(const pen_model_t *model, pen_instance_t *self, pen_set_t *ready);
 
 /** Publish `ready` if `found` is PEN_OK, and count. @param piece  of the inactive slot; NULL if nothing is folded. @return found */

@@ -117,7 +117,7 @@ pen_status_t pen_tuning_write_bytes(pen_tuning_t *tuning, uint32_t length, uint3
 pen_status_t pen_tuning_commit(const pen_tuning_t *tuning, uint32_t layout, uint32_t length, pen_set_t *ready);
 
 /**
- * A whole set (in flash, say), without copying it; an open set is dropped.
+ * A whole set, for example in flash, without copying it; an open set is dropped.
  * @return PEN_OK; PEN_SET_BUSY; PEN_SET_LAYOUT; PEN_SET_CHECKSUM; PEN_SET_NONFINITE; PEN_SET_BADARG
  */
 pen_status_t pen_tuning_select(pen_tuning_t *tuning, uint32_t layout, uint32_t length, const pen_set_t *set, pen_set_t *ready);

@@ -21,7 +21,7 @@ sources=
 while [ "$1" != -- ]; do sources="$sources $1"; shift; done
 shift
 
-# The text of files without their includes of the runtime, after the text of what they include.
+# The text of files without their includes of the runtime, after the text of the included files.
 text='
 function base(path) { sub(/.*\//, "", path); return path }
 

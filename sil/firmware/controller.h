@@ -3,7 +3,7 @@
 
 /**
  * A controller that a calibration tool connects to: one instance of any generated model, an XCP slave, and what may be read.
- * The compiler is told which model by the options of sample.h, and by CONTROLLER_EPK, a text, which program it is. Where the model file
+ * The options of sample.h select the model; CONTROLLER_EPK, a text, identifies the program. Where the model file
  * has a filter, the controller steps that: controller_filter.h.
  *
  * Addresses are those of the program: on a host, link it with -no-pie.
@@ -18,7 +18,7 @@
 
 #include "penode/pen_xcp_daq.h"
 
-/* Between two steps, in ns. The compiler is told of it where a float does not hold it. */
+/* Between two steps, in ns; given as an option where a float cannot represent it. */
 #ifndef CONTROLLER_PERIOD
 #define CONTROLLER_PERIOD (UINT64_C(1000) * (uint32_t)((MODEL_SIZE(SAMPLE_TIME) * (pen_real_t)1e6) + (pen_real_t)0.5))
 #endif

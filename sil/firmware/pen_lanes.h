@@ -36,7 +36,7 @@ LANES_INTERNAL pen_real_t pen_softplus(pen_real_t x);
 #endif
 #define LANES        (LANES_BYTES / sizeof(pen_real_t))
 #define LANES_INLINE static inline __attribute__((always_inline, unused))
-#define LANES_APART  static __attribute__((noinline)) /* one copy of what is long */
+#define LANES_APART  static __attribute__((noinline)) /* one copy of long functions */
 
 #ifdef PEN_REAL_DOUBLE
 typedef int64_t integer_t; /* as wide as pen_real_t */

@@ -4,7 +4,7 @@
 /**
  * One sample of any generated model, and what tests need of it. For the SiL library and the PiL program.
  *
- * The compiler is told which model by options; for the model nqvm:
+ * Options of the compiler select the model; for nqvm:
  *   -DMODEL_HEADER='"nqvm.h"'  '-DMODEL(name)=nqvm_##name'  '-DMODEL_SIZE(name)=NQVM_##name'
  *   -DMODEL_STATES  if it has states    -DMODEL_SENSORS  if it has sensors
  */

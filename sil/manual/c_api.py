@@ -43,7 +43,7 @@ def plain(comment: str) -> str:
 
 
 def pieces(text: str) -> Iterator[tuple[str, str]]:
-    """Of a header, in order: statements ("code": up to a semicolon, or a whole body), comments before one ("before"), and comments that
+    """Parts of a header: statements ("code": up to a semicolon, or a whole body), comments before one ("before"), and comments that
     follow one in its line ("behind")."""
     text = re.sub(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", "", text, flags=re.MULTILINE)
     text = re.sub(r'^extern "C" \{$', "", text, flags=re.MULTILINE)

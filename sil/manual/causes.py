@@ -51,7 +51,7 @@ OWN_UNIT = "that of the signal"
 
 @dataclass
 class Known:
-    """What is known of a kind: where it can be, and its numbers with their units."""
+    """Entries of a kind: where it can be, and its parameters with their units."""
 
     where: list[str] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
@@ -107,17 +107,19 @@ def known() -> dict[str, Known]:
             signal = "an input" if kind.startswith("input_") else "a sensor" if kind.startswith("sensor_") else ""
             one_known.where.append((others.WHERE | channels.WHERE).get(kind, signal))
     found["input_hold"].units["period"] = "s"
+    for kind, units in others.UNITS.items():
+        found[kind].units |= units
     return found
 
 
 def meanings() -> dict[str, dict[str, str]]:
-    """Of each kind, what its numbers mean."""
+    """Meaning of the parameters of each kind."""
     files = (*catalogue.FILES, drives, channels, others)
     return {kind: text for file in files for kind, text in getattr(file, "PARAMETERS", {}).items()}
 
 
 def rates() -> dict[str, tuple[int, int]]:
-    """Of each kind that the kept campaign hid by itself: how often it was named rightly, of how many."""
+    """For each kind that the kept campaign hid by itself: cases in which it was named rightly, and all cases."""
     block = re.split(r"^## ", CAMPAIGN.read_text(encoding="utf-8"), flags=re.MULTILINE)[1]
     table = block.split("\nkind ", 1)[1].split("\n\n", 1)[0]
     found = {}
@@ -157,8 +159,8 @@ def page() -> str:
     lines = [
         "# The causes",
         "",
-        f"`penode diagnose` can name {len(catalogue.MEANING)} kinds of cause. Those that act as a force act as a torque between ends",
-        "that turn, with units to match. A positive force pulls the two ends of an element together; positive deflection and rate",
+        f"`penode diagnose` can name {len(catalogue.MEANING)} kinds of cause. Between ends that turn, forces are torques, with",
+        "the units of those. A positive force pulls the two ends of an element together; positive deflection and rate",
         "are rebound.",
         f"Hit rates are from the campaign of {draw} (`test/diagnosis/CAMPAIGN.md`); a kind is counted where it was hidden by itself.",
         "",

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""JSON schemas of what the command writes, from the classes that hold it; their $id has the version."""
+"""JSON schemas of the files that the command writes, from the classes of their contents; their $id has the version."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from penode_gen.tools import not_installed
 
 from .errors import TargetError, ToolMissing
 
-Part = str | bytes | Path  # of what a compiled thing is made from: a text, or a file by its contents
+Part = str | bytes | Path  # of the input of a compilation: a text, or a file by its contents
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
 
 

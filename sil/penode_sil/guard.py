@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 """
-What a command ends with: 0 done, 2 wrong use or bad input with a line for each problem, 3 a fault of ours with one line,
+What a command ends with: 0 done, 2 wrong use or bad input with a line for each problem, 3 a bug in penode with one line,
 4 a training that did not come down to the noise.
 
 The lines go to stderr; where the command line has --json, the same go to stdout, as one JSON object (sil/ERRORS.md).
@@ -49,7 +49,7 @@ def guarded(command: Callable[[], object]) -> None:
         sys.exit(0)
     except OSError as exc:
         _end(WrongUse(f"{exc.filename or 'a file'}: {exc.strerror or exc}; check the path and its permissions"))
-    except Exception as exc:  # a fault of ours, whatever it is
+    except Exception as exc:  # a bug in penode, of any kind
         _end(_crashed(exc))
 
 
@@ -87,7 +87,7 @@ def crash_file(exc: Exception) -> tuple[str, Path | None]:
 
 
 def _crashed(exc: Exception) -> InternalError:
-    """The line that says what to send."""
+    """The line that asks for a report."""
     what, path = crash_file(exc)
     send = f"{path} and the files that the command names" if path else "this line, the command and the files that it names"
-    return InternalError(f"a fault of penode, not of yours ({what}); send us {send}", None if path is None else str(path))
+    return InternalError(f"a bug in penode ({what}); report it with {send}", None if path is None else str(path))

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What `penode inspect` prints: what is in a recording, how good it is, and how it maps to a model."""
+"""The output of `penode inspect`: channels of a recording, their quality, and their signals in a model."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import asdict
 
-from .recordings import look
+from .recordings import look, named
 
 
 def machine(found: look.Look) -> dict[str, object]:
@@ -37,10 +37,10 @@ def people(found: look.Look) -> list[str]:
         lines += [f"  note: {note}" for note in table.notes]
         lines += _aligned([("channel", "unit", "least", "largest", "quality"), *map(_row, table.channels)])
     if found.signals:
-        lines += ["", f"of the model {found.model}"]
+        lines += ["", f"signals of the model {found.model}"]
         lines += _aligned([(f"{s.kind} {s.name} [{s.unit or '1'}]", _verdict(s)) for s in found.signals])
     if found.options:
-        lines += ["", "to paste:", "  " + " ".join(found.options)]
+        lines += ["", "options to copy:", "  " + " ".join(found.options)]
     return lines
 
 
@@ -58,12 +58,13 @@ def _row(c: look.Channel) -> tuple[str, ...]:
 
 
 def _verdict(s: look.Signal) -> str:
-    says = f": say {s.option} ({s.why})" if s.option else ""
     if s.problem:
-        return f"{s.problem}{says}"
+        return s.problem if not s.option or s.option in s.problem else f"{s.problem}; say {s.option} ({s.why})"
     if s.column is not None:
         return f"is {s.column}" if s.column != s.name else "found"
-    return f"not found{says}"
+    if s.option:
+        return f"not found; say {s.option} ({s.why})"
+    return "not found; an output need not be recorded" if s.kind == "output" else f"not found; say {named.option(s.name, 'COLUMN [UNIT]')}"
 
 
 def _aligned(rows: list[tuple[str, ...]]) -> list[str]:

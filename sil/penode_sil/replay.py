@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Recordings that drive a model: inputs on the model's raster, and what the sensors measured meanwhile."""
+"""Recordings that drive a model: inputs on the model's raster, and the measured sensors."""
 
 from __future__ import annotations
 

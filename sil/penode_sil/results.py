@@ -99,7 +99,7 @@ def rmse(model: Model, replay: Replay, result: Result) -> dict[str, dict[str, An
 def summary(
     model: Model, plan: scenarios.Scenario, times: NDArray[np.float64], results: list[Result], target: str, output: Path
 ) -> dict[str, Any]:
-    """What a machine may want to read."""
+    """The summary for programs."""
     instances = []
     for result in results:
         entry: dict[str, Any] = {"name": result.instance.name, "set": result.instance.set, "adopted_at_sample": list(result.adopted)}

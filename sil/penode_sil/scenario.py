@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Scenario files: what drives the model, for how long, and which parameter sets are exchanged when.
+"""Scenario files: inputs, duration, and exchanges of parameter sets.
 
 The file is checked as a whole: UserError has one line for each problem, with file, key and remedy. All SI.
 """

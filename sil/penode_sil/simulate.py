@@ -147,7 +147,7 @@ class Asked:
         return outputs
 
     def check(self, model: Model) -> None:
-        """What the model must know."""
+        """Check options against the model."""
         names = _names(model)
         if self.signal is not None and self.signal not in names:
             raise WrongUse(f'--signal: the model has no signal "{self.signal}"; {hint(self.signal, names)}')

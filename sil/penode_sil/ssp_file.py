@@ -97,9 +97,9 @@ class _Reader:
         try:
             value = words[text] if text in words else float(text)
         except ValueError:
-            raise self.error(where, f"{text[:40]!r} is not a number", "mend it") from None
+            raise self.error(where, f"{text[:40]!r} is not a number", "correct it") from None
         if not math.isfinite(value):
-            raise self.error(where, f"{text[:40]!r} is not finite", "mend it")
+            raise self.error(where, f"{text[:40]!r} is not finite", "correct it")
         return value
 
     def system(self) -> System:

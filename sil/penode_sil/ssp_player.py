@@ -79,7 +79,7 @@ def _run(path: Path, system: ssp_file.System, fmu: _Fmu, table: dict[str, tuple[
 
 
 def _start(system: ssp_file.System, fmu: _Fmu, name: str) -> float:
-    """Of an input of the system: what the SSP binds to it, or else the FMU's own."""
+    """Start value of an input of the system: what the SSP binds to it, or else the FMU's own."""
     bound = system.start.get(system.wires[name])
     return bound[0] if bound else fmu.get(system.wires[name])
 
@@ -150,7 +150,7 @@ class _Fmu:
         try:
             yield
         except FMICallException as error:
-            raise ModelError([f"{doing}: the FMU refuses it: {self.lines[-1] or error}; mend the SSP"]) from None
+            raise ModelError([f"{doing}: the FMU refuses it: {self.lines[-1] or error}; correct the SSP"]) from None
 
     def unit(self, name: str) -> str:
         variable = self.variables[name]
@@ -158,7 +158,7 @@ class _Fmu:
 
     def known(self, name: str, where: str) -> Any:
         if name not in self.variables:
-            raise ModelError([f"{where}: the FMU has no variable {name!r}; mend the SSP"])
+            raise ModelError([f"{where}: the FMU has no variable {name!r}; correct the SSP"])
         return self.variables[name]
 
     def set(self, values: ssp_file.Values, where: str) -> None:
@@ -166,7 +166,7 @@ class _Fmu:
             variable = self.known(name, where)
             size = int(np.prod(variable.shape or (1,))) if self.new else 1
             if len(given) != size:
-                raise ModelError([f"{where}: {name} has {size} elements, and {len(given)} values are given; mend the SSP"])
+                raise ModelError([f"{where}: {name} has {size} elements, and {len(given)} values are given; correct the SSP"])
             with self.guarded(f"{where}: {name}"):
                 if variable.type == "Enumeration":
                     (self.fmu.setInt64 if self.new else self.fmu.setInteger)([variable.valueReference], [int(v) for v in given])
@@ -209,7 +209,7 @@ def _component(path: Path, system: ssp_file.System, tell: Tell) -> Iterator[_Fmu
             ) from None
         missing = [name for name in system.wires.values() if name not in fmu.variables]
         if missing:
-            raise ModelError([f"{path}: the FMU has no variable {missing[0]!r}; mend the SSP"])
+            raise ModelError([f"{path}: the FMU has no variable {missing[0]!r}; correct the SSP"])
         try:
             yield fmu
         finally:

@@ -36,6 +36,7 @@ from figures import CORES, OURS, PRICES, README, ROOT, accuracy, hostile_inputs,
 from numpy.typing import NDArray
 from programs import Program
 from reference import same_step
+from screenshot import screenshot
 
 HERE = Path(__file__).parent
 KEPT, TABLE = HERE / "bench.json", HERE / "table.md"
@@ -332,6 +333,7 @@ def main() -> int:
     TABLE.write_text(report.table(figures))
     README.write_text(shown(figures))
     shutil.copy(ROOT / "build" / "run" / "recalibration.png", ROOT / "sil" / "recalibration.png")
+    say(screenshot(ROOT / "build" / "run" / "diagnosis" / "report.html", ROOT / "sil" / "diagnosis.png"))
     print(report.prices(figures), report.summary(figures), sep="\n\n")
     return 0
 

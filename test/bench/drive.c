@@ -3,7 +3,7 @@
 
 /*
  * drive INPUTS RECORD [ROUNDS]: steps through the inputs of a file, ROUNDS times (1), and records the last round. It is
- * our own step if the compiler is told a model as for sample.h, else a peer's.
+ * our own step if options select a model as for sample.h, else a peer's.
  *
  * record  the state after each step; then words: most stack of a step [bytes], fewest and most instructions of a step
  */

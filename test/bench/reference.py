@@ -60,6 +60,6 @@ def reference_step(case: peers.Case, x: NDArray, before: NDArray, now: NDArray) 
 
 
 def same_step(case: peers.Case, x: NDArray, u: NDArray) -> float:
-    """Largest difference to the reference of each step from the state before, as a share of what rounding allows."""
+    """Largest difference to the reference of each step from the state before, as a share of the rounding bound."""
     expected, allowed = reference_step(case, x[:-1], u[1:-1], u[2:])
     return float(np.max(np.abs(x[1:] - expected) / allowed))

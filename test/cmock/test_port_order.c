@@ -3,7 +3,7 @@
 
 /*
  * In which order the parameter sets use the port. A missing or misplaced barrier passes every test that runs on one
- * core, here it does not. The mocked port works on memory and keeps a trace of what another context could see:
+ * core, here it does not. The mocked port works on memory and records what another context could see:
  * "p" pending is read, "A" "P" "H" active, pending, hold are written, "|" a barrier.
  */
 #include <stddef.h>

@@ -498,7 +498,7 @@ def test_settled_force_and_bias_of_the_deflection_are_answers_of_each_other():
     )
 
 
-def test_bias_that_wanders_may_be_a_load_that_does():
+def test_drifting_bias_may_be_a_drifting_load():
     """Of a height over a single mass: it goes along with so slow a load; no acceleration tells."""
     case = cases.make(717678205, 3)
     assert next((e.form.name, e.where) for e in case.effects) == ("warming_up", "z_mass")

@@ -104,7 +104,7 @@ def test_gate_and_table_from_the_command(tmp_path):
     assert called(bad).returncode == 0 and " NO" in called(bad).stdout
 
 
-def test_taken_over_and_told(tmp_path, monkeypatch):
+def test_changes_are_adopted_and_reported(tmp_path, monkeypatch):
     """What the script writes is what a report reads; not from rows whose commit is unknown."""
     monkeypatch.setattr(reliability, "TABLE", tmp_path / "reliability.json")
     rows = [

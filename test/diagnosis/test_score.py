@@ -149,7 +149,7 @@ def sized(kind, where="", confidence=0.9, alternatives=(), **intervals):
         ((), [], []),
     ],
 )
-def test_rows_say_of_each_named_cause_how_sure_and_whether_right(effects, causes, right):
+def test_rows_have_the_confidence_and_correctness_of_each_named_cause(effects, causes, right):
     row = score.score(truth(*effects), said(*causes), 1.0)
     assert [c["right"] for c in row["named"]] == right
     assert all(c["confidence"] == 0.9 and c["cause"] for c in row["named"])
@@ -192,7 +192,7 @@ def test_errors_and_intervals_count_for_common_forms_that_are_named_themselves()
     assert foreign["errors"] == foreign["covered"] == rival["errors"] == []
 
 
-def test_errors_are_told_of_effects_above_the_noise_and_of_all():
+def test_errors_are_listed_for_effects_above_the_noise_and_for_all():
     def told(value):
         return said(cause("coulomb_friction", "damper", force={"value": value}))
 
@@ -285,7 +285,7 @@ def test_tables_add_up():
         ["4", "no_discrepancy"],
     ]
     assert (out["time"]["longest"], out["time"]["q90"]) == (19.0, 16.0)
-    first = [{**row, "compiling": 0.25} for row in rows("null", 10, 10)]  # what compilers took is told apart
+    first = [{**row, "compiling": 0.25} for row in rows("null", 10, 10)]  # time of compilers is listed apart
     assert score.summary(first)["time"] == {"median": 3.75, "q90": 7.75, "longest": 8.75, "compiling": 0.25}
     assert "18 of 20" in score.text(out) and "2x backlash at damper" in score.text(out)
 
@@ -314,7 +314,7 @@ def test_campaign_runs_a_command_and_survives_it(tmp_path, answer, outcome):
     assert json.loads((tmp_path / "out" / "truth" / "1-1.json").read_text())["effects"] == []
 
 
-def test_campaign_that_is_stopped_has_tables_of_what_is_through(tmp_path):
+def test_campaign_that_is_stopped_has_tables_of_finished_cases(tmp_path):
     """As soon as one of four cases is; the second never ends by itself."""
     mark, script, page = tmp_path / "second", tmp_path / "explain.py", tmp_path / "page.md"
     script.write_text(

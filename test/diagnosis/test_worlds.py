@@ -30,7 +30,7 @@ def test_same_seed_same_bytes(tmp_path):
 
 
 @pytest.mark.parametrize("index", [2, 5, 10])
-def test_stated_ratio_by_another_way(index):
+def test_stated_ratio_by_another_computation(index):
     """A second simulation with steps half as long, and forces written here along its motion, give the ratio that the truth states.
 
     Halving the step of a rule of order 4 changes a motion by less than 1e-4; 1 % is allowed for kinks that fall between steps.
@@ -59,7 +59,7 @@ def test_stated_ratio_by_another_way(index):
 
 
 @pytest.mark.parametrize("index", sample(range(4), 1))  # world 14 is one that is drawn again
-def test_no_damper_drives(index):
+def test_dampers_dissipate(index):
     """Of asymmetric dampers, those of a lightly damped swing would have to: they are drawn again."""
     effects = [e for i in range(12 * index, 12 * index + 12) for e in world.make(20261203, i).effects if e.kind == "asymmetric_damper"]
     assert all(min(e.parameters.values()) >= 0.0 for e in effects)
@@ -181,7 +181,7 @@ def test_scoring(effects, causes, verdict, outcome):
         ((), [SCALE], [False]),
     ],
 )
-def test_rows_say_which_named_cause_is_right(effects, causes, right):
+def test_rows_have_the_correctness_of_each_named_cause(effects, causes, right):
     """Parts of a whole and companions are right with it."""
     row = score(truth(*effects), {"causes": causes, "verdict": "explained"}, {"k": 9.0})
     assert [c["right"] for c in row["named"]] == right

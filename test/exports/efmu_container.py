@@ -119,7 +119,7 @@ class Schemas:
         return [f"{kind}: {e.path}: {e.reason}" for e in self._read[kind].iter_errors(manifest.decode())]
 
     def errors_of_all(self, files: dict[str, bytes]) -> list[str]:
-        """Of every manifest of the container."""
+        """Errors of every manifest of the container."""
         found = self.errors("", files["__content.xml"])
         for part in ElementTree.fromstring(files["__content.xml"]):
             found += self.errors(str(part.get("kind")), files[f"{part.get('name')}/{part.get('manifest')}"])

@@ -34,17 +34,17 @@ def raises(path: Path, output: Path) -> None:
 
 def writes_before_it_reads(path: Path, output: Path) -> None:
     output.write_bytes(path.read_bytes()[:3])
-    raise penode_gen.ModelError(["half of it is bad; mend it"])
+    raise penode_gen.ModelError(["half of it is bad; correct it"])
 
 
 def leaves_a_part(path: Path, output: Path) -> None:
     output.with_suffix(".part").write_text("1")
-    raise penode_gen.ModelError(["bad; mend it"])
+    raise penode_gen.ModelError(["bad; correct it"])
 
 
 def talks_at_length(path: Path, output: Path) -> None:
     print("warning: something\nis wrong", file=sys.stderr)
-    raise penode_gen.ModelError(["bad; mend it"])
+    raise penode_gen.ModelError(["bad; correct it"])
 
 
 def says_nothing(path: Path, output: Path) -> None:
@@ -76,7 +76,7 @@ def test_a_faulty_importer_is_found(fault: Any, tmp_path: Path, monkeypatch: pyt
 
 def test_an_importer_without_fault_passes(tmp_path: Path) -> None:
     def right(path: Path, output: Path) -> None:
-        raise penode_gen.ModelError(["bad; mend it"])
+        raise penode_gen.ModelError(["bad; correct it"])
 
     importer = df.Importer("right", ".mo", "out.json", lambda path, output: [str(path), str(output)], [b"record"], df.text_changed)
     command = click.Command("right", params=[click.Argument(["path"], type=Path), click.Argument(["output"], type=Path)], callback=right)

@@ -310,7 +310,7 @@ def test_1000_damaged_files_are_refused_with_a_line(nqvm: Any) -> None:
     check_damaged(nqvm, range(1000, 2000))
 
 
-def test_other_models_and_what_has_no_form(tmp_path: Path) -> None:
+def test_other_models_and_unsupported_ones(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_text(
         '[model]\nname = "m"\nsample_time = "1 ms"\n[parameters]\nk = { value = 3, unit = "1" }\n[inputs]\nu = { unit = "m" }\n'

@@ -179,7 +179,7 @@ def changed(path: Path, to: Path, name: str, *swap: tuple[str, str]) -> Path:
 def test_what_is_wrong_in_an_ssp_is_one_line(ssp: Path, tmp_path: Path) -> None:
     to = tmp_path / "wrong.ssp"
     for name, swap, line in (
-        ("extra/penode/schedule.xml", ('time="1.0"', 'time="soon"'), "extra/penode/schedule.xml: 'soon' is not a number; mend it"),
+        ("extra/penode/schedule.xml", ('time="1.0"', 'time="soon"'), "extra/penode/schedule.xml: 'soon' is not a number; correct it"),
         (
             "extra/penode/schedule.xml",
             ('time="1.0"', 'time="9"'),
@@ -248,7 +248,7 @@ def test_1000_damaged_archives_are_refused_with_a_line(ssp: Path, tmp_path: Path
 
 
 @needs("fmpy")
-def test_exchanges_after_the_end_are_told(ssp: Path, tmp_path: Path) -> None:
+def test_exchanges_after_the_end_are_reported(ssp: Path, tmp_path: Path) -> None:
     """The schedule has sets at 1 s and 1.5 s; the recording ends at 1.2 s."""
     record = tmp_path / "road.csv"
     record.write_text("time [s],z_road [m]\n0,0\n1.2,0.01\n")

@@ -84,7 +84,7 @@ class Plant:
 
 @dataclass
 class Truth:
-    """Of many runs: states with the road behind them [samples, runs, 5], and measurements [samples, runs, 2]."""
+    """The truth of many runs: states with the road behind them [samples, runs, 5], and measurements [samples, runs, 2]."""
 
     x: Array
     z: Array

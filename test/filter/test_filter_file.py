@@ -72,7 +72,7 @@ WRONG = [
     (('correlation = "1 s"', 'correlation = "1 m"'), "", "'1 m' is not measured in s; give a quantity in s"),
     (('correlation = "1 s"', 'correlation = "0 s"'), "", "0 s is not above zero; give a time such as '0.5 s'"),
     (('name = "layered"', 'name = "layered"\ninput = "cubic"'), "", 'write input = "linear" or "held" in [model]'),
-    (('name = "layered"', 'name = "layered"'), '[filter.limits]\nl = { value = "z_b", unit = "N", max = 1 }', "mend the units"),
+    (('name = "layered"', 'name = "layered"'), '[filter.limits]\nl = { value = "z_b", unit = "N", max = 1 }', "correct the units"),
     (('name = "layered"', 'name = "layered"'), '[filter.limits]\nl = { value = "z_b*z_b", unit = "m^2", max = 1 }', "is no sum of states"),
     (
         ('name = "layered"', 'name = "layered"'),

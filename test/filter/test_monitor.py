@@ -68,7 +68,7 @@ def test_monitor_is_that_of_the_independent_one(rubbed) -> None:
         np.testing.assert_array_equal(getattr(beside, part), getattr(plain, part))
 
 
-def test_missing_measurements_say_nothing(rubbed) -> None:
+def test_missing_measurements_change_nothing(rubbed) -> None:
     model, z = rubbed
     own = CompiledMonitor(Compiled(model), "default")
     own.run(np.zeros((len(z), 1)), z, np.zeros(len(z)))
@@ -142,7 +142,7 @@ def test_command_shows_sums_and_flags(tmp_path: Path) -> None:
     assert "monitor rubbing: not raised; highest" in done.stdout
 
 
-EXTENDED = """# What the recordings taught about model.toml: coulomb_friction at body-wheel.
+EXTENDED = """# Extension of model.toml from recordings: coulomb_friction at body-wheel.
 
 [model]
 extends = "model.toml"
@@ -186,7 +186,7 @@ def test_diagnosis_writes_no_monitor_without_a_filter_or_a_cause(tmp_path: Path)
     assert monitored.write(tmp_path, nominal(tmp_path, filtered=False), "model_extended.toml") == ""
     (tmp_path / "model_extended.toml").write_text('[model]\nextends = "model.toml"\nname = "layered_extended"\n')
     note = monitored.write(tmp_path, nominal(tmp_path), "model_extended.toml")
-    assert note == "no model_monitored.toml: nothing was named whose size could be watched for"
+    assert note == "no model_monitored.toml: no cause was named that a monitor can watch for"
     assert not (tmp_path / "model_monitored.toml").exists()
 
 

@@ -72,7 +72,7 @@ def test_noises_that_are_known_are_found(guessed: tuple[Path, penode_gen.Model],
     assert tuned.states[2].noise == pytest.approx(own["v_b"] * np.sqrt(plant.H), rel=1e-5)
 
 
-def test_table_says_before_and_after(guessed: tuple[Path, penode_gen.Model]) -> None:
+def test_table_has_errors_before_and_after(guessed: tuple[Path, penode_gen.Model]) -> None:
     folder, _ = guessed
     record = folder / "rec.csv"
     said = penode("tune-filter", folder / "guessed.toml", "--data", record, "--holdout", record, "-o", folder / "own.toml")

@@ -100,7 +100,7 @@ def test_units_limits_and_signals(text: str) -> None:
 @pytest.mark.parametrize(
     "transport", ["tcp:127.0.0.1:5555", "udp:10.0.0.1:5555", "serial:115200", "can:0x100:0x101", "canfd:0x18DA00F1:0x18DAF100"]
 )
-def test_a2ltool_has_nothing_to_say(rich: tuple[penode_gen.Model, dict], program: Path, tmp_path: Path, transport: str) -> None:
+def test_a2ltool_reports_nothing(rich: tuple[penode_gen.Model, dict], program: Path, tmp_path: Path, transport: str) -> None:
     path, kept = tmp_path / "x.a2l", tmp_path / "kept.a2l"
 
     def tool(*words: object) -> str:

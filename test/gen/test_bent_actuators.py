@@ -41,7 +41,7 @@ acceleration = { value = "der(v_slide)", unit = "m/s^2" }
 """
 
 
-def test_each_does_what_it_says(tmp_path):
+def test_each_call_does_as_documented(tmp_path):
     """Exactly: each is a sum and a choice. A sample that is not finite is not received: the limiter goes on from what it gave before."""
     path = tmp_path / "bent.toml"
     path.write_text(DRIVE)

@@ -121,7 +121,7 @@ def test_lines_fit(tmp_path):
         "x = " + "a" * 150 + ";",  # cannot be broken
     ],
 )
-def test_folded_lines_say_the_same(line):
+def test_folded_lines_read_the_same(line):
     """Only white space changes, and the place of a remark; comments stay comments."""
     folded = c_text.fold(line)
     assert all(len(part) <= 120 for part in folded.split("\n")) or "a" * 150 in line
@@ -278,7 +278,7 @@ def test_all_files_or_none(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("where", ["n2.json/c", "taken", "no/such/folder", "blocked"])
-def test_command_says_where_it_cannot_write(tmp_path, monkeypatch, capsys, where):
+def test_command_names_the_place_that_it_cannot_write(tmp_path, monkeypatch, capsys, where):
     from penode_sil import cli
 
     path = models.rich(tmp_path)
@@ -359,7 +359,7 @@ def test_weights_arrive_in_c_as_they_were(tmp_path):
         assert f"CHECKSUM_{name.upper()} 0x{penode_gen.set_head(model, name)[3]:08x}U" in text
 
 
-def test_every_expression_means_what_it_says(tmp_path):
+def test_every_expression_is_evaluated_correctly(tmp_path):
     """The printer's text, read back by Python as C would read it, is the expression: precedence, signs, divisions."""
     a, b, c = (sp.Symbol(n, real=True) for n in "abc")
     cases = [

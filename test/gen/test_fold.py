@@ -140,7 +140,7 @@ def _affine(layer: Affine, h: NDArray) -> NDArray:
 
 
 def _size(layer: Affine | Dense, h: NDArray) -> NDArray:
-    """The sum of the sizes of what a layer adds up."""
+    """The sum of the magnitudes of the terms of a layer."""
     if isinstance(layer, Dense):
         return np.abs(h) @ np.abs(layer.weights).T + np.abs(layer.bias)
     factor, shift = np.abs(layer.factor), np.abs(layer.shift)

@@ -175,7 +175,7 @@ def expect_refused(path: Path, text: str, what: str) -> None:
         ('stiffness = "50 N*m/rad"', 'stiffness = "50 N/m"', "'50 N/m' is not measured in N*m/rad; give a quantity in N*m/rad"),
         ('inertia = "0.3 kg*m^2"', 'inertia = "0.3 kg"', "'0.3 kg' is not measured in kg*m^2"),
         ('inertia = "0.3 kg*m^2"', 'inertia = "-0.3 kg*m^2"', "inertia '-0.3 kg*m^2' is not above zero"),
-        ('"z - a*theta"', '"z - theta"', "combines m with no unit; mend the units: an arm in m times an angle in rad is a length"),
+        ('"z - a*theta"', '"z - theta"', "combines m with no unit; correct the units: an arm in m times an angle in rad is a length"),
         ('"z - a*theta"', '"z*theta"', "'z*theta' is not a linear combination of positions"),
         ('"z - a*theta"', '"z + a"', "'z + a' is not a linear combination of positions"),
         ('"z - a*theta"', '"z - a*tehta"', "uses 'tehta'"),

@@ -219,7 +219,7 @@ FAULTS = [
     (
         'tau = { value = 50, unit = "ms"',
         'tau = { value = 50, unit = "mm"',
-        "equations.lag: m^2*kg*s^-3 is set equal to m*kg*s^-2",
+        "equations.lag: the two sides have different units, m^2*kg*s^-3 and m*kg*s^-2",
         at("lag ="),
     ),
     ('inputs = ["m", "m/s"]', 'inputs = ["m", "N"]', "elements.net.inputs: the network takes N, but rate is in m/s", at("net =")),
@@ -230,7 +230,7 @@ FAULTS = [
         "network 'net2' gives m, an element needs a force",
         at("net ="),
     ),
-    ('value = "q", unit = "mm"', 'value = "q", unit = "mm/s"', "outputs.q: m*s^-1 is set equal to m"),
+    ('value = "q", unit = "mm"', 'value = "q", unit = "mm/s"', "outputs.q: the two sides have different units, m*s^-1 and m"),
     ('value = "F_foot", unit = "N"', 'value = "q + 1", unit = "m"', "sensors.load: 'q + 1' combines"),
     ('value = "F_foot", unit = "N"', 'value = "exp(F_foot)", unit = "1"', "the argument has the unit m*kg*s^-2"),
     ('value = "F_foot", unit = "N"', 'value = "where(F > q, F, F_foot)", unit = "N"', "combines"),
@@ -356,7 +356,7 @@ FAULTS = [
         ("der(w)", "der(v)"),
     ),
     # TOML
-    ('name = "good"', "name = good", "is not valid TOML (Invalid value); mend the syntax there"),
+    ('name = "good"', "name = good", "is not valid TOML (Invalid value); correct the syntax there"),
     ('name = "good"', 'name = "good', "is not valid TOML"),
     ("[sets.heavy]", "[sets.heavy", "is not valid TOML"),
     ('net2 = "net2.json"', f"net2 = {'[' * 3000}", "is not valid TOML", at('m = "4 kg')),
@@ -452,7 +452,7 @@ def test_no_outputs(folder):
     (folder / "net.json").write_text((folder / "one.json").read_text())
     (folder / "bad.toml").write_text(text)
     assert problems(folder / "bad.toml") == [
-        f"{folder}/bad.toml:1: outputs: the model has no outputs; add [outputs]: the C needs at least one"
+        f'{folder}/bad.toml:1: outputs: the model has no outputs; add [outputs], for example position = {{ value = "x", unit = "m" }}'
     ]
 
 
@@ -558,7 +558,7 @@ def test_lines_are_found_in_any_layout(folder):
         assert [int(p.partition(":")[0]) for p in found] == expected, found
 
 
-def test_command_says_it_in_lines(folder, monkeypatch, capsys):
+def test_command_prints_errors_as_lines(folder, monkeypatch, capsys):
     """Exit code 2, a line for each problem on stderr, nothing on stdout, nothing written."""
     from penode_sil import cli
 

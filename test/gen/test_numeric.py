@@ -234,7 +234,7 @@ def points(case: Case, model: penode_gen.Model, n: int) -> list[tuple[Vector, Ve
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_reference_means_what_the_file_says(tmp_path, name):
+def test_reference_follows_the_file(tmp_path, name):
     case, model = CASES[name], loaded(tmp_path, name)
     assert model.states == case.states
     numeric = penode_gen.numeric(model, case.chosen)

@@ -110,7 +110,7 @@ def test_odd_by_subtraction(activation: str, tmp_path: Path) -> None:
         ([node("Gemm", "x w1 b1", "h", transA=1), node("BatchNormalization", "h g c m v", "a"), OUT], "not transposed"),
     ],
 )
-def test_refused_with_a_way_out(nodes: list[onnx.NodeProto], says: str, tmp_path: Path) -> None:
+def test_refused_with_a_remedy(nodes: list[onnx.NodeProto], says: str, tmp_path: Path) -> None:
     constants = (
         PLAIN
         | BN

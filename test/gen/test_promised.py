@@ -48,7 +48,7 @@ def steeper(sil, factor):
 
 
 def force(sil, s):
-    """Of the default set's spring network, in float64."""
+    """Force of the default set's spring network, in float64."""
     return sil.model.sets["default"].networks["spring_net"].evaluate(np.array([float(s)]))[0]
 
 
@@ -59,7 +59,7 @@ def steepest(sil):
 
 
 @pytest.mark.parametrize("pieces", [0, 96], ids=["layers", "folded"])
-def test_a_set_that_breaks_a_promise_is_refused_and_says_where(pieces, tmp_path):
+def test_a_set_that_breaks_a_promise_is_refused_with_the_place(pieces, tmp_path):
     sil = Sil(model(tmp_path, pieces))
     instance = sil.instance()
     select, breach = sil.function("tune_select"), Breach()

@@ -45,7 +45,7 @@ COMMANDS = {
 
 @pytest.fixture(scope="module")
 def answers(installed: Installed) -> dict:
-    """Of all commands; `serve` and `generate` are called by the program `penode` itself."""
+    """Answers of all commands; `serve` and `generate` are called by the program `penode` itself."""
     import generator
 
     generator.make(generator.Truth(), 1, seconds=3.0).write(installed.place / "recorded.csv")

@@ -19,6 +19,7 @@ import targets
 import penode_gen
 from penode_sil import scenario
 from penode_sil.diagnosis import catalogue
+from penode_sil.diagnosis.catalogue import drives
 from penode_sil.errors import RecordingError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -44,7 +45,7 @@ def test_every_cause(kind: str, of_causes: str) -> None:
         assert kind not in pair or all(f"](#{other})" in section[1] for other in pair - {kind})
 
 
-@pytest.mark.parametrize("kind", catalogue.OF)
+@pytest.mark.parametrize("kind", [*catalogue.OF, *drives.KINDS])
 def test_every_parameter_is_explained(kind: str, found: dict[str, causes.Known]) -> None:
     units = found[kind].units
     assert units and set(causes.meanings().get(kind, {})) == set(units), "say what each means in PARAMETERS of its file"

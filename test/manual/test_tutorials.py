@@ -30,7 +30,7 @@ def done(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return folder, list(replay(PAGES[request.param], folder))
 
 
-def test_all_is_as_the_page_says(done: tuple[Path, list[Step]]) -> None:
+def test_everything_is_as_stated_on_the_page(done: tuple[Path, list[Step]]) -> None:
     assert len(done[1]) >= 4
     for step in done[1]:
         assert step.same, f"{step.what}: the page has\n{step.expected}\nbut there is\n{step.found}\nreplay.py --take-over rewrites the page"

@@ -110,7 +110,7 @@ def installed(tree: Path, work: Path) -> Path:
 
 
 def find_package(tree: Path, work: Path) -> Built:
-    """CMake's find_package of what is installed."""
+    """CMake's find_package of the installed package."""
     prefix = installed(tree, work)
     model = f"-DMODEL={tree / f'penode-{VERSION}' / 'models/nqvm'}"
     return Built(consumer(work, HERE / "cmake", f"-DCMAKE_PREFIX_PATH={prefix}", model), symbols(prefix / "lib/libpenode.a"))

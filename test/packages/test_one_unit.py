@@ -63,7 +63,7 @@ def test_clash_is_noticed(file: str, old: str, new: str, said: str, one: Path, t
 
 
 def test_program_keeps_its_own_contraction(one: Path, tmp_path: Path):
-    """Only the runtime and the models are told how to compute, not a program that includes their headers."""
+    """Pragmas for the arithmetic apply to the runtime and the models only, not a program that includes their headers."""
     said = run(["gcc", "-E", f"-I{one}", "-include", "nqvm.h", "-x", "c", "/dev/null"], cwd=tmp_path)
     assert "pen_real_t" in said and "optimize" not in said and "FP_CONTRACT" not in said
 

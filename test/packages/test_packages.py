@@ -134,7 +134,7 @@ def test_zephyr_module(tree: Path):
 
 
 def test_pack_description(tree: Path):
-    """What PACK.xsd asks for, as far as it can be told without it; with it (PACK_XSD names a copy) also against it."""
+    """The rules of PACK.xsd that can be checked without it; with it (PACK_XSD names a copy) all of them."""
     from lxml import etree
 
     source = tree / f"penode-{VERSION}" / "penode.penode.pdsc"

@@ -99,7 +99,7 @@ def chosen(model: str, key: str) -> str:
 
 
 def told(model: str) -> list[str]:
-    """How coverage_model.c is told of a model."""
+    """Options of coverage_model.c for a model."""
     range_flags = "(PEN_INPUT_RANGE | PEN_HELD)" if chosen(model, "out_of_range") == "hold" else "PEN_INPUT_RANGE"
     return [
         *eva.told(model),
@@ -111,7 +111,7 @@ def told(model: str) -> list[str]:
 
 
 def of_model(build: str, test: Path, model: str) -> tuple[list[Path], list[str]]:
-    """What a test of coverage_*.c is linked with, and how it is told of a model and its sets."""
+    """Files that a test of coverage_*.c is linked with, and its options for a model and its sets."""
     zeros = zlib.crc32(bytes(LENGTH * (8 if build == "double" else 4)))  # the checksum of a set of zeros
     words = [*told(model), f"-DSET(name)={eva.owner(model)}_set_##name", f"-DZEROS=0x{zeros:08x}U"]
     names = [model, f"{model}_selftest"]

@@ -112,7 +112,7 @@ void test_a_step_with_derivatives_is_the_same_step(void)
     TEST_ASSERT_TRUE(!(j.y_x[0][0] < (pen_real_t)1) && !(j.y_x[0][0] > (pen_real_t)1)); /* the output is the state */
 }
 
-/* Far outside of what the networks were trained on, either way, near and far: reported, and the state still advances. */
+/* Outside of the trained range of the networks, on either side, near and far: reported, and the state still advances. */
 void test_outside_of_the_envelope(void)
 {
     for (int32_t side = -1; side <= 1; side += 2) {

@@ -211,7 +211,7 @@ def owner(model: str) -> str:
 
 
 def told(model: str) -> list[str]:
-    """How the programs here are told which model they are for."""
+    """Options that select the model of a program."""
     return [f'-DMODEL_HEADER="{model}.h"', f"-DMODEL(name)={model}_##name", f"-DMODEL_SIZE(name)={model.upper()}_##name"]
 
 

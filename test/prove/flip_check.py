@@ -194,8 +194,7 @@ def main() -> int:
         guarded[name] = int(n[1]) if (n := re.search(r"^flips (\d+)$", said, re.M)) else 0
         problems += [f"{name}:\n{said[-3000:]}"] if code or not guarded[name] else []
     good &= gate.report(
-        f"flip: {sum(guarded.values())} flipped bits of what verify guards: each found in time, and then done as the model file says",
-        problems,
+        f"flip: {sum(guarded.values())} flipped bits in guarded memory: each found in time, and followed by the reaction set", problems
     )
     missed = [f"not found: {what}" for k, (what, fault) in enumerate(FAULTS.items()) if not campaign("nqvm/nqvm", fault=fault, k=str(k))[0]]
     missed += [

@@ -2,7 +2,7 @@
  * Copyright (c) 2026 the penode authors */
 
 /*
- * flip_verify EVERY: flips one bit of what NAME_verify guards: the running set, its folded pieces, their checksum, its head
+ * flip_verify EVERY: flips one bit of the memory that NAME_verify guards: the running set, its folded pieces, their checksum, its head
  * and address, the addresses of the banks, all their copies, and which slot is active. Every EVERY-th bit of values and
  * pieces. For several numbers of values a call:
  *

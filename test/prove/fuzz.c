@@ -2,8 +2,8 @@
  * Copyright (c) 2026 the penode authors */
 
 /*
- * For libFuzzer: its bytes are calls of the whole interface of a model in any order with any arguments. What each must
- * say and do is told by an oracle that is written down here a second time from the headers: where sets lie, which runs,
+ * For libFuzzer: its bytes are calls of the whole interface of a model in any order with any arguments. The expected
+ * return value and effect of each come from an oracle, a second implementation from the headers: where sets lie, which runs,
  * which waits, whether it is withdrawn, which is the rollback set. A twin without banks that is only given whole sets steps
  * along; state and outputs of the two must be the same to the bit. Now and then the instance is saved as bytes and goes on
  * as another one that was restored from them, the first one's memory spoilt. AddressSanitizer sees to the memory.

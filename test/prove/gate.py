@@ -44,7 +44,7 @@ def faulty(text: str, fault: tuple[str, int, str]) -> str:
     right, which, wrong = fault
     parts = text.split(right)
     if len(parts) < which + 2:
-        raise SystemExit(f"FAIL  the source has changed, a fault cannot be put in any more: {right!r}; mend the fault")
+        raise SystemExit(f"FAIL  the source has changed, a fault cannot be put in any more: {right!r}; correct the fault")
     return right.join(parts[: which + 1]) + wrong + right.join(parts[which + 1 :])
 
 

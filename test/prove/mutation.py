@@ -162,7 +162,7 @@ def faults(source: Path, share: int, first: int, must: set[Fault]) -> Iterator[t
 
 
 def preprocessed(source: Path) -> str | None:
-    """A fingerprint of a source without comments, and of what it does not compile; None if it cannot be read."""
+    """A fingerprint of a source without comments and parts that are not compiled; None if it cannot be read."""
     done = gate.run(["gcc", *FLAGS, "-E", "-P", source])
     return hashlib.sha256(done.stdout.encode()).hexdigest() if done.returncode == 0 else None
 

@@ -263,7 +263,7 @@ static void end(bool was_waiting)
     runs++;
 }
 
-/* By other names, so that they are told from those that nothing interrupts. */
+/* Other names distinguish them from those that nothing interrupts. */
 __attribute__((noinline)) void the_call(void)
 {
     tune();

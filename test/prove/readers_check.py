@@ -94,7 +94,7 @@ def changed(data: bytes, pick: random.Random, binary: bool) -> bytes:
 
 
 def regraft(data: bytes, pick: random.Random) -> bytes:
-    """One change of what an ONNX file says, if it can be read: damage to its bytes rarely gets beyond the protocol buffer."""
+    """One change of the contents of an ONNX file, if it can be read: damage to its bytes rarely gets beyond the protocol buffer."""
     try:
         model = onnx.load_from_string(data)
     except Exception:  # not ours

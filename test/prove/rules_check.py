@@ -50,7 +50,7 @@ READ = {
 
 
 def suite(name: str, least: int) -> tuple[int, list[str], list[str]]:
-    """Of a suite of `make test`: how many checks were good, what is wrong with it, and what bad checks said, line by line.
+    """Result of a suite of `make test`: how many checks were good, what is wrong with it, and what bad checks said, line by line.
 
     A suite that stops, or has fewer checks than `least`, is bad whatever it says.
     """

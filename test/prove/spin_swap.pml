@@ -44,7 +44,7 @@ bool waiting;      /* a set is published, and neither adopted nor withdrawn */
 bool asked;        /* its withdrawal has been requested                     */
 bool granted;      /* the step has reported that it is withdrawn            */
 bool could_return; /* there was a rollback set before it was published      */
-byte id_waiting, id_now, id_before; /* before: of what ran before that */
+byte id_waiting, id_now, id_before; /* before: of the set that ran before that */
 
 /* a committed set is adopted or, if that was requested, withdrawn; then another may be published */
 #define unanswered (waiting || pending != NOTHING)
@@ -200,7 +200,7 @@ inline pen_tuning_begin()
     fi
 }
 
-/* A copy of what runs. Its values are not those of the set that is to be made of it: what counts is where they come from. */
+/* A copy of the running set. Only its source matters here, not its values. */
 inline pen_tuning_begin_copy()
 {
     if :: copy = NO :: copy = YES fi;

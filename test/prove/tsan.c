@@ -78,7 +78,7 @@ static bool withdrawn(unsigned long k)
         (void)sched_yield();
         (void)MODEL(tune_pending)(&model, &pending);
     }
-    (void)MODEL(tune_withdraw)(&model); /* nothing to withdraw: takes note of what has become of it */
+    (void)MODEL(tune_withdraw)(&model); /* nothing to withdraw: learns its result */
     (void)MODEL(tune_running)(&model, &head);
     return head.id != set[which(k)]->head.id;
 }

@@ -303,7 +303,7 @@ static void end(bool samples_go_on)
     runs++;
 }
 
-/* By other names, so that they are told from those that nothing interrupts. */
+/* Other names distinguish them from those that nothing interrupts. */
 __attribute__((noinline)) void the_call(void)
 {
     the_packet();

@@ -120,7 +120,7 @@ def test_advice_for_each_verdict(d, parts):
     assert all(part in text for part in parts)
 
 
-def test_the_first_line_says_whether_to_keep_the_nominal_model():
+def test_the_first_line_advises_whether_to_keep_the_nominal_model():
     kept = said("partly_explained", cause(), model_file="model_rejected.toml")
     assert screen(kept).startswith("car: keep the nominal model; partly explained")
     assert headline(kept).startswith("Keep the nominal model: ") and not headline(said("explained", cause())).startswith("Keep")
@@ -131,7 +131,7 @@ def test_what_has_no_name_has_no_confidence_on_the_screen():
     assert "confidence" not in text and "explained," not in text and "512 standard deviations" in text
 
 
-def test_a_screen_without_room_says_how_much_the_report_has_more():
+def test_a_full_screen_states_how_many_more_lines_the_report_has():
     """Advice goes before notes; each note is whole, or counted."""
     notes = tuple(f"{word} " * 40 + "end" for word in ("one", "two", "three", "four", "five", "six"))
     text = screen(said("explained", cause(), notes=notes, data=(Recorded("a.csv", "training", 9, 1.0, ("x: 2 samples are missing",)),)))

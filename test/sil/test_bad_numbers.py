@@ -124,7 +124,7 @@ def test_bad_state_is_refused_by_set_state(sil, bad, which):
 
 @pytest.mark.parametrize("bad", BAD)
 def test_bad_weight_is_flagged_and_held(sil, bad):
-    """Many weights in turn. A sample with a bad one is worth exactly a held one, on a twin that was told to hold.
+    """Many weights in turn. A sample with a bad one is worth exactly a held one, on a twin that holds.
 
     Only the bounds of trust envelopes are compared with and not computed with: then the step must advance to finite states.
     """
@@ -175,7 +175,7 @@ def refused(instance, call, flag):
     assert bytes(instance.running()) == head
 
 
-def test_refused_sets_say_why_and_change_nothing(sil):
+def test_refused_sets_have_a_reason_and_change_nothing(sil):
     model, dtype = sil.model, sil.dtype
     instance, twin = sil.instance(), sil.instance()
     values, head = (penode_gen.set_values(model, "altered_friction", dtype), penode_gen.set_head(model, "altered_friction", dtype))

@@ -133,7 +133,7 @@ def rich(
 
 
 def drive(samples: int, seed: int = 0) -> np.ndarray:
-    """A force and a foot that wander [samples, 2]."""
+    """A force and a foot as slow random walks [samples, 2]."""
     return np.cumsum(np.random.default_rng(seed).standard_normal((samples, 2)), axis=0) * [0.3, 0.002]
 
 
@@ -200,7 +200,7 @@ def test_any_compiler_gives_the_same_bits(tmp_path, monkeypatch, dtype, compiler
     same(run, 2, Sil(model, dtype).run(u))
 
 
-def test_clang_compiles_what_it_does_sooner(tmp_path, oscillator, monkeypatch):
+def test_clang_compiles_where_it_is_faster(tmp_path, oscillator, monkeypatch):
     """Models without networks; without it gcc compiles all."""
     assert library._compiler(oscillator) == "clang-19" and library._compiler(rich(tmp_path)) == "gcc"
     monkeypatch.setattr(library.shutil, "which", lambda name: None)
@@ -263,7 +263,7 @@ def test_inputs_starts_and_sets_of_their_own(tmp_path, folding):
     same(heavy, 0, Sil(model, np.float64).run(u[0], set_name="heavy"))
 
 
-def test_a_run_that_fails_is_told_and_disturbs_no_other(oscillator):
+def test_a_run_that_fails_is_reported_and_affects_no_other(oscillator):
     """A mass of 0, a spring that overflows, a NaN in one run's input: held like the step holds, from the first bad sample on."""
     u = np.repeat(0.01 * np.sin(np.arange(300) * 0.05)[None, :, None], 5, axis=0)
     u[3, 100] = np.nan

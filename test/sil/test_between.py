@@ -148,7 +148,7 @@ def term(how: str, where: str = "tau") -> Term:
 
 
 class Values:
-    """Of a fit, as far as a file needs them."""
+    """Values of a fit, as far as a file needs them."""
 
     values: ClassVar[dict[str, float]] = {}
 
@@ -200,7 +200,7 @@ def test_what_noise_cannot_move_has_a_filter():
     assert np.all(gain.riccati(0.9 * np.eye(2), np.ones((1, 2)), np.zeros((2, 2)), np.zeros((2, 1)), np.eye(1)) == 0.0)
 
 
-def test_a_share_of_what_is_noise_already_is_none():
+def test_a_share_of_noise_is_zero():
     """A sensor 2 % above its noise, of 200 updates: all of that is within three deviations, 0.3, of an estimate."""
     before, after = (SimpleNamespace(variance=np.array(v), used=np.ones((200, 2), bool)) for v in ([1.02, 100.0], [1.0, 100.0]))
     assert np.all(Fit.taken(before, after, np.ones(2)) < 0.1)

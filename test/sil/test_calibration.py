@@ -145,7 +145,7 @@ def test_every_entry_of_the_a2l_is_the_models_value() -> None:
     check_measurements(model, u, a2l, log)
 
 
-def test_refused_set_changes_nothing_and_says_why() -> None:
+def test_refused_set_changes_nothing_and_has_a_reason() -> None:
     model = penode_gen.load(NQVM)
     bad = pages.choose(f"{NQVM}:altered_friction", np.dtype("f4"))
     bad.values[700] = np.nan
@@ -215,7 +215,7 @@ def test_compare_names_sets_and_values() -> None:
     assert named["damper_net.bias_1[7]"] == np.float32(layers[0].bias[7])
 
 
-def test_nobody_answers_in_one_line() -> None:
+def test_no_answer_is_one_line() -> None:
     with pytest.raises(UserError, match="nothing answers there"), links.connected(address.parse("tcp:127.0.0.1:1")):
         pass
     with pytest.raises(UserError, match="is not an address"):

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import os
 import resource
@@ -68,10 +67,10 @@ def test_help_loads_nothing_heavy() -> None:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_list_has_the_first_line_of_each_command(name: str) -> None:
+def test_the_list_has_a_whole_line_for_each_command(name: str) -> None:
     command = cli.get_command(cli.make_context("penode", [name]), name)
     assert command is not None and command.name == name and command.help is not None
-    assert COMMANDS[name][1] == inspect.cleandoc(command.help).splitlines()[0]
+    assert len(COMMANDS[name][1]) <= 60 and COMMANDS[name][1].endswith(".")
 
 
 def test_penode_gen_has_all_it_lists() -> None:

@@ -230,5 +230,5 @@ def test_values_tell_late_stamps_from_late_samples():
 
 @pytest.mark.parametrize("rows", range(6))
 def test_few_rows_show_no_clock(rows):
-    """Of fewer than five, none has two on either side; found by a damaged file."""
+    """With fewer than five rows none has two on either side; found by a damaged file."""
     assert not sampled_evenly(TIME[:rows] + 1e-4 * np.arange(rows) ** 2, TIME[:rows], [np.arange(rows, dtype=float)])

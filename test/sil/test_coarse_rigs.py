@@ -166,7 +166,7 @@ def test_a_converter_that_holds_its_output_is_a_delay(tmp_path, penode):
     assert {found["causes"][0]["kind"], found["causes"][0]["alternatives"][0]["kind"]} == {"sensor_delay", "input_delay"}
 
 
-def test_a_converter_that_the_model_file_knows_of(tmp_path, penode):
+def test_a_converter_in_the_model_file(tmp_path, penode):
     """With `input = "held"` the model is right: nothing has a name, and the hold-out is met to its noise; but for the fine step in which an
     input rises here, an eightieth of a sample, of 0.2 m/s at most."""
     records, model = converters((13, 14), 5e-3)

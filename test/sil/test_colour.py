@@ -67,7 +67,7 @@ def test_an_update_without_a_measurement_stays_one() -> None:
 
 
 @pytest.mark.parametrize("late", (0.25, 0.5, 1.5))
-def test_half_a_sample_takes_no_noise_away(late: float) -> None:
+def test_half_a_sample_of_delay_removes_no_noise(late: float) -> None:
     """Straight lines between samples would leave 7/8 of the power of means of four at half a sample, which likelihood takes for a delay."""
     white = np.random.default_rng(4).normal(size=COUNT)
     moved = earlier(white, np.array([late]))[0]

@@ -106,7 +106,7 @@ def without(columns: dict[str, np.ndarray], *names: str) -> dict[str, np.ndarray
         ({"z_road": 1e-3}, "r.csv: z_road is 1/1000 of what fits the model, like mm and m; correct its unit"),
     ],
 )
-def test_a_wrong_unit_is_an_error_that_says_which(diagnose, changes, line):
+def test_a_wrong_unit_is_an_error_with_its_name(diagnose, changes, line):
     columns = drive()
     lines = diagnose({name: changes.get(name, 1.0) * values for name, values in columns.items()})
     assert len(lines) == sum(name != "z_road" for name in changes) or (list(changes) == ["z_road"] and len(lines) == 1)
@@ -186,7 +186,7 @@ def test_data_of_something_else_get_no_name(diagnose, case):
     assert any(text in note for note in found["notes"]), found["notes"]
 
 
-def test_a_sound_vehicle_stays_sound_whatever_the_recorder_did(diagnose, tmp_path):
+def test_faults_of_a_recorder_cause_no_finding_on_a_correct_model(diagnose, tmp_path):
     """NaN, a repeated time, a spike, a constant sensor; the hold-out has one sensor only."""
     columns = drive()
     columns["a_body"][500:520] = np.nan

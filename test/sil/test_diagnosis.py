@@ -241,7 +241,7 @@ def test_bursts_are_of_samples_that_count():
     assert burst[[496, 513], 0].all() and not burst[500:510].any()
 
 
-def test_a_way_that_cannot_be_simulated_is_not_gone(model, sound, monkeypatch):
+def test_a_step_that_cannot_be_simulated_is_not_taken(model, sound, monkeypatch):
     """Where a little more of a value makes the simulation leave all bounds, that is a large residual, and a fit goes on."""
     one = study.null_study(model, [experiment(m, model) for m in sound])
     problem = Problem(model, one.experiments, one.metrics)
@@ -467,7 +467,7 @@ def test_simulation_between_close_samples_is_exact(tmp_path, step, damping):
 
 
 @pytest.mark.parametrize("tyre", ["", 'rubber = { between = ["wheel", "z_road"], law = "linear_damper", damping = "d" }'])
-def test_every_second_of_close_samples_says_the_same(tmp_path, tyre):
+def test_every_second_of_close_samples_gives_the_same(tmp_path, tyre):
     """Half a millisecond apart: chi2 of the difference is of the size that another way to join the inputs makes. The road does not end
     as it began, and noise goes up to frequencies that every second sample would mirror into the band."""
     (tmp_path / "car.toml").write_text(MODEL.replace('"2 ms"', '"0.5 ms"').replace("[outputs]", f"{tyre}\n[outputs]"))

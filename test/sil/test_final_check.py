@@ -52,7 +52,7 @@ def record(path, seed, moving=False, friction=FRICTION, mass=MASS, corner=0.0):
     return path
 
 
-LEARNT = """# What the recordings taught about rig.toml: coulomb_friction at damper.
+LEARNT = """# Extension of rig.toml from recordings: coulomb_friction at damper.
 
 [model]
 {extends}
@@ -146,10 +146,10 @@ def test_a_model_that_predicts_worse_is_rejected(tmp_path):
         (Cause("coulomb_friction", "damper", {"force": Value(4.0, "N", (-0.1, 8.1))}, 0.9), "may be nothing"),
         (Cause("sensor_scale", "speed", {"scale": Value(1.1, "1", (0.99, 1.21))}, 0.9), "may be nothing"),
         (Cause("wrong_parameter", "k", {"k": Value(790.0, "N/m", (770.0, 810.0))}, 0.9), "may be nothing"),
-        (Cause("constant_force", "spring", {"force": Value(4e9, "N", (3e9, 5e9))}, 0.9), "would have 4e+09 N, and no more than"),
+        (Cause("constant_force", "spring", {"force": Value(4e9, "N", (3e9, 5e9))}, 0.9), "would have 4e+09 N, but no more than"),
     ],
 )
-def test_names_that_say_nothing_go(tmp_path, cause, note):
+def test_names_without_evidence_are_dropped(tmp_path, cause, note):
     """What may be nothing, and what is larger than all that acts, is a note; without a name something is still unexplained."""
     case, end = ended(tmp_path, FRICTION)
     found = final.checked(
@@ -167,7 +167,7 @@ def test_a_name_about_reversals_needs_reversals(tmp_path):
     ahead = replace(one, motions=tuple(replace(m, v=np.abs(m.v) + 1.0) for m in one.motions))
     assert [c.kind for c in final.checked(case, said(end, turning)).causes] == ["backlash"]
     found = final.checked(case, said(replace(end, study=replace(end.study, seen=(ahead,))), play))
-    assert "backlash" not in {c.kind for c in found.causes} and "the rate there keeps its sign" in found.notes[-1]
+    assert "backlash" not in {c.kind for c in found.causes} and "the rate there does not change its sign" in found.notes[-1]
 
 
 def test_a_model_does_not_agree_where_the_written_one_mends_it(tmp_path):

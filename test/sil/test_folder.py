@@ -169,7 +169,7 @@ def test_what_is_done_is_kept_and_what_changed_is_done_anew(place, tmp_path):
     assert not {row.source for row in rows} & {folder._source(one, folder.files.load_model(one)) for one in other}
 
 
-def test_a_recording_is_named_after_its_file_and_after_its_way_if_that_is_not_enough(place, tmp_path):
+def test_a_recording_is_named_after_its_file_and_after_its_path_if_that_is_ambiguous(place, tmp_path):
     for name in ("one/r.csv", "two/r.csv", "two/s.mf4"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("")

@@ -39,7 +39,7 @@ def test_form_is_read_as_the_plain_one(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", DOUBTFUL)
-def test_doubt_is_refused_with_what_mends_it(tmp_path, name):
+def test_ambiguity_is_refused_with_the_remedy(tmp_path, name):
     form, reason, mended = DOUBTFUL[name]
     with pytest.raises(UserError) as caught:
         values(tmp_path, form)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""An input that acts in steps of a slower controller: the steps as a simulation needs them, and the hold told from a delay."""
+"""An input that acts in steps of a slower controller: its steps for a simulation, and how a hold is distinguished from a delay."""
 
 from __future__ import annotations
 

@@ -226,7 +226,7 @@ def test_no_force_is_unmodelled_where_none_is_missing(tmp_path):
     assert not weighed.misfit(study, study.null).size
 
 
-def test_sensor_noise_does_not_judge_what_is_bent_everywhere(tmp_path):
+def test_sensor_noise_does_not_judge_models_with_errors_everywhere(tmp_path):
     model, experiments = swing(tmp_path, lambda s, v: 0.03 * 0.64 * 0.3 * math.sin(9.0 * s) + 0.0005 * math.sin(40.0 * v))
     study, _ = begin(with_tolerances(model), experiments)
     assert weighed.misfit(study, study.null).size

@@ -26,7 +26,7 @@ def road(rng: np.random.Generator) -> np.ndarray:
     return np.fft.irfft(np.where(f > 0.3, 1e-2 / np.maximum(f, 0.3) ** 2, 0.0) * np.exp(2j * np.pi * rng.random(f.size)), SAMPLES) * 100.0
 
 
-def test_a_bump_is_kept_in_what_is_mostly_noise():
+def test_a_bump_is_kept_in_mostly_noise():
     """
     30 ms of 10 mm in 20 s that are flat: its error is its noise, and no longer that most of the time there is none.
 

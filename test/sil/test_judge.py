@@ -82,7 +82,7 @@ def test_nothing_found(values):
     assert judged() == OUT
 
 
-def test_a_cause_has_to_take_most_of_it_away(values):
+def test_a_cause_has_to_explain_most_of_it(values):
     assert judged(found(("bump_stop", "spring"))) == (["bump_stop"], "explained")
     gap = 4.0 * ROWS  # that could be gained
     assert judged(found(("bump_stop", "spring"), left=0.14 * ROWS)) == (["bump_stop"], "explained")  # near the noise
@@ -99,7 +99,7 @@ def test_what_sensors_share_is_no_noise(values):
     assert judged(patchwork, alike=noise.ALIKE + 0.1, shared=0.01 * 4.0 * ROWS)[1] == "explained"
 
 
-def test_several_causes_have_to_take_more_of_it_away(values):
+def test_several_causes_have_to_explain_more_of_it(values):
     """A sixteenth left beyond chance is a form that one cause may have and several may not."""
     patchwork = found(("bump_stop", "spring"), ("quadratic_damper", "damper"), left=0.07 * 4.0 * ROWS)
     assert judged(patchwork) == OUT

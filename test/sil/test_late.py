@@ -121,7 +121,7 @@ def test_signals():
         ),
     ],
 )
-def test_a_model_without_inputs_says_what_its_recording_lacks(tmp_path, header, channel, what):
+def test_a_model_without_inputs_names_missing_channels(tmp_path, header, channel, what):
     """The first problem of the only sensor, not that there is none."""
     swing = ROTOR.replace('tau = { unit = "N*m" }', "").replace("[inputs]", "").split("[actuators]")[0]
     swing += '[bodies]\nrotor = { inertia = "J", position = "phi", velocity = "omega" }\n[outputs]\nphi = { value = "phi", unit = "rad" }\n'

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Recordings with seeded trouble: what is sound comes through, the rest is masked, and every trouble is said."""
+"""Recordings with seeded trouble: good samples pass, others are masked, and every fault is reported."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_several_recordings_and_any_subset_of_sensors(record, oscillator):
     assert list(first.z) == ["z"] and list(second.z) == ["a"] and first.path.name == "1.csv"
 
 
-def test_missing_and_faulty_samples_are_masked_and_said(record, oscillator):
+def test_missing_and_faulty_samples_are_masked_and_reported(record, oscillator):
     a, z = A.copy(), np.clip(Z, -8.0, None)
     a[100:120] = np.nan
     a[3000] += 1.0
@@ -94,7 +94,7 @@ def test_a_gap_parts_the_recording(record, oscillator):
     assert re.search(r"r.csv:3002: channel time has a gap of 1.001 s", first.quality.problems[0])
 
 
-def test_a_gap_of_the_input_alone_parts_the_recording_and_a_short_one_is_bridged(record, oscillator):
+def test_a_gap_of_the_input_splits_the_recording_and_a_short_one_is_bridged(record, oscillator):
     foot = FOOT.copy()
     foot[1000:1003] = np.nan
     foot[5000:5004] = np.nan
@@ -259,7 +259,7 @@ def test_names_of_the_file_can_be_given(tmp_path, oscillator):
 
 @settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
-def test_any_trouble_is_masked_or_refused(tmp_path, oscillator, data):
+def test_any_fault_is_masked_or_refused(tmp_path, oscillator, data):
     n = data.draw(st.integers(0, 400))
     draw = np.random.default_rng(data.draw(st.integers(0, 99)))
     columns = {"time [s]": T[:n].copy(), "foot [mm]": FOOT[:n].copy(), "z [mm]": Z[:n].copy()}

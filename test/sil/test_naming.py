@@ -119,7 +119,7 @@ def test_a_stop_leaves_room(gaps, kind):
 
 
 @pytest.mark.parametrize("stiffness, gap, kind", [(500.0, 0.33, "cubic_spring"), (3e3, 0.33, "cubic_spring"), (1e5, 0.33, "bump_stop")])
-def test_a_law_that_mends_the_form_of_a_stop_does_not_say_where_it_begins(stiffness, gap, kind):
+def test_a_law_that_corrects_the_form_of_a_stop_does_not_set_its_gap(stiffness, gap, kind):
     """Squares from a fifteenth of the reach on, 174 N at its end on either side; a stop beside one of them has 7, 40 and 1340 N."""
     square = {"k": 5e5, "gap": REACH / 15.0}
     laws = [("bump_stop", law, "k", square) for law in ("k*max(s - gap, 0)^2", "-k*min(s + gap, 0)^2")]

@@ -86,7 +86,7 @@ def test_level_and_colour_under_a_signal(excitation, quanta, pole):
         assert law.density(frequency, H) == pytest.approx(density, rel=0.12)
 
 
-def test_a_standstill_tells_all():
+def test_noise_of_all_channels_from_a_standstill():
     draw = np.random.default_rng(SEED)
     z, rest = sensors(bumps())[:, 0], (T < 5.0) | (T > 20.0)
     for pole in (0.0, 0.9, 0.97):

@@ -54,7 +54,7 @@ def recorded(path, measured: float, drove: float, seed: int, n: int = 8000):
 
 
 @pytest.mark.parametrize("measured, drove, taken", [(4e-4, 0.0, True), (0.0, 4e-4, False), (0.0, 0.0, False), (1e-5, 0.0, False)])
-def test_noise_of_an_input_is_told_from_a_signal_by_the_sensors(tmp_path, measured, drove, taken):
+def test_noise_of_an_input_is_distinguished_from_a_signal_by_the_sensors(tmp_path, measured, drove, taken):
     """The last is 0.2 % of what the foot does."""
     (tmp_path / "model.toml").write_text(RIG)
     model = penode_gen.load(tmp_path / "model.toml")

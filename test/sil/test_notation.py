@@ -51,7 +51,7 @@ SURE = {
 
 
 @pytest.mark.parametrize("name", SURE)
-def test_all_numbers_tell_what_a_sign_parts(tmp_path, name):
+def test_signs_are_inferred_from_all_numbers(tmp_path, name):
     cells, clock, exact = SURE[name]
     separator = "," if '"' in cells[0] else ";"
     assert read_x(tmp_path, cells, clock, separator) == pytest.approx(np.asarray(exact, float), rel=1e-12)
@@ -71,7 +71,7 @@ def test_what_may_be_thousands_or_a_fraction_is_refused(tmp_path, cells, clock):
         read_x(tmp_path, cells, clock)
 
 
-def test_a_channel_that_nobody_asks_for_refuses_nothing(tmp_path):
+def test_a_bad_channel_that_is_not_used_is_ignored(tmp_path):
     path = tmp_path / "r.csv"
     path.write_text("time [s];x [m];y [m]\n" + "".join(f"{k};{k};{y}\n" for k, y in enumerate(["998", "1.001", "12"])))
     (table,) = read(path)

@@ -113,7 +113,7 @@ def test_spikes_are_found(move, noise, quantum):
     assert np.array_equal(np.flatnonzero(examine(x).spikes), np.sort(at))
 
 
-def test_faults_of_several_kinds_are_told_apart():
+def test_faults_of_several_kinds_are_distinguished():
     x, _draw = measured(random, 0.02, 1e-3)
     x = np.clip(x, -1.5, 1.5)
     calm = np.flatnonzero(np.abs(x) < 1.0)

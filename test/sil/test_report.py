@@ -22,7 +22,7 @@ from penode_sil.diagnosis import advice, catalogue, files, noise, reliability, r
 from penode_sil.diagnosis.report import changes, figure as fig, panels
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
-EXTENDED = """# What the recordings taught about car.toml: coulomb_friction at damper.
+EXTENDED = """# Extension of car.toml from recordings: coulomb_friction at damper.
 
 [model]
 extends = "car.toml"
@@ -169,7 +169,7 @@ def test_page_is_sound_html(tree):
     assert tree.of("html")[0]["lang"] == "en" and len(tree.of("h1")) == 1
 
 
-def test_page_says_what_the_diagnosis_says(found, tree):
+def test_page_has_the_results_of_the_diagnosis(found, tree):
     text = " ".join(" ".join(tree.text).split())
     for fact in (
         "Coulomb friction at damper explains what the model gets wrong",

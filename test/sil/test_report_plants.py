@@ -164,7 +164,7 @@ def plant(request, tmp_path_factory):
 
 
 def extent(f: fig.Figure) -> tuple[float, float]:
-    """Of the plot, across and up, the share that its lines, points and tiles take; above 1 where some are outside."""
+    """The shares of the plot, across and up, that its lines, points and tiles take; above 1 where some are outside."""
     across, up = [], []
     for m in (m for m in f.marks if m.kind in ("line", "dots", "tile")):
         for part in m.path.split("M")[1:]:

@@ -153,7 +153,7 @@ def test_missing_force_is_the_one_that_was_hidden(stiff):
     assert worst["missing"] * worst["deflection"] > 0.0 and abs(worst["missing"]) > residual.rms(hidden)
 
 
-def test_channels_say_where_and_how_much(stiff):
+def test_messages_of_channels_have_place_and_size(stiff):
     e = stiff.experiments[0]
     before = residual.channels(e, stiff.model, stiff.null.simulated[0], None, residual.noise_floor(stiff, 0))
     found = residual.Shown(tuple(before), (), ()).numbers()

@@ -59,7 +59,7 @@ def wide(folder: Path, sizes: list[int], activation: str = "relu", seed: int = 1
 
 
 def instructions(model: penode_gen.Model) -> int:
-    """Of one step on the Cortex-M4F: the same for every input."""
+    """Instructions of one step on the Cortex-M4F: the same for every input."""
     cost = Pil(model, "m4f").run(np.random.default_rng(2).standard_normal((5, len(model.inputs)))).cost["normal"]
     assert cost.least == cost.most
     return cost.most

@@ -47,7 +47,7 @@ def test_a_law_stays_beside_its_companions(residual, gains):
 
 
 @pytest.mark.parametrize("kind, chosen", [("sensor_bias", [0, 1]), ("cubic_spring", [0])])
-def test_a_bias_goes_any_slow_way(kind, chosen):
+def test_a_bias_may_drift_in_any_slow_course(kind, chosen):
     """What a second law takes, 1600 beside 1000000, is of the form of the first; but a bias has none."""
     candidates = [Candidate(kind, "height", 0, False, LAW), Candidate(kind, "height", 0, True, LAW)]
     fit = SimpleNamespace(free=(), residual=np.array([1000.0, 40.0]), jacobian=np.zeros((2, 0)))
@@ -77,7 +77,7 @@ def test_a_load_pays_for_looking_like_a_bias_only_once():
 
 
 def test_form_is_a_part_of_what_formulas_leave():
-    """A load takes 150 000 and has no form to mend; a second cause that gains 1 000 beside it is worth nearly that."""
+    """A load takes 150 000 and has no form to correct; a second cause that gains 1 000 beside it is worth nearly that."""
     alone, both = (
         explanation("constant_force", gain=150_000.0),
         explanation("constant_force", "tyre_liftoff", gain=151_000.0, formulas=150_000.0),
@@ -161,7 +161,7 @@ def test_the_law_that_makes_a_cause_is_not_spared(companion, spare):
     assert [e.terms.index(t) for t in weak(e)] == spare
 
 
-def test_a_play_of_nothing_takes_away_nothing():
+def test_a_play_of_zero_has_no_effect():
     """Else its gap is none, and no fit can make it wider."""
     what = Basis("backlash", 0, "backlash", ("k", "N/m"), {"gap": (0.003, "m")}, 1, ())
     spring = SimpleNamespace(law="linear_spring", name="spring", arguments={"stiffness": "c"})

@@ -99,7 +99,7 @@ class Tcp:
         self.line.close()
 
 
-def test_silent_connections_keep_nobody_out() -> None:
+def test_silent_connections_do_not_block_others() -> None:
     """One, and as many as there is room for: those that have been silent for 2 s give way."""
     with served("tcp") as found, ExitStack() as stack:
         first = stack.enter_context(Tcp(found))
@@ -115,7 +115,7 @@ def test_silent_connections_keep_nobody_out() -> None:
         assert silent[-1].connect()
 
 
-def test_second_master_is_told_to_come_later() -> None:
+def test_second_master_is_refused_for_now() -> None:
     """As the standard has it since 1.1: CONNECT may be answered so, and is then repeated."""
     with served("tcp") as found, Tcp(found) as one, Tcp(found) as other:
         assert one.ask(CONNECT)[:1] == b"\xff"
@@ -163,7 +163,7 @@ def test_name_and_lists_are_those_of_the_a2l() -> None:
         assert one.ask(GET_DAQ_PROCESSOR_INFO)[2:7] == b"\x02\x00\x01\x00\x00"
 
 
-def test_late_steps_are_told_while_it_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_late_steps_are_reported_while_it_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A model that no machine steps in its sample time."""
     path = tmp_path / "fast.toml"
     path.write_text(f'[model]\nextends = "{NQVM}"\nname = "fast"\nsample_time = "1 us"\n')
@@ -174,7 +174,7 @@ def test_late_steps_are_told_while_it_runs(tmp_path: Path, capsys: pytest.Captur
 
 
 def timer(port: int) -> str:
-    """Of the server's end of the connection at a port."""
+    """The timer of the server's end of the connection at a port."""
     rows = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
     (found,) = [row[5][:2] for row in rows if int(row[1].split(":")[1], 16) == port and row[3] == "01"]
     return found

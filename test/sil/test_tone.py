@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A tone in a residual is told from noise of any colour, and from what a model makes under a sine."""
+"""A tone in a residual is distinguished from noise of any colour, and from the response of a model to a sine."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_noise_has_no_tone(rate, pole):
 
 
 @pytest.mark.parametrize("swing, loud, seconds", [(0.0, 1.0, 12), (0.1, 1.0, 12), (0.1, 0.25, 30)])
-def test_a_tone_is_found_though_its_frequency_wanders(swing, loud, seconds):
+def test_a_tone_of_varying_frequency_is_found(swing, loud, seconds):
     """Its power is half the noise's, or a thirtieth."""
     draw, t = np.random.default_rng(3), np.arange(seconds * 1000) * 1e-3
     hum = loud * np.sin(2 * np.pi * 31.0 * t - 31.0 * swing / 0.07 * np.cos(2 * np.pi * 0.07 * t))

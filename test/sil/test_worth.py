@@ -27,7 +27,7 @@ MODEL = SimpleNamespace(bodies=(SimpleNamespace(mass="m"),))
 
 
 @pytest.mark.parametrize("turn", (0.0, 0.3, np.pi / 2))
-def test_only_what_nothing_else_can_do_counts(turn):
+def test_only_the_part_that_nothing_else_can_explain_counts(turn):
     """A column at an angle to the only other one: its sine is left."""
     others = [[1.0, 0.0, 0.0, 0.0], [np.cos(turn), np.sin(turn), 0.0, 0.0]]
     assert own(MODEL, fit(others, [Free("k", 1.0, 1.0), LAW]), ["law"]) == pytest.approx(np.sin(turn), abs=1e-12)

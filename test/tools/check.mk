@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 #
-# `make check`: all that can be said about the sources without running the project; seconds. `make format` mends layout.
+# `make check`: checks of the sources without running the project; seconds. `make format` corrects the layout.
 
 ##@ Checks in seconds
 

@@ -80,7 +80,7 @@ def project(root: Path, commands: frozenset[str]) -> Project:
 
 
 def anchors(text: str) -> set[str]:
-    """Of the headings of a page, as Git hosts make them."""
+    """Anchors of the headings of a page, as Git hosts make them."""
     found = set()
     for heading in re.findall(r"^#{1,6} (.+?)\s*$", re.sub(r"```.*?```", "", text, flags=re.DOTALL), re.MULTILINE):
         found.add(re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-"))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Counts of what makes the project hard to change, against structure.json: each may only fall.
+"""Counts of properties that make the project hard to change, against structure.json: each may only fall.
 
 structure.py             print the counts; exit code 1 if one is not the kept one
 structure.py --take-over write counts that have fallen into structure.json; none that has risen (`make structure`)

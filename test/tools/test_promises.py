@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The table of what is promised: complete, true to the tests, and as the last figures are."""
+"""The table of promises: complete, consistent with the tests and with the last figures."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ def judged(case: Case, made: generator.Made, t: Trained) -> Iterator[tuple[str, 
 
 
 def covered(case: Case, force: Force, which: int) -> float:
-    """Share [%] of the visited places, as often as visited, where the truth is within 2 sigma of what was trained."""
+    """Share [%] of the visited places, as often as visited, where the truth is within 2 sigma of the trained curve."""
     x, y, s = force.x[0], force.y[0], force.sigma[0]
     truth = case.truth.force(which, x, x)
     weight = np.interp(x, 0.5 * (force.edges[0][:-1] + force.edges[0][1:]), force.counts[0])

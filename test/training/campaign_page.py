@@ -55,7 +55,7 @@ Asked = tuple[str, str, str, bool | None]  # what, the bar, what was found, whet
 
 
 def judged(what: str, bar: str, some: list[Row], text: Callable[[], str], good: Callable[[], bool]) -> Asked:
-    """A line of what is asked; `text` and `good` look at trainings that did not fail, and are called if there are any."""
+    """A line of the requirements; `text` and `good` look at trainings that did not fail, and are called if there are any."""
     sound = [r for r in some if "failed" not in r]
     seeds = f"{len(some)} trainings: " if some else ""
     return what, bar, seeds + text() if sound else OPEN, bool(good()) and len(sound) == len(some) if sound else None

@@ -72,7 +72,7 @@ class Exact:
         return h, over
 
     def value(self, x: Fraction) -> Fraction:
-        """Of the network."""
+        """Value of the network."""
         (found,), over = self.units(x, len(self.layers))
         return Fraction(found, over)
 
@@ -235,7 +235,7 @@ FAULTS = ("outermost pieces are free", "a knot is forgotten", "the other directi
 
 
 def seen(name: str, count: int) -> int:
-    """Of how many random curves the judge finds that they break a promise, where the limits have a fault."""
+    """Number of random curves of which the judge finds that they break a promise, where the limits have a fault."""
     random = np.random.default_rng(2)
     return sum(kept(GIVEN[k % len(GIVEN)], random, [8, 8], faulty(name))[1] for k in range(count))
 
@@ -244,13 +244,13 @@ def seen(name: str, count: int) -> int:
 
 
 def random_curves(seed: int, count: int) -> list[int]:
-    """Of so many: broken before training's limits, after them, refused."""
+    """Counts of random curves: broken before training's limits, after them, refused."""
     random = np.random.default_rng([1, seed])
     return [sum(values) for values in zip(*(kept(GIVEN[k % len(GIVEN)], random, [8, 8]) for k in range(count)), strict=True)]
 
 
 def trained_curves(seed: int, count: int, folder: Path, promising: bool = True) -> list[int]:
-    """Of so many trainings, two networks each: networks that are broken, and that are refused."""
+    """Counts over trainings of two networks each: networks that are broken, and that are refused."""
     with threads.one():
         pairs = list(trained(count, seed, folder, promising))
     return [sum(breaks(g, n) for g, n in pairs if n is not None), sum(n is None for _, n in pairs)]

@@ -74,7 +74,7 @@ def test_first_knots_on_both_sides_of_zero_stay_or_go_together() -> None:
     assert alone > 0
 
 
-def test_a_grid_mirrors_itself_about_zero() -> None:
+def test_a_grid_is_symmetric_about_zero() -> None:
     for low, high, count, power in (
         (-1.19, 1.11, 41, 2.0),
         (-0.066, 0.041, 29, 1.2),
@@ -89,7 +89,7 @@ def test_a_grid_mirrors_itself_about_zero() -> None:
     assert np.array_equal(found[zero + 1 : zero + 18], -found[zero - 17 : zero][::-1])
 
 
-def test_on_the_way_a_constant_costs_and_a_step_does_not() -> None:
+def test_during_a_fit_a_constant_costs_and_a_step_does_not() -> None:
     """A force that is 0 at 0 alone and a constant elsewhere moves where another network's 0 is: on the way to a fit a spike costs as if
     its deviation were 1e-4 (SETTINGS.problem_tied) of 0.3 spans (problem_bent); a step of friction costs what it does at the end."""
     model = penode_gen.load(HERE / "quarter.toml")

@@ -53,7 +53,7 @@ def test_a_curve_that_is_not_0_at_0_is_its_network(layers: list[int], low: float
     assert found.architecture == network.architecture
 
 
-def test_a_knot_that_nothing_shows_gives_way() -> None:
+def test_a_knot_without_evidence_is_dropped() -> None:
     """A straight force whose outermost knot, beyond what was visited, is anywhere: without its neighbour the force is straight still."""
     knots, spread = np.linspace(0.0, 1.0, 9), np.diag([*np.full(8, 1e-2), 1e6])
     values = np.where(knots == 1.0, 500.0, -3.0 * knots)

@@ -35,7 +35,7 @@ def test_faults_in_the_limits_are_found(name: str) -> None:
     assert campaign_promises.seen(name, 8) > 0
 
 
-def test_independent_judge_finds_what_is_broken() -> None:
+def test_independent_judge_finds_broken_promises() -> None:
     """Seeded faults: a falling piece, a slope above the limit, a force that drives."""
     network = untrained({"layers": [8, 8]}, 1, "net")
     knots = np.linspace(-1.0, 1.0, 9)

@@ -72,7 +72,7 @@ def test_files_agree(trained: Path) -> None:
 def test_report_stands_alone(trained: Path) -> None:
     text = (trained / "report.html").read_text()
     assert text.count("data:image/png;base64,") == 2 and "http" not in text.replace("http-equiv", "")
-    assert "What the recordings cannot tell" in text
+    assert "What the recordings do not determine" in text
 
 
 def test_one_weighed_mass_settles_the_scale(recordings: tuple[Path, Path], tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def causalise(model: Model) -> Causal:
         try:
             return ex.parse(text, names | extra, ports, moving)
         except ex.ExpressionError as error:
-            problems.append((where, str(error), "mend the expression"))
+            problems.append((where, str(error), "correct the expression"))
             return sp.Integer(0)
 
     equations = [*kinematic, *forces(model, parse, names, lambda *problem: problems.append(problem)), *balances(model)]
@@ -179,10 +179,10 @@ def _check_units(model: Model, equations: list[Relation], signals: dict[str, lis
             a = left if isinstance(left, units.Dimension) else units.dimension_of(left, of)
             b = units.dimension_of(right, of)
         except units.UnitError as error:
-            yield where, str(error), "mend the units"
+            yield where, str(error), "correct the units"
             return
         if a is not None and b is not None and a != b:
-            yield where, f"{units.describe(a)} is set equal to {units.describe(b)}", "mend the units"
+            yield where, f"the two sides have different units, {units.describe(a)} and {units.describe(b)}", "correct the units"
 
     for q in equations:
         yield from compare(q.where, q.left, q.right)

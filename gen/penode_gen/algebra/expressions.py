@@ -23,11 +23,11 @@ _KEPT = 4096  # parsed expressions: models that differ in one element share all 
 
 
 class ExpressionError(ValueError):
-    """A text that is no expression of the model; the message says what and where."""
+    """A text that is no expression of the model; the message states the error and its place."""
 
 
 class UnknownFunction(ExpressionError):
-    """A call of what is neither a function nor a network."""
+    """A call of a name that is neither a function nor a network."""
 
 
 class Softplus(sp.Function):

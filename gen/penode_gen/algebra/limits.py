@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Limits of a filter as sums of its states with constant coefficients, and what a filter cannot be made for."""
+"""Limits of a filter as sums of its states with constant coefficients, and models that cannot have a filter."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def complete(model: Model) -> tuple[Model, list[Problem]]:
 
 
 def _of_inputs(model: Model, given: Filter) -> list[Problem]:
-    """Inputs as states are told to the step sample by sample, which restarts what it remembers of them."""
+    """Inputs that are states are set in the step sample by sample, which restarts its memory of earlier samples."""
     where, names = ("filter", "inputs"), [i.name for i in given.inputs]
     if not names:
         return []

@@ -66,7 +66,7 @@ def state_unit(model: Model, state: str) -> str:
 
 
 def combination(text: str, moving: dict[str, Motion], parameters: set[str]) -> Motion:
-    """Position and rate of a point. Raises ExpressionError where it is no linear combination of what moves."""
+    """Position and rate of a point. Raises ExpressionError where it is no linear combination of positions."""
     found = ex.parse(text, {*moving, *parameters}, {})
     symbols = {name: ex.symbol(name) for name in moving}
     parts = {name: sp.diff(found, s) for name, s in symbols.items() if found.has(s)}

@@ -13,7 +13,7 @@ from .jacobian import Derivatives
 
 
 def effects(model: Model, cause: MonitorCause) -> tuple[list[sp.Expr], list[sp.Expr]]:
-    """Of a cause of its full size: changes of the rates, and of the sensors of the filter, over states and inputs. CausaliseError."""
+    """Changes by a cause of its full size: of the rates and the sensors of the filter, over states and inputs. CausaliseError."""
     causal = causalise(model)
     rows = {s.name: row for s, row in zip(model.sensors, causal.sensors, strict=True)}
     sensed = [rows[s.name] for s in _filter(model).sensors]

@@ -84,7 +84,7 @@ class Emitter(Equations):
     """The context of the templates."""
 
     def context(self) -> dict[str, Any]:
-        """All that the templates see."""
+        """The context of the templates."""
         functions = self._functions()
         bodies = [body for body in functions.values() if body]
         return self._head() | self._equations(functions) | self._network_texts(functions, bodies) | self._set_texts(bodies)
@@ -205,7 +205,7 @@ class Emitter(Equations):
     # -- guard ----------------------------------------------------------------------------------------------------
 
     def _prepared(self) -> list[dict[str, Any]]:
-        """The networks that are folded, or of which something is promised, as initialisers of a pen_network_t want them."""
+        """The networks that are folded, or have promises, as initialisers of pen_network_t."""
         found = []
         for code in self.networks:
             for name in code.users:

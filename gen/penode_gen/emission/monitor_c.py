@@ -19,7 +19,7 @@ FILES = {"filter/monitor.h.j2": "{name}_monitor.h", "filter/monitor.c.j2": "{nam
 
 
 def threshold(model: Model, monitor: Monitor) -> float:
-    """Of all tests: a mean time between false alarms that is at least the one that is asked for (penode/pen_monitor.h)."""
+    """Threshold of all tests, for a mean time between false alarms of at least the one in the model file (penode/pen_monitor.h)."""
     return math.log((len(monitor.causes) + 1) * monitor.mean_time / model.sample_time)
 
 

@@ -45,7 +45,7 @@ class NetworkCode:
 
     @property
     def neurons(self) -> int:
-        """Of all ReLU layers."""
+        """Number of neurons in all ReLU layers."""
         return sum(layer.n_out for layer in self.network.layers if _relu(layer))
 
     def layers(self) -> list[tuple[Layer, str]]:

@@ -105,7 +105,9 @@ def flat(path: Path, text: str, model: str) -> Flat:
                 f"{path}: {model} has events (when, reinit, or if without noEvent), which are not read; "
                 "use the elements of a model file for stops and friction"
             )
-        raise ImportProblem(f"{path}: rumoca cannot compile {model}: {said[:300]}; mend the model, or name its libraries in MODELICA_LIBS")
+        raise ImportProblem(
+            f"{path}: rumoca cannot compile {model}: {said[:300]}; correct the model, or name its libraries in MODELICA_LIBS"
+        )
     return _parsed(done.stdout, f"{path}: {model}")
 
 

@@ -81,7 +81,7 @@ class _Reader:
         return self.tokens[self.at][2]
 
     def next(self) -> str:
-        """The word here; then go on."""
+        """The current word; moves to the next one."""
         word = self.word
         self.at += self.kind != "end"
         return word

@@ -80,11 +80,11 @@ class _Reduction:
         left = [e for e in self.equations if e != 0]
         for e in left:
             if not {str(s) for s in e.free_symbols} - self.constant:
-                raise ImportProblem(f"{self.where}: the equations contradict each other: {str(e)[:60]} = 0; mend the model")
+                raise ImportProblem(f"{self.where}: the equations contradict each other: {str(e)[:60]} = 0; correct the model")
         self.equations = left
 
     def candidates(self, e: sympy.Expr, names: set[str]) -> list[str]:
-        """Of these names, those in which the equation is linear with a number as factor."""
+        """Those of the names in which the equation is linear with a number as factor."""
         found = []
         for name in names & {str(s) for s in e.free_symbols}:
             factor = e.coeff(self.symbol(name), 1)
@@ -146,7 +146,7 @@ class _Reduction:
         if any(derivative(name) in other.free_symbols for other in [*self.equations, *self.solved.values()]):
             if any(str(s).startswith("der(") for s in value.free_symbols):
                 raise ImportProblem(
-                    f"{self.where}: the second derivative of what {name} equals is needed, which is not read; declare it as a state"
+                    f"{self.where}: the second derivative of the value of {name} is needed, which is not supported; declare it as a state"
                 )
             by[derivative(name)] = differentiated(value, self.constant)
         self.equations = [sympy.expand(other.subs(by)) for other in self.equations]
@@ -199,7 +199,7 @@ def _factors(term: sympy.Expr) -> dict[str, int] | None:
 
 
 def _unit_of(part: dict[str, int] | None, known: dict[str, pint.Unit], without: str) -> pint.Unit | None:
-    """Of a product, less one of its names; None if it has another name whose unit is not known."""
+    """Unit of a product without one of its names; None if it has another name whose unit is not known."""
     unit = _unit("1")
     for name, power in (part or {"": 1}).items():
         if name != without:
@@ -284,7 +284,7 @@ class _Page:
         return {n: self.reduced.solved.get(n, self.found.variables[n].symbol) for n in declared or moving}
 
     def label(self, name: str) -> str:
-        """Of an output: not the name of a state or variable."""
+        """Label of an output: not the name of a state or variable."""
         return f"{self.names[name]}_out" if name in self.reduced.free else self.names[name]
 
     def equation(self, e: sympy.Expr) -> str:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a model file says of actuators: what a plant makes of an input before it is driven by it."""
+"""Actuators of a model file: between an input and the plant that it drives."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .. import model as m
 from ..algebra import sampled
 from .ends import EndTables
 
-SOURCE = "{unit}"  # of an argument in the unit of what the actuator takes
+SOURCE = "{unit}"  # of an argument in the unit of the actuator's input
 LAWS = {  # arguments with their units
     "gain": {"gain": "1"},
     "lag": {"time": "s"},
@@ -94,7 +94,7 @@ class ActuatorTables(EndTables):
 
 
 def _add(found: Actuated, name: str, law: str, source: str, unit: str, arguments: Mapping[str, str], start: float) -> None:
-    """Adds what a law makes of a signal."""
+    """Adds the output of a law for a signal."""
     if law == "gain":
         found.points.append(m.Point(name, f"{arguments['gain']}*{source}", unit))
         return

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a model file says of mechanisms: bodies that move or turn, points, and what elements may act between."""
+"""Mechanisms of a model file: bodies that move or turn, points, and the ends of elements."""
 
 from __future__ import annotations
 
@@ -116,11 +116,13 @@ class EndTables(NetworkTables):
                 self.problem(where, str(error), 'write positions, inputs and points with parameters as coefficients, such as "z - a*theta"')
                 continue
             except units.UnitError as error:
-                self.problem(where, str(error), "mend the units: an arm in m times an angle in rad is a length")
+                self.problem(where, str(error), "correct the units: an arm in m times an angle in rad is a length")
                 continue
             unit = {units.dimension("m"): "m", units.NONE: "rad"}.get(dimension)
             if unit is None:
-                self.problem(where, f"is measured in {units.describe(dimension)}", "a point is a length or an angle: mend the coefficients")
+                self.problem(
+                    where, f"is measured in {units.describe(dimension)}", "a point is a length or an angle: correct the coefficients"
+                )
                 continue
             self.kinds[name] = unit_of[name] = unit
             moving[name] = (ex.symbol(name),) * 2
@@ -196,7 +198,7 @@ class EndTables(NetworkTables):
                     where,
                     f"network '{network}' takes {unit or 'a number without unit'}, "
                     f"an element has a deflection in {length} and a rate in {length}/s",
-                    "mend the unit in [networks]",
+                    "correct the unit in [networks]",
                 )
         else:
             for kind, unit in zip(inputs, takes, strict=False):  # another number of inputs is reported below
@@ -206,7 +208,7 @@ class EndTables(NetworkTables):
                     self.problem(
                         (*where, "inputs"),
                         f"the network takes {unit or 'a number without unit'}, but {kind} is in {kinds[kind]}",
-                        "mend the unit in [networks]",
+                        "correct the unit in [networks]",
                     )
             if takes and len(inputs) != len(takes):
                 self.problem((*where, "inputs"), f"{len(inputs)} inputs for a network of {len(takes)}", "give one for each")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a model file says of its filter: [filter], and the tables in it."""
+"""The filter of a model file: [filter], and the tables in it."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class FilterTables(ActuatorTables):
         return m.FilterSensor(sensor.name, noise, self.above_zero((*where, "gate"), entry["gate"]) if "gate" in entry else gate)
 
     def states_of(self, state_units: Mapping[str, str], entries: dict[str, Any], sample_time: float) -> Iterable[m.FilterState]:
-        """All states: how uncertain a state is at the start has to be said of each."""
+        """All states; each needs its standard deviation at the start."""
         for name, unit in state_units.items():
             where, entry = ("filter", "states", name), entries.get(name, {})
             scale = self.unit(where, unit)

@@ -51,7 +51,7 @@ class _Reader:
         try:
             return json.loads(self.path.read_bytes(), object_pairs_hook=_unique, parse_constant=_refuse)
         except OSError as error:
-            raise NetworkError(f"{self.path}: {error.strerror}; mend the path in the model file") from None
+            raise NetworkError(f"{self.path}: {error.strerror}; correct the path in the model file") from None
         except (ValueError, RecursionError) as error:
             raise NetworkError(f"{self.path}: not JSON that can be read: {error}; export the network again") from None
 
@@ -73,7 +73,7 @@ class _Reader:
         if low.shape != high.shape:
             raise self.error(where, f"{low.size} minima, but {high.size} maxima", "give one of each per value")
         if not (low < high).all():
-            raise self.error(where, "a minimum is not below its maximum", "mend the two numbers")
+            raise self.error(where, "a minimum is not below its maximum", "correct the two numbers")
         return low, high
 
     def min_max(self, value: Any, where: str) -> tuple[Vector, Vector]:

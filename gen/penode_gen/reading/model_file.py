@@ -86,7 +86,7 @@ class _Reader(MonitorTables):
         self.shown((*outputs, *sensors), {i.name for i in inputs}, moving, len(outputs), equations)
         self.macros(parameters, networks, name)
         if not outputs and not self.data.get("outputs"):
-            self.problem(("outputs",), "the model has no outputs", "add [outputs]: the C needs at least one")
+            self.problem(("outputs",), "the model has no outputs", 'add [outputs], for example position = { value = "x", unit = "m" }')
         if self.problems:
             self.expressions(elements, equations, (*outputs, *sensors), networks, len(outputs))
             raise m.ModelError(self.problems)
@@ -347,7 +347,7 @@ class _Reader(MonitorTables):
             except ex.UnknownFunction:
                 pass  # perhaps a network
             except ex.ExpressionError as error:
-                self.problem(where, str(error), "mend the expression")
+                self.problem(where, str(error), "correct the expression")
 
     def macros(self, parameters: dict[str, m.Parameter], networks: dict[str, m.NetworkPort], model: str) -> None:
         """Constants of the generated C are in capitals: names that differ in case only would meet."""

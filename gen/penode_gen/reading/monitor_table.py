@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a model file says of its fault monitor: [monitor]."""
+"""The fault monitor of a model file: [monitor]."""
 
 from __future__ import annotations
 

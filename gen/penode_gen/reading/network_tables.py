@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a model file says of networks: their ports, the sets with a file for each, and whether they can be folded."""
+"""Networks of a model file: their ports, the sets with a file for each, and whether they can be folded."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ class NetworkTables(Tables):
                 self.problem(where, str(error), "see [sets]")
                 self.files[path] = None
             except (OSError, ValueError) as error:
-                self.problem(where, f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})", "mend the path")
+                self.problem(where, f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})", "correct the path")
                 self.files[path] = None
             found = self.files[path]
             for layer in found.layers if found else ():  # weights may lie in files of their own
@@ -152,7 +152,7 @@ class NetworkTables(Tables):
                 where,
                 f"{path.name} has {network.n_inputs} input(s) and {network.n_outputs} output(s), "
                 f"declared are {len(port.input_units)} and 1",
-                "mend [networks] or the file",
+                "correct [networks] or the file",
             )
             return None
         remedy = "give min and max, one number for each input, or write them into the file"

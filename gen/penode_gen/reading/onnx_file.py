@@ -40,7 +40,7 @@ def _load(path: Path) -> onnx.ModelProto:
         raise NetworkError(f"{path}: not an ONNX file, or cut off; export the network again") from None
     except (onnx.checker.ValidationError, OSError) as error:
         if not path.is_file():
-            raise NetworkError(f"{path}: no such file; mend the path in the model file") from None
+            raise NetworkError(f"{path}: no such file; correct the path in the model file") from None
         remedy = "keep the weight data (.data) file of the export beside it"
         raise NetworkError(f"{path}: weights in another file cannot be read: {line(error)}; {remedy}") from None
     except (ValueError, RuntimeError, TypeError) as error:

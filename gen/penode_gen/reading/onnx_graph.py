@@ -59,7 +59,7 @@ class Graph:
         try:
             return call(*arguments, **named)
         except (ValueError, TypeError, LookupError, OverflowError, ZeroDivisionError) as error:
-            raise self.node_error(index, node, line(error), "mend the node, or export the network again") from None
+            raise self.node_error(index, node, line(error), "correct the node, or export the network again") from None
 
     # ---- what the graph holds ----
 

@@ -28,7 +28,7 @@ class Step:
 
 class Chain:
     """
-    The layers so far, and the shape of what comes out of them: one batch axis of size `batch`, and `width` values for
+    The layers so far, and the shape of their output: one batch axis of size `batch`, and `width` values for
     each of its rows, in order.
     """
 
@@ -87,7 +87,7 @@ class Chain:
                 self.add(c)
             case "Div" if first:
                 if not (c != 0.0).all():
-                    raise self.error(step, "divides by zero", "mend the scaling, a constant input has no deviation")
+                    raise self.error(step, "divides by zero", "correct the scaling, a constant input has no deviation")
                 self.multiply(1.0 / c)
             case _:
                 raise self.error(step, "divides a constant by the signal, which is not linear", SIMPLIFY)

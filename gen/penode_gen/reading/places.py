@@ -44,7 +44,7 @@ class Lines:
         return tuple(part.strip("\"'") for part in _KEY_PART.findall(key))
 
     def knows(self, path: tuple[str, ...]) -> bool:
-        """Does the file say anything under this path?"""
+        """Does the file have an entry under this path?"""
         return path[:2] in self._at
 
     def of(self, path: tuple[str, ...]) -> int:
@@ -88,7 +88,7 @@ def parse(path: Path, called: str = "") -> tuple[dict[str, Any], bytes, Lines]:
         toml = isinstance(error, tomllib.TOMLDecodeError)
         what = str(error).replace(found[0], "") if found else str(error) if toml else "a number or a nesting beyond all measure"
         place = found[1] if found else raw.count(b"\n") + (not raw.endswith(b"\n"))
-        raise m.ModelError([one_line(f"{path}:{place}: is not valid TOML ({what}); mend the syntax there")]) from error
+        raise m.ModelError([one_line(f"{path}:{place}: is not valid TOML ({what}); correct the syntax there")]) from error
 
 
 def merge(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:

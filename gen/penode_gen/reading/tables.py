@@ -76,7 +76,7 @@ REQUIRED = {
 
 
 def _base(tables: dict[str, Any]) -> str:
-    """What a file says that it extends; empty if nothing."""
+    """The file that a file extends; empty if none."""
     head = tables.get("model")
     found = head.get("extends") if isinstance(head, dict) else None
     return found if isinstance(found, str) else ""
@@ -110,7 +110,7 @@ class Tables:
             self.places.append((base_path, lines))
 
     def place(self, where: tuple[str, ...]) -> tuple[Path, Lines]:
-        """The file that says something about this key."""
+        """The file that has this key."""
         return next(((p, la) for p, la in self.places if la.knows(where)), self.places[0])
 
     def problem(self, where: Iterable[str], what: str, remedy: str) -> None:

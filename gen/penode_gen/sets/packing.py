@@ -115,7 +115,7 @@ def set_values(model: Model, set_name: str, dtype: RealType = np.float32) -> NDA
 
 
 def layout(model: Model, dtype: RealType = np.float32) -> int:
-    """Fingerprint of what the values mean: model name, tunable parameters, architectures, ABI and real type."""
+    """Fingerprint of the meaning of the values: model name, tunable parameters, architectures, ABI and real type."""
     nets = model.sets["default"].networks if model.sets else {}
     names = tuple(p.name for p in model.tunable) + tuple((n, net.architecture) for n, net in nets.items())
     text = repr((ABI, model.owner, names, np.dtype(dtype).name))

@@ -88,7 +88,7 @@ _DOUBLE: dict[str, float | list[float]] = {
 
 @dataclass(frozen=True)
 class _Format:
-    """Of a real type: the integer as wide, bits of the significand behind its leading 1, bias, and what lifts subnormal numbers."""
+    """Format of a real type: integer type of its width, bits of the significand after the leading 1, bias, factor for subnormals."""
 
     word: type[np.unsignedinteger[Any]]
     bits: int

@@ -77,7 +77,7 @@ class Entry:
 
     @property
     def unit(self) -> str:
-        """Of what a tool shows."""
+        """Unit that a tool shows."""
         return self.method.unit
 
     def shown(self, numbers: NDArray[Any]) -> NDArray[Any]:
@@ -91,7 +91,7 @@ class Entry:
         return int(np.prod(self.sizes)) if self.sizes else 1
 
     def element(self, index: int) -> str:
-        """The name of one of its numbers: row, then column, of what lies in memory column by column."""
+        """The name of one of its numbers: row, then column, of an array that lies in memory column by column."""
         used = [n for n in self.sizes if n > 1] or list(self.sizes[:1])
         places = []
         for n in used:
@@ -140,12 +140,12 @@ def _tree(text: str) -> Block:
 
 
 def _method(block: Block) -> Method:
-    """Of one that is neither identical nor linear: the number in memory, without a unit."""
+    """Conversion that is neither identical nor linear: shown as the number in memory, without a unit."""
     kind, unit = block.words[2], block.words[4]
     if kind == "LINEAR":
         scale, offset = (float(word) for word in block.after("COEFFS_LINEAR", 2))
         return Method(unit, scale, offset)
-    if kind == "RAT_FUNC":  # number in memory = (a x^2 + b x + c) / (d x^2 + e x + f) of what is shown
+    if kind == "RAT_FUNC":  # number in memory = (a x^2 + b x + c) / (d x^2 + e x + f) with x the shown number
         a, b, c, d, e, f = (float(word) for word in block.after("COEFFS", 6))
         return Method() if a or d or e or not b else Method(unit, f / b, -c / b)
     return Method(unit if kind == "IDENTICAL" else "")

@@ -13,7 +13,7 @@ class Who(IntEnum):
 
 
 class Page(IntEnum):
-    """Of segment 0."""
+    """Pages of segment 0."""
 
     WORKING = 0
     REFERENCE = 1
@@ -27,7 +27,7 @@ class Text(IntEnum):
 
 
 class Slave(IntEnum):
-    """Of the virtual controller (sil/firmware/): its event, the id of the first set that a master opens, its longest packet and the inputs
+    """The virtual controller (sil/firmware/): its event, the id of the first set that a master opens, its longest packet and the inputs
     that the emulated one holds [bytes]."""
 
     STEP = 0

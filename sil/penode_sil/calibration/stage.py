@@ -34,7 +34,7 @@ class Staged:
         """For people."""
         within = "" if self.id is None else f", as set {self.id} of the controller"
         return (
-            f"{self.bytes} bytes written in {self.seconds:.3f} s, proven (CRC-32 0x{self.checksum:08x}), read back\n"
+            f"{self.bytes} bytes written in {self.seconds:.3f} s, verified (CRC-32 0x{self.checksum:08x}), read back\n"
             f"in force: {self.set}{within}"
         )
 

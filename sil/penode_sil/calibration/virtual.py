@@ -101,7 +101,7 @@ def free_port(host: str, datagrams: bool) -> int:
 @dataclass
 class Served:
     """
-    A virtual controller that runs: `address` is what --to takes. `steps` and `late` are told each second that adds late ones, and at its
+    A virtual controller that runs: `address` is what --to takes. `steps` and `late` are updated in each second with late steps, and at the
     end; `first`: it steps before all other programs (SCHED_FIFO).
     """
 

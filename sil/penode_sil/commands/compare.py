@@ -20,7 +20,7 @@ from ..console import FILE
 @click.option("--list", "listed", type=click.IntRange(min=0), default=20, show_default=True, help="How many differing values to print.")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 def compare(model: Path, to: str, a2l: Path | None, listed: int, as_json: bool) -> None:
-    """Which of the sets of the model file MODEL a controller runs, and what differs from its reference page."""
+    """Show which set of the model file MODEL a controller runs, and how it differs from its reference page."""
     import penode_gen
 
     from ..calibration import pages

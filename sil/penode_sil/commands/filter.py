@@ -18,7 +18,7 @@ from ..console import FILE, Several
     "--data", "records", type=FILE, multiple=True, required=True, help="Recordings (CSV with units, or MDF) with sensors of the filter."
 )
 @click.option(
-    "--on", "target", default="sil", show_default=True, type=click.Choice(["mil", "sil"]), help="float64 apart from the C, or the C."
+    "--on", "target", default="sil", show_default=True, type=click.Choice(["mil", "sil"]), help="An independent float64 filter, or the C."
 )
 @click.option(
     "-o", "--output", type=FILE, required=True, help="Table to write (.csv, .mf4); for several recordings a folder, or with {name}."
@@ -29,7 +29,7 @@ from ..console import FILE, Several
 @click.option("--channel", multiple=True, help="What the recording calls a signal: a_body=acc, or a_body=Beschl [g].")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def filter(model: Path, **given: Any) -> None:
-    """Estimate the states of the model file MODEL, and what its sensors would show, from the sensors that its [filter] uses."""
+    """Estimate the states and all sensors of the model file MODEL from the sensors that its [filter] uses."""
     from ..filtering.command import over_recordings
 
     over_recordings(model, **given)

@@ -32,8 +32,8 @@ from ..console import FILE
 )
 @click.option("--model", help="Modelica model to read, if the file has several; for a .toml only.")
 def import_(file: Path, output: Path, network: str | None, activation: str, model: str | None) -> None:
-    """Read a network of FILE, a Modelica record of weights, and write it as JSON, with the same bits;
-    or a Modelica model of masses, springs and dampers, as a model file."""
+    """Convert FILE, a Modelica record of weights to a network in JSON, with the same bits;
+    or a Modelica model of masses, springs and dampers to a model file."""
     from ..importing import import_ as run
 
     run(file, output, network, activation, model)

@@ -29,7 +29,7 @@ from ..console import FILE
 def measure(
     signals: str, to: str, a2l: Path | None, duration: str | None, staged: str | None, after: str, every: int, output: Path
 ) -> None:
-    """Record signals of a controller that runs, a sample a step, with units and its own time stamps."""
+    """Record signals of a running controller, a sample a step, with units and its own time stamps."""
     from ..calibration.measure import measure as run
 
     run(signals, to, a2l, duration, staged, after, every, output)

@@ -21,7 +21,7 @@ from ..errors import WrongUse
 @click.option("--back", is_flag=True, help="Switch back to the reference page, the set in flash; without SET.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was done as JSON.")
 def stage(chosen: str | None, to: str, a2l: Path | None, back: bool, as_json: bool) -> None:
-    """Write a parameter set into a controller that runs: written, proven by its checksum, switched, read back.
+    """Write a parameter set into a running controller: write, verify the checksum, switch, read back.
 
     SET is MODEL.toml:NAME, or a file in serial form. The controller adopts it between two steps, all or none.
     """

@@ -42,10 +42,10 @@ def train(
     """Fit the networks of the model file MODEL, and its parameters within their tolerances, to recordings.
 
     DIR gets an ONNX file for each network, model_trained.toml with a set `default` of them (and `before`), the set's serial form for a
-    running controller, training.json, and report.html, which also says what the recordings cannot tell.
+    running controller, training.json, and report.html, which also lists what the recordings do not determine.
 
-    Exit codes: 0 trained; 2 wrong use or bad input; 3 a fault of penode; 4 the fit did not come down to the noise that the sensors state,
-    from several starts, or the trained model predicts the held-out recordings worse than MODEL: what there is is written, and marked.
+    Exit codes: 0 trained; 2 wrong use or bad input; 3 a bug in penode; 4 the fit did not reach the stated noise of the sensors
+    from several starts, or the trained model predicts the held-out recordings worse than MODEL: the result is written, and marked.
     """
     from ..diagnosis.files import check_folder
     from ..training import files, result

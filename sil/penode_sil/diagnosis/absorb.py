@@ -38,7 +38,7 @@ SET = "absorbed"
 
 @dataclass(frozen=True, eq=False)
 class Taught:
-    """A network with a law in it; `missing`: RMS of what it has not learnt over that of the law."""
+    """A network with a law in it; `missing`: RMS of its difference from the law over that of the law."""
 
     port: str
     element: str
@@ -82,7 +82,7 @@ def _fits(study: Study, what: object, element: Element) -> bool:
 def _lesson(
     study: Study, element: Element, network: Network, curve: Curve, values: Mapping[object, float], place: int
 ) -> tuple[Array, Array]:
-    """Inputs of the network, and what the law adds there [points]."""
+    """Inputs of the network, and the force that the law adds there [points]."""
     sense = next(sense for name, sense in study.places[place].elements if name == element.name)
     by_rate = element.network_inputs[0] == "rate"
     moved = np.concatenate([sense * (m.v if by_rate else m.s) for m in (s.motions[place] for s in study.seen)])
@@ -137,7 +137,7 @@ def learn(network: Network, x: Array, wanted: Array) -> tuple[Network, float]:
 
 
 def derivatives(network: Network, x: Array) -> Array:
-    """Of the output with respect to all weights and biases of dense layers, in their order: [n, weights]."""
+    """Derivatives of the output with respect to all weights and biases of dense layers, in their order: [n, weights]."""
     inputs = [x]
     for layer in network.layers:
         inputs.append(layer_value(layer, inputs[-1]))
@@ -182,11 +182,11 @@ def as_json(network: Network) -> str:
 
 
 def write(study: Study, e: Explanation, learnt: list[Taught], beside: Path, output: Path) -> Path:
-    """model_absorbed.toml and its networks into `output`; `beside` is the way from there to the nominal file."""
+    """model_absorbed.toml and its networks into `output`; `beside` is the path from there to the nominal file."""
     values = {f.target: f.value for f in e.fit.free}
     lines = [
-        f"# The nominal model with one more parameter set, in which {', '.join(t.element for t in learnt)} knows what the recordings show.",
-        "# It has the layout of the nominal code: it can be staged in an ECU that runs that.",
+        f"# The nominal model with one more set, in which {', '.join(t.element for t in learnt)} includes what the recordings show.",
+        "# It has the layout of the nominal code: it can be staged into a running controller.",
         "",
         "[model]",
         f'extends = "{beside.as_posix()}"',

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A model file with what a search by innovations found in it."""
+"""A model file with the result of a search by innovations."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .terms import Term
 
 @dataclass(frozen=True, eq=False)
 class Applied:
-    """Text of a model file that extends the nominal one; `left` says what it cannot have."""
+    """Text of a model file that extends the nominal one; `left` lists effects that it cannot express."""
 
     text: str
     left: tuple[str, ...]
@@ -89,7 +89,7 @@ def _head(model: Model, terms: Sequence[Term], substeps: int) -> list[str]:
     """Lines of a file that extends the model's, down to the end of [model]."""
     learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
     return [
-        f"# What the recordings taught about {model.path.name}: {learnt or 'nothing but values'}.",
+        f"# Extension of {model.path.name} from recordings: {learnt or 'values only'}.",
         "",
         "[model]",
         extends(model.path.resolve()),
@@ -200,7 +200,7 @@ class Driven:
         return found
 
     def through(self, text: str) -> str:
-        """An expression with what stands for its inputs now; an offset has no rate."""
+        """An expression with its inputs replaced; an offset has no rate."""
         if self.acts:
             text = re.sub(rf"\b({'|'.join(self.acts)})\b", lambda m: self.acts[m[1]], text)
         for name, offset in self.offsets.items():
@@ -271,7 +271,7 @@ def _uncorrected(t: Term) -> str:
 
 
 def redirected(model: Model, driven: Driven) -> dict[str, list[str]]:
-    """Elements, equations and outputs on which inputs act, with what stands for these now."""
+    """Elements, equations and outputs on which inputs act, with the expressions that replace these."""
     found: dict[str, list[str]] = {"elements": [], "equations": [], "outputs": []}
     for e in model.elements:
         ends = tuple(driven.acts.get(x, x) for x in e.ends)

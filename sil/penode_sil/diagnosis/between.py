@@ -53,8 +53,8 @@ def parts(time: Array, u: Array, rate: Array, count: int) -> Array:
 
 
 def _means(u: Array) -> Array:
-    """Of the smooth signals [..., n - 1, n_u] over each interval. At their ends they go on turned by half about them, for there the noise
-    of samples would count six times."""
+    """Means of the smooth signals [..., n - 1, n_u] over each interval. They are continued by point reflection at their ends, where
+    the noise of samples would otherwise count six times."""
     more, axis = min(16, u.shape[-2] - 1), u.ndim - 2
     before, after = (
         2.0 * u[..., [end], :] - u[..., rows, :][..., ::-1, :] for end, rows in ((0, slice(1, more + 1)), (-1, slice(-more - 1, -1)))

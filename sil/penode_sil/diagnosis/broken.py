@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Sensors that clip or drop out, by what their samples show and a simulation agrees with."""
+"""Sensors that clip or drop out, by their samples and a simulation that confirms it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STILL = 2e-3  # of the samples: values that a noisy sensor repeats that often ar
 def still_broken(
     train: Sequence[Measured], study: Study, fit: Fit, faults: Sequence[Cause], bursts: Sequence[NDArray[np.bool_]]
 ) -> list[Cause]:
-    """Sensors that clip or drop out beside a fit of what explains the recordings: bursts and spikes that it explains were none. One with a
+    """Sensors that clip or drop out beside a fit of the recordings; bursts and spikes that it explains do not count. One with a
     rail among the `faults` before has no drop-outs: a cause may clip as well, and then a rail looks like one."""
     kept = [b & wild for b, wild in zip(bursts, still_wild(study, fit, bursts), strict=True)]
     return others.still_at_fault(broken_sensors(study.model, train, study, fit.simulated, kept), faults)
@@ -68,7 +68,7 @@ class _Counts:
 def broken_sensors(
     model: Model, train: Sequence[Measured], study: Study, simulated: Sequence[np.ndarray], bursts: Sequence[NDArray[np.bool_]]
 ) -> list[Cause]:
-    """Sensors that clip or drop out, by what their samples show and a simulation agrees with: it goes on where they stop."""
+    """Sensors that clip or drop out, by their samples and a simulation that confirms it: it continues where they stop."""
     found = []
     for j, sensor in enumerate(model.sensors):
         c = _Counts()

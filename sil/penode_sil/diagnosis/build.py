@@ -54,7 +54,7 @@ class Extended:
 
 
 def element(term: Term, place: Place, name: str, model: Model) -> tuple[Element, dict[str, tuple[float, str]], list[Free]]:
-    """The element of a force law, its parameters, and what is free in it."""
+    """The element of a force law, its parameters, and its free values."""
     what = term.candidate.what
     if not isinstance(what, Basis):  # an absorber
         _, _, f0, zeta = what
@@ -130,7 +130,7 @@ def extended(model: Model, places: Sequence[Place], terms: Sequence[Term], recor
 
 
 def all_free(nuisances: Sequence[Free], found: Extended) -> tuple[Free, ...]:
-    """Nuisances, those that a hypothesis set free without their priors, and what the terms add."""
+    """Nuisances, those that a hypothesis set free without their priors, and the free values of the terms."""
     loose = (
         replace(f, sigma=np.inf, low=min(0.0, 10.0 * f.origin), high=max(0.0, 10.0 * f.origin)) if f.target in found.loosened else f
         for f in nuisances

@@ -25,7 +25,7 @@ SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # quantiles of abs(y) that are tried as l
 
 def propose(bench: Bench, index: int, seen: Sequence[Array]) -> tuple[Score, Form] | None:
     """The limit that gains most for a sensor; None for one that was not measured, or hardly moves. A free run, `seen` [n, n_z] for each
-    recording, stands for the signal that is not cut off; what a limit cuts off it is the change of the innovations. Before any
+    recording, replaces the signal that is not cut off; the part beyond a limit is the change of the innovations. Before any
     form is accepted, and if the largest 2 % of the samples agree within three standard deviations of noise, limits are also tried with the
     nominal parameters."""
     y = np.abs(np.concatenate([r.y[:, index] for r in bench.records]))

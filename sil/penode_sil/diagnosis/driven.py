@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Recordings as a diagnosis sees them, and what its sensors say of an input that the file repeats between samples.
+"""Recordings for a diagnosis, and the decision by the sensors on an input that the file repeats between samples.
 
 Such an input may have moved in steps (a controller's output, a rig), or smoothly, and only the logger repeated it. Rows do not tell
 one from the other; the sensors do: a plant that is driven by steps follows them half an interval later, and shakes with them. When a

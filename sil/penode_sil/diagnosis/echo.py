@@ -26,7 +26,7 @@ LAGGING = {"hidden_resonance", "maxwell_bushing", "tyre_damping"}  # kinds that 
 
 @dataclass(frozen=True)
 class Echo:
-    """chi2 that forces on a body take of what is left, which go like its deflection, rate and acceleration at another time: `late`,
+    """Reduction of chi2 by forces on a body that are proportional to its deflection, rate and acceleration at another time: `late`,
     `early`, or `soon`, before the first of LAGS."""
 
     late: float = 0.0

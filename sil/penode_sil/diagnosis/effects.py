@@ -31,7 +31,7 @@ FEW = 200  # samples of a sensor that are taken out one by one, sooner than by a
 
 class _Effects:
     """Effects in every recording: of forces at places and of faults of sensors. Forces along a motion are looked at every `every`
-    samples; samples of sensors that do not count are taken out of effects as they are of what was measured."""
+    samples; samples of sensors that do not count are removed from effects as from the measurements."""
 
     def __init__(self, experiments: Sequence[Experiment], metrics: Sequence[Metric], seen: Sequence[Seen]) -> None:
         self.experiments = experiments
@@ -77,26 +77,26 @@ class _Effects:
         return spectra
 
     def answered(self, force: Complex, place: int, e: int, out: Array, settled: Sequence[bool] = ()) -> None:
-        """Of spectra of forces [k, f] at a place."""
+        """Add the effects of spectra of forces [k, f] at a place."""
         if len(self.holes[e]):
             self.metrics[e].white(self.masked(e, self.plain[e].answer(force, place, settled)), out)
         else:
             self.white[e].answer(force, place, settled, out)
 
     def acted(self, place: int, laws: Sequence[Basis], e: int, out: Array) -> None:
-        """Of elementary laws at a place."""
+        """Add the effects of elementary laws at a place."""
         rows = np.stack([b.series[e] for b in laws])
         phi = np.float32(self.every) * _transformed(rows, self.experiments[e].band)
         self.answered(phi, place, e, out, [b.settled for b in laws])
 
     def pulled(self, place: int, body: Sequence[Array], tried: Array, e: int, out: Array) -> None:
-        """Of hidden masses with frequencies and damping ratios `tried` [k, 2] on a body with accelerations of spectra `body`."""
+        """Add effects of hidden masses with frequencies and damping ratios `tried` [k, 2] on a body with acceleration spectra `body`."""
         x = self.experiments[e].frequencies[: self.experiments[e].band] / tried[:, :1]
         damped = 2j * tried[:, 1:] * x
         self.answered(((1.0 + damped) / (1.0 - x**2 + damped) * body[e]).astype(np.complex64), place, e, out)
 
     def faulty(self, sensor: int, faults: Sequence[Fault], e: int, out: Array) -> None:
-        """Of faults of a sensor."""
+        """Add the effects of faults of a sensor."""
         x, metric = self.experiments[e], self.metrics[e]
         spectra = _transformed(np.stack([f.series[e] for f in faults]) * x.good[:, sensor], x.band)
         out = out.view(np.complex64).reshape(len(faults), x.good.shape[1], x.band, copy=False)

@@ -141,7 +141,7 @@ def _friction(at: _At) -> Iterator[Basis | None]:
 
 
 def _hysteresis(at: _At) -> Iterator[Basis | None]:
-    """Odd, memory of the way since the last reversal; with little of it, friction."""
+    """Odd, with memory of the travel since the last reversal; with little of it, friction."""
     motions, reach, speed, step, wanted, prescribed, place = at.motions, at.reach, at.speed, at.step, at.wanted, at.prescribed, at.place
     widths = [w * reach for w in (0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)]
     if not wanted("bouc_wen", "coulomb_friction", "backlash"):

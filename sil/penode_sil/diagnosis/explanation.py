@@ -53,7 +53,7 @@ Group = tuple[str, str]
 @dataclass(frozen=True, eq=False)
 class Explanation:
     """Some causes, fitted. `gain`: fall of the loss against the null fit, `formulas` the part of it that causes had taken which are
-    formulas and leave no form to mend; `score`: gain less what the freedom is worth."""
+    formulas and leave no form to correct; `score`: gain less what the freedom is worth."""
 
     terms: tuple[Term, ...]
     built: Extended
@@ -127,7 +127,7 @@ def numbers(e: Explanation) -> int:
 
 
 def weight(model: Model) -> float:
-    """Of all bodies [N], without any no bound. A load beyond it is a start in motion in disguise."""
+    """Weight of all bodies [N], inf without bodies. A larger load stands for a start in motion."""
     return constants.g * sum(model.parameters[b.mass].value for b in model.bodies) or np.inf
 
 

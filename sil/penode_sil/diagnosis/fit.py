@@ -84,7 +84,7 @@ class Fit:
         return next(f.value for f in self.free if f.target == target)
 
     def covariance(self) -> Array:
-        """Of all free values, in their units (log: relative)."""
+        """Covariance of all free values, in their units (log: relative)."""
         priors = np.array([(f.unit / f.sigma) ** 2 for f in self.free])
         curvature = self.jacobian.T @ self.jacobian + np.diag(priors)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
@@ -237,7 +237,7 @@ class Problem:
         return z, skews, run.x
 
     def residuals(self, e: int, z: Array, skews: Array) -> Array:
-        """Whitened residuals [runs, rows] of what `sensors` gives."""
+        """Whitened residuals [runs, rows] of the result of `sensors`."""
         thin, good, measured = _thinned(self.experiments[e])
         with np.errstate(over="ignore", invalid="ignore"):  # some runs leave all bounds
             spectra = thin(z, good)  # [n_z, runs, f]

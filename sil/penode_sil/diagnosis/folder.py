@@ -122,7 +122,7 @@ def attempt(job: Job) -> Answer:
         return None, exc.problems[0] + (f" (and {more} more)" if more else "")
     except Exception as exc:  # a defect in one diagnosis must not take the others along
         what, path = crash_file(exc)
-        return None, f"{job.data[0]}: the diagnosis failed ({what}); send us {path or 'this line'} and the recording"
+        return None, f"{job.data[0]}: the diagnosis failed ({what}); report this bug with {path or 'this line'} and the recording"
 
 
 def _in_processes(jobs: Sequence[Job], count: int) -> Iterator[tuple[int, Answer]]:

@@ -48,12 +48,12 @@ class Basis:
 
 VALUED = ("bias", "scale", "delay", "roll_off", "rail", "sharpness", "clock")  # faults of a value alone; the others add a series
 ROLLED = 0.006  # [s] lag of the filter that a sensor may be behind: it only has to be of the size of one
-CLOCK = "clock_drift"  # kind of what is not on the list, but would pass for something that is
+CLOCK = "clock_drift"  # kind of an effect that is not on the list, but looks like one that is
 
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """One elementary fault of a sensor: `series` is what it adds to that sensor for gain 1, per recording."""
+    """One elementary fault of a sensor: `series` is its contribution to that sensor for gain 1, per recording."""
 
     kind: str
     sensor: int
@@ -212,7 +212,7 @@ def _sensor_faults(
 
 
 def rolled_off(y: Array, lag: float, step: float) -> Array:
-    """The second derivative of a signal [n], as a filter takes it from one: of what is fast, no more than there is."""
+    """The second derivative of a signal [n], as by a filter; at high frequencies not above that of the signal."""
     both = np.concatenate([y, y[::-1]])  # ends where it began
     s = 2j * np.pi * fft.rfftfreq(len(both), step)
     return fft.irfft(fft.rfft(both) * s * s / (1.0 - (s * lag) ** 2), len(both))[: len(y)]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The search by innovations for what a model lacks: the forms accepted, and those large enough to be named."""
+"""The search by innovations for missing effects of a model: the forms accepted, and those large enough to be named."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
         starts = [[f for f in fit.free if f.target not in own] for fit in (bench.fit, whole)]
         without = max((problem.solve(free, still, FREE_RUN) for free in starts), key=lambda f: f.cost)
         taken = without.taken_whole(whole, problem.floor)
-        log(f"{name_of(a.trial)} takes {taken:.1%} of what a free run misses without it")
+        log(f"{name_of(a.trial)} explains {taken:.1%} of the error of a free run without it")
         if mostly(taken):
             accepted[k] = replace(a, trial=replace(a.trial, whole=max(taken, a.trial.whole)))
             large[k] = a.trial.share >= least(level, taken)

@@ -37,7 +37,7 @@ def judge(
     study: Study, explanations: Sequence[Explanation], faults: list[Cause], alike: float, shared: float, pure: bool, changed: float = 0.0
 ) -> tuple[tuple[Cause, ...], str, float, float]:
     """Causes, verdict, share explained, and the evidence that there is anything at all; `alike`, `shared`: see
-    noise.correlation; `pure`: a tone is left; `changed`: chi2 of what changes with time, if that is beyond chance."""
+    noise.correlation; `pure`: a tone is left; `changed`: chi2 of changes with time, if that is beyond chance."""
     rows = explanation.rows(study)
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)
@@ -77,7 +77,7 @@ def judge(
 
 
 def share(study: Study, e: Explanation, left: float = 0.0) -> float:
-    """Of the avoidable residual that an explanation takes away, 0 to 1; `left`: a lower bound of the chi2 that remains."""
+    """Share of the avoidable residual that an explanation takes away, 0 to 1; `left`: a lower bound of the chi2 that remains."""
     left, gained = max(e.fit.chi2 - explanation.rows(study), left), study.null.cost - e.fit.cost
     return gained / (gained + left) if gained + left > 0.0 else 1.0
 

@@ -285,7 +285,7 @@ def _at(
 
 
 def _unit(linear: Linear, column: int, p: _Recording) -> float:
-    """The force that would make so much of a residual where sensors see it best: walks are counted in it."""
+    """The force whose effect on the sensors is as large as the residual, at the frequency where it shows best: the unit of the walks."""
     f = p.experiment.frequencies[1 : p.experiment.band]
     seen = linear.transfer(p.experiment.frequencies)[1 : p.experiment.band, list(p.sensors), column]
     most = float(np.max(np.abs(seen) / p.sigma)) if len(f) else 0.0

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The model with a filter and a monitor for what a diagnosis named: the extended model, in which the causes have no size yet."""
+"""The model with a filter and a monitor for the diagnosed causes: the extended model with causes of size 0."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def sizes(element: Element) -> list[str]:
 
 
 def changes(nominal: Model, extended: Model) -> dict[str, dict[str, float]]:
-    """Causes by name: what their parameters have grown to from no effect, SI."""
+    """Causes by name: their parameters, which without the fault have no effect, SI."""
     known, found = {e.name for e in nominal.elements}, {}
     for element in extended.elements:
         own = sizes(element) if element.name not in known else []
@@ -64,7 +64,7 @@ def write(folder: Path, nominal: Model, model_file: str) -> str:
     found = changes(nominal, extended)
     watched = {name: own for name, own in found.items() if _good(path, _text(text, extended, {name: own}))}
     if not watched:
-        return f"no {MONITORED}: nothing was named whose size could be watched for"
+        return f"no {MONITORED}: no cause was named that a monitor can watch for"
     path.write_text(_text(text, extended, watched), encoding="utf-8")
     return f"{MONITORED} watches for {', '.join(watched)}; `penode generate` writes the C of its filter and monitor"
 
@@ -93,5 +93,5 @@ def _text(text: str, extended: Model, watched: dict[str, dict[str, float]]) -> s
             entry[parameter] = change / factor
         causes.append(f"{name} = {table(entry)}")
     text = re.sub(r'(?m)^name = ".*"$', f"name = {toml(extended.name.removesuffix('_extended') + '_monitored')}", text, count=1)
-    head = "# What a diagnosis named, as it is before it begins; the monitor watches for it. Below is what the diagnosis wrote."
+    head = "# The named cause at its value without the fault; the monitor watches for its onset. Below: the comment of the extended model."
     return "\n".join([head, text.rstrip(), "", "[monitor]", f"mean_time = {toml(MEAN_TIME)}", "", "[monitor.causes]", *causes, ""])

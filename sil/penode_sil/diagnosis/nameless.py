@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Structure is left, and nothing on the list is it: a small network takes what it can of it, and gets no name."""
+"""A remaining structure that no cause on the list explains: a small network approximates it, without a name."""
 
 from __future__ import annotations
 

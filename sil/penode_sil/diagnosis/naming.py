@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a fitted curve is called: friction, dampers, springs and tyres by what it does, not by the laws that it was put together from."""
+"""Names of fitted curves: friction, dampers, springs and tyres by their force, not by the laws that they are composed of."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _spring(terms: Sequence[Term], names: Sequence[str], values: Values, reach: 
 
 def _contact(terms: Sequence[Term], names: Sequence[str], values: Values, reach: float) -> float:
     """Deflection where stops come into contact, on the side where they do later; `reach` without any. Laws with a smaller part of
-    the force there mend the form of others."""
+    the force there correct the form of others."""
     stops = [(t, n) for t, n in zip(terms, names, strict=True) if t.candidate.kind == "bump_stop"]
     ends = np.array([-reach, reach])
     forces = np.array([np.abs(Curve([t], [n])(ends, np.zeros(2), values)) for t, n in stops]).reshape(-1, 2)
@@ -164,7 +164,7 @@ def _size(f: Array) -> float:
 
 
 class Curve:
-    """The force of a group of terms over deflection or rate, for any values of what is free."""
+    """The force of a group of terms over deflection or rate, for any values of the free parameters."""
 
     def __init__(self, terms: Sequence[Term], names: Sequence[str]):
         self.parts = [(t, n) for t, n in zip(terms, names, strict=True) if isinstance(t.candidate.what, Basis)]

@@ -41,7 +41,7 @@ class Experiment:
     """One recording on the model's raster: inputs u [n, n_u], sensors y [n, n_z] (NaN nowhere), and which samples are good.
 
     `drive`, `rate` [n, n_u] are the inputs as they most likely were and their rates, `unsure` [f, n_u] the standard
-    deviation of what is left of their noise (see prepare).
+    deviation of their remaining noise (see prepare).
     """
 
     name: str
@@ -356,7 +356,7 @@ ALIKE = 7.0  # standard deviations by which sensors may share a residual that is
 
 
 def correlation(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> tuple[float, float]:
-    """How much the residuals of different sensors are alike, in standard deviations of what independent noise makes, in that
+    """How much the residuals of different sensors are alike, in standard deviations of that of independent noise, in that
     part of the spectrum where they are most alike; and in all of it the chi-square beyond what such noise makes.
 
     Noise of sensors has nothing in common (what the inputs' noise has, the metrics take out), so coherence between two of

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Parameters that differ from the model file in a fit to innovations: which are causes, and which only make up for laws that are
+"""Parameters that differ from the model file in a fit to innovations: which are causes, and which only compensate for laws that are
 missing."""
 
 from __future__ import annotations

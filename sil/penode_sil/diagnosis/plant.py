@@ -46,7 +46,7 @@ class Place:
         return self.elements[0][0] if self.elements else self.ends[0]
 
     def unit(self, of_length: str) -> str:
-        """A unit of the force there: `of_length` as it is, or what stands for it where the ends turn."""
+        """A unit of the force there: `of_length`, or the rotational one where the ends turn."""
         return laws.for_angles(of_length) if self.turns else of_length
 
 
@@ -161,7 +161,7 @@ def _share(signal: Signal, new: str, place: Place) -> Signal:
 
 
 def rotational_unit(model: Model, ends: tuple[str, str], of_length: str) -> str:
-    """A unit of the force between two ends: `of_length`, or what stands for it where they turn."""
+    """A unit of the force between two ends: `of_length`, or the rotational one where they turn."""
     return mechanics.unit(model, ends, of_length)
 
 

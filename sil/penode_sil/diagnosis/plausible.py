@@ -59,7 +59,7 @@ def off_by(y: Array, z: Array, good: NDArray[np.bool_]) -> float | None:
 
 
 def mixed(ratio: float, unit: str) -> tuple[float, str] | None:
-    """The ratio that a wrong unit makes of a signal and what is mixed up, if it is near; -1 for a sign; or None."""
+    """The ratio of a wrong unit and the two units, if one is near; -1 for a sign; or None."""
     for factor, what, kinds in MIXED:
         for exact in (factor, 1.0 / factor):
             if abs(np.log(abs(ratio) / exact)) < NEAR and any(units.same_dimension(unit, kind) for kind in kinds):

@@ -27,12 +27,12 @@ TRIED = 6  # forms that are fitted in a round, the best of each name and place f
 PROMISE = 3.0  # log likelihood that a form has to promise for it
 SMALL = 0.02  # of the force at a place: a force that is put on to see what it does, and a law's start
 LITTLE = 0.4  # of a unit, which is 0.05 of the force at the place
-VAGUE = 0.5  # standard deviation of the logarithm of a parameter above which it counts as a guess
+GUESSED_DEVIATION = 0.5  # standard deviation of the logarithm of a parameter above which it counts as a guess
 FREE_RUN, FOLLOWED = 10, 12  # iterations of a form's fits
 
 
 def motions(probe: Probe) -> list[Motion]:
-    """Of every place. On a body without any modelled force, the reference is the force that accelerates it."""
+    """Motion at every place. On a body without any modelled force, the reference is the force that accelerates it."""
     found, bench = [], probe.bench
     driving = drives_of(bench.model)
     for k, place in enumerate(bench.places):
@@ -126,7 +126,7 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
 
 
 def _bent(bench: Bench, index: int, terms: Sequence[Term]) -> list[tuple[Score, Form]]:
-    """Of an input, each kind whose effect is not proportional to its value, at the best of the values that are tried."""
+    """Forms of an input whose effect is not proportional to their value, each at the best of the values tried."""
     forms = [f for f in drives.bent(bench.model, index, drive(bench, index)) if not _taken(f, terms)]
     if not forms:
         return []
@@ -177,7 +177,7 @@ def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[
     n_x = len(wide.states)
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
     starts, runs = [(*bench.fit.free, *_sized(term, sizes))], []
-    if term.form.how == "clip" or any(f.log and f.sigma > VAGUE for f in bench.nominal):
+    if term.form.how == "clip" or any(f.log and f.sigma > GUESSED_DEVIATION for f in bench.nominal):
         little = np.clip(sizes, *np.outer((-1.0, 1.0), [LITTLE * f.unit for f in term.free if not f.log]))
         own = {f.target for f in bench.nominal}
         nominal = (*bench.nominal, *(f for f in bench.fit.free if f.target not in own))

@@ -99,7 +99,7 @@ def resembles(e: Explanation, c: Candidate) -> bool:
 
 
 def further(study: Study, e: Explanation, r: Regression) -> list[list[int]]:
-    """Choices of one more kind by what no curve of the causes so far can do, from best to worst."""
+    """Choices of one more kind by the part that no curve of the causes so far can explain, from best to worst."""
     taken = [k for k in family(study, r, e.groups) if resembles(e, r.candidates[k])]
     rest, related = r.beside(taken), set(taken)
     least = 0.0 if exact(e.groups) else LEAST * e.gain

@@ -44,7 +44,7 @@ class Whiteness:
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """Of one sensor in one recording: samples [n]; densities [unit^2/Hz], coherence with the inputs [f], test for
+    """Residual of one sensor in one recording: samples [n]; densities [unit^2/Hz], coherence with the inputs [f], test for
     whiteness."""
 
     values: Array

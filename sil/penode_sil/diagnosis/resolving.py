@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Interpolation and substeps of an extended model, as fine as what it describes asks for."""
+"""Interpolation and substeps of an extended model, as fine as its effects require."""
 
 from __future__ import annotations
 

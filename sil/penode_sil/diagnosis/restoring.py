@@ -46,7 +46,7 @@ class Surface:
     located: bool = True
 
     def unit(self, of_length: str) -> str:
-        """A unit of the force there: `of_length` as it is, or what stands for it where the ends turn."""
+        """A unit of the force there: `of_length`, or the rotational one where the ends turn."""
         return for_angles(of_length) if self.turns else of_length
 
     def grid(self, values: Array) -> Array:
@@ -173,7 +173,7 @@ def _ends(q: Array) -> tuple[float, float]:
 
 
 def _located(linear: Linear, acting: Sequence[int], rounding: float = 1e-6) -> list[bool]:
-    """Of each place: do the sensors show its deflection? Not where bodies may be moved and all rates and sensors stay the same, as a car on
+    """Do the sensors determine the deflection at each place? Not if bodies can be moved without a change of rates and sensors, as a car on
     a floor of which the speed is measured."""
     seen = np.vstack([linear.a, linear.c[: linear.n_sensors]])
     if not seen.size:

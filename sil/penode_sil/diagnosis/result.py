@@ -90,7 +90,7 @@ class Figure(Compared):
 
 @dataclass(frozen=True)
 class Recorded:
-    """A recording that was used, and what is not as it should be in it. `role`: training or hold-out."""
+    """A recording that was used, with its faults. `role`: training or hold-out."""
 
     name: str
     role: str
@@ -131,7 +131,7 @@ class Diagnosis:
 
     @property
     def rejected(self) -> bool:
-        """Does what was learnt predict worse than the nominal model?"""
+        """Does the extended model predict worse than the nominal one?"""
         return self.model_file == REJECTED
 
     def as_json(self) -> dict[str, Any]:

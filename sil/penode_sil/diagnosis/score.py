@@ -48,7 +48,7 @@ class Seen:
     free: Complex | None  # None if start states are free anyway
 
     def answer(self, force: Complex, place: int, settled: Sequence[bool] = (), out: Array | None = None) -> Complex:
-        """Spectra [k, f, sensors] of what forces [k, f] at a place do to the sensors, from rest unless settled; in memory, which
+        """Spectra [k, f, sensors] of the sensors under forces [k, f] at a place, from rest unless settled; in memory, which
         may be the rows `out`, [k, sensors, f]."""
         shape, dtype = (len(force), self.response.shape[1], force.shape[1]), self.response.dtype
         spectra = np.empty(shape, dtype=dtype) if out is None else out.view(dtype).reshape(shape, copy=False)
@@ -74,12 +74,12 @@ class Seen:
 
     @cached_property
     def _responses(self) -> Complex:
-        """Of one place after the other, [places, sensors, f]."""
+        """Responses to forces at each place, [places, sensors, f]."""
         return np.ascontiguousarray(self.response.T)
 
     @cached_property
     def _frees(self) -> Array:
-        """Of one state after the other, [x, numbers]."""
+        """Free motions from each state, [x, numbers]."""
         return np.ascontiguousarray(self.free.T).reshape(self.free.shape[2], -1).view(self.free.real.dtype)
 
     @property
@@ -115,7 +115,7 @@ def smooth(
 
 
 def likely(e: Experiment, levels: Array, g: Complex, acting: int, r: Complex) -> Complex:
-    """Gain [f, q, n_z] from spectra of a residual to those of what reaches the sensors through g [f, n_z, q]: `acting` forces
+    """Gain [f, q, n_z] from spectra of a residual to those of the part that reaches the sensors through g [f, n_z, q]: `acting` forces
     first, then errors of the inputs. These are their most likely values; the spectra of the forces are those that spectra r [f, n_z] of
     a residual suggest, smooth over half a hertz."""
     band = len(g)
@@ -139,7 +139,7 @@ def likely(e: Experiment, levels: Array, g: Complex, acting: int, r: Complex) ->
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One column of the regression and what it stands for."""
+    """One column of the regression and its hypothesis."""
 
     kind: str
     where: str

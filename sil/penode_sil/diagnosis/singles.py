@@ -53,7 +53,7 @@ def singles(study: Study, r: Regression, few: int = 3) -> list[Explanation]:
 
 
 def sufficient(study: Study, e: Explanation) -> list[Term]:
-    """Of two causes of one number each, those beside which the other one is worth less than it costs: a regression may have asked for
+    """Of two causes with one number each, those that make the other one worth less than it costs: a regression may have asked for
     two parameters in place of one that is far off."""
     if len(e.terms) != 2 or len(e.groups) != 2:
         return []

@@ -66,11 +66,11 @@ class _Cause:
         return self.v[self.v > 0.0]
 
     def damping(self, p: Values) -> float:
-        """Of the linear dampers at the place."""
+        """Damping of the linear dampers at the place."""
         return nominal(self.study.model, self.place, "linear_damper", "damping", p)
 
     def stiffness(self, p: Values) -> float:
-        """Of the linear springs at the place."""
+        """Stiffness of the linear springs at the place."""
         return nominal(self.study.model, self.place, "linear_spring", "stiffness", p)
 
 
@@ -124,12 +124,12 @@ def _mass(name: str) -> Parameters:
 
 
 def having(terms: Sequence[Term], *shapes: str) -> list[int]:
-    """Which terms have one of these shapes; others only mend their form."""
+    """Which terms have one of these shapes; others only correct their form."""
     return [i for i, t in enumerate(terms) if not t.candidate.what.shapes.keys().isdisjoint(shapes)]
 
 
 def _fault(model: Model, kind: str, what: Fault, shown: float) -> Parameters:
-    """Of a fault of a sensor, of which `shown` is the most that it shows."""
+    """Parameters of a fault of a sensor; `shown` is the largest value that it shows."""
     unit, j = model.sensors[what.sensor].unit, what.sensor
     si = units.si(unit)
     match kind:
@@ -312,7 +312,7 @@ def _tyre_liftoff(c: _Cause) -> Parameters:
         return {"preload": ("N", lambda p: c0(p) * p[f"{names[main]}_static"])}
 
     def preload(p: Values) -> float:
-        """Where a bent curve has taken a twentieth of what it takes at last."""
+        """Where a curve has lost a twentieth of its final loss."""
         f = np.abs(curve(s, zero, p))
         return c0(p) * float(s[np.flatnonzero((s > 0.0) & (f > 0.05 * f[-1]))[0]])
 
@@ -326,7 +326,7 @@ def _tyre_damping(c: _Cause) -> Parameters:
     met = [m.motions[what.place] for m in study.seen]
 
     def damping(p: Values) -> float:
-        """Of the linear damper that takes as much work from the motion that was met."""
+        """Damping of the linear damper that dissipates the same work in the observed motion."""
         work = 0.0
         for m in met:
             late = sum(p[f"{n}_stiffness"] * p[f"{n}_relaxation"] * lag(m.v, p[f"{n}_relaxation"], m.t[1] - m.t[0]) for n in lagging)

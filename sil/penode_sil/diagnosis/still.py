@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Noise as a test bench has it: from recordings at standstill, instead of what the model file states."""
+"""Noise from recordings at standstill, instead of the model file's."""
 
 from __future__ import annotations
 

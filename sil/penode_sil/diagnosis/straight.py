@@ -41,7 +41,7 @@ def off(nominal: float, own: float, slopes: Slopes, limit: float) -> bool:
 
 
 def beside(model: Model, bench: Bench, terms: Sequence[Term], moved: Sequence[Motion]) -> dict[str, Slopes]:
-    """Of each parameter of a straight line beside `terms` at its place: the slopes that these have, as they are fitted."""
+    """For each parameter of a linear law beside `terms` at its place: the fitted slopes of these terms."""
     found: dict[str, Slopes] = {}
     for k in {t.form.index for t in terms}:
         own, motion = [t for t in terms if t.form.index == k], moved[k]
@@ -89,7 +89,7 @@ def _lines(model: Model, place: Place) -> list[tuple[str, str]]:
 
 
 def _slopes(terms: Sequence[Term], bench: Bench, quantity: str, x: Array) -> Slopes:
-    """Of the laws of terms over deflection or rate. One with memory has any slope from 0 to its gain."""
+    """Slopes of the laws of terms over deflection or rate. One with memory has any slope from 0 to its gain."""
     zeros, force, low, high = np.zeros_like(x), np.zeros_like(x), 0.0, 0.0
     along = Moved(x, zeros, np.arange(len(x)) * bench.step) if quantity == "s" else Moved(zeros, x, np.arange(len(x)) * bench.step)
     for gain, part in (pair for term in terms for pair in term.laws(bench.fit.values)):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The state of a diagnosis: a model against its recordings, with noise, places, and what is free within tolerance."""
+"""The state of a diagnosis: a model against its recordings, with noise, places, and values that are free within tolerance."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .score import Regression, Seen, smooth
 Array = NDArray[np.float64]
 SKEW = 0.001  # of a sample: channels are never sampled at exactly the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
-VAGUE = 0.5  # tolerance above which a parameter counts as a guess: it may change the behaviour of the plant entirely
+GUESSED_TOLERANCE = 0.5  # tolerance above which a parameter counts as a guess: it may change the behaviour of the plant entirely
 FEW = 4  # studies with other noise that are kept: the next step of a search may ask for one again
 
 
@@ -49,8 +49,8 @@ class Study:
 
 
 def guessed(model: Model) -> list[str]:
-    """Parameters that the file hardly knows."""
-    return [name for name, p in model.parameters.items() if p.tolerance > VAGUE]
+    """Parameters that are only guesses."""
+    return [name for name, p in model.parameters.items() if p.tolerance > GUESSED_TOLERANCE]
 
 
 def uncertain(p: Parameter, guessed: float = 1e3) -> Free:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A diagnosis on one screen: is the model wrong, how, how sure that is, what it costs, what to do next."""
+"""A diagnosis on one screen: is the model wrong, how, with what confidence, the gain, what to do next."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _causes(d: Diagnosis) -> list[str]:
 
 
 def _sure(d: Diagnosis) -> list[str]:
-    """That something is wrong, and that it is what is named."""
+    """The evidence that something is wrong, and the reliability of the names."""
     if d.verdict == "no_discrepancy":
         return []
     reasons = [f"the residual exceeds noise by {sigmas(d.evidence)} standard deviations"] if d.evidence > 3.0 else []

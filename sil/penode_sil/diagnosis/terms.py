@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Forms of causes as terms of a model: its elements, its free values, and what a fit has made of them."""
+"""Forms of causes as terms of a model: elements, free values, and their fitted values."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def level_friction(study: Study, e: Explanation, log) -> Explanation:
 
 
 def unlagged(study: Study, e: Explanation, log) -> Explanation:
-    """The explanation with a spring that hardens in place of a bushing that hardens, where it does as well without its memory."""
+    """The explanation with a spring that hardens in place of a bushing that hardens, where it fits as well without memory."""
     for t in [t for t in e.terms if law_of(t.candidate) == "hardening_bushing"]:
         if t.group in e.groups:
             what = replace(t.candidate.what, kind="cubic_spring", law="cubic_spring", shapes={})

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Tones in a residual that its inputs do not have: what makes one is a machine, no noise."""
+"""Tones in a residual that its inputs do not have: their source is a machine, not noise."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class CompiledFilter:
 
     @property
     def address(self) -> ctypes.c_void_p:
-        """Of NAME_ekf_t."""
+        """Address of the NAME_ekf_t."""
         return ctypes.c_void_p(self._memory.ctypes.data)
 
     def _function(self, name: str) -> Callable[..., int]:
@@ -83,7 +83,7 @@ class CompiledFilter:
         Step through inputs u [n, n_u] and measurements z [n, n_z], NaN where missing; mask [n]: bit k: measurement k is offered.
 
         Estimates (without values and deviations unless `estimates`), states of the filter [n, N] and, if `covariance`, the factors of
-        their covariance [n, N, N] (else of no rows). `progress` is told every `stretch` samples.
+        their covariance [n, N, N] (else of no rows). `progress` is called every `stretch` samples.
         """
         owner, dtype = self.owner, self.owner.dtype
         z = np.ascontiguousarray(z, dtype).reshape(-1, owner.n_z)

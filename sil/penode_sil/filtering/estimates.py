@@ -55,7 +55,7 @@ def signals(model: Model) -> Iterator[tuple[str, str, str]]:
 
 
 def named(model: Model) -> list[tuple[int, str, str]]:
-    """Column, name and unit of what is estimated, each quantity once: outputs, sensors, estimated inputs, then other states."""
+    """Column, name and unit of the estimates, each quantity once: outputs, sensors, estimated inputs, then other states."""
     own, rank = {i.name for i in of(model).inputs}, "yzux"
     columns = [(rank.index(kind), at, name, unit) for at, (kind, name, unit) in enumerate(signals(model)) if kind != "u" or name in own]
     found: dict[str, tuple[int, str, str]] = {}

@@ -77,7 +77,7 @@ class Monitor(Exact):
             self.s = (self.s + half * was) @ phi.T + half * self.effect
 
     def _rates(self, u: Array) -> Array:
-        """Of the model, at the state before the measurements of a sample."""
+        """Rates of the model, at the state before the measurements of a sample."""
         driven = self.drive(u, self.x)
         return np.asarray(self.numeric.rates(self.x[: self.n_x], driven, np.zeros_like(driven)), float)
 

@@ -25,7 +25,7 @@ HOLDING = FLAGS["nonfinite"] | sum(
 
 @dataclass(frozen=True)
 class OfSensor:
-    """Of one sensor: `mean_ratio` has an expectation of 1, and is within `band` with 95 % if the noises are right; `lag_1` is the
+    """Figures of one sensor: `mean_ratio` has an expectation of 1, and is within `band` with 95 % if the noises are right; `lag_1` is the
     correlation of neighbouring innovations over their standard deviations, 0 if they are right. None without measurements."""
 
     used: int
@@ -57,7 +57,7 @@ def tested(found: Estimates) -> NDArray[np.bool_]:
 
 
 def log_likelihood(given: Filter, runs: Iterable[Estimates]) -> tuple[float, int]:
-    """Of the innovations, and how many they are. A refused one counts as if it were at its gate, so that refusing pays nothing."""
+    """Log-likelihood of the innovations, and their number. A refused one counts as if it were at its gate."""
     gates = np.array([np.inf if s.gate is None else s.gate**2 for s in given.sensors])
     total, count = 0.0, 0
     for found in runs:
@@ -68,7 +68,7 @@ def log_likelihood(given: Filter, runs: Iterable[Estimates]) -> tuple[float, int
 
 
 def consistency(given: Filter, runs: Sequence[Estimates]) -> Consistency:
-    """Of one filter over recordings."""
+    """Consistency of one filter over recordings."""
     total, count = log_likelihood(given, runs)
     every = list(range(len(given.sensors)))
     sensors = {s.name: _of(runs, [k]) for k, s in enumerate(given.sensors)}

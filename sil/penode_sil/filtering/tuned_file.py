@@ -72,7 +72,7 @@ def _entries(model: Model) -> Iterator[tuple[Key, dict[str, Any], str]]:
 
 
 def _unit(model: Model, table: str, name: str, key: str) -> str:
-    """Of a noise of the file."""
+    """Unit of a noise in the file."""
     if table == "states":
         return f"{state_unit(model, name)}/sqrt(s)"
     found = next(s.unit for s in (model.sensors if table == "sensors" else model.inputs) if s.name == name)

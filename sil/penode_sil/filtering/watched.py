@@ -95,7 +95,7 @@ def columns(model: Model, found: Watched | None) -> list[Column]:
 
 
 def summary(model: Model, found: Watched | None, times: Array) -> dict[str, Any]:
-    """Of each test: when it was raised first [s], how often, and its highest sum in thresholds; nothing without a monitor."""
+    """For each test: when it was raised first [s], how often, and its highest sum in thresholds; nothing without a monitor."""
     entry: dict[str, Any] = {}
     if found is None:
         return entry

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A first look into a recording: its channels, their clocks and quality, and what of a model they are."""
+"""A first look into a recording: its channels, their clocks and quality, and the signals of a model that they are."""
 
 from __future__ import annotations
 
@@ -159,11 +159,13 @@ def _signals(tables: Sequence[Recording], model: Model) -> tuple[Signal, ...]:
     names = {key: table.name_of(key) for table in tables for key in table.columns}
     names = {key: name for key, name in names.items() if key not in taken and named.plain(name) not in known}
     free = {key: table.units[key] for table in tables for key in table.columns if key in names}
-    for name, (column, why) in similar.proposals(missing, free, names).items():
-        unit = missing[name]
-        called = column if free[column] is not None else f"{column} [{unit or '1'}]"
-        doubt = why if free[column] is not None else f"{why}; the file has no unit, check it"
-        found[name] = Signal(found[name].kind, name, unit, None, "", named.option(name, called), doubt)
+    outputs = {name: unit for name, unit in missing.items() if found[name].kind == "output"}  # what is left over; they need not be recorded
+    for wanted in ({name: unit for name, unit in missing.items() if name not in outputs}, outputs):
+        for name, (column, why) in similar.proposals(wanted, free, names).items():
+            unit, given = wanted[name], free.pop(column)
+            called = column if given is not None else f"{column} [{unit or '1'}]"
+            doubt = why if given is not None else f"{why}; the file has no unit, check it"
+            found[name] = Signal(found[name].kind, name, unit, None, "", named.option(name, called), doubt)
     order = {"time": 0, "input": 1, "sensor": 2, "output": 3}
     return tuple(sorted(found.values(), key=lambda signal: order[signal.kind]))
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a user calls columns: texts of --channel like `x=pos_mm`, `x=Weg 1 [mm]`, `a=a_body@10ms`, `z=z#2`, `time=@1ms`."""
+"""Names of columns by the user: texts of --channel like `x=pos_mm`, `x=Weg 1 [mm]`, `a=a_body@10ms`, `z=z#2`, `time=@1ms`."""
 
 from __future__ import annotations
 
@@ -98,6 +98,12 @@ def columns(text: str, units: Units, texts: Texts) -> list[str]:
 def unit(text: str, units: Units, texts: Texts) -> str | None:
     """The unit that an alias gives; None if it leaves that to the file."""
     return meant(text, units, texts)[0].unit
+
+
+def unit_of(key: str, aliases: Mapping[str, str], units: Units, texts: Texts) -> str | None:
+    """The unit that any alias gives a column; None if none does."""
+    given = [meant(text, units, texts) for text in aliases.values()]
+    return next((one.unit for one, found in given if key in found and one.unit is not None), None)
 
 
 def with_unit(text: str, given: str, units: Units, texts: Texts) -> str:

@@ -253,7 +253,7 @@ def _move(
             usable &= np.abs(place - nearest) <= 0.5 * step / interval + 1e-9
         between = _beside(place[usable])
         values = np.interp(place, np.arange(even.size), even)
-        if curved and between.any():  # rows beside the raster: by all of what they show, not by chords
+        if curved and between.any():  # rows beside the raster: by the whole curve, not by chords
             values[usable] = Kernel(raster[usable], start, interval, even.size, step).apply(even[:, None])[:, 0]
         return values, usable
     if interval > 0.999 * step and not np.any(_beside(place)):

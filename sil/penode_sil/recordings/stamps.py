@@ -104,7 +104,7 @@ class _Rows:
 
     @property
     def squares(self) -> float:
-        """Of what stamps are off the lines."""
+        """Sum of squared distances of the stamps from the lines."""
         return float(self.rest @ self.rest)
 
     def _range(self) -> tuple[Array, Array]:

@@ -138,10 +138,12 @@ class Recording:
         return self.units[column] is None and ending != self.name_of(column) and _suffix(ending, unit) is not None
 
     def unit_of(self, name: str, key: str, unit: str) -> str | None:
-        """The unit text of a column that holds channel `name`: the user's, the header's, or the end of its name."""
+        """The unit text of a column that holds channel `name`: the user's, the header's, the user's for another channel in the
+        same column, or the end of its name."""
         alias = self.aliases.get(name)
         given = None if alias is None else named.unit(alias, self.units, self.texts)
         given = self.units[key] if given is None else given
+        given = named.unit_of(key, self.aliases, self.units, self.texts) if given is None else given
         if given is None and self.name_of(key) != name:
             endings = _endings(self.name_of(key))
             given = next((u for u in (_suffix(e, unit) for e in endings) if u is not None), None)

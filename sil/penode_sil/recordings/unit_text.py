@@ -96,7 +96,7 @@ def _per_degree(text: str) -> str:
 
 @cache
 def _scale(given: str, asked: str) -> float | str:
-    """The factor, or what is wrong."""
+    """The factor, or the error."""
     try:
         return _read(given, "1" if asked.strip() in ("", "-") else asked)
     except UnitError as exc:

@@ -67,7 +67,7 @@ def _terms(signals: Sequence[Signal], bounds: Array) -> tuple[Array, Array]:
 
 
 def _close(*both: Array) -> NDArray[np.bool_]:
-    """Of each segment: have the last terms of all series vanished?"""
+    """For each segment: have the last terms of all series vanished?"""
     good = np.ones(len(both[0]), dtype=bool)
     for terms in both:
         scale = np.abs(terms).max(axis=(0, 2), initial=0.0)

@@ -37,7 +37,7 @@ class Change:
 
 
 def question(problem: Problem, ports: Sequence[Port]) -> str:
-    """What to ask about the recordings; empty where no change makes much more sense of them."""
+    """A question about the recordings; empty if no change explains them much better."""
     short = tuple(r.first(lines.rows(problem) // 4) for r in problem.records)
     before, found = _score(problem, ports, short), []
     for change in _changes(problem.model, short):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""How far a trained force may be from the true one: what noise does, and what straight pieces between few knots cannot be.
+"""Error bands of a trained force: from noise, and from straight pieces between few knots.
 
-A force is no chain of straight pieces. Between two knots it may sag, by width^2 * curvature / 8 in the middle, and what it sags there moves
-the knots too, and the constant that two curves share. So the band is taken on curves with a knot more in the middle of each piece: its sag
-has a prior deviation as its neighbours bend, and no more. The error of what was trained is then that of the best such curve, and the way to
-it, which is known, and the covariance of the best, which is not."""
+A true force is curved. Between two knots it may differ from the chord, by width^2 * curvature / 8 in the middle, and that difference also
+moves the knots, and the constant that two curves share. So the band is computed with one more knot in the middle of each piece, whose
+distance from the chord has a prior deviation according to the bend of its neighbours. The error of the trained curve is then the sum of its
+distance from the best such curve, which is known, and the error of that curve, given by its covariance."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True, eq=False)
 class Band:
     """Where a fit ended, the same point with a knot more in each piece of its curves, and there `spread` [n, n] and `away` [n]: covariance
-    of the unknowns, and the way to the best."""
+    of the unknowns, and the distance to the best."""
 
     point: Point
     fine: Point
@@ -36,7 +36,7 @@ class Band:
 
     @property
     def deviations(self) -> Array:
-        """Of each unknown."""
+        """Standard deviation of each unknown."""
         return np.sqrt(np.maximum(np.diag(self.spread), 0.0) + self.away**2)
 
     def deviation(self, k: int) -> Callable[[Array], Array]:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Piecewise linear networks of one input by way of curves: straight lines first, then knots where the recordings want them."""
+"""Piecewise linear networks of one input by way of curves: straight lines first, then knots where the recordings require them."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def chosen(problem: Problem, point: Point, ports: Sequence[Port], limits: Callab
 
 
 def covariance(problem: Problem, fit: Fit) -> Array:
-    """Of all unknowns, where a fit ended."""
+    """Covariance of all unknowns at the end of a fit."""
     curvature = fit.normal.curvature + problem.with_(tied=None).prior(fit.point)[0]
     scale = 1.0 / np.sqrt(np.diag(curvature))
     scaled = curvature * np.outer(scale, scale) + 1e-13 * np.eye(len(scale))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Recordings as training sees them, and how loud and of which colour what is left of them is."""
+"""Recordings for training, and the level and colour of their residuals."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def record(model: Model, m: Measured, signals: Sequence[str]) -> Record:
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """What is left of each signal: standard deviation `sigma` [n_z] of what is new in a sample, and its colour: e[k] = r[k] - sum of
+    """Noise of each signal: standard deviation `sigma` [n_z] of its innovation, and its colour: e[k] = r[k] - sum of
     colour[i] r[k - 1 - i]. `level` [n_z] is the standard deviation of all of it."""
 
     sigma: Array

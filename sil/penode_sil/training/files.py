@@ -110,7 +110,7 @@ def _known(text: str, model: Model) -> tuple[str, float | None]:
 
 
 def _write(job: Job, model: Model, found: Trained, measured: Sequence[Measured], held: Sequence[Measured]) -> Trained:
-    """All files, and the training with the figures of what was written; no set of a model that predicts worse than the nominal one."""
+    """All files, and the training with the figures of the written model; no set for a model that predicts worse than the nominal one."""
     facts = {
         "penode.seed": str(found.seed),
         "penode.chi2": "" if found.chi2 is None else f"{found.chi2:.6g}",

@@ -35,7 +35,7 @@ class Part:
 
 
 def loud(problem: Problem, point: Point) -> bool:
-    """Is what a sensor leaves louder than the noise that it states? Not where none is stated."""
+    """Is the residual of a sensor above its stated noise? False if none is stated."""
     found = left.of(problem, point)
     return found is not None and bool(found.above(SETTINGS.story_loud))
 
@@ -70,7 +70,7 @@ def predicted(found: list[Part], precision: Array, pull: Array) -> Array:
 
 
 def sizes(problem: Problem, point: Point) -> Array:
-    """Of each network's force, over that of the problem: the smallest that predicts no worse than the best by more than a standard
+    """Size of each network's force, over that of the problem: the smallest that predicts no worse than the best by more than a standard
     error."""
     found, factors = parts(problem, point), np.ones(len(problem.scale))
     if len(found) < 2:

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """Of each signal [n_z], NaN for one that was not recorded: residual over the stated noise (NaN: none is stated), over the signal's
+    """For each signal [n_z], NaN for one that was not recorded: residual over the stated noise (NaN: none is stated), over the signal's
     standard deviation, and the mean correlation of rows some apart where it is more than that of noise, else 0. `counts`: rows."""
 
     names: tuple[str, ...]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Straight lines in place of all networks: parameters, start states and the range of motion that everything later leans on.
+"""Straight lines in place of all networks: parameters, start states and the range of motion, the start of all later fits.
 
 A network that nothing stands beside is 0 at first: its body is free, and within seconds a fit may take it anywhere, to half a metre beside
 its place. So lines are fitted to the first rows, then to twice as many from where that ended, and so on: over few rows a free body goes

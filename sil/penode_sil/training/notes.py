@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a user must know of a fit, in sentences."""
+"""Notes on a fit for the user."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .tries import Try
 
 
 def of(problem: Problem, fit: Fit, ports: Sequence[Port], train_: Sequence[Measured], left: Sequence[Measured]) -> list[str]:
-    """Of a fit and its recordings; `left` are the held-out ones, if the trained model leaves all bounds there."""
+    """Notes on a fit and its recordings; `left` are the held-out ones, if the trained model leaves all bounds there."""
     notes = list(dict.fromkeys(p for m in train_ for p in m.quality.problems))  # parts of a file have them in common
     notes += [
         f"{a.parameter} stands beside {a.network}: it is the least-squares one of their sum over the visited range, "

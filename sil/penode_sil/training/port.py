@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Networks to be trained, and what goes into them."""
+"""Networks to be trained, and their inputs."""
 
 from __future__ import annotations
 

@@ -183,7 +183,7 @@ class Problem:
                 if name in self.held or self.frozen
                 else SETTINGS.problem_limit * tolerance
                 if known
-                else SETTINGS.problem_vague
+                else SETTINGS.problem_unknown_deviation
                 if not np.isfinite(tolerance)
                 else tolerance
             )

@@ -38,7 +38,7 @@ def write(path: Path, t: Trained) -> None:
         parts.append(f"<h2>{html.escape(force.name)}</h2>\n<p>{html.escape(_about(force))}</p>\n{_image(force)}")
     if t.unknown:
         parts.append(
-            "<h2>What the recordings cannot tell</h2>\n<ul>" + "".join(f"<li>{html.escape(u.text)}</li>" for u in t.unknown) + "</ul>"
+            "<h2>What the recordings do not determine</h2>\n<ul>" + "".join(f"<li>{html.escape(u.text)}</li>" for u in t.unknown) + "</ul>"
         )
     if t.parameters:
         rows = "".join(

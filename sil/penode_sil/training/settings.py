@@ -22,7 +22,7 @@ class Settings:
     engine_room: int = 4_000_000  # doubles of derivatives that are held at a time
     judge_after: float = 0.5  # [s] after a sample outside of the trained range that are left out: what happened there dies away
     problem_limit: float = 0.5  # standard deviation of a parameter, in tolerances: a tolerance is a limit, not a deviation
-    problem_vague: float = 10.0  # standard deviation of a parameter that is unknown, over its nominal value
+    problem_unknown_deviation: float = 10.0  # standard deviation of a parameter that is unknown, over its nominal value
     problem_least: float = 0.02  # of its nominal value, that a parameter keeps
     problem_bent: float = 0.3  # of a curve's span: standard deviation of a knot from the line between its neighbours
     problem_large: float = 30.0  # of the force scale: standard deviation of a value, so that what nothing shows stays finite

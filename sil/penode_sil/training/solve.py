@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Damped Gauss-Newton, within linear limits where promises ask for them."""
+"""Damped Gauss-Newton, within linear limits where promises require them."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""One training from recordings to networks: which way each network goes, the fit, what is known of it afterwards."""
+"""One training from recordings to networks: the method for each network, the fit, its uncertainty."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def _started(problem: Problem, point: Point, ports: Sequence[Port], start: begin
 
 
 def coloured(problem: Problem, fit: Fit, bounds: Sequence[Callable[[Curve], Limits]]) -> tuple[Problem, Fit]:
-    """The fit with the colour of what it leaves, for its estimate and its band. What is louder than noise is what the model lacks: there
+    """The fit with the colour of its residuals, for its estimate and its band. Residuals above the noise are errors of the model: there
     the estimate stays that of least errors, and curves bend as held-out parts of the recordings allow."""
     loud = heldout.loud(problem, fit.point)
     if loud:
@@ -206,7 +206,7 @@ def _is_rate(port: NetworkPort) -> bool:
 
 
 def _with_known(model: Model, options: Options) -> tuple[Model, tuple[str, ...]]:
-    """The model with what was measured, exact."""
+    """The model with the measured parameters exact."""
     changed = dict(model.parameters)
     for name, value in options.known:
         if name not in changed:
@@ -337,7 +337,7 @@ def _deployed(after: Model, train_: Sequence[Measured], point: Point, problem: P
 
 
 def versions() -> dict[str, str]:
-    """Of the programs that the numbers of a training follow from."""
+    """Versions of the programs that determine the numbers of a training."""
     return {"penode": penode_gen.VERSION, "python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
 
 

@@ -51,7 +51,7 @@ def usual(seen: Seen) -> dict[str, bool]:
 
 
 def deciding(seen: Seen) -> dict[str, set[str]]:
-    """Of each threshold, the cases in which one of its comparisons came out otherwise than usual."""
+    """For each threshold, the cases in which one of its comparisons came out otherwise than usual."""
     most = usual(seen)
     found: dict[str, set[str]] = {place.partition(" @ ")[0]: set() for place in most}
     for case, places in seen.items():

@@ -43,7 +43,7 @@ PATTERN = (  # the stratum of case i is PATTERN[i % 24]: 1/6 null, 1/2 with form
 )
 STRATA = tuple(dict.fromkeys(PATTERN))
 KINDS = tuple(dict.fromkeys(f.kind for f in FORMS if f.kind != OUTSIDE))
-BOUND = 50.0  # chi-square: below, an effect cannot be told from the noise with certainty, and "not identifiable" is right
+BOUND = 50.0  # chi-square: below, an effect cannot be distinguished from noise with certainty, and "not identifiable" is right
 APART = 30.0  # chi-square: a rival that leaves less of the effect unexplained is as good an answer
 FAINT = 1000.0  # chi-square: below, every kind is tried as a rival
 NEAR = {  # kinds that come near, beside wrong parameters, biases and scales, which are always tried

@@ -261,7 +261,7 @@ def progressive(at: Place, curve: Curve) -> Build:
 
 
 def fading(r: Rng, at: Place, kept: Callable[[np.ndarray, float], np.ndarray]) -> Build:
-    """Damping times kept(heat, size), the heat in units of what the linear damper makes in a recording."""
+    """Damping times kept(heat, size), the heat in units of that of the linear damper in a recording."""
     cooling = logarithmic(r, 0.5, 5) * at.duration
 
     def build(size: float) -> Change:

@@ -180,7 +180,7 @@ class Case:
         return paths
 
     def truth(self, refused: Mapping[str, int] | None = None) -> dict[str, Any]:
-        """Kind, place, parameters, size and equivalents of what hides; how often was drawn again, and why."""
+        """Kind, place, parameters, size and equivalents of the effect; how often it was drawn again, and why."""
         found = [
             {
                 "kind": e.kind,

@@ -47,7 +47,7 @@ HISTORY = ("delay", "nsample", "interp")  # attributes of an actuator that acts 
 # Of a delay of whole steps, less a quarter so that no time is on an edge, the last of four evaluations of a step sees the next one: it has
 # a sixth of the weight, so that the delay is EARLY short of whole steps.
 EARLY = STEP / 6
-ASKED = EARLY - STEP / 4  # s, what MuJoCo is told less what the delay is
+ASKED = EARLY - STEP / 4  # s, the value given to MuJoCo minus the delay
 DELAYS = 0.05  # s, the longest that a fit may try
 
 

@@ -25,8 +25,8 @@ Array = npt.NDArray[np.float64]
 HOME = Path(__file__).resolve().parents[3] / "build" / "mujoco"
 REMEDY = "no MuJoCo in build/mujoco: test/setup.sh mujoco (make campaign-mujoco does it)"
 SAMPLE = 0.002  # s between the rows of a recording
-STEP = 2e-4  # s, of what is written: 50 us from one evaluation to the next
-COARSE = 1e-3  # s, of what is fitted
+STEP = 2e-4  # s, of the recordings: 50 us from one evaluation to the next
+COARSE = 1e-3  # s, of fits
 # Friction is a constraint of MuJoCo: below its level it brakes to rest within FRICTION_TIME / 2, whatever load acts, but for 1e-4 of it.
 FRICTION_TIME = 0.002
 FRICTION = f'solreffriction="{FRICTION_TIME:g} 1" solimpfriction="0.9999 0.9999 0.01"'
@@ -94,7 +94,7 @@ class Run:
 
 
 Command = Callable[[int, Array, Array], float]  # row, positions, rates -> what the controller sends
-Reach = Callable[[float], float]  # of what is sent at this row, and what it has kept of earlier ones -> what the actuator takes
+Reach = Callable[[float], float]  # command of this row, memory of earlier ones -> input of the actuator
 
 
 def _level_setter(model: Any, data: Any, job: Job) -> Callable[[], None]:

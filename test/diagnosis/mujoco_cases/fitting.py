@@ -51,7 +51,7 @@ def simulate(
     rows: int,
     step: float = COARSE,
 ) -> Array:
-    """Signals [rows, sensors] before noise, of what was sent; wrong parameters take the place of those given. Raises Unstable."""
+    """Signals [rows, sensors] before noise, for the commands; wrong parameters take the place of those given. Raises Unstable."""
     wrong = {e.place: e.numbers["value"] for e in hidden if e.kind == "wrong_parameter"}
     inside = effects.in_plant(list(hidden), plant)
     if late := effects.late(hidden):
@@ -142,12 +142,12 @@ class Fit:
 
     @property
     def ratio(self) -> float:
-        """RMS of what is left, over the noise."""
+        """RMS of the residual over the noise."""
         return float(np.sqrt(np.mean(self.residual[: self.measured] ** 2)))
 
     @property
     def energy(self) -> float:
-        """Sum of squares of what is left, over the noise."""
+        """Sum of squares of the residual over the noise."""
         return float(np.sum(self.residual**2))
 
     def elsewhere(self, record: Record) -> float:

@@ -93,7 +93,7 @@ class Plant:
         return self.name == "quarter"
 
     def columns(self, y: np.ndarray) -> np.ndarray:
-        """Of MuJoCo's sensor data [n, numbers] the sensors [n, sensors]."""
+        """The sensors [n, sensors] in MuJoCo's sensor data [n, numbers]."""
         ends = np.cumsum([0, *(s.pick[1] for s in self.sensors)])
         return y[:, [int(a) + s.pick[0] for a, s in zip(ends, self.sensors, strict=False)]]
 

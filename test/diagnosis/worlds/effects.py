@@ -114,7 +114,7 @@ def held(y: Array, samples: int) -> Array:
 
 
 def input_changed(kind: str, u: Array, x: float, sign: float, rate: float, like: Array | None = None) -> tuple[Array, dict[str, float]]:
-    """What acts where the recording says u [N] (at `rate` Hz); x as for forces, along `like` (u itself if not given)."""
+    """The acting input where the recording has u [N] (at `rate` Hz); x as for forces, along `like` (u itself if not given)."""
     like = u if like is None else like
     rms = float(np.sqrt(np.mean(like**2)))
     omega = float(np.sqrt(np.mean(np.gradient(like, 1 / rate) ** 2))) / rms

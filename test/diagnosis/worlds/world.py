@@ -48,7 +48,7 @@ class Record:
     """Excitation of one recording at the solver's step: inputs as the file has them, as they act without effects, gusts; start state."""
 
     u: Array
-    error: Array  # [steps + 1, n_u], of unit size: what acts is u + scale * error
+    error: Array  # [steps + 1, n_u], of unit size: the acting input is u + scale * error
     gust: Array  # [steps + 1]
     start: Array
 
@@ -249,7 +249,7 @@ class World:
         return both or [r.ddq[:, site.coordinate]]
 
     def effect_size(self, i: int) -> tuple[float, float]:
-        """Of an effect: force (or signal) RMS over that of the mis-modelling at its place, and over the force there."""
+        """Size of an effect: force (or signal) RMS over that of the mis-modelling at its place, and over the force there."""
         e, r = self.effects[i], self.runs["train_1"]
         if e.kind in effects.SENSOR:
             y = self._clean(r, e.site)

@@ -4,7 +4,7 @@
 /*
  * For Frama-C: every function of a generated model, in any order, any number of times, with any arguments.
  *
- * in_order  starts with an instance of zeros: what a program does that knows nothing of what it calls.
+ * in_order  starts with an instance of zeros: as called by a program that ignores all rules.
  * corrupted overwrites the whole instance with any bytes before each call. Its pointers then name any of the buffers, in
  *           any mix: that a pointer points somewhere is the one thing that no C program can check.
  */

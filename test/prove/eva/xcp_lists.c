@@ -74,7 +74,7 @@ void xcp_pointer(void)
         }
         //@ loop unroll 66;
         for (uint32_t k = 0U; k <= (n + 1U); k++) {
-            daq.at = 0U; /* of no entry, it says nothing; it stays, and left becomes 0, where the pointer is refused */
+            daq.at = 0U; /* without an entry it has no meaning; it stays, and left becomes 0, where the pointer is refused */
             in[5] = (uint8_t)((k <= n) ? k : Frama_C_unsigned_int_interval(n + 1U, 255U));
             seen = pen_xcp_list_command(&xcp, in, Frama_C_unsigned_int_interval(0U, PEN_XCP_LISTS - 1U));
             /*@ assert daq.at + daq.left <= PEN_XCP_ENTRIES; */
@@ -254,7 +254,7 @@ static void packet_of_static(uint32_t n, uint8_t code, uint32_t to, uint32_t ent
         daq.entry[k].size = Frama_C_unsigned_int_interval(0U, ROOM);
     }
     daq.busy = any;
-    daq.at = 0U; /* of no entry: it says nothing */
+    daq.at = 0U; /* without an entry it has no meaning */
     daq.left = 0U;
     seen = pen_xcp_static_receive(&xcp, &statics[0], in, n, out);
     unchanged();

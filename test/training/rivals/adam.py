@@ -39,7 +39,7 @@ SCALE = (0.03, 0.5), 1000.0  # of deflection [m] and its rate [m/s]; of forces [
 
 
 def weights(key: jax.Array) -> Tree:
-    """Of a network; its output is small at first."""
+    """Weights of a network; its output is small at first."""
     found = []
     for n, (i, o) in enumerate(itertools.pairwise(WIDTH)):
         key, one, two = jax.random.split(key, 3)
@@ -59,7 +59,7 @@ def network(net: Tree, x: jax.Array) -> jax.Array:
 
 
 def rates(known: dict[str, float], p: Tree, x: jax.Array, road: jax.Array) -> jax.Array:
-    """Of the states: places of body and wheel, speeds of both."""
+    """Rates of the states: places of body and wheel, speeds of both."""
     s, v = x[1] - x[0], x[3] - x[2]
     force = known["c"] * s + known["d"] * v + SCALE[1] * (network(p["spring"], s / SCALE[0][0]) + network(p["damper"], v / SCALE[0][1]))
     tyre = known["c_t"] * (x[1] - road[0]) + known["d_t"] * (x[3] - road[1])
@@ -106,7 +106,7 @@ def by_diffrax(known: dict[str, float]) -> Callable[[Tree, jax.Array], jax.Array
 def loss_of(
     simulate: Callable[[Tree, jax.Array], jax.Array], road: jax.Array, y: jax.Array, noise: jax.Array
 ) -> Callable[[Tree], jax.Array]:
-    """Mean square of what is left over the noise: 1 is the best there is."""
+    """Mean square of the residual over the noise: 1 is the best possible."""
     return lambda p: jnp.mean(((simulate(p, road) - y) / noise) ** 2)
 
 

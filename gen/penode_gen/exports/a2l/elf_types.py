@@ -122,7 +122,7 @@ class Program:
                         )
 
     def _address(self, unit: Any, die: Any) -> int | None:
-        """Of a static variable; None if it has none, or the linker has dropped it."""
+        """Address of a static variable; None if it has none, or the linker has dropped it."""
         location = die.attributes.get("DW_AT_location")
         if location is None or location.form not in ("DW_FORM_exprloc", "DW_FORM_block1", "DW_FORM_block"):
             return None
@@ -176,7 +176,7 @@ class Program:
 
     def pointed(self, place: Place, n: int = 0) -> Place | None:
         """
-        Element n of what a pointer of the program's file points to; None if it is NULL.
+        Element n of the array that a pointer in the program's file points to; None if it is NULL.
 
         Raises KeyError where it is no pointer to data.
         """

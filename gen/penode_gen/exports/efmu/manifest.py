@@ -33,7 +33,7 @@ class Representation:
 
     @property
     def checksum(self) -> str:
-        """Of the manifest."""
+        """Checksum of the manifest."""
         return sha1(self.manifest)
 
 
@@ -49,7 +49,7 @@ def identifier(model: Model, *of: str) -> str:
 
 
 def time_stamp() -> str:
-    """Of SOURCE_DATE_EPOCH, else a fixed one. Raises ExportError where that is no time."""
+    """Time of SOURCE_DATE_EPOCH, or a fixed one without it. Raises ExportError where that is no time."""
     given = os.environ.get("SOURCE_DATE_EPOCH", str(_FIRST))
     try:
         return datetime.fromtimestamp(int(given), UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -58,7 +58,7 @@ def time_stamp() -> str:
 
 
 def shared(model: Model, dialect: str) -> dict[str, Any]:
-    """What every template sees."""
+    """The context of every template."""
     return {"model": model, "version": VERSION, "time": time_stamp(), "dialect": dialect, "xsd": list(DIALECTS[dialect].values())}
 
 

@@ -10,7 +10,7 @@ from ...model import Model
 from ...networks import Affine, Dense, Network
 from . import galec_text as text
 
-# Of the sum p[i] of a neuron. ReLU is as in the C: max(p, 0.0) may turn NaN into 0. Adding 0 p keeps NaN and turns Inf into it.
+# Activations of the sum p[i] of a neuron. ReLU is as in the C: max(p, 0.0) may turn NaN into 0. Adding 0 p keeps NaN and turns Inf into it.
 _ACTIVATIONS = {
     "relu": "0.5 * ({0} + absolute({0}))",
     "tanh": "tanh({0})",

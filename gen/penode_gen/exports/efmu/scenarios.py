@@ -40,7 +40,7 @@ class Scenario:
     at: int = 0
 
     def table(self, model: Model) -> str:
-        """The CSV: time, inputs, outputs, and a column for each element of what is tuned."""
+        """The CSV: time, inputs, outputs, and a column for each tuned element."""
         signals = [*(i.name for i in model.inputs), *(o.name for o in model.outputs)]
         rows = [",".join([time_column(signals), *signals, *(c for v, _, _ in self.tuned for c in columns(v))])]
         tails = [

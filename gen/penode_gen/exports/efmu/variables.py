@@ -59,7 +59,7 @@ class Variable:
 
     @property
     def count(self) -> int:
-        """Of its elements."""
+        """Number of its elements."""
         return prod(self.shape)
 
     @property
@@ -74,7 +74,7 @@ class Variable:
 
     @property
     def unit_id(self) -> str:
-        """Of the manifest's list of units."""
+        """Its unit in the manifest's list of units."""
         return unit_id(self.unit)
 
     @property
@@ -84,7 +84,7 @@ class Variable:
 
     @property
     def member(self) -> str:
-        """Of the structure of the Production Code; no name of a model file ends in _."""
+        """Its member in the structure of the Production Code; no name of a model file ends in _."""
         found = re.sub(r"\W+", "_", self.label).strip("_")
         return f"{found}_" if found in _MEMBERS else found
 

@@ -65,7 +65,7 @@ def token(model: Model, options: Options) -> str:
 
 
 def context(model: Model, options: Options, fmi: int) -> dict[str, Any]:
-    """What the templates see."""
+    """The context of the templates."""
     found = fv.variables(model, dtype(options))
     groups = fv.groups(found)
     arrays, block = [], 0
@@ -191,7 +191,7 @@ def binaries(texts: dict[str, str], name: str, fmi: int, debug: bool = False) ->
 
 
 def notes(options: Options) -> list[str]:
-    """The binaries that are missing for want of a compiler, a line each; none where they are not wanted."""
+    """A line for each binary that is missing because there is no compiler; none if binaries were not requested."""
     if options.get("source_only"):
         return []
     return [
@@ -211,5 +211,5 @@ def documentation(context: dict[str, Any], platforms: list[str]) -> dict[str, st
 
 
 def suffix(target: str) -> str:
-    """Of the shared library of a platform."""
+    """Suffix of a shared library on a platform."""
     return _COMPILERS[target][1]

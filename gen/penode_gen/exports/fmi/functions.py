@@ -142,7 +142,7 @@ class Function:
 
     @property
     def names(self) -> list[str]:
-        """Of the parameters."""
+        """Names of the parameters."""
         return [] if self.text == "void" else [re.findall(r"\w+", part)[-1] for part in self.text.split(",")]
 
     @property

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What to do next, from what a diagnosis says: tell rivals apart, take the model over or not, record what is lacking."""
+"""Advice on the next step after a diagnosis: separate rivals, adopt the model or not, record missing data."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def likely(d: Diagnosis) -> list[Mapping[str, Any]]:
 
 @dataclass(frozen=True)
 class Doubt:
-    """A cause that the data do not tell from others, each with its posterior where one is known, and what would tell them apart."""
+    """A cause that the data do not separate from others, each with its posterior if known, and an experiment that would."""
 
     cause: Cause
     others: tuple[tuple[Named, float | None], ...]
@@ -43,7 +43,7 @@ class Doubt:
 
 
 def doubts(d: Diagnosis, model: Model | None = None) -> list[Doubt]:
-    """Of the named causes those that may as well be others: not what explanations with little posterior have in their place. `model`: the
+    """Named causes with alternatives that the recordings do not rule out; explanations with little posterior are ignored. `model`: the
     plant that the experiments are for."""
     found = []
     for c in d.causes:
@@ -118,7 +118,7 @@ def _experiment(d: Diagnosis, model: Model | None) -> list[str]:
 
 
 def _take_over(d: Diagnosis) -> list[str]:
-    """Mend what is not the model's, and take over what is."""
+    """Advice to correct channels and sensors, and to adopt the changes of the model."""
     mixes = [c for c in d.causes if c.kind in channels.KINDS]
     faults = [c for c in d.causes if c.kind.startswith("sensor_") and c not in mixes]
     doubtful = [(c, a.where) for c in faults for a in c.alternatives if a.kind.startswith("input_")]

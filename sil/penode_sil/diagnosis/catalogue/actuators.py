@@ -56,7 +56,7 @@ class Value:
 class Actuator:
     """A kind of actuator. `output(u, values, step)`: its output [runs, n] for the recorded input u [runs, n] and a value for each run
     [runs]; `fitted`: how its value is fitted, and `tried`: values that a score test compares, where the effect is not proportional to
-    it; `size`: name and unit of what a report gives ("": the unit of the input, "/s" behind it), and `shown` that for a value; `law` of
+    it; `size`: name and unit in a report ("": the unit of the input, "/s" behind it), and `shown` that for a value; `law` of
     [actuators] that does the same, empty if there is none, and its `entry` for a value; `order` of actuators in series, as in the model
     file."""
 

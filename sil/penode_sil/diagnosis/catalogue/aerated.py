@@ -10,7 +10,7 @@ from ..plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("aerated_damper",)
-MEANING = {"aerated_damper": "After each reversal no damping force acts over a part of the travel, as where gas is in the oil of a damper."}
+MEANING = {"aerated_damper": "After each reversal no damping force acts over a part of the travel, as in a damper with gas in its oil."}
 PARAMETERS = {  # what each number of a report means
     "aerated_damper": {"pocket": "travel from one end of the gas to the other, at the RMS rate"}
 }

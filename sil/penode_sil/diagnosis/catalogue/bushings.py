@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Rubber: a spring behind a damper, beside what is there."""
+"""Rubber: a spring in series with a damper, parallel to the elements of the model."""
 
 from collections.abc import Iterable
 

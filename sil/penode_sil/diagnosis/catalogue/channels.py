@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Channels that are not what they are called: their sign is the other one, or two of them are exchanged. `checks` finds them."""
+"""Channels with the opposite sign, or two that are exchanged. `checks` finds them."""
 
 KINDS = ("input_sign", "sensor_sign", "swapped_channels")
 MEANING = {

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Inputs that are not what drove the plant, and sensors that do not show what it does."""
+"""Inputs that differ from the excitation of the plant, and sensors that differ from its motion."""
 
 from collections.abc import Iterable
 
@@ -18,7 +18,7 @@ KINDS = (*INPUTS, "sensor_scale", "sensor_delay")
 MEANING = {
     "input_gain": "The input that drives the plant is larger, or smaller, than its recording by a factor.",
     "input_offset": "A constant acts on top of the recorded input.",
-    "input_delay": "The input acts later than the recording says.",
+    "input_delay": "The input acts later than recorded.",
     "input_lag": "The input acts with a lag: an actuator that the model does not have.",
     "input_hold": "The input acts in steps: its controller is slower than the recorder and holds the value in between.",
     "input_dead_zone": "Inputs below a width have no effect; of larger ones the part beyond it drives the plant.",
@@ -44,7 +44,18 @@ RIVALS = {
     ): "weigh a body, or measure the force of the actuator: motion alone shows only ratios of force to mass",
 }
 
-
+PARAMETERS = {
+    "input_gain": {"gain": "acting over recorded input"},
+    "input_offset": {"offset": "acting minus recorded input"},
+    "input_delay": {"delay": "from the recording to the effect"},
+    "input_lag": {"lag": "time constant of a first-order lag"},
+    "input_hold": {"period": "time between two steps of the input"},
+    "input_dead_zone": {"width": "magnitude below which the input has no effect"},
+    "input_saturation": {"limit": "largest magnitude of the acting input"},
+    "input_slew_limit": {"rate": "largest rate of the acting input"},
+    "sensor_scale": {"scale": "reading over true value"},
+    "sensor_delay": {"delay": "from the motion to the reading"},
+}
 ALIKE = {"input_delay": "sensor_delay", "sensor_delay": "input_delay", "input_gain": "sensor_scale", "sensor_scale": "input_gain"}
 ALIKE |= {"input_sign": "sensor_sign", "sensor_sign": "input_sign"}
 
@@ -77,7 +88,7 @@ def bent(model: Model, index: int, drive: Drive) -> Iterable[Form]:
 
 
 def sensors(model: Model, count: int) -> Iterable[Form]:
-    """Forms of the first `count` sensors: what physics cannot do in any place."""
+    """Forms of the first `count` sensors: effects that no force in any place has."""
     for j, s in enumerate(model.sensors[:count]):
         yield Form("sensor_scale", s.name, "scale", j)
         if count > 1 or model.inputs:  # there is something to be late against
@@ -85,7 +96,7 @@ def sensors(model: Model, count: int) -> Iterable[Form]:
 
 
 def plain(model: Model, sensor: str, time: Array, z: Array) -> dict[str, Array]:
-    """Of each thing that an extended model says is wrong with a sensor, by kind: what the sensor would show [n] without it at `time` [n], z
+    """By kind of sensor fault in an extended model: the signal [n] of the sensor without that fault at `time` [n], z
     [n] being what it shows."""
     bias, gain, delay = (model.parameters.get(f"{key}_{sensor}") for key in ("bias", "gain", "delay"))
     found = {"sensor_bias": z - bias.value} if bias else {}

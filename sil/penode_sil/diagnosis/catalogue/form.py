@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What a kind of cause is made of: forms, each a sum of laws at one place, an input or a sensor that is not what it seems."""
+"""Forms of causes: each is a sum of laws at one place, or a fault of an input or a sensor."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ class Motion:
 
     @property
     def rates(self) -> Array:
-        """Of all recordings [n]."""
+        """Rates in all recordings [n]."""
         return np.concatenate([p.v for p in self.parts])
 
     @property
     def longest(self) -> float:
-        """Of the recordings [s]."""
+        """Length of the longest recording [s]."""
         return float(max(p.t[-1] for p in self.parts))
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Dry friction: of Coulomb, with a constant force beside it or a peak at low rates, with memory of the way, other at each place or load."""
+"""Dry friction: of Coulomb, with a constant force beside it or a peak at low rates, with memory of the travel, by position or by load."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -22,7 +22,7 @@ MEANING = {
     "coulomb_friction": "Friction: a force against the motion that hardly depends on the rate.",
     "stribeck_friction": "Friction that is larger at the lowest rates than at higher ones; it makes the element stick.",
     "bouc_wen": "Hysteresis: the force depends on the travel since the last reversal, elastic at first, then yielding.",
-    "position_dependent_friction": "Friction that is larger at one end of the travel than at the other, or at both than between.",
+    "position_dependent_friction": "Friction that depends on the position: larger at one end of the travel, or at both ends.",
     "load_dependent_friction": "Friction that grows with the force that a bearing, a guide or a gear transmits.",
 }
 PARAMETERS = {  # what each number of a report means

@@ -13,7 +13,7 @@ from ..plant import Place
 from .form import Form, Motion, Moved, Part, Sizes
 
 KINDS = ("hidden_resonance",)
-MEANING = {"hidden_resonance": "A mass on a spring of its own that the model does not have."}
+MEANING = {"hidden_resonance": "A mass on a spring, attached to a body, that the model does not have."}
 PARAMETERS = {  # what each number of a report means
     "hidden_resonance": {
         "mass": "of the hidden body",

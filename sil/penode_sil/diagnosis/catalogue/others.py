@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Causes without a law: what parameters, sensors, networks and numerics are off by. Other rooms find them."""
+"""Causes without a law: of parameters, sensors, networks and numerics. Other modules find them."""
 
 from collections.abc import Sequence
 
@@ -12,18 +12,23 @@ MEANING = {
     "sensor_bias": "The sensor reads a constant or slowly drifting amount too much.",
     "sensor_clipping": "The sensor is cut off beyond a limit.",
     "sensor_dropout": "The sensor lost samples.",
-    "network_extrapolation": "A network is used outside of what it was trained on.",
+    "network_extrapolation": "A network is used outside of the range that it was trained on.",
     "integration_error": "The physics is right; the deployed step integrates it too coarsely.",
     "outside_taxonomy": "A residual remains that is not noise and that no known kind explains.",
 }
 DRIFTING = ("sensor_bias",)  # constant, or of any slow course: it has no form
 PARAMETERS = {  # what each number of a report means
-    "wrong_parameter": {"its name": "value in the recordings, in its own unit"},
-    "differs_between_recordings": {"its name": "a value for each recording, in its own unit"},
-    "sensor_bias": {"bias": "added to the signal, in the sensor's unit"},
-    "sensor_clipping": {"limit": "largest magnitude, in the sensor's unit"},
-    "sensor_dropout": {"share": "of the samples that are lost"},
-    "integration_error": {"rms_error_SENSOR": "of each sensor that the step misses"},
+    "wrong_parameter": {"its name": "value in the recordings"},
+    "differs_between_recordings": {"its name": "a value for each recording"},
+    "sensor_bias": {"bias": "added to the signal"},
+    "sensor_clipping": {"limit": "largest magnitude"},
+    "sensor_dropout": {"share": "share of the samples that are lost"},
+    "integration_error": {"rms_error_SENSOR": "error of the step, for each sensor that it affects"},
+}
+UNITS = {  # of these parameters, where it is not that of the signal
+    "wrong_parameter": {"its name": "its own"},
+    "differs_between_recordings": {"its name": "its own"},
+    "sensor_dropout": {"share": "1"},
 }
 _CLIPPING, _DROPOUT = "sensor_clipping", "sensor_dropout"
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What is diagnosed, and where a search for causes has ended: what its answer is checked with."""
+"""The input of a diagnosis, and the end of a search for causes, for the checks of its answer."""
 
 from __future__ import annotations
 

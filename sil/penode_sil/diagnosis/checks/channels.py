@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Before a search: is the sign of a channel the other one, or are two alike exchanged? What is found is mended in the model, for the search
+"""Before a search: is the sign of a channel the other one, or are two alike exchanged? A finding is corrected in the model, for the search
 to go on with, and is the first cause of its answer."""
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Mix:
 
 
 def mixed(model: Model, experiments: Sequence[Experiment], set_name: str) -> list[Mix]:
-    """What is wrong with channels, nothing where the model follows all of them as they are: each explains most of what is missed, and no
+    """What is wrong with channels, nothing where the model follows all of them as they are: each explains most of the misfit, and no
     values of parameters explain as much."""
     metrics = [_metric(model, e) for e in experiments]
     found: list[Mix] = []
@@ -98,7 +98,7 @@ def _all(model: Model, experiments: Sequence[Experiment]) -> list[Mix]:
 
 
 def _explains(m: Mix, before: Array, after: Array) -> bool:
-    """Does it leave less than half of the power of each sensor that it is about, and a quarter of what was missed there? An input is about
+    """Does it leave less than half of the power of each sensor that it is about, and a quarter of the misfit there? An input is about
     all sensors: a quarter of the misfit of the sensor that shows it most, and no larger misfit of any."""
     own = np.isfinite(before) if m.driving else np.isin(np.arange(len(before)), m.numbers)
     before, after = before[own] + LITTLE * LITTLE, after[own] + LITTLE * LITTLE
@@ -108,13 +108,13 @@ def _explains(m: Mix, before: Array, after: Array) -> bool:
 
 
 def _metric(model: Model, e: Experiment) -> object:
-    """Equal weight of all samples, in parts of what each sensor shows."""
+    """Equal weight of all samples, relative to the signal of each sensor."""
     power = np.array([max(LITTLE * LITTLE * _power(e, j), 1e-300) for j in range(len(model.sensors))])
     return metric(e, np.tile(power, (e.band, 1)), np.zeros((e.band, len(power), len(model.inputs))))
 
 
 def _power(e: Experiment, j: int) -> float:
-    """Of a sensor about its mean; 1 of one that does not move."""
+    """Power of a sensor about its mean; 1 if it is constant."""
     y = e.y[e.good[:, j], j]
     return float(np.var(y)) or 1.0 if y.size else 1.0
 

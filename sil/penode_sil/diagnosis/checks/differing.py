@@ -128,7 +128,7 @@ def _sets(study: Study) -> dict[str, str]:
 
 
 def _text(case: Case, best: Own, sets: dict[str, str]) -> str:
-    """The model file with what was fitted in common, and a set for each recording."""
+    """The model file with the common fitted parameters, and a set for each recording."""
     model, p = case.model, case.model.parameters[best.name]
     per = units.factor(p.unit)
     lines = [*heading(model, KIND, best.name), f"{best.name} = {table(entry(p, p.value) | {'tunable': True})}"]

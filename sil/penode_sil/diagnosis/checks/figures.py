@@ -192,7 +192,7 @@ def with_figures(case: Case, end: End, table: Table) -> tuple[Diagnosis, list[Ch
 
 
 def _gain(table: Table, name: str, g: Gain) -> Gain:
-    """The gain of a sensor by what `penode simulate` gives on the hold-out."""
+    """The gain of a sensor by the errors of `penode simulate` on the hold-out."""
     own = [r for r in table.of("hold-out") if r.figure.signal == name]
     if not own:
         return g

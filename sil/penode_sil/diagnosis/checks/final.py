@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The final check: the written model is read back and simulated as a user would do it, and what the rules do not allow is withdrawn."""
+"""The final check: the written model is read back and simulated as a user would do it, and results that break a rule are withdrawn."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class Rule:
 
 
 def neutral(case: Case, end: End, table: Table) -> list[tuple[Cause, str]]:
-    """Causes whose interval holds what has no effect: 0, 1 of a scale, the nominal value of a parameter."""
+    """Causes whose interval includes the value without effect: 0, 1 of a scale, the nominal value of a parameter."""
     nominal = {p.name: p.value for p in case.model.parameters.values()}
     return [(c, MAY_BE_NOTHING) for c in _named(end) if c.neutral(nominal)]
 
@@ -54,7 +54,7 @@ def larger(case: Case, end: End, table: Table) -> list[tuple[Cause, str]]:
         forces = {k: v.value for k, v in c.parameters.items() if own is not None and v.unit == own.unit("N")}
         if own is not None and (too := [x for x in forces.values() if abs(x) > float(np.max(np.abs(own.measured)))]):
             most = number(float(f"{np.max(np.abs(own.measured)):.3g}"))
-            found.append((c, f"would have {too[0]:.3g} {own.unit('N')}, and no more than {most} is measured there; {NOT_NAMED}"))
+            found.append((c, f"would have {too[0]:.3g} {own.unit('N')}, but no more than {most} is measured there; {NOT_NAMED}"))
     return found
 
 
@@ -66,7 +66,7 @@ def unturned(case: Case, end: End, table: Table) -> list[tuple[Cause, str]]:
         if c.kind in catalogue.REVERSING and at and end.study.seen:
             rates = np.concatenate([seen.motions[at[0]].v for seen in end.study.seen])
             if not turns(rates):
-                found.append((c, f"is about reversals, and the rate there keeps its sign; {NOT_NAMED}"))
+                found.append((c, f"acts at reversals, but the rate there does not change its sign; {NOT_NAMED}"))
     return found
 
 
@@ -124,7 +124,7 @@ def mended(case: Case, end: End, table: Table) -> list[str]:
 
 
 def _missed(table: Table) -> list[Row]:
-    """Of which the nominal model is off by more than noise, as it is and refitted."""
+    """Rows in which the error of the nominal model exceeds the noise, as it is and refitted."""
     return [r for r in table.rows if all(r.sensor in misses([r], model, table.noise) for model in NOMINAL)]
 
 
@@ -147,8 +147,8 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
         return by_values(case, replace(end, answer=d), table, found)
     if end.answer.verdict == "unexplained":
         return end
-    off = f"the model misses {', '.join(sensors)} by more than noise, {EXTENDED} by less"
-    note = f"{off}: neither the small causes in it nor other values of its parameters explain that"
+    off = f"the error of the model at {', '.join(sensors)} exceeds the noise, that of {EXTENDED} is smaller"
+    note = f"{off}: neither its small causes nor other parameter values explain that"
     unsure = (Cause(OUTSIDE, "", {}, 0.5),)
     return replace(end, answer=replace(d, verdict="unexplained", causes=unsure, explained=0.0, notes=(*d.notes, note)))
 

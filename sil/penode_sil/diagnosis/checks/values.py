@@ -32,7 +32,7 @@ from .written import heading
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Few:
-    """Parameters, and the fit in which they are free beside what the file states tolerances of."""
+    """Parameters, and the fit in which they are free beside the parameters with stated tolerances."""
 
     names: tuple[str, ...]
     fit: Fit
@@ -137,7 +137,7 @@ def _sizes(x: Few) -> list[float]:
 
 
 def posterior(found: Sequence[Few]) -> list[float]:
-    """How likely each of them is; what is not among them has the rest."""
+    """The probability of each of them; all others together have the rest."""
     likely = np.exp([0.5 * (found[0].fit.cost - x.fit.cost) for x in found])
     return [float(p) for p in RIGHT * likely / likely.sum()]
 

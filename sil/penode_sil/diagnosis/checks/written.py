@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The model file with what was learnt, as it is written and read back."""
+"""The extended model file, written and read back."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def write_extended(text: str, case: Case) -> Model:
 def heading(model: Model, kind: str, where: str) -> list[str]:
     """The first lines of a model file that extends another one by a cause, down to its parameters."""
     return [
-        f"# What the recordings taught about {model.path.name}: {kind} at {where}.",
+        f"# Extension of {model.path.name} from recordings: {kind} at {where}.",
         "",
         "[model]",
         extends(model.path.resolve()),

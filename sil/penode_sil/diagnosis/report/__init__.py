@@ -40,7 +40,7 @@ BUDGET = 60_000  # points of all lines over time together, so that the page stay
 
 
 def write(path: Path, model: Model, d: Diagnosis, extended: Path) -> None:
-    """The page for a diagnosis whose `shown` is there; `extended`: the model file with what was learnt."""
+    """The page for a diagnosis that has `shown`; `extended`: the extended model file."""
     text = render(model, d, extended)
     with whole(path) as part:
         part.write_text(text, encoding="utf-8")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What an extended model changes in the nominal file, and what it costs on a controller."""
+"""Changes of the nominal file by an extended model, and its cost on a controller."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _entries(text: str) -> dict[tuple[str, str], str]:
 
 
 def price(model: Model, extended: Path) -> list[tuple[str, int, int]]:
-    """Bytes of the C on a Cortex-M4F, nominal and extended: of what, and how many; nothing without a compiler."""
+    """Sizes of the C on a Cortex-M4F: name, bytes of the nominal and of the extended model; empty without a compiler."""
     if not shutil.which("arm-none-eabi-gcc") or not shutil.which("arm-none-eabi-size"):
         return []
     try:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Of each place with elements: pictures of the force there over deflection and rate, as measured, nominal and extended."""
+"""Figures of the force at each place with elements over deflection and rate: measured, nominal and extended."""
 
 from __future__ import annotations
 

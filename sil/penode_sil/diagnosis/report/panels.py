@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Of each sensor in each recording: its numbers, and pictures of its residual over time, over frequency, and against inputs and noise."""
+"""Numbers of each sensor in each recording, and figures of its residual over time, over frequency, and against inputs and noise."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def over_time(c: Channel, points: int) -> Figure:
         marks.insert(0, fig.spans("beyond", time, c.beyond, x, "outside of the trained range"))
     marks += [fig.line(name, time, v, x, y, name, points) for name, v in values.items()]
     before, *after = (value(float(f"{c.level(r) / c.noise:.3g}")) for _, r in _both(c))
-    says = f"A right model stays within the grey band. This one errs by {before} × the noise{bursts(c)}"
-    says += f"; with the extension by {after[0]} × the noise." if after else "."
+    says = f"The residual of a correct model stays within the grey band. Here it is {before} × the noise{bursts(c)}"
+    says += f"; with the extension {after[0]} × the noise." if after else "."
     return Figure("Residual over time", x, y, tuple(marks), says, f"time {c.recording}", "wide")
 
 
@@ -80,7 +80,7 @@ def spectrum(c: Channel) -> Figure:
     names = {"signal": "measured signal", "noise": "noise floor"}
     marks = [fig.line(name, c.f, factor * root, x, y, names.get(name, name)) for name, root in roots.items()]
     found = half_between(c)
-    says = f"The dashed line is what the noise leaves. {found}." if found else "The residual is no larger than the noise (dashed)."
+    says = f"The dashed line is the noise. {found}." if found else "The residual is no larger than the noise (dashed)."
     return Figure("Spectrum of the residual", x, y, tuple(marks), says, f"frequency {c.sensor} {c.recording}")
 
 
@@ -94,8 +94,8 @@ def linear(c: Channel) -> Figure:
     marks = [fig.band("noise", 0.0, c.limit, y, "chance, 95 %")]
     marks += [fig.line(name, c.f, r.coherence, x, y, name) for name, r in _both(c)]
     share = linear_share(c, c.before)
-    hints = ("friction, play or a bent curve does that, or something that no input causes", "a parameter, a gain or a delay does that")
-    says = f"{percent(share)} of the residual's power before is a linear function of the inputs: {hints[round(share)]}."
+    hints = ("typical of friction, play or a curved law, or of a cause outside the inputs", "typical of a parameter, a gain or a delay")
+    says = f"{percent(share)} of the power of the residual before is a linear function of the inputs, {hints[round(share)]}."
     return Figure("Coherence with the input", x, y, tuple(marks), says, f"frequency {c.sensor} {c.recording}")
 
 
@@ -106,9 +106,9 @@ def running(c: Channel) -> Figure:
     path = f"M0 {fig.HIGH - half}L{fig.WIDE} {-half}V{half}L0 {fig.HIGH + half}z"
     marks = [fig.Mark("area", "noise", path, "white, 95 %")]
     marks += [fig.line(name, c.bins, r.running, x, y, name, 400) for name, r in _both(c)]
-    stays = ("leaves it: not only noise", "stays inside: like noise")
-    found = [f"{name} it {stays[_white(r)]} (distance {r.white.distance:.3f}, {_chance(r.white.p_value)})" for name, r in _both(c)]
-    says = f"Noise alone runs inside the grey band; {'; '.join(found)}; limit {c.before.white.limit:.3f}."
+    stays = ("outside, not only noise", "inside, like noise")
+    found = [f"{name}: {stays[_white(r)]} (distance {r.white.distance:.3f}, {_chance(r.white.p_value)})" for name, r in _both(c)]
+    says = f"The curve of noise alone stays inside the grey band. {'; '.join(found).capitalize()}; limit {c.before.white.limit:.3f}."
     return Figure("Whiteness (running periodogram)", x, y, tuple(marks), says)
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Words and numbers of the report: the answer in a sentence, what matters most, what it costs."""
+"""Words and numbers of the report: the answer in a sentence, the key figures, the cost."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from .. import catalogue
 from ..advice import doubts
-from ..reliability import line
 from ..residual import Channel
 from ..result import OUTSIDE, Cause, Diagnosis, place, plain, sigmas
 from . import figure as fig
@@ -80,7 +79,7 @@ def known(d: Diagnosis) -> list[Cause]:
 
 def headline(d: Diagnosis) -> str:
     """The answer in one sentence; before it, whether to keep the nominal model."""
-    return f"{'Keep the nominal model: the one that was learnt predicts worse. ' * d.rejected}{_named(d)}"
+    return f"{'Keep the nominal model: the extended one predicts worse. ' * d.rejected}{_named(d)}"
 
 
 def _named(d: Diagnosis) -> str:
@@ -108,12 +107,12 @@ def lead(d: Diagnosis, train: Sequence[Channel]) -> list[str]:
     recordings, sensors = (f"{n} {word}{'s' * (n > 1)}" for n, word in counts)
     worst = train[0]
     times, share = worst.level(worst.before) / worst.noise, percent(worst.share)
-    found = [f"Learnt from {recordings} of {duration(sum(seconds.values()))} with {sensors}."]
+    found = [f"Fitted to {recordings} of {duration(sum(seconds.values()))} with {sensors}."]
     if d.verdict == "no_discrepancy":
         return [*found, f"The largest residual, of {worst.sensor}, is {times:.2f} × its noise, {share} of the signal."]
-    found.append(f"It errs most at {worst.sensor}: {times:.1f} × the noise, {share} of the signal, {where(worst)}.")
+    found.append(f"The error is largest at {worst.sensor}: {times:.1f} × the noise, {share} of the signal, {where(worst)}.")
     if worst.after is not None:
-        found.append(f"With the extended model that error is {worst.level(worst.after) / worst.noise:.2f} × the noise.")
+        found.append(f"With the extended model it is {worst.level(worst.after) / worst.noise:.2f} × the noise.")
     return [*found, *(because(c) for c in known(d))]
 
 
@@ -159,7 +158,7 @@ def key_figures(d: Diagnosis) -> list[tuple[str, str, str]]:
     if named := known(d):
         found.append(("Explained", percent(d.explained), "of the avoidable residual, in training"))
         least = min(c.confidence for c in named)
-        found.append(("Confidence", sure(least), f"against the next best answer. {sentence(line(d.reliability, least))}"))
+        found.append(("Confidence", sure(least), "against the next best answer"))
     return [*found, cost(d)]
 
 
