@@ -26,7 +26,7 @@ def main() -> int:
     options = parser.parse_args()
     good, figures = True, {"seconds": options.seconds}
     for name in ("layered", "folded"):
-        model = penode_gen.load(HERE / f"{name}.toml")
+        model = penode_gen.load(HERE / "models" / f"{name}.toml")
         for dtype, limit in LIMITS.items():
             with tempfile.TemporaryDirectory() as place:
                 found = independent.difference(model, dtype, 1000 * options.seconds, Path(place))

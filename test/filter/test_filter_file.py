@@ -22,7 +22,7 @@ from penode_sil.targets import MACHINES, PORT
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 QUARTER = ROOT / "sil" / "filter" / "quarter.toml"
-TEXT = (HERE / "layered.toml").read_text().replace("../../gen", str(ROOT / "gen"))
+TEXT = (HERE / "models" / "layered.toml").read_text().replace("../../../gen", str(ROOT / "gen"))
 
 
 def load(folder: Path, *changes: tuple[str, str], more: str = ""):
@@ -104,7 +104,7 @@ def test_a_model_without_a_filter_has_no_files_of_it() -> None:
 @pytest.mark.parametrize("double", [False, True])
 def test_the_c_gives_no_warning(tmp_path: Path, name: str, double: bool) -> None:
     """All that clang can say, but for its opinions on C99, padding, comments and plain arrays; and what gcc says strictly."""
-    penode_gen.generate(penode_gen.load(HERE / f"{name}.toml"), tmp_path, self_test=False)
+    penode_gen.generate(penode_gen.load(HERE / "models" / f"{name}.toml"), tmp_path, self_test=False)
     include = [f"-I{ROOT / part}" for part in ("inc", "port/gnu")]
     options = ["-std=c99", "-fsyntax-only", "-Werror", *include, *(["-DPEN_REAL_DOUBLE"] if double else [])]
     silent = [f"-Wno-{w}" for w in ("padded", "documentation", "declaration-after-statement", "unsafe-buffer-usage", "double-promotion")]

@@ -18,7 +18,7 @@ from penode_sil.building import FLAGS
 from penode_sil.targets import MACHINES, PORT
 
 WORK = gate.BUILD / "ekf-cost"
-MODELS = gate.ROOT / "test" / "filter"
+MODELS = gate.ROOT / "test" / "filter" / "models"
 HEADER = gate.ROOT / "inc" / "penode" / "pen_ekf.h"
 PAGE = gate.ROOT / "gen" / "README.md"
 METHODS = ("euler", "heun", "rk4")
@@ -49,7 +49,7 @@ def measured(model: str, method: str, level: str, header: Path = HEADER, machine
     """Least and most instructions by kind of sample; bytes of the filter, and of the model in it. SystemExit if one is not of its kind."""
     place = WORK / f"{model}-{method}"
     place.mkdir(parents=True, exist_ok=True)
-    text = (MODELS / f"{model}.toml").read_text().replace("../../gen", str(gate.ROOT / "gen"))
+    text = (MODELS / f"{model}.toml").read_text().replace("../../../gen", str(gate.ROOT / "gen"))
     name = re.search(r'name = "(\w+)"', text)[1]
     (place / "model.toml").write_text(text.replace(f'name = "{name}"', f'name = "{name}"\nmethod = "{method}"'))
     penode_gen.generate(penode_gen.load(place / "model.toml"), place, self_test=False)
