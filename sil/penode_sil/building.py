@@ -123,7 +123,7 @@ def build_library(model: Model, dtype: type = np.float32, compiler: Sequence[str
     source = source or generated(model)
     code, runtime = [source / f"{model.name}.c", source / f"{model.owner}_params.c"], sources_in(("src", "*.c"))
     shim = native("sil", "firmware", "sil.c")
-    code += [source / f"{model.name}_ekf.c"] if model.filter else []
+    code += [source / f"{name}.c" for name in dict.fromkeys((f"{model.name}_ekf", model.stepped)) if model.filter and name != model.name]
     code += [source / f"{model.name}_monitor.c"] if model.monitor else []
     options = [*compiler, *FLAGS, "-fPIC", *(["-DPEN_REAL_DOUBLE"] if dtype == np.float64 else []), *include("inc", "port/gnu")]
     read: list[Part] = [compiler_version(compiler[0]), *sources_in(("inc", "*.h"), ("port/gnu", "*.h"), ("sil/firmware", "*.h"))]

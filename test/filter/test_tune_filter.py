@@ -138,7 +138,8 @@ def test_what_is_wrong_is_one_line(guessed: tuple[Path, penode_gen.Model], tmp_p
     np.savetxt(tmp_path / "rec.csv", np.column_stack([rows, np.zeros(len(rows))]), "%.9g", ",", header=head, comments="")
     said = penode("tune-filter", tmp_path / "still.toml", "--data", tmp_path / "rec.csv", "-o", tmp_path / "o.toml", fails=True)
     assert said == (
-        f"penode: {tmp_path / 'still.toml'}: no state or input of [filter] has a noise above zero; give one to start from, or --sensors\n"
+        f"penode: {tmp_path / 'still.toml'}: no state, input or parameter of [filter] has a noise above zero; give one to start from, "
+        "or --sensors\n"
     )
     said = penode("tune-filter", NQVM, "--data", record, "-o", tmp_path / "o.toml", fails=True)
     assert "has no [filter]; add one" in said
@@ -152,7 +153,15 @@ def test_what_is_wrong_is_one_line(guessed: tuple[Path, penode_gen.Model], tmp_p
 @pytest.mark.skipif(not MEASURED.exists(), reason="the measured data are not beside the checkout")
 def test_measured_joint_held_out(tmp_path: Path, show: Callable[[str], None]) -> None:
     """Noises from the first 6 s of a measured joint fit the 4 s after them."""
-    words = ["tune-filter", HERE / "models" / "joint.toml", "--sensors", "--data", MEASURED / "train.csv", "--holdout", MEASURED / "test.csv"]
+    words = [
+        "tune-filter",
+        HERE / "models" / "joint.toml",
+        "--sensors",
+        "--data",
+        MEASURED / "train.csv",
+        "--holdout",
+        MEASURED / "test.csv",
+    ]
     found = json.loads(penode(*words, "-o", tmp_path / "tuned.toml", "--json"))
     before, after = (found["held_out"][part] for part in ("before", "after"))
     q = after["sensors"]["q"]
