@@ -18,6 +18,7 @@ from penode_gen.model import Model
 from penode_sil.filtering.compiled import Compiled
 
 HERE = Path(__file__).parent
+FLOAT = 1e-2  # of a standard deviation: what a filter in float may be off
 PIECE = 60_000  # samples at once
 ROUNDING = 16.0  # what three layers of sums of sixteen products may be off by, in units of the last place
 MEMORY = 100  # samples in which what was different once is forgotten
@@ -113,13 +114,15 @@ class Difference:
     """
     Of a generated filter: the largest of state [standard deviations] and of covariance [of their products]. In the memory of the filter
     after a step in which a kink of a network lies between the states of both, or within the rounding of either, where no derivative is
-    the right one: `at_kinks`, the largest of the state, and `share` of all samples.
+    the right one: `at_kinks`, the largest of the state, and `share` of all samples. `beyond`: share of the samples in which the state is
+    more than FLOAT off.
     """
 
     state: float = 0.0
     covariance: float = 0.0
     at_kinks: float = 0.0
     share: float = 0.0
+    beyond: float = 0.0
 
 
 def difference(model: Model, dtype: type, samples: int, place: Path, seed: int = 3) -> Difference:
@@ -138,4 +141,5 @@ def difference(model: Model, dtype: type, samples: int, place: Path, seed: int =
         found.state, found.covariance = max(found.state, state[~kinks].max()), max(found.covariance, covariance[~kinks].max())
         found.at_kinks = max(found.at_kinks, state[kinks].max(initial=0.0))
         found.share += float(kinks.sum()) / samples
+        found.beyond += float((state > FLOAT).sum()) / samples
     return found

@@ -17,7 +17,7 @@ import penode_gen
 from penode_sil.filtering.compiled import Compiled
 
 HERE = Path(__file__).parent
-DOUBLE, FLOAT = 1e-9, 1e-2  # of a standard deviation
+DOUBLE, FLOAT = 1e-9, independent.FLOAT  # of a standard deviation
 SHARE = 0.05  # of samples, at most, in 0.1 s after a kink between both or within the rounding of a float: 25 in a minute
 
 
