@@ -35,10 +35,9 @@ def problems(model: Model, given: Filter, causal: Causal) -> list[Problem]:
             found.append((where, "changes neither a rate nor a sensor of the filter", "remove it"))
         if p.least <= 0.0 <= p.most and _divides(causal, ex.symbol(p.name)):
             found.append((where, "the model divides by it, and its bounds reach 0", "give bounds of one sign"))
-        for name, chosen in model.sets.items():
-            value = chosen.parameters[p.name]
-            if not p.least < value < p.most:
-                found.append((where, f"its value in the set '{name}' is not inside of its bounds", "move a bound, or the value"))
+        outside = [f"'{name}'" for name, chosen in model.sets.items() if not p.least < chosen.parameters[p.name] < p.most]
+        if outside:
+            found.append((where, f"its value in {', '.join(outside)} of [sets] is not inside of its bounds", "move a bound, or the value"))
         for cause in model.monitor.causes if model.monitor else ():
             if p.name in cause.changes:
                 what = f"the filter follows its changes, and the cause '{cause.name}' of [monitor] would not be seen"

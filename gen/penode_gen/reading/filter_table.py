@@ -143,7 +143,7 @@ class FilterTables(ActuatorTables):
                 self.problem(where, f"'{key}' is missing", f"add {key} = ..., {meaning}")
         start, walk = (self.above_zero((*where, key), entry[key], scale) if key in entry else math.inf for key in needs)
         step, least = walk * math.sqrt(sample_time), ROUNDING * abs(given.value)
-        if step < least:
+        if 0.0 < step < least:
             shown = f"{least / math.sqrt(sample_time) / scale:.2g}"
             self.problem((*where, "walk"), f"{entry['walk']} is lost in the rounding of a float", f"give at least {shown}")
         low, high = self.bounds(where, entry, scale)
