@@ -154,8 +154,7 @@ def _hours() -> Iterator[tuple[str, str, bool]]:
                     f" (0.1 s after a kink of a network between both, or within a float's rounding: {kept[f'{name} share']} of the samples)"
                 )
             yield text, f"{value:.1e}", value <= most
-        if f"{name} beyond" in kept:
-            yield f"{name} in float: share of all samples in which it is further off", kept[f"{name} beyond"], True
+        yield f"{name} in float: share of all samples in which it is further off", kept[f"{name} beyond"], True
 
 
 def rows(runs: int, place: Path) -> Iterator[tuple[str, str, bool]]:
