@@ -216,6 +216,18 @@ class FilterInput:
 
 
 @dataclass(frozen=True)
+class FilterParameter:
+    """A tunable parameter as a state of the filter, SI: standard deviation at the start, and of what each sample adds; bounds. It starts
+    where the set that the filter starts with has it."""
+
+    name: str
+    start: float
+    step: float
+    least: float
+    most: float
+
+
+@dataclass(frozen=True)
 class FilterLimit:
     """A sum of the states of the filter that stays within bounds: coefficients by name (the largest is 1 or -1) and bounds."""
 
@@ -235,11 +247,12 @@ class Filter:
     states: tuple[FilterState, ...]  # all states of the model, in their order
     inputs: tuple[FilterInput, ...]
     limits: tuple[FilterLimit, ...]
+    parameters: tuple[FilterParameter, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of its states."""
-        return (*(s.name for s in self.states), *(i.name for i in self.inputs))
+        return (*(s.name for s in self.states), *(i.name for i in self.inputs), *(p.name for p in self.parameters))
 
 
 @dataclass(frozen=True)
@@ -298,6 +311,11 @@ class Model:
     def owner(self) -> str:
         """The model that the sets are named after: several methods of one model share them."""
         return self.set_owner or self.name
+
+    @property
+    def stepped(self) -> str:
+        """The model that the filter steps: if it estimates parameters, one in which they are inputs (algebra/augmented.py)."""
+        return f"{self.name}_augmented" if self.filter and self.filter.parameters else self.name
 
     def fits(self, step: float) -> bool:
         """Are its delays and holds whole numbers of steps [s]?"""

@@ -95,9 +95,10 @@ def filter_options(model: Model) -> list[str]:
 
 
 def code_of(model: Model, source: Path) -> list[Path]:
-    """The C of a model in a folder: step, sets, filter, monitor."""
-    parts = [*(["_ekf"] if model.filter else []), *(["_monitor"] if model.monitor else [])]
-    return [source / f"{model.name}.c", source / f"{model.owner}_params.c", *(source / f"{model.name}{part}.c" for part in parts)]
+    """The C of a model in a folder: step, sets, filter with the model that it steps, monitor."""
+    names = [model.name, f"{model.owner}_params", *([f"{model.name}_ekf", model.stepped] if model.filter else [])]
+    names += [f"{model.name}_monitor"] if model.monitor else []
+    return [source / f"{name}.c" for name in dict.fromkeys(names)]
 
 
 def missing_tool(name: str) -> ToolMissing:

@@ -29,7 +29,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 PLACE = ROOT / "build" / "bench" / "filters"
 KEPT, TABLE = HERE / "bench.json", HERE / "table.md"
-MODEL = ROOT / "test" / "filter" / "cost.toml"
+MODEL = ROOT / "test" / "filter" / "models" / "cost.toml"
 LEVELS = ("-Os", "-O2", "-O3")
 SHARE = 0.02  # of a figure
 CLOSE = 1e-2  # how far states [standard deviations] and variances [of them] may be from ours: rounding
@@ -45,9 +45,9 @@ Figures = dict[str, Any]
 
 
 def generated() -> Path:
-    """The C of the model, as test/filter/cost.toml has it, with Runge-Kutta of order 4."""
+    """The C of the model, as test/filter/models/cost.toml has it, with Runge-Kutta of order 4."""
     PLACE.mkdir(parents=True, exist_ok=True)
-    text = MODEL.read_text().replace("../../gen", str(ROOT / "gen"))
+    text = MODEL.read_text().replace("../../../gen", str(ROOT / "gen"))
     (PLACE / "model.toml").write_text(text.replace('name = "costly"', 'name = "costly"\nmethod = "rk4"'))
     penode_gen.generate(penode_gen.load(PLACE / "model.toml"), PLACE, self_test=False)
     return PLACE

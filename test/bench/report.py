@@ -229,7 +229,7 @@ def written(figures: Figures) -> str:
 
 
 FILTERS = """\
-An update of an extended Kalman filter, made by `make bench-filters`: four states, two measurements, `test/filter/cost.toml`
+An update of an extended Kalman filter, made by `make bench-filters`: four states, two measurements, `test/filter/models/cost.toml`
 with RK4 and folded networks, float. All call the same functions of the model and its derivatives, which the last row has
 alone; after 400 samples all agree within 1 % of a standard deviation. Only ours has gates, counters, measurements that are
 missing, refused or not offered, finite checks, and the last good state to return to. The forms with whole matrices

@@ -15,7 +15,7 @@
 #define WIDTH 64
 #define H     1e-3
 
-static const double M_B = 350.0, M_W = 90.0, C = 10000.0, D = 800.0, C_T = 300000.0;
+static const double NOMINAL = 350.0, M_W = 90.0, C = 10000.0, D = 800.0, C_T = 300000.0;
 
 /* Networks of one input, as numbers: shift and factor of the input, layers, of each n_in, n_out, 1 for ReLU, weights, biases;
  * then factor and shift of the output. */
@@ -34,8 +34,11 @@ typedef struct {
     double running; /* 0 before the first sample */
 } filter_t;
 
+static double m_b = 350.0; /* NOMINAL but while a vehicle of another mass drives */
 static double slopes[16]; /* of all networks evaluated since `seen` was 0 */
 static int seen;
+static double rounding;       /* of the arithmetic that is compared with this one, relative */
+static unsigned char touched; /* 1: a neuron came so near to its kink since it was 0 */
 
 static double network(const double *at, double input, double *slope)
 {
@@ -56,12 +59,15 @@ static double network(const double *at, double input, double *slope)
         for (int i = 0; i < n_out; i++) {
             double v = 0.0;
             double t = 0.0;
+            double size = fabs(b[i]);
             for (int k = 0; k < n_in; k++) {
                 v += value[k] * w[(i * n_in) + k];
+                size += fabs(value[k] * w[(i * n_in) + k]);
                 t += tangent[k] * w[(i * n_in) + k];
             }
             v += b[i];
             const int off = (at[2] > 0.0) && !(v > 0.0);
+            touched |= ((at[2] > 0.0) && (fabs(v) < (rounding * size))) ? 1 : 0;
             new_value[i] = off ? 0.0 : v;
             new_tangent[i] = off ? 0.0 : t;
         }
@@ -88,12 +94,12 @@ static void rates(const nets_t *nets, const double x[X], double u, double dx[X],
 
     dx[0] = x[2];
     dx[1] = x[3];
-    dx[2] = -force / M_B;
+    dx[2] = -force / m_b;
     dx[3] = (force - (C_T * (x[1] - u))) / M_W;
     for (int j = 0; j < X; j++) {
         fx[0][j] = (j == 2) ? 1.0 : 0.0;
         fx[1][j] = (j == 3) ? 1.0 : 0.0;
-        fx[2][j] = -row[j] / M_B;
+        fx[2][j] = -row[j] / m_b;
         fx[3][j] = row[j] / M_W;
         fu[j] = (j == 3) ? (C_T / M_W) : 0.0;
     }
@@ -141,9 +147,10 @@ static void step(const nets_t *nets, double x[X], double before, double now, dou
     }
 }
 
-/* Samples of the vehicle from x on: `drawn` [n][N] is added to states and road, `noise` [n][Z] to what is measured. */
-void reference_drive(const nets_t *nets, double decay, size_t n, double x[N], const double drawn[][N], const double noise[][Z],
-                     double truth[][N], double z[][Z])
+/* Samples of the vehicle from x on: `drawn` [n][N] is added to states and road, `noise` [n][Z] to what is measured; body mass [n].
+ * The first one of all, if not `begun`, is at x. */
+void reference_drive(const nets_t *nets, double decay, int begun, size_t n, double x[N], const double drawn[][N], const double noise[][Z],
+                     const double mass[], double truth[][N], double z[][Z])
 {
     for (size_t k = 0; k < n; k++) {
         double d[X][X + 2];
@@ -151,10 +158,15 @@ void reference_drive(const nets_t *nets, double decay, size_t n, double x[N], co
         double fx[X][X];
         double fu[X];
         const double now = (decay * x[X]) + drawn[k][X];
-        step(nets, x, x[X], now, d);
-        x[X] = now;
+        m_b = mass[k];
+        if ((begun != 0) || (k > 0U)) {
+            step(nets, x, x[X], now, d);
+            x[X] = now;
+            for (int i = 0; i < X; i++) {
+                x[i] += drawn[k][i];
+            }
+        }
         for (int i = 0; i < N; i++) {
-            x[i] += (i < X) ? drawn[k][i] : 0.0;
             truth[k][i] = x[i];
         }
         rates(nets, x, x[X], dx, fx, fu);
@@ -162,6 +174,7 @@ void reference_drive(const nets_t *nets, double decay, size_t n, double x[N], co
             z[k][i] = dx[2 + i] + noise[k][i];
         }
     }
+    m_b = NOMINAL;
 }
 
 static void predict(filter_t *self)
@@ -221,19 +234,23 @@ static void slopes_of(const nets_t *nets, double decay, const double from[N], do
     }
 }
 
-/* Does a kink of a network lie between the steps from two states? By n states each; the derivatives of the next sample differ. */
-void reference_kinks(const nets_t *nets, double decay, size_t n, const double a[][N], const double b[][N], unsigned char between[])
+/* Does a kink of a network lie between the steps from two states, or as near as rounding? By n states each. */
+void reference_kinks(const nets_t *nets, double decay, double within, size_t n, const double a[][N], const double b[][N],
+                     unsigned char between[])
 {
+    rounding = within;
     for (size_t k = 0; k < n; k++) {
         double left[10];
         double right[10];
+        touched = 0;
         slopes_of(nets, decay, a[k], left);
         slopes_of(nets, decay, b[k], right);
-        between[k] = 0;
+        between[k] = touched;
         for (int i = 0; i < 10; i++) {
             between[k] |= (fabs(left[i] - right[i]) > (1e-6 * (fabs(left[i]) + fabs(right[i])))) ? 1 : 0;
         }
     }
+    rounding = 0.0;
 }
 
 /* Joseph's form: P = (1 - k h') P (1 - k h')' + r k k'. */

@@ -65,7 +65,7 @@ def constants(model: Model) -> str:
 
 def build(folder: Path) -> Path:
     """The program."""
-    model = penode_gen.load(HERE / "monitored.toml")
+    model = penode_gen.load(HERE / "models" / "monitored.toml")
     model_c.generate(model, folder, self_test=False)
     (folder / "nets.h").write_text(constants(model))
     code = [folder / f"monitored{end}.c" for end in ("", "_ekf", "_monitor", "_params")]
@@ -141,7 +141,7 @@ def main() -> int:
     parser.add_argument("--page", type=Path, default=HERE / "MONITOR.md")
     asked = parser.parse_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
-    program, monitor = build(asked.folder), penode_gen.load(HERE / "monitored.toml").monitor
+    program, monitor = build(asked.folder), penode_gen.load(HERE / "models" / "monitored.toml").monitor
     assert monitor is not None
     delays, alarms = with_friction(program, asked.runs, asked.jobs, asked.force), without(program, asked.hours, asked.jobs)
     text = page(delays, alarms, asked.hours, asked.force, monitor.mean_time)

@@ -121,7 +121,7 @@ def joseph_fails(phi: np.ndarray, start: np.ndarray, q: np.ndarray, r: float, sa
 
 def test_covariance_of_badly_scaled_states_stays_positive(show: Callable[[str], None]) -> None:
     samples = 2000
-    model = penode_gen.load(HERE / "scaled.toml")
+    model = penode_gen.load(HERE / "models" / "scaled.toml")
     compiled, rng = Compiled(model), np.random.default_rng(1)
     z = 50.0 + 1e-5 * rng.standard_normal((samples, 1))
     found, _, f = run(compiled, z)

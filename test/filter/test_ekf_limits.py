@@ -14,13 +14,13 @@ import penode_gen
 from penode_sil.filtering.compiled import Compiled
 from penode_sil.filtering.estimates import FLAGS
 
-LAYERED = Path(__file__).parent / "layered.toml"
+LAYERED = Path(__file__).parent / "models" / "layered.toml"
 
 
 def limited(folder: Path, least: float, most: float):
     """layered.toml with bounds of both heights and a limit of the tyre's deflection [m]."""
     path = folder / "limited.toml"
-    text = LAYERED.read_text().replace("../../gen", str(LAYERED.parents[2] / "gen")).replace('"layered"', '"limited"')
+    text = LAYERED.read_text().replace("../../../gen", str(LAYERED.parents[3] / "gen")).replace('"layered"', '"limited"')
     text = text.replace("z_b = { start = 1e-4, noise = 1e-5 }", f"z_b = {{ start = 1e-4, noise = 1e-5, min = {least}, max = {most} }}")
     path.write_text(text + f'\n[filter.limits]\ntyre = {{ value = "F_tyre", unit = "kN", min = {300.0 * least}, max = {300.0 * most} }}\n')
     return penode_gen.load(path)

@@ -17,13 +17,13 @@ import penode_gen
 from penode_sil.filtering.compiled import Compiled
 
 HERE = Path(__file__).parent
-DOUBLE, FLOAT = 1e-9, 1e-2  # of a standard deviation
-SHARE = 0.02  # of samples, at most, in 0.1 s after a kink between both: four to eight in a minute
+DOUBLE, FLOAT = 1e-9, independent.FLOAT  # of a standard deviation
+SHARE = 0.05  # of samples, at most, in 0.1 s after a kink between both or within the rounding of a float: 25 in a minute
 
 
 def test_reference_is_the_filter_of_numpy(tmp_path: Path) -> None:
     """independent.c against plant.Dense, with missing measurements; both in double."""
-    model = penode_gen.load(HERE / "layered.toml")
+    model = penode_gen.load(HERE / "models" / "layered.toml")
     fast, slow = independent.Reference(model, tmp_path, seed=3), plant.Dense(plant.Plant(model), model)
     _, z = fast.drive(300)
     z[50], z[60, 1] = np.nan, np.nan
@@ -38,8 +38,8 @@ def test_reference_is_the_filter_of_numpy(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["layered", "folded"])
 def test_filter_is_that_of_the_reference(name: str, tmp_path: Path, show: Callable[[str], None]) -> None:
     """Over 30 s in double at every sample, in float but where a kink lies between both; over 4 s in float at every sample too. An hour:
-    make campaign-ekf."""
-    model = penode_gen.load(HERE / f"{name}.toml")
+    make campaign-filter."""
+    model = penode_gen.load(HERE / "models" / f"{name}.toml")
     double, single = (independent.difference(model, dtype, 30_000, tmp_path) for dtype in (np.float64, np.float32))
     show(f"{name}: {double.state:.1e} off, in float {single.state:.1e}; after kinks {single.at_kinks:.1e}, {single.share:.1%}")
     assert max(double.state, double.covariance, double.at_kinks) < DOUBLE
@@ -51,8 +51,8 @@ def test_filter_is_that_of_the_reference(name: str, tmp_path: Path, show: Callab
 @pytest.mark.long
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_filter_is_that_of_the_reference_for_ten_minutes(dtype: type, tmp_path: Path) -> None:
-    """At every sample; in float it is 0.035 off within a minute, after a kink lies between both: not solved."""
-    found = independent.difference(penode_gen.load(HERE / "layered.toml"), dtype, 600_000, tmp_path)
+    """At every sample; in float it is 0.035 off within a minute, where a kink lies within the rounding of a float: not solved."""
+    found = independent.difference(penode_gen.load(HERE / "models" / "layered.toml"), dtype, 600_000, tmp_path)
     assert max(found.state, found.covariance, found.at_kinks) < (DOUBLE if dtype is np.float64 else FLOAT)
 
 
@@ -67,7 +67,7 @@ def inside(values: np.ndarray, freedom: int) -> float:
 def test_filter_is_consistent_over_100_runs(name: str, seed: int, show: Callable[[str], None]) -> None:
     """NEES and NIS are inside of their 95 % bands in at least 90 % of the samples."""
     samples, runs = 1000, 100
-    model = penode_gen.load(HERE / f"{name}.toml")
+    model = penode_gen.load(HERE / "models" / f"{name}.toml")
     truth = plant.drive(plant.Plant(model), model, samples, runs, seed, road=False)
     compiled, nees, nis = Compiled(model), np.zeros((samples, runs)), np.zeros((samples, runs))
     for run in range(runs):

@@ -96,7 +96,7 @@ def test_what_cannot_be_filtered_is_one_line(simulated: tuple[Path, dict], tmp_p
 @pytest.mark.parametrize("name", ["layered", "measured"])
 def test_filter_in_numpy_is_the_compiled_one(name: str) -> None:
     """Different arithmetic, derivatives by differences: 1e-5 of a standard deviation, of which 2e-6 were measured."""
-    model = penode_gen.load(HERE / f"{name}.toml")
+    model = penode_gen.load(HERE / "models" / f"{name}.toml")
     z = plant.drive(plant.Plant(model), model, 150, 1, seed=2, road=name == "layered").z[:, 0]
     z[40, 0] = np.nan
     mask = np.full(150, 3, np.uint32)

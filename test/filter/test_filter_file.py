@@ -22,7 +22,7 @@ from penode_sil.targets import MACHINES, PORT
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 QUARTER = ROOT / "sil" / "filter" / "quarter.toml"
-TEXT = (HERE / "layered.toml").read_text().replace("../../gen", str(ROOT / "gen"))
+TEXT = (HERE / "models" / "layered.toml").read_text().replace("../../../gen", str(ROOT / "gen"))
 
 
 def load(folder: Path, *changes: tuple[str, str], more: str = ""):
@@ -104,7 +104,7 @@ def test_a_model_without_a_filter_has_no_files_of_it() -> None:
 @pytest.mark.parametrize("double", [False, True])
 def test_the_c_gives_no_warning(tmp_path: Path, name: str, double: bool) -> None:
     """All that clang can say, but for its opinions on C99, padding, comments and plain arrays; and what gcc says strictly."""
-    penode_gen.generate(penode_gen.load(HERE / f"{name}.toml"), tmp_path, self_test=False)
+    penode_gen.generate(penode_gen.load(HERE / "models" / f"{name}.toml"), tmp_path, self_test=False)
     include = [f"-I{ROOT / part}" for part in ("inc", "port/gnu")]
     options = ["-std=c99", "-fsyntax-only", "-Werror", *include, *(["-DPEN_REAL_DOUBLE"] if double else [])]
     silent = [f"-Wno-{w}" for w in ("padded", "documentation", "declaration-after-statement", "unsafe-buffer-usage", "double-promotion")]
@@ -128,19 +128,18 @@ def test_white_errors_of_a_measured_input_are_those_of_the_reference(tmp_path: P
     assert plant.covariance(f[0])[:4, :4] == pytest.approx(p - gain @ hx @ p, rel=1e-7, abs=1e-16)
 
 
-def test_the_c_keeps_misra(tmp_path: Path) -> None:
-    """As the models of gen/nqvm: nothing found in a program that calls every function of the header."""
-    penode_gen.generate(penode_gen.load(QUARTER), tmp_path)
-    headers = [
-        tmp_path / "quarter.h",
-        tmp_path / "quarter_ekf.h",
-        *sorted(f"inc/penode/{p.name}" for p in (ROOT / "inc/penode").glob("*.h")),
-    ]
+@pytest.mark.parametrize("path", [QUARTER, HERE / "models" / "cost_mass.toml"], ids=["states", "parameters"])
+def test_the_c_keeps_misra(tmp_path: Path, path: Path) -> None:
+    """As the models of gen/nqvm: nothing found in a program that calls every function of the headers."""
+    model = penode_gen.load(path)
+    penode_gen.generate(model, tmp_path)
+    parts = dict.fromkeys((model.name, model.stepped, f"{model.name}_ekf"))
+    headers = [*(tmp_path / f"{part}.h" for part in parts), *sorted(f"inc/penode/{p.name}" for p in (ROOT / "inc/penode").glob("*.h"))]
     headers.append("port/template/pen_port_target.h")
     entry = tmp_path / "every_entry.c"
     made = subprocess.run(["test/misra/every_entry", *headers], cwd=ROOT, capture_output=True, text=True, check=True)
     entry.write_text(made.stdout)
-    sources = [entry, *(tmp_path / f"quarter{part}.c" for part in ("", "_ekf", "_selftest"))]
+    sources = [entry, *(tmp_path / f"{part}.c" for part in (*parts, f"{model.name}_selftest"))]
     done = subprocess.run(
         ["test/misra/check", "clean", *sources], cwd=ROOT, capture_output=True, text=True, env=os.environ | {"OPTIONS": f"-I{tmp_path}"}
     )

@@ -28,8 +28,8 @@ from penode_sil.filtering.watched import FLAGS, CompiledMonitor, names
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-TEXT = (HERE / "monitored.toml").read_text().replace("../../gen", str(ROOT / "gen"))
-MODEL = HERE / "monitored.toml"
+TEXT = (HERE / "models" / "monitored.toml").read_text().replace("../../../gen", str(ROOT / "gen"))
+MODEL = HERE / "models" / "monitored.toml"
 
 
 class Rubbing(plant.Plant):
@@ -164,7 +164,7 @@ a_wheel = { value = "der(v_w) + bias_a_wheel", unit = "m/s^2", noise = 0.1 }
 
 
 def nominal(folder: Path, filtered: bool = True) -> penode_gen.Model:
-    text = (HERE / "layered.toml").read_text().replace("../../gen", str(ROOT / "gen"))
+    text = (HERE / "models" / "layered.toml").read_text().replace("../../../gen", str(ROOT / "gen"))
     (folder / "model.toml").write_text(text if filtered else text[: text.index("[filter")])
     return penode_gen.load(folder / "model.toml")
 

@@ -15,7 +15,7 @@ from penode_sil.targets import MACHINES, PORT
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-TEXT = (HERE / "monitored.toml").read_text().replace("../../gen", str(ROOT / "gen"))
+TEXT = (HERE / "models" / "monitored.toml").read_text().replace("../../../gen", str(ROOT / "gen"))
 CAUSE = "[monitor.causes]\nrubbing = { friction = 30 }"
 VARIANTS = {
     "one cause": "",

@@ -46,7 +46,7 @@ z_road = {{ noise = 2e-3, correlation = "1 s" }}
 def guessed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, penode_gen.Model]:
     """A folder with 8 s of a plant whose noises are those of folded.toml, and a model file that guesses others; the true model."""
     folder = tmp_path_factory.mktemp("tune")
-    true = penode_gen.load(HERE / "folded.toml")
+    true = penode_gen.load(HERE / "models" / "folded.toml")
     z = plant.drive(plant.Plant(true), true, 8000, 1, seed=5).z[:, 0]
     rows = np.column_stack([np.arange(8000) * plant.H, z])
     np.savetxt(folder / "rec.csv", rows, "%.9g", ",", header="time [s],a_body [m/s^2],a_wheel [m/s^2]", comments="")
@@ -84,11 +84,11 @@ def test_table_has_errors_before_and_after(guessed: tuple[Path, penode_gen.Model
 
 
 def test_library_with_factors_is_that_of_a_file_with_these_noises(tmp_path: Path) -> None:
-    model = penode_gen.load(HERE / "folded.toml")
+    model = penode_gen.load(HERE / "models" / "folded.toml")
     z = plant.drive(plant.Plant(model), model, 300, 1, seed=2).z[:, 0]
     factors = {("inputs", "z_road"): 2.0, ("sensors", "a_wheel"): 4.0, ("states", "v_b"): 0.5}
     (variable,) = Variable(model, "default").run(factors, [(np.zeros((300, 1)), z, np.full(300, 3, np.uint32))])
-    text = (HERE / "folded.toml").read_text().replace("../../gen", str(HERE.parents[1] / "gen"))
+    text = (HERE / "models" / "folded.toml").read_text().replace("../../../gen", str(HERE.parents[1] / "gen"))
     for old, new in (("noise = 1e-3, corr", "noise = 2e-3, corr"), ("a_wheel = {}", "a_wheel = { noise = 0.4 }")):
         assert old in text
         text = text.replace(old, new)
@@ -138,7 +138,8 @@ def test_what_is_wrong_is_one_line(guessed: tuple[Path, penode_gen.Model], tmp_p
     np.savetxt(tmp_path / "rec.csv", np.column_stack([rows, np.zeros(len(rows))]), "%.9g", ",", header=head, comments="")
     said = penode("tune-filter", tmp_path / "still.toml", "--data", tmp_path / "rec.csv", "-o", tmp_path / "o.toml", fails=True)
     assert said == (
-        f"penode: {tmp_path / 'still.toml'}: no state or input of [filter] has a noise above zero; give one to start from, or --sensors\n"
+        f"penode: {tmp_path / 'still.toml'}: no state, input or parameter of [filter] has a noise above zero; give one to start from, "
+        "or --sensors\n"
     )
     said = penode("tune-filter", NQVM, "--data", record, "-o", tmp_path / "o.toml", fails=True)
     assert "has no [filter]; add one" in said
@@ -152,7 +153,15 @@ def test_what_is_wrong_is_one_line(guessed: tuple[Path, penode_gen.Model], tmp_p
 @pytest.mark.skipif(not MEASURED.exists(), reason="the measured data are not beside the checkout")
 def test_measured_joint_held_out(tmp_path: Path, show: Callable[[str], None]) -> None:
     """Noises from the first 6 s of a measured joint fit the 4 s after them."""
-    words = ["tune-filter", HERE / "joint.toml", "--sensors", "--data", MEASURED / "train.csv", "--holdout", MEASURED / "test.csv"]
+    words = [
+        "tune-filter",
+        HERE / "models" / "joint.toml",
+        "--sensors",
+        "--data",
+        MEASURED / "train.csv",
+        "--holdout",
+        MEASURED / "test.csv",
+    ]
     found = json.loads(penode(*words, "-o", tmp_path / "tuned.toml", "--json"))
     before, after = (found["held_out"][part] for part in ("before", "after"))
     q = after["sensors"]["q"]

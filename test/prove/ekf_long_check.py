@@ -18,7 +18,7 @@ import penode_gen
 from penode_sil.filtering.compiled import Compiled, CompiledFilter
 from penode_sil.filtering.estimates import FLAGS, VERDICTS
 
-MODELS = ("sil/filter/quarter.toml", "test/filter/scaled.toml")
+MODELS = ("sil/filter/quarter.toml", "test/filter/models/scaled.toml")
 STRETCH = 100_000  # steps between two exchanges
 MISSING = VERDICTS.index("missing")
 

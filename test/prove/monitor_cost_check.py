@@ -42,7 +42,7 @@ def measured(level: str, source: Path = SOURCE, machine: str = "m4f") -> dict[st
     """Least and most instructions by kind of sample; bytes of the monitor. SystemExit if one is not of its kind."""
     place = WORK / "model"
     place.mkdir(parents=True, exist_ok=True)
-    penode_gen.generate(penode_gen.load(gate.ROOT / "test" / "filter" / "monitored.toml"), place, self_test=False)
+    penode_gen.generate(penode_gen.load(gate.ROOT / "test" / "filter" / "models" / "monitored.toml"), place, self_test=False)
     runtime = [source if path == SOURCE else path for path in sorted((gate.ROOT / "src").glob("*.c"))]
     code = [place / f"monitored{part}.c" for part in ("", "_ekf", "_monitor", "_params")]
     elf = WORK / f"cost{level}-{machine}.elf"

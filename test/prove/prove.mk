@@ -80,7 +80,7 @@ prove-mutation-filter: | $(READY) build/setup/proof build/setup/unity ## Small f
 
 # -- the same in full -------------------------------------------------------------------------------------------------
 
-CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-xcp-fuzz campaign-readers campaign-recordings campaign-flip campaign-longrun campaign-ekf campaign-monitor campaign-accuracy
+CAMPAIGN := campaign-mutation campaign-status campaign-fuzz campaign-xcp-fuzz campaign-readers campaign-recordings campaign-flip campaign-longrun campaign-ekf campaign-filter campaign-monitor campaign-accuracy
 .PHONY: campaign-proofs $(CAMPAIGN)
 
 campaign-proofs: setup build/setup/proof ## The long proofs: all floats, 10^7 sequences of calls, every bit, a whole day
@@ -105,6 +105,8 @@ campaign-accuracy: | $(READY)
 	@$(PYTHON) test/prove/accuracy_check.py --stride 1 --as "accuracy campaign"
 campaign-ekf: | $(READY)
 	@$(PYTHON) test/prove/ekf_long_check.py --steps 50000000 --as "ekf campaign"
-	@PYTHONPATH=test/prove $(PYTHON) test/filter/hour_check.py
+campaign-filter: | $(READY) ## Filters against a plant of their own, and an hour against another filter: test/filter/FILTER.md; RUNS and SECONDS
+	@PYTHONPATH=test/prove $(PYTHON) test/filter/hour_check.py --seconds $(or $(SECONDS),3600) || true # the page has it
+	@$(PYTHON) test/filter/filter_campaign.py --runs $(or $(RUNS),100)
 campaign-monitor: | $(READY) ## The fault monitor: friction put in, and hours without, beside chi-square tests: test/filter/MONITOR.md; RUNS and HOURS
 	@$(PYTHON) test/filter/monitor_campaign.py --runs $(or $(RUNS),200) --hours $(or $(HOURS),200) --jobs $$(nproc)

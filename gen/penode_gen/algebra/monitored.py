@@ -47,12 +47,14 @@ def _where(cause: MonitorCause) -> tuple[str, ...]:
 
 def _plain(causal: Causal, cause: MonitorCause, value: sp.Expr) -> sp.Expr:
     """A derivative with values of parameters: over states and inputs alone."""
-    where, known = _where(cause), {*causal.states, *causal.inputs}
+    varied = {p.name for p in _filter(causal.model).parameters}
+    where, known = _where(cause), {*causal.states, *causal.inputs, *map(ex.symbol, varied)}
     for step in reversed(causal.needed([value])):
         if step.value is not None:
             value = value.xreplace({step.target: step.value})
     value = value.xreplace({ex.derivative(q.name): v for q, v in causal.kinematics.items()})
-    value = value.xreplace({ex.symbol(p.name): sp.Float(p.value, 17) for p in causal.model.parameters.values()})
+    fixed = [p for p in causal.model.parameters.values() if p.name not in varied]
+    value = value.xreplace({ex.symbol(p.name): sp.Float(p.value, 17) for p in fixed})
     if value.free_symbols & set(causal.input_rates):
         raise CausaliseError([(where, "its effect depends on the rate of an input", "watch for another parameter")])
     if value.free_symbols - known:

@@ -135,9 +135,9 @@ class Equations:
         for i, s in enumerate(self.drive):
             if s in used:
                 lines.append(f"const pen_real_t {self._c_name(s)} = u[{i}];")
-        for p in model.tunable:
-            if ex.symbol(p.name) in used:
-                lines.append(f"const pen_real_t {self._c_name(ex.symbol(p.name))} = p[{self.at[p.name]}]; /* {units.si(p.unit)} */")
+        read = [p for p in model.tunable if ex.symbol(p.name) in used - set(self.drive)]
+        for p in read:
+            lines.append(f"const pen_real_t {self._c_name(ex.symbol(p.name))} = p[{self.at[p.name]}]; /* {units.si(p.unit)} */")
         if lines and steps:
             lines.append("")
         calls = uses_p = uses_f = False
@@ -160,7 +160,7 @@ class Equations:
         return {
             "lines": lines,
             "calls": calls,
-            "uses_p": uses_p or any(ex.symbol(p.name) in used for p in model.tunable),
+            "uses_p": uses_p or bool(read),
             "uses_f": uses_f,
             "uses_x": any(s in used for s in causal.states),
             "uses_u": any(s in used for s in self.drive),

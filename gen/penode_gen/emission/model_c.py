@@ -12,9 +12,10 @@ import numpy as np
 
 from .. import units
 from ..algebra import sampled
+from ..algebra.augmented import augmented
 from ..algebra.functions import CALLS
 from ..algebra.mechanics import state_unit
-from ..model import Model
+from ..model import Filter, Model
 from ..networks import Dense
 from ..resources import resource
 from ..sets import layout, packing, promises
@@ -62,17 +63,29 @@ _FILES = {"model.h.j2": "{name}.h", "model.c.j2": "{name}.c", "sets.h.j2": "{own
 
 def render(model: Model, self_test: bool = True) -> dict[str, str]:
     """File name -> text of the C of a model, with or without its self-test. Pure: no clock, no path beyond the model file's name."""
-    context, texts = selftest.answered(Emitter(model).context(), self_test), {}
+    context = selftest.answered(Emitter(model).context(), self_test)
+    texts: dict[str, str] = {}
     files = _FILES | ({"selftest.c.j2": "{name}_selftest.c"} if self_test else {})
     if model.filter:
         context |= filter_c.context(model, model.filter)
         files |= filter_c.FILES
+        texts |= _stepped(model, model.filter)
         if model.monitor:
             context |= monitor_c.context(model, model.filter, model.monitor)
             files |= monitor_c.FILES
     for template, name in files.items():
         texts[name.format(name=model.name, owner=model.owner)] = fold(TEMPLATES.get_template(template).render(context))
     return texts | {f"{model.owner}_layout.json": layout.to_json(model)}
+
+
+def _stepped(model: Model, given: Filter) -> dict[str, str]:
+    """The C of the model that a filter steps, if that is one of its own: without sets, which are those of the model, and self-test."""
+    if not given.parameters:
+        return {}
+    whole, causal = augmented(model, given)
+    context = Emitter(whole, causal).context() | {"plain": model.name}
+    files = {"model.h.j2": f"{whole.name}.h", "model.c.j2": f"{whole.name}.c"}
+    return {name: fold(TEMPLATES.get_template(template).render(context)) for template, name in files.items()}
 
 
 def generate(model: Model, directory: str | Path, self_test: bool = True) -> list[Path]:
@@ -117,6 +130,8 @@ class Emitter(Equations):
             "digest": model.digest[:16],
             "method_name": _METHOD_NAMES[model.method],
             "owner": model.owner,
+            "plain": "",
+            "varied": [{"name": i.name, "at": at} for at, i in enumerate(model.inputs) if i.name in model.parameters],
             "sets_digest": packing.digest(model)[:16],
             "real": real,
             "si": units.si,

@@ -53,7 +53,8 @@ def _effects(model: Model, given: Filter, monitor: Monitor) -> list[str]:
         wanted += [(f"effect[{c * n + i}]", value) for i, value in enumerate(rates)]
         wanted += [(f"direct[{c * n_z + i}]", value) for i, value in enumerate(sensed)]
     known = {name: f"x[{i}]" for i, name in enumerate(model.states)}
-    known |= {i.name: f"({given_input(given, i.name)['text']})" for i in model.inputs}
+    inputs = [i.name for i in model.inputs] + [p.name for p in given.parameters]
+    known |= {i: f"({given_input(given, i)['text']})" for i in inputs}
     numbered = (ex.symbol(f"t{i}") for i in range(1, 10000) if f"t{i}" not in known)
     common, reduced = sp.cse([value for _, value in wanted], symbols=numbered, order="canonical")
     text = Printer(lambda s: known.get(s.name, s.name))

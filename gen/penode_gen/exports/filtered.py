@@ -15,7 +15,7 @@ OTHER = "other"  # the test for what no named cause is
 @dataclass(frozen=True)
 class Estimate:
     """
-    An estimated quantity: `member` of `part` (x, u, y, z) of NAME_ekf_estimate_t, with a standard deviation in `part`_deviation. `unit` is
+    An estimated quantity: `member` of `part` (x, u, p, y, z) of NAME_ekf_estimate_t, with a standard deviation in `part`_deviation. `unit` is
     that of the model file.
     """
 
@@ -27,7 +27,7 @@ class Estimate:
 
 
 def estimates(model: Model) -> list[Estimate]:
-    """Each quantity once: outputs, sensors, inputs that are states of the filter, then other states; none without a filter."""
+    """Each quantity once: outputs, sensors, inputs and parameters that are states of the filter, then other states; none without a filter."""
     found: dict[str, Estimate] = {}
     for part, name, unit in _quantities(model):
         found.setdefault(name, Estimate(f"filter.{name}", part, name, unit, f"{name}, estimated"))
@@ -43,6 +43,7 @@ def _quantities(model: Model) -> Iterator[tuple[str, str, str]]:
     yield from (("y", o.name, o.unit) for o in model.outputs)
     yield from (("z", s.name, s.unit) for s in model.sensors)
     yield from (("u", i.name, i.unit) for i in model.inputs if i.name in own)
+    yield from (("p", p.name, model.parameters[p.name].unit) for p in model.filter.parameters)
     yield from (("x", name, state_unit(model, name)) for name in model.states)
 
 

@@ -17,17 +17,24 @@ TABLES: dict[str, dict[str, Any]] = {
     "sensors": {"noise": NUMBER, "gate": NUMBER},
     "states": {"start": NUMBER, "noise": NUMBER, "min": NUMBER, "max": NUMBER},
     "inputs": {"noise": NUMBER, "walk": NUMBER, "start": NUMBER, "correlation": str},
+    "parameters": {"start": NUMBER, "walk": NUMBER, "min": NUMBER, "max": NUMBER},
     "limits": {"value": str, "unit": str, "min": NUMBER, "max": NUMBER},
 }
-KINDS = {"sensors": "sensor", "states": "state", "inputs": "input"}
+KINDS = {"sensors": "sensor", "states": "state", "inputs": "input", "parameters": "parameter"}
 MOST = 32  # sensors: bits of the mask
+ROUNDING = 2.0**-24  # of a float
 
 
 class FilterTables(ActuatorTables):
     """Reads [filter]."""
 
     def filter(
-        self, sensors: Collection[m.Signal], state_units: Mapping[str, str], inputs: Collection[m.Input], sample_time: float
+        self,
+        sensors: Collection[m.Signal],
+        state_units: Mapping[str, str],
+        inputs: Collection[m.Input],
+        parameters: Mapping[str, m.Parameter],
+        sample_time: float,
     ) -> m.Filter | None:
         """The filter; None if the file has none. Limits are still without coefficients (algebra/limits.py)."""
         if "filter" not in self.data:
@@ -35,6 +42,7 @@ class FilterTables(ActuatorTables):
         head = self.table(("filter",), {"gate": NUMBER} | dict.fromkeys(TABLES, dict), self.data["filter"], ("sensors", "states"))
         gate = self.above_zero(("filter", "gate"), head["gate"]) if "gate" in head else None
         known = {"sensors": [s.name for s in sensors], "states": list(state_units), "inputs": [i.name for i in inputs]}
+        known["parameters"] = list(parameters)
         entries = {part: dict(self.known(part, head.get(part, {}), known.get(part))) for part in TABLES}
         if not state_units:
             self.problem(("filter",), "the model has no states, and a filter estimates states", "remove [filter]")
@@ -45,6 +53,7 @@ class FilterTables(ActuatorTables):
             tuple(self.states_of(state_units, entries["states"], sample_time)),
             tuple(self.input_of(i, entries["inputs"][i.name], sample_time) for i in inputs if i.name in entries["inputs"]),
             tuple(self.limit(name, entry) for name, entry in entries["limits"].items()),
+            tuple(self.parameter(parameters[name], entry, sample_time) for name, entry in entries["parameters"].items()),
         )
 
     def known(self, part: str, given: dict[str, Any], names: list[str] | None) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -122,6 +131,23 @@ class FilterTables(ActuatorTables):
             time = 1.0
         decay = math.exp(-sample_time / time)
         return m.FilterInput(signal.name, noise, noise * math.sqrt(-math.expm1(-2.0 * sample_time / time)), decay, False)
+
+    def parameter(self, given: m.Parameter, entry: dict[str, Any], sample_time: float) -> m.FilterParameter:
+        """A walk within bounds. What a float does not resolve from one sample to the next would be no walk."""
+        where, scale = ("filter", "parameters", given.name), self.unit((), given.unit)
+        if not given.tunable:
+            self.problem(where, "is not tunable, and the C has it as a constant", "add tunable = true to it in [parameters]")
+        needs = {"start": "its standard deviation at the start", "walk": "how far it moves in a second"}
+        for key, meaning in (needs | {"min": "its lower bound", "max": "its upper bound"}).items():
+            if key not in entry:
+                self.problem(where, f"'{key}' is missing", f"add {key} = ..., {meaning}")
+        start, walk = (self.above_zero((*where, key), entry[key], scale) if key in entry else math.inf for key in needs)
+        step, least = walk * math.sqrt(sample_time), ROUNDING * abs(given.value)
+        if 0.0 < step < least:
+            shown = f"{least / math.sqrt(sample_time) / scale:.2g}"
+            self.problem((*where, "walk"), f"{entry['walk']} is lost in the rounding of a float", f"give at least {shown}")
+        low, high = self.bounds(where, entry, scale)
+        return m.FilterParameter(given.name, start, step, -math.inf if low is None else low, math.inf if high is None else high)
 
     def limit(self, name: str, entry: dict[str, Any]) -> m.FilterLimit:
         where = ("filter", "limits", name)

@@ -76,7 +76,7 @@ class _Reader(MonitorTables):
         states = (*self.states(), *acts.states, *self.law_states(elements))
         variables, equations = (*self.variables(), *acts.variables), (*self.equations(), *acts.equations)
         outputs, sensors = (tuple(self.signals(section)) for section in ("outputs", "sensors"))
-        own_filter = self.filter(sensors, self.units_of_states(bodies, states), inputs, sample_time)
+        own_filter = self.filter(sensors, self.units_of_states(bodies, states), inputs, parameters, sample_time)
         own_monitor = self.monitor(parameters, own_filter is not None, sample_time)
         sets = self.sets(parameters, networks, {b.mass for b in bodies})
         self.folds(head, sets)

@@ -61,6 +61,10 @@ class Beside:
         self.truth: dict[str, NDArray[Any]] = dict(zip((i.name for i in model.inputs), u.T, strict=True))
         self.truth |= dict(zip(model.states, result.x.T, strict=True))
         self.truth |= {s.name: v for s, v in zip((*model.outputs, *model.sensors), (*result.y.T, *result.z.T), strict=True)}
+        for p in given.parameters:
+            self.truth[p.name] = np.full(len(z), model.sets[result.instance.set].parameters[p.name])
+            for sample, chosen in sorted(exchanges.items()):
+                self.truth[p.name][sample:] = model.sets[chosen].parameters[p.name]
 
     def columns(self, prefix: str) -> list[Column]:
         """Estimates, to stand behind the table of the simulation."""

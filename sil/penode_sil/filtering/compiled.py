@@ -45,7 +45,7 @@ class CompiledFilter:
         self.owner = owner
         self._memory = np.zeros(owner.size // 8 + 1)
         self._kept: list[Set] = []
-        status = self._function("ekf_init")(self.address, ctypes.byref(self._set(set_name)), None)
+        status = self._function(f"{owner.model.name}_ekf_init")(self.address, ctypes.byref(self._set(set_name)), None)
         if status:
             raise AssertionError(f"init refused its own set: {status:#x}")
 
@@ -55,7 +55,7 @@ class CompiledFilter:
         return ctypes.c_void_p(self._memory.ctypes.data)
 
     def _function(self, name: str) -> Callable[..., int]:
-        found = getattr(self.owner.library, f"{self.owner.model.name}_{name}")
+        found = getattr(self.owner.library, name)
         found.restype = ctypes.c_uint32
         function: Callable[..., int] = found
         return function
@@ -66,7 +66,8 @@ class CompiledFilter:
 
     def select(self, name: str) -> int:
         """Let the next step adopt a set of the model file; a status."""
-        return self._function("tune_select")(self.address, ctypes.byref(self._set(name)))  # `model` is the first member
+        select = self._function(f"{self.owner.model.stepped}_tune_select")
+        return select(self.address, ctypes.byref(self._set(name)))  # `model` is the first member
 
     def run(
         self,
@@ -111,7 +112,7 @@ class CompiledFilter:
     def _columns(self, found: Array) -> tuple[Array, Array]:
         """Values and deviations, without the input that a model without inputs has in its C."""
         model = self.owner.model
-        sizes = [len(model.states), max(len(model.inputs), 1), len(model.outputs), len(model.sensors)]
+        sizes = [len(model.states), max(len(model.inputs), 1), len(model.outputs), len(model.sensors), len(self.owner.given.parameters)]
         edges = np.cumsum([0, *(s for size in sizes for s in (size, size))])
         parts = [found[:, a:b] for a, b in itertools.pairwise(edges)]
         if not model.inputs:

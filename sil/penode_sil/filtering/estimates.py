@@ -47,16 +47,17 @@ def of(model: Model) -> Filter:
 
 
 def signals(model: Model) -> Iterator[tuple[str, str, str]]:
-    """Kind (x, u, y, z), name and unit of the columns of `values`, in the order of NAME_ekf_estimate_t: u without inputs is left out."""
+    """Kind (x, u, y, z, p), name and unit of the columns of `values`, in the order of NAME_ekf_estimate_t."""
     yield from (("x", name, state_unit(model, name)) for name in model.states)
     yield from (("u", i.name, i.unit) for i in model.inputs)
     yield from (("y", s.name, s.unit) for s in model.outputs)
     yield from (("z", s.name, s.unit) for s in model.sensors)
+    yield from (("p", p.name, model.parameters[p.name].unit) for p in of(model).parameters)
 
 
 def named(model: Model) -> list[tuple[int, str, str]]:
-    """Column, name and unit of the estimates, each quantity once: outputs, sensors, estimated inputs, then other states."""
-    own, rank = {i.name for i in of(model).inputs}, "yzux"
+    """Column, name and unit of the estimates, each quantity once: outputs, sensors, estimated inputs, parameters, other states."""
+    own, rank = {i.name for i in of(model).inputs}, "yzupx"
     columns = [(rank.index(kind), at, name, unit) for at, (kind, name, unit) in enumerate(signals(model)) if kind != "u" or name in own]
     found: dict[str, tuple[int, str, str]] = {}
     for _, at, name, unit in sorted(columns):

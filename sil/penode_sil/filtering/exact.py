@@ -2,7 +2,8 @@
 # Copyright (c) 2026 the penode authors
 """
 The filter of a model file in float64, apart from its C: the equations as NumPy functions, Runge-Kutta of order 4 on straight lines
-between inputs, derivatives by central differences, whole covariance matrices in Joseph's form. Limits by the same projection.
+between inputs, derivatives by central differences, whole covariance matrices in Joseph's form. Limits by the same projection. Parameters
+that it estimates are given to the equations as values.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 import penode_gen
 from penode_gen.model import FilterLimit, Model
+from penode_gen.twins.numeric import Numeric
 
 from .estimates import FLAGS, VERDICTS, Estimates, joined, of
 
@@ -39,15 +41,17 @@ class Exact:
         self.numeric = penode_gen.numeric(model, set_name)
         given, names = self.given, [i.name for i in model.inputs]
         self.n_x, self.n = len(model.states), len(given.names)
+        self.first = self.n_x + len(given.inputs)  # of the parameters among the states of the filter
         self.at = [names.index(i.name) for i in given.inputs]
         self.measured = np.array([i.measured for i in given.inputs], bool)
-        self.decay = np.array([i.decay for i in given.inputs])
-        self.start = np.array([*(s.start for s in given.states), *(i.noise for i in given.inputs)])
-        self.noise = np.array([*(s.noise for s in given.states), *(i.step for i in given.inputs)])
+        self.decay = np.array([*(i.decay for i in given.inputs), *(1.0 for _ in given.parameters)])
+        self.start = np.array([*(s.start for s in given.states), *(i.noise for i in given.inputs), *(p.start for p in given.parameters)])
+        self.noise = np.array([*(s.noise for s in given.states), *(i.step for i in given.inputs), *(p.step for p in given.parameters)])
         self.rows = [[s.name for s in model.sensors].index(s.name) for s in given.sensors]
         self.variance = np.array([s.noise**2 for s in given.sensors])
         self.gate = np.array([np.inf if s.gate is None else s.gate**2 for s in given.sensors])
-        self.x, self.p = np.array([*model.start, *(0.0 for _ in given.inputs)]), np.diag(self.start**2)
+        values = [model.sets[set_name].parameters[p.name] for p in given.parameters]
+        self.x, self.p = np.array([*model.start, *(0.0 for _ in given.inputs), *values]), np.diag(self.start**2)
         self.before: Array | None = None  # inputs of the last sample, as measured
 
     def select(self, set_name: str) -> None:
@@ -57,17 +61,24 @@ class Exact:
     def drive(self, u: Array, x: Array) -> Array:
         """The inputs of the model, from those measured and the state of the filter."""
         driven = np.array(u, float)
-        driven[self.at] = np.where(self.measured, driven[self.at], 0.0) + x[self.n_x :]
+        driven[self.at] = np.where(self.measured, driven[self.at], 0.0) + x[self.n_x : self.first]
         return driven
 
-    def step(self, x: Array, before: Array, now: Array) -> Array:
-        """State of the model after one sample."""
+    def at_values(self, parameters: Array) -> Numeric:
+        """The equations with values of the parameters that are estimated."""
+        return self.numeric.with_parameters(dict(zip((p.name for p in self.given.parameters), parameters, strict=True)))
+
+    def step(self, x: Array, u_before: Array, later: Array, u_now: Array) -> Array:
+        """State of the model after one sample, from states of the filter and measured inputs before it; `later`: what inputs and
+        parameters are in it, behind any states."""
+        before, now = self.drive(u_before, x), self.drive(u_now, later)
         h, rate = self.model.sample_time, (now - before) / self.model.sample_time
         held = self.model.interpolation == "held"
         k, total = np.zeros(self.n_x), np.zeros(self.n_x)
         for share, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
-            u = before if held else before + share * (now - before)
-            k = self.numeric.rates(x[: self.n_x] + h * share * k, u, np.zeros_like(rate) if held else rate)
+            along = 0.0 if held else share
+            u, values = before + along * (now - before), x[self.first :] + along * (later[self.first :] - x[self.first :])
+            k = self.at_values(values).rates(x[: self.n_x] + h * share * k, u, np.zeros_like(rate) if held else rate)
             total += weight * k
         moved: Array = x[: self.n_x] + h / 6.0 * total
         return moved
@@ -78,9 +89,9 @@ class Exact:
             return
         before, n_x = self.before, self.n_x
 
-        def moved(joined: Array) -> Array:  # states before, then what each input adds in this sample
-            now = self.decay * joined[n_x : self.n] + joined[self.n :]
-            return self.step(joined, self.drive(before, joined[: self.n]), self.drive(u, np.concatenate([joined[:n_x], now])))
+        def moved(joined: Array) -> Array:  # states before, then what each input and parameter adds in this sample
+            x = joined[: self.n]
+            return self.step(x, before, np.concatenate([x[:n_x], self.decay * x[n_x:] + joined[self.n :]]), u)
 
         joined = np.concatenate([self.x, np.zeros(self.n - n_x)])
         slopes = derivatives(moved, joined, np.concatenate([self.start, self.noise[n_x:]]))
@@ -94,7 +105,8 @@ class Exact:
         """Outputs, then sensors."""
         driven = self.drive(u, x)
         rate = np.zeros_like(driven) if self.before is None else (driven - self.drive(self.before, x)) / self.model.sample_time
-        return np.concatenate([self.numeric.outputs(x[: self.n_x], driven, rate), self.numeric.sensors(x[: self.n_x], driven, rate)])
+        own = self.at_values(x[self.first :])
+        return np.concatenate([own.outputs(x[: self.n_x], driven, rate), own.sensors(x[: self.n_x], driven, rate)])
 
     def correct(self, u: Array, z: Array, mask: int) -> tuple[Array, list[int]]:
         """Use the measurements; innovation, variance and ratio [3, n_z], and verdicts."""
@@ -132,7 +144,7 @@ class Exact:
         """Values and standard deviations, in the order of estimates.signals()."""
 
         def values(x: Array) -> Array:
-            return np.concatenate([x[: self.n_x], self.drive(u, x), self.look(u, x)])
+            return np.concatenate([x[: self.n_x], self.drive(u, x), self.look(u, x), x[self.first :]])
 
         slopes = derivatives(values, self.x, self.start)
         return values(self.x), np.sqrt(np.einsum("ij,jk,ik->i", slopes, self.p, slopes))

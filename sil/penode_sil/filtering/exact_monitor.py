@@ -79,12 +79,12 @@ class Monitor(Exact):
     def _rates(self, u: Array) -> Array:
         """Rates of the model, at the state before the measurements of a sample."""
         driven = self.drive(u, self.x)
-        return np.asarray(self.numeric.rates(self.x[: self.n_x], driven, np.zeros_like(driven)), float)
+        return np.asarray(self.at_values(self.x[self.first :]).rates(self.x[: self.n_x], driven, np.zeros_like(driven)), float)
 
     def _moved(self, before: Array, u: Array, x: Array) -> Array:
         """State of the filter after one sample."""
         later = self.decay * x[self.n_x :]
-        return np.concatenate([self.step(x, self.drive(before, x), self.drive(u, np.concatenate([x[: self.n_x], later]))), later])
+        return np.concatenate([self.step(x, before, np.concatenate([x[: self.n_x], later]), u), later])
 
     def correct(self, u: Array, z: Array, mask: int) -> tuple[Array, list[int]]:
         at, p, n_y = self.x.copy(), self.p.copy(), len(self.model.outputs)

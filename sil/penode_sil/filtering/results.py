@@ -32,14 +32,22 @@ def columns(model: Model, found: Estimates, suffix: str = "") -> list[Column]:
 
 
 def summary(model: Model, found: Estimates) -> dict[str, Any]:
-    """Counts of measurements, means of test ratios (1 where noises are right), counts of flags."""
+    """Counts of measurements, means of test ratios (1 where noises are right), parameters at the end, counts of flags."""
     measured = {}
     for k, sensor in enumerate(of(model).sensors):
         used = found.verdict[:, k] == VERDICTS.index("used")
         ratios = found.ratio[used, k]
         counts = {name: int(n) for name, n in zip(VERDICTS, found.counts[k], strict=True)}
         measured[sensor.name] = counts | {"mean_ratio": float(ratios.mean()) if used.any() else None}
-    return {"measurements": measured, "flags": {name: n for name, bit in FLAGS.items() if (n := int((found.status & bit > 0).sum()))}}
+    parameters, own = {}, {p.name for p in of(model).parameters}
+    for at, name, unit in (column for column in named(model) if column[1] in own):
+        value, deviation = (float(part[-1, at]) / units.factor(unit) for part in (found.values, found.deviations))
+        parameters[name] = {"value": value, "deviation": deviation, "unit": unit}
+    return {
+        "measurements": measured,
+        "parameters": parameters,
+        "flags": {name: n for name, bit in FLAGS.items() if (n := int((found.status & bit > 0).sum()))},
+    }
 
 
 def checked(model: Model, found: Estimates, read: Replay) -> dict[str, dict[str, Any]]:
@@ -70,6 +78,8 @@ def sentences(entry: dict[str, Any]) -> list[str]:
     for name, m in entry["measurements"].items():
         ratio = "" if m["mean_ratio"] is None else f", mean test ratio {m['mean_ratio']:.3f}"
         lines.append(f"  {name}: used in {m['used']} samples, missing in {m['missing']}, refused in {m['refused']}{ratio}")
+    for name, p in entry["parameters"].items():
+        lines.append(f"  {name}: {p['value']:.6g} {p['unit']} at the end, standard deviation {p['deviation']:.2g} {p['unit']}")
     lines += [f"  {name} in {n} samples" for name, n in entry["flags"].items() if name not in ("missing", "refused")]
     for name, c in entry.get("checked", {}).items():
         lines.append(

@@ -62,9 +62,9 @@ def text(model: Model, factors: Mapping[Key, float], output: Path) -> str:
 
 
 def _entries(model: Model) -> Iterator[tuple[Key, dict[str, Any], str]]:
-    """Each entry of sensors, states and inputs as the file has it, and the key of its noise; a sensor's noise is stated."""
+    """Each entry of sensors, states, inputs and parameters as the file has it, and the key of its noise; a sensor's noise is stated."""
     data = Tables(model.path).data["filter"]
-    for table in ("sensors", "states", "inputs"):
+    for table in ("sensors", "states", "inputs", "parameters"):
         for name, entry in data.get(table, {}).items():
             own = {s.name: s.noise for s in of(model).sensors}.get(name, 0.0) if table == "sensors" else 0.0
             given = {"noise": own / units.factor(_unit(model, table, name, "noise"))} | entry if table == "sensors" else entry
@@ -75,5 +75,7 @@ def _unit(model: Model, table: str, name: str, key: str) -> str:
     """Unit of a noise in the file."""
     if table == "states":
         return f"{state_unit(model, name)}/sqrt(s)"
+    if table == "parameters":
+        return f"{model.parameters[name].unit}/sqrt(s)"
     found = next(s.unit for s in (model.sensors if table == "sensors" else model.inputs) if s.name == name)
     return f"{found}/sqrt(s)" if key == "walk" else found

@@ -39,6 +39,7 @@ class Tuned:
 def free(given: Filter, sensors: bool) -> list[Key]:
     """Noises that can be fitted: those of the file above zero; of sensors only if asked for."""
     found = [("states", s.name) for s in given.states if s.noise > 0.0] + [("inputs", i.name) for i in given.inputs]
+    found += [("parameters", p.name) for p in given.parameters]
     return found + ([("sensors", s.name) for s in given.sensors] if sensors else [])
 
 
@@ -84,7 +85,7 @@ class Search:
         return at
 
     def idle(self, logs: Array, decades: int = 3, least: float = 2.0) -> tuple[Key, ...]:
-        """Noises of states and inputs that a thousandth would replace: the logarithm of the likelihood falls by less than `least`."""
+        """Noises but those of sensors that a thousandth would replace: the logarithm of the likelihood falls by less than `least`."""
         at = self(logs)
         found = []
         for k, key in enumerate(self.keys):
@@ -109,7 +110,9 @@ def fit(
     """Fit to recordings; `held_out` are only looked at. Raises WrongUse if the file leaves nothing to fit."""
     given, keys = of(model), free(of(model), sensors)
     if not keys:
-        raise WrongUse(f"{model.path}: no state or input of [filter] has a noise above zero; give one to start from, or --sensors")
+        raise WrongUse(
+            f"{model.path}: no state, input or parameter of [filter] has a noise above zero; give one to start from, or --sensors"
+        )
     filters = Variable(model, set_name)
     search = Search(filters, keys, recordings, tell)
     logs = search.best()

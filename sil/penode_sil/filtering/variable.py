@@ -31,6 +31,7 @@ def variances(given: Filter, factors: Mapping[Key, float]) -> dict[str, list[flo
         factor = factors.get(("inputs", i.name), 1.0)
         walks = i.decay == 1.0  # then its start is no noise
         inputs.append((i.noise if walks else i.noise * factor, i.step * factor))
+    inputs += [(p.start, p.step * factors.get(("parameters", p.name), 1.0)) for p in given.parameters]
     found = {
         "start": [start for start, _ in (*states, *inputs)],
         "noise": [noise for _, noise in states if noise > 0.0] + [step for _, step in inputs],

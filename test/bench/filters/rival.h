@@ -23,7 +23,7 @@ float rival_state(size_t i);
 float rival_variance(size_t i);
 uint32_t rival_bytes(void); /* of the filter, beside its model */
 
-/* variances at the start, of process noise and of measurements: as test/filter/cost.toml has them */
+/* variances at the start, of process noise and of measurements: as test/filter/models/cost.toml has them */
 static const float START[N] = { 4e-4F, 4e-4F, 4e-2F, 4e-2F };
 static const float NOISE[N] = { 1e-11F, 1e-11F, 1e-7F, 1e-7F };
 static const float NONE[N] = { 0.0F, 0.0F, 0.0F, 0.0F };

@@ -46,7 +46,7 @@ int main(void)
         uint32_t n;
         road += (pen_real_t)1e-4 * next();
         u.z_road = road;
-        (void)MODEL(sensors)(&filter.model, &seen);
+        (void)STEPPED(sensors)(&filter.model, &seen);
         z.a_body = seen.a_body + ((pen_real_t)0.01 * next());
         z.a_wheel = seen.a_wheel + ((pen_real_t)0.05 * next()) + ((kind == REFUSED) ? (pen_real_t)1000 : (pen_real_t)0);
         z.a_body = (kind == MISSING) ? NAN : z.a_body;
