@@ -18,7 +18,6 @@ from penode_sil.filtering.compiled import Compiled
 
 HERE = Path(__file__).parent
 DOUBLE, FLOAT = 1e-9, independent.FLOAT  # of a standard deviation
-SHARE = 0.05  # of samples, at most, in 0.1 s after a kink between both or within the rounding of a float: 25 in a minute
 
 
 def test_reference_is_the_filter_of_numpy(tmp_path: Path) -> None:
@@ -37,15 +36,12 @@ def test_reference_is_the_filter_of_numpy(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["layered", "folded"])
 def test_filter_is_that_of_the_reference(name: str, tmp_path: Path, show: Callable[[str], None]) -> None:
-    """Over 30 s in double at every sample, in float but where a kink lies between both; over 4 s in float at every sample too. An hour:
-    make campaign-filter."""
+    """Over 30 s, at every sample, in double and in float. An hour, with kinks within the rounding of a float: make campaign-filter."""
     model = penode_gen.load(HERE / "models" / f"{name}.toml")
     double, single = (independent.difference(model, dtype, 30_000, tmp_path) for dtype in (np.float64, np.float32))
     show(f"{name}: {double.state:.1e} off, in float {single.state:.1e}; after kinks {single.at_kinks:.1e}, {single.share:.1%}")
     assert max(double.state, double.covariance, double.at_kinks) < DOUBLE
-    assert max(single.state, single.covariance) < FLOAT and single.share < SHARE
-    short = independent.difference(model, np.float32, 4_000, tmp_path)
-    assert max(short.state, short.covariance, short.at_kinks) < FLOAT
+    assert max(single.state, single.covariance, single.at_kinks) < FLOAT
 
 
 @pytest.mark.long
