@@ -19,11 +19,12 @@ pen_xcp_t controller_xcp;
 #include "controller_filter.h"
 #define CONTROLLED filter.model
 #else
+#define CORE MODEL
 static MODEL(t) controller;
 #define CONTROLLED controller
 #endif
 
-static MODEL(banks_t) banks;
+static CORE(banks_t) banks;
 static pen_xcp_daq_t daq;
 
 /* What a master may read, besides the instance. Written by the step. One region: a master may read neighbours at once. */
@@ -48,11 +49,11 @@ static const char name_text[] = TEXT_OF(MODEL()); /* the model's name, which its
 
 static pen_status_t commit(void)
 {
-    return MODEL(tune_commit)(&CONTROLLED);
+    return CORE(tune_commit)(&CONTROLLED);
 }
 static pen_status_t choose(const pen_set_t *set)
 {
-    return MODEL(tune_select)(&CONTROLLED, set);
+    return CORE(tune_select)(&CONTROLLED, set);
 }
 
 #define REGIONS 4U
@@ -170,7 +171,7 @@ void controller_step(const MODEL(u_t) *u, bool late)
 
     if ((status & PEN_ADOPTED) != PEN_OK) {
         pen_set_head_t running;
-        (void)MODEL(tune_running)(&CONTROLLED, &running);
+        (void)CORE(tune_running)(&CONTROLLED, &running);
         shown.set_in_force = running.id;
         shown.adopted_at = now;
     }

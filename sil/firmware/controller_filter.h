@@ -5,8 +5,8 @@
  * What a controller steps where the model file has a filter: the filter, and its monitor if there is one. A second instance of the
  * model, with the set default, stands for the plant: its sensors, without noise, are the measurements. For controller.c.
  *
- * The compiler is told by -DEKF_HEADER='"NAME_ekf.h"', -DMONITOR_HEADER='"NAME_monitor.h"', and -DMODEL_MEASURED=0U,2U: which
- * sensors the filter uses, in its order.
+ * Compiler options: -DEKF_HEADER='"NAME_ekf.h"', -DMONITOR_HEADER='"NAME_monitor.h"', -DCORE(name)=..., the prefix of the model that the
+ * filter steps, and -DMODEL_MEASURED=0U,2U, the sensors that it uses, in its order.
  */
 #ifndef CONTROLLER_FILTER_H
 #define CONTROLLER_FILTER_H
@@ -25,7 +25,7 @@ static MODEL(ekf_t) filter;
 static MODEL(monitor_t) monitor;
 #endif
 
-static pen_status_t filter_start(MODEL(banks_t) *banks)
+static pen_status_t filter_start(CORE(banks_t) *banks)
 {
     pen_status_t status = MODEL(init)(&plant, &MODEL(set_default), NULL) | MODEL(ekf_init)(&filter, &MODEL(set_default), banks);
 

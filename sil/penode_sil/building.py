@@ -91,7 +91,7 @@ def filter_options(model: Model) -> list[str]:
     names = [sensor.name for sensor in model.sensors]
     measured = ",".join(f"{names.index(sensor.name)}U" for sensor in model.filter.sensors)
     monitor = [f'-DMONITOR_HEADER="{model.name}_monitor.h"'] if model.monitor else []
-    return [f'-DEKF_HEADER="{model.name}_ekf.h"', f"-DMODEL_MEASURED={measured}", *monitor]
+    return [f'-DEKF_HEADER="{model.name}_ekf.h"', f"-DCORE(name)={model.stepped}_##name", f"-DMODEL_MEASURED={measured}", *monitor]
 
 
 def code_of(model: Model, source: Path) -> list[Path]:

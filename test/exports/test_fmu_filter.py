@@ -195,11 +195,26 @@ def test_derivatives_are_those_of_the_model(watched: Filtered) -> None:
 
 def test_a_filter_with_a_noisy_input_and_without_a_monitor(tmp_path: Path) -> None:
     (tmp_path / "model.toml").write_text(
-        (ROOT / "test/filter/measured_folded.toml").read_text().replace("../../gen", str(ROOT / "gen"))
+        (ROOT / "test/filter/models/measured_folded.toml").read_text().replace("../../../gen", str(ROOT / "gen"))
         + "[filter.inputs]\nz_road = { noise = 1e-4 }\n"
     )
     of = make(tmp_path / "model.toml", 3, tmp_path)
     assert np.array_equal(run(of, Master(of.fmu).initialise(z_road=of.u[0]), range(SAMPLES)), sil(of))
+
+
+def test_a_filter_that_estimates_a_parameter(tmp_path: Path) -> None:
+    """It steps a model of its own; its state is saved with it."""
+    of = make(ROOT / "test/filter/models/mass.toml", 3, tmp_path)
+    master, half = Master(of.fmu).initialise(z_road=of.u[0]), SAMPLES // 2
+    first = run(of, master, range(half))
+    state, now = master.save(), master.now
+    found = np.concatenate([first, run(of, master, range(half, SAMPLES))])
+    assert np.array_equal(found, sil(of))
+    mass = outputs(of.model).index("filter.m_b")
+    assert abs(found[0, mass] - 350.0) < 1.0 and np.ptp(found[:, mass]) > 1e-3  # the set's value, then what the recording shows
+    master.restore(state)
+    master.now = now
+    assert np.array_equal(run(of, master, range(half, SAMPLES)), found[half:])
 
 
 @pytest.mark.skipif(importlib.util.find_spec("elftools") is None, reason="pyelftools is not installed: pip install penode[xcp]")

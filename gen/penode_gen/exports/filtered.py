@@ -15,8 +15,8 @@ OTHER = "other"  # the test for what no named cause is
 @dataclass(frozen=True)
 class Estimate:
     """
-    An estimated quantity: `member` of `part` (x, u, p, y, z) of NAME_ekf_estimate_t, with a standard deviation in `part`_deviation. `unit` is
-    that of the model file.
+    An estimated quantity: `member` of `part` (x, u, p, y, z) of NAME_ekf_estimate_t, with a standard deviation in `part`_deviation. `unit`
+    is that of the model file.
     """
 
     name: str
@@ -27,7 +27,7 @@ class Estimate:
 
 
 def estimates(model: Model) -> list[Estimate]:
-    """Each quantity once: outputs, sensors, inputs and parameters that are states of the filter, then other states; none without a filter."""
+    """Each quantity once: outputs, sensors, estimated inputs and parameters, then other states; none without a filter."""
     found: dict[str, Estimate] = {}
     for part, name, unit in _quantities(model):
         found.setdefault(name, Estimate(f"filter.{name}", part, name, unit, f"{name}, estimated"))

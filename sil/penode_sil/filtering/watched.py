@@ -46,7 +46,7 @@ class CompiledMonitor(CompiledFilter):
         super().__init__(owner, set_name)
         size, self.tests = list((ctypes.c_uint32 * 2).in_dll(owner.library, "sil_monitor_sizes"))
         self._monitor = np.zeros(size // 8 + 1)
-        self._function("monitor_init")(ctypes.c_void_p(self._monitor.ctypes.data))
+        self._function(f"{self.owner.model.name}_monitor_init")(ctypes.c_void_p(self._monitor.ctypes.data))
         self._sums, self._raised = np.zeros((0, self.tests), owner.dtype), np.zeros((0, self.tests), np.uint32)
 
     def run(self, u: ArrayLike, z: ArrayLike, mask: ArrayLike | None = None, **options: Any) -> tuple[Estimates, Array, Array]:

@@ -217,7 +217,7 @@ def instance_of(model: Model, program: Program, named: str | None) -> str:
         place = program.find(named)
     except KeyError as exc:
         raise ExportError(f"--instance: {program.path} has no variable {exc.args[0]}; {_one_of(known)}") from exc
-    if type_name(place.type) != kind:
+    if type_name(place.type) not in (kind, f"{model.stepped}_t"):
         raise ExportError(f"--instance: {named} is of the type {type_name(place.type) or 'without a name'}, not {kind}; {_one_of(known)}")
     return named
 

@@ -52,4 +52,5 @@ def context(model: Model) -> dict[str, Any]:
         "tests": filtered.tests(model),
         "monitor": model.monitor is not None,
         "filter": model.filter is not None,
+        "core": model.stepped,
     }
