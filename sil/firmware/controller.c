@@ -19,7 +19,7 @@ pen_xcp_t controller_xcp;
 #include "controller_filter.h"
 #define CONTROLLED filter.model
 #else
-#define CORE MODEL
+#define CORE       MODEL
 static MODEL(t) controller;
 #define CONTROLLED controller
 #endif

@@ -25,7 +25,7 @@ static MODEL(ekf_t) filter;
 static MODEL(monitor_t) monitor;
 #endif
 
-static pen_status_t filter_start(CORE(banks_t) *banks)
+static pen_status_t filter_start(CORE(banks_t) * banks)
 {
     pen_status_t status = MODEL(init)(&plant, &MODEL(set_default), NULL) | MODEL(ekf_init)(&filter, &MODEL(set_default), banks);
 
