@@ -58,7 +58,7 @@ def make(path: Path, version: int, folder: Path) -> Filtered:
     return Filtered(model, Unpacked(fmu, folder / "unpacked"), fmu, *recording(model))
 
 
-@pytest.fixture(scope="module", params=[3, 2], ids=["FMI 3", "FMI 2"])
+@pytest.fixture(scope="module", params=[3, pytest.param(2, marks=pytest.mark.long)], ids=["FMI 3", "FMI 2"])
 def watched(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Filtered:
     """With a monitor; the road is estimated."""
     return make(WATCHED, request.param, tmp_path_factory.mktemp("watched"))

@@ -128,7 +128,11 @@ def test_white_errors_of_a_measured_input_are_those_of_the_reference(tmp_path: P
     assert plant.covariance(f[0])[:4, :4] == pytest.approx(p - gain @ hx @ p, rel=1e-7, abs=1e-16)
 
 
-@pytest.mark.parametrize("path", [QUARTER, HERE / "models" / "cost_mass.toml"], ids=["states", "parameters"])
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(QUARTER, marks=pytest.mark.long), HERE / "models" / "cost_mass.toml"],  # test_monitor_c.py has a plain filter
+    ids=["states", "parameters"],
+)
 def test_the_c_keeps_misra(tmp_path: Path, path: Path) -> None:
     """As the models of gen/nqvm: nothing found in a program that calls every function of the headers."""
     model = penode_gen.load(path)

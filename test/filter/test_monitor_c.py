@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from samples import sample
 
 import penode_gen
 from penode_sil.targets import MACHINES, PORT
@@ -24,7 +25,7 @@ VARIANTS = {
 }
 
 
-@pytest.fixture(params=VARIANTS)
+@pytest.fixture(params=sample(list(VARIANTS), "of state and input"))
 def folder(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """With all C of a variant."""
     assert CAUSE in TEXT

@@ -14,6 +14,7 @@ from pathlib import Path
 import filter_campaign
 import numpy as np
 import pytest
+from samples import sample
 
 import penode_gen
 from penode_gen.emission.model_c import render
@@ -267,21 +268,21 @@ def test_the_c_gives_no_warning(tmp_path: Path, double: bool) -> None:
         subprocess.run(["gcc", *strict, *options, str(tmp_path / f"{name}.c")], check=True)
 
 
-def test_commands_know_parameters(tmp_path: Path) -> None:
+@pytest.mark.parametrize("place", sample(["sil", "mil"], "sil"))
+def test_commands_know_parameters(tmp_path: Path, place: str) -> None:
     """`penode simulate --filter` follows a mass that an exchange of sets changes in the vehicle; `penode tune-filter` fits its walk."""
     axle(tmp_path, "rk4", False, ("m = { start = 0.4, walk = 1e-3", "m = { start = 0.4, walk = 0.3"))
     scenario = 'duration = "4 s"\n[input.foot]\nkind = "chirp"\namplitude = "2 cm"\nstart_frequency = "1 Hz"\nend_frequency = "5 Hz"\n'
     exchange = '[[instance]]\nname = "driven"\nset = "default"\n[[instance.exchange]]\nhow = "select"\ntime = "1 s"\nset = "loaded"\n'
     (tmp_path / "ride.toml").write_text(scenario + exchange)
     words = [sys.executable, "-m", "penode_sil", "simulate", tmp_path / "axle.toml", "--scenario", tmp_path / "ride.toml", "--filter"]
-    for place in ("sil", "mil"):
-        done = subprocess.run([*map(str, words), "--on", place, "-o", str(tmp_path / "out.csv"), "--json"], capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        with open(tmp_path / "out.csv", newline="") as file:
-            head, *rows = csv.reader(file)
-        mass = np.array(rows, float)[:, head.index("m.estimate [kg]")]
-        assert mass[900] == pytest.approx(2.0, abs=0.05) and mass[-1] == pytest.approx(2.4, abs=0.05)
-        assert json.loads(done.stdout)["instances"][0]["filter"]["errors"]["m"]["within_3_sd"] > 0.8
+    done = subprocess.run([*map(str, words), "--on", place, "-o", str(tmp_path / "out.csv"), "--json"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    with open(tmp_path / "out.csv", newline="") as file:
+        head, *rows = csv.reader(file)
+    mass = np.array(rows, float)[:, head.index("m.estimate [kg]")]
+    assert mass[900] == pytest.approx(2.0, abs=0.05) and mass[-1] == pytest.approx(2.4, abs=0.05)
+    assert json.loads(done.stdout)["instances"][0]["filter"]["errors"]["m"]["within_3_sd"] > 0.8
     given = penode_gen.load(tmp_path / "axle.toml").filter
     more = variances(given, {("parameters", "m"): 10.0})
     assert more["noise"][-1] == pytest.approx(100.0 * variances(given, {})["noise"][-1]) and more["start"] == variances(given, {})["start"]

@@ -107,7 +107,7 @@ def test_residuals_are_judged_by_the_stated_noise(
 
 def test_exit_code_4_is_in_the_help() -> None:
     said = CliRunner().invoke(cli, ["train", "--help"]).output
-    assert re.search(r"4 the\s+fit did not come\s+down to the\s+noise", said), said
+    assert re.search(r"4 the\s+fit\s+did\s+not\s+reach\s+the\s+stated\s+noise", said), said
 
 
 @pytest.fixture(scope="module")
