@@ -135,7 +135,7 @@ def test_estimates_are_those_of_sil_to_the_bit(watched: Filtered) -> None:
     assert plain.get("filter.status") == 0 and plain.get("filter.ratio.a_body") == 0.0
 
 
-def test_a_filter_that_is_never_told_finds_the_friction(watched: Filtered) -> None:
+def test_a_filter_with_the_old_set_finds_the_friction(watched: Filtered) -> None:
     found = run(watched, Master(watched.fmu).initialise(z_road=watched.u[0]), range(SAMPLES))
     raised = found[:, outputs(watched.model).index("monitor.raised.rubbing")]
     assert not raised[:EXCHANGE].any() and raised[EXCHANGE : EXCHANGE + 100].any()

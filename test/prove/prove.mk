@@ -106,7 +106,7 @@ campaign-accuracy: | $(READY)
 campaign-ekf: | $(READY)
 	@$(PYTHON) test/prove/ekf_long_check.py --steps 50000000 --as "ekf campaign"
 campaign-filter: | $(READY) ## Filters against a plant of their own, and an hour against another filter: test/filter/FILTER.md; RUNS and SECONDS
-	@PYTHONPATH=test/prove $(PYTHON) test/filter/hour_check.py --seconds $(or $(SECONDS),3600) || true # the page has it
-	@$(PYTHON) test/filter/filter_campaign.py --runs $(or $(RUNS),100)
+	@hour=0; PYTHONPATH=test/prove $(PYTHON) test/filter/hour_check.py --seconds $(or $(SECONDS),3600) || hour=$$?; \
+	$(PYTHON) test/filter/filter_campaign.py --runs $(or $(RUNS),100) && exit $$hour
 campaign-monitor: | $(READY) ## The fault monitor: friction put in, and hours without, beside chi-square tests: test/filter/MONITOR.md; RUNS and HOURS
 	@$(PYTHON) test/filter/monitor_campaign.py --runs $(or $(RUNS),200) --hours $(or $(HOURS),200) --jobs $$(nproc)

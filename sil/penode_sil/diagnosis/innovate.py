@@ -64,9 +64,8 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
 
 
 def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
-    """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. Those that are small by the
-    level of the search, or would be, count by what a free run of all others misses: what changes slowly the observer follows,
-    so that innovations show little of it."""
+    """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. One too small for that
+    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
     accepted, large = list(end.accepted), [is_large(a.trial, least(level, a.trial.whole)) for a in end.accepted]
     if all(large):

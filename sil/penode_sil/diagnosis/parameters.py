@@ -36,9 +36,9 @@ class Judged:
     absorbed: tuple[str, ...]
 
 
-def judge(model: Model, found: Found, moved: Sequence[Motion], level: float, confidence: float, log: Callable[[str], None]) -> Judged:
+def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float, log: Callable[[str], None]) -> Judged:
     """Judges each parameter by its value beside the named forms alone, in a bench that has moved along `moved`, and by its value beside all
-    forms that were found. `level`: the unmodelled force that remains; causes have this `confidence`."""
+    forms that were found. Causes have this `confidence`."""
     plain, whole = found.plain.fit, found.bench.fit.values
     shared = straight.beside(model, found.plain, _straight(terms_of(found.named)), moved)
     shared_by_all = straight.beside(model, found.bench, _straight(found.terms), moved)
@@ -47,14 +47,14 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], level: float, con
         if p.name not in whole or np.isinf(p.tolerance):
             continue
         size, value, beside, unit = shift(model, found.plain, moved, p.name), plain.value(p.name), whole[p.name], units.si(p.unit)
-        bent = systematic(level)
+        bent = systematic(found.level)
         sd = float(np.hypot(plain.deviation(p.name), bent / max(size, bent, 1e-300) * abs(value - p.value)))
         log(f"{p.name}: {value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of the force there")
         if abs(value - p.value) <= _limit(p) * abs(p.value) + Z_95 * sd:
             continue
         if p.name in shared and not straight.off(p.value, value, shared[p.name], _limit(p)):
             notes.append(f"{p.name} is {value:.4g} {unit} together with the cause found at its place, which has a linear part too")
-        elif size < least(level, 0.0):
+        elif size < least(found.level, 0.0):
             notes.append(
                 f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than unmodelled effects can"
             )

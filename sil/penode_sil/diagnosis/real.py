@@ -140,7 +140,7 @@ def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[F
 
     def judged(found: Found) -> tuple[Found, list[Motion], parameters.Judged]:
         moved = motions(Probe.of(found.plain))
-        return found, moved, parameters.judge(model, found, moved, found.level, RIGHT, log)
+        return found, moved, parameters.judge(model, found, moved, RIGHT, log)
 
     first = judged(innovate.search(bench, log))
     large = [a for a in first[0].small if a.trial.share >= WORTH]
