@@ -60,7 +60,7 @@ def _first(model: Model, e: Experiment, study: Study, set_name: str) -> tuple[li
     size = dict(zip(study.model.states, 3.0 * np.sqrt(np.mean(np.where(np.abs(x) < 1e12, x, 0.0) ** 2, axis=0)) + 1e-9, strict=True))
     record = Record.of(e)
     few = replace(record, u=record.u[:FIRST], y=record.y[:FIRST])
-    wide = augmented(model, study.places)
+    wide = augmented(model)
     noise = sample_noise([record], np.array([s.noise for s in model.sensors]))
     at = {i: float(model.start[i]) for i in own}
     free = tuple(Free(("start", 0, i), at[i], 0.01 * size[model.states[i]], sigma=size[model.states[i]], origin=at[i]) for i in own)

@@ -43,7 +43,7 @@ def motions(probe: Probe) -> list[Motion]:
             Moved(m[:, 3 * k], m[:, 3 * k + 1], np.arange(len(m)) * bench.step, {f: np.abs(m[:, i]) for f, i in loads.items()})
             for m in probe.motions
         ]
-        acts = float(np.std(np.concatenate([m[:, 3 * k + 2] for m in probe.motions])))
+        acts = float(np.std(np.concatenate([m[:, first + len(driving) + k] for m in probe.motions])))
         found.append(Motion.of(parts, acts if place.elements else _inertia(bench, place.ends[0])))
     return found
 

@@ -33,7 +33,7 @@ TURNS = 3  # how often levels and values are fitted in turn
 @dataclass(frozen=True, eq=False)
 class Bench:
     """An augmented model, its recordings and what is known of both: `forces` [unmodelled] rms acceleration of each body (without bodies,
-    rms force of each place), `noise` [n_z] of a sample."""
+    rms rate of each state), `noise` [n_z] of a sample."""
 
     model: Model
     set_name: str
@@ -106,7 +106,7 @@ def build(
     """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]. `like`: the bench of
     the nominal model if `model` is another one; base, updates, forces and colour are taken from it. `shape` [f, n_z]: spectrum of the noise
     as a fit has left it; it counts if the recordings are likelier with it."""
-    wide = augmented(model, places)
+    wide = augmented(model)
     free = [f for f in map(parameter, model.parameters.values()) if f]
     spans = np.array([max(np.nanstd(np.concatenate([r.y[:, j] for r in records])), noise[j]) for j in range(len(noise))])
     means = np.array(
@@ -120,7 +120,7 @@ def build(
     plain = Fit((), Filter.none(0, 0), *(np.zeros(0),) * 2, np.zeros(0, bool), np.zeros(0), 0.0, 0.0)
     longest = sum(map(len, records)) * records[0].step
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
-    base, forces = like.base if like else augmented(model, places), np.ones(len(driven_by_noise(wide.states)))
+    base, forces = like.base if like else augmented(model), np.ones(len(driven_by_noise(wide.states)))
     bench = Bench(wide, set_name, tuple(places), tuple(records), base, (), first, forces, noise, fastest, Level(0.0, 1.0), plain)
     if like:
         bench = replace(bench, update=like.update, forces=like.forces, fastest=like.fastest, colour=like.colour)
@@ -163,17 +163,29 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
             bench = replace(bench, forces=np.maximum(moving, 1e-12))
             continue
         if not n_q:
-            rms = np.array([np.sqrt(np.nanmean(np.concatenate([r.y[:, j] for r in bench.records]) ** 2)) for j in range(len(spans))])
-            return replace(bench, forces=np.full(len(bench.forces), float(np.max(rms)))), x
+            return replace(bench, update=_update(bench, _period([r.u for r in bench.records], bench))), x
         rates = np.concatenate([s[:, n_q : 2 * n_q] for s in x])
         slopes = np.concatenate([np.gradient(smooth(s[:, n_q : 2 * n_q], bench.update), bench.step, axis=0) for s in x])
         v, a = (np.sqrt(np.mean(r**2, axis=0)) for r in (rates, slopes))
         if not (np.isfinite(v).all() and np.all(a < FAR * scale)):  # it does not follow: what was guessed has to do
             return replace(bench, forces=scale), [np.where(np.abs(s) < np.inf, s, 0.0) for s in x]
         period = float(np.min(2.0 * np.pi * v / np.maximum(a, 1e-300)))
-        update = int(np.clip(round(period / UPDATES / bench.step), 1, max(len(r) for r in bench.records) // 40 or 1))
-        bench = replace(bench, forces=np.maximum(a, 1e-12), update=update, fastest=max(fastest, MAX_TURN * UPDATES * MIN_STEPS / period))
+        bench = replace(
+            bench, forces=np.maximum(a, 1e-12), update=_update(bench, period), fastest=max(fastest, MAX_TURN * UPDATES * MIN_STEPS / period)
+        )
     return bench, x
+
+
+def _period(signals: Sequence[Array], bench: Bench) -> float:
+    """The shortest period [s] of signals [n, .] per recording, by their rms and that of their rates."""
+    rates = np.concatenate([np.gradient(smooth(s, 1), bench.step, axis=0) for s in signals])
+    moving = np.std(np.concatenate(signals), axis=0)
+    return float(np.min(2.0 * np.pi * moving / np.maximum(np.sqrt(np.mean(rates**2, axis=0)), 1e-300)))
+
+
+def _update(bench: Bench, period: float) -> int:
+    """Samples between corrections, for a motion of this period [s]."""
+    return int(np.clip(round(period / UPDATES / bench.step), 1, max(len(r) for r in bench.records) // 40 or 1))
 
 
 def _followed(bench: Bench) -> list[Array]:
@@ -185,7 +197,7 @@ def _followed(bench: Bench) -> list[Array]:
 def _guess(bench: Bench, model: Model, spans: Array) -> Array:
     """Forces that would move the sensors about as much as they do."""
     if not model.bodies:
-        return np.full(len(bench.forces), float(np.max(spans)) / (1.0 if bench.places else UPDATES * bench.update * bench.step))
+        return np.full(len(bench.forces), float(np.max(spans)) / (UPDATES * bench.update * bench.step))
     gains = bench.gains()
     noisy, step = driven_by_noise(gains.names), gains.period
     reach = np.abs(gains.plant.c @ np.linalg.matrix_power(np.eye(len(gains.plant.a)) + gains.plant.a * step, 3)[:, noisy])

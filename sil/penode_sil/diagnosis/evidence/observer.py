@@ -70,33 +70,30 @@ def scale(sensor: str) -> str:
     return f"{sensor}_scale"
 
 
-def augmented(model: Model, places: Sequence[Place]) -> Model:
+def augmented(model: Model) -> Model:
     """The model with a bias and a scale of each sensor as parameters, and with an unmodelled acceleration w of each body, a
-    first-order Gauss-Markov process w' = -w/tau + noise; without bodies, with such a force at each place. The parameter unmodelled_tau is
-    tau [s]. It is an acceleration because the observer then does not change if all masses and forces are scaled by one factor, which
-    sensors of motion cannot show."""
+    first-order Gauss-Markov process w' = -w/tau + noise. The parameter unmodelled_tau is tau [s]. It is an acceleration because the
+    observer then does not change if all masses and forces are scaled by one factor, which sensors of motion cannot show."""
     free = {bias(s.name): Parameter(bias(s.name), 0.0, s.unit) for s in model.sensors}
     free |= {scale(s.name): Parameter(scale(s.name), 1.0, "1") for s in model.sensors}
     free[f"{UNMODELLED}_tau"] = Parameter(f"{UNMODELLED}_tau", 1.0, "s")
-    ends = [(b.name, GROUND) for b in model.bodies] or [p.ends for p in places]
-    where = [] if model.bodies else list(places)
-    units = [rotational_unit(model, e, "m/s^2" if model.bodies else "N") for e in ends]
+    ends = [(b.name, GROUND) for b in model.bodies]
+    units = [rotational_unit(model, e, "m/s^2") for e in ends]
     names = [f"{UNMODELLED}{k}" for k in range(len(ends))]
-    masses = [f"{b.mass}*" for b in model.bodies] or [""] * len(ends)
-    forces = [Element(name, e, "expression", expression=f"{mass}{name}_f") for name, e, mass in zip(names, ends, masses, strict=True)]
+    forces = [Element(name, e, "expression", expression=f"{b.mass}*{name}_f") for name, e, b in zip(names, ends, model.bodies, strict=True)]
     states = [State(f"{name}_f", u) for name, u in zip(names, units, strict=True)]
     laws = [Equation(name, f"der({name}_f)*{UNMODELLED}_tau = -{name}_f") for name in names]
     wide = replace(
         model, parameters={**model.parameters, **free}, extra_states=(*model.extra_states, *states), equations=(*model.equations, *laws)
     )
-    wide = extend(wide, forces, {}, where)
+    wide = extend(wide, forces, {})
     sensors = tuple(replace(s, expression=f"({s.expression})*{scale(s.name)} + {bias(s.name)}") for s in wide.sensors)
     return replace(wide, sensors=sensors)
 
 
 def with_probes(model: Model, places: Sequence[Place]) -> Model:
     """An augmented model with a force at_k as a further input at each place, and its deflection, its rate and the force there already as
-    further sensors; behind them the forces of its drives."""
+    further sensors; behind them the forces of its drives, and all of each place, those of forms too."""
     forces = [Element(f"probe{k}", p.ends, "expression", expression=f"at{k}") for k, p in enumerate(places)]
     wide = replace(model, inputs=(*model.inputs, *(Input(f"at{k}", p.unit("N")) for k, p in enumerate(places))))
     wide = extend(wide, forces, {}, places)
@@ -105,6 +102,7 @@ def with_probes(model: Model, places: Sequence[Place]) -> Model:
         signals = (("s", f"s_probe{k}", "m"), ("v", f"v_probe{k}", "m/s"), ("F", force_at(p), "N"))
         seen += [Signal(f"{q}_of_probe{k}", text, p.unit(unit)) for q, text, unit in signals]
     seen += [Signal(f"F_of_{e.name}", f"F_{e.name}", rotational_unit(model, e.ends, "N")) for e in drives(model)]
+    seen += [Signal(f"all_of_probe{k}", _all_at(model, p), p.unit("N")) for k, p in enumerate(places)]
     return replace(wide, sensors=(*wide.sensors, *seen))
 
 
@@ -116,6 +114,13 @@ def drives(model: Model) -> list[Element]:
 def force_at(p: Place) -> str:
     """The force of the elements at a place, as an expression."""
     return " ".join(f"{'+' if sense > 0 else '-'} F_{name}" for name, sense in p.elements) or "0"
+
+
+def _all_at(model: Model, p: Place) -> str:
+    """The force of the elements at a place and of the forms put there."""
+    own = {name for name, _ in p.elements}
+    forms = [e.name for e in model.elements if e.ends == p.ends and e.name not in own and not external(model, e)]
+    return " + ".join([force_at(p), *(f"F_{n}" for n in forms if not n.startswith(UNMODELLED))])
 
 
 @dataclass(frozen=True, eq=False)
