@@ -16,6 +16,7 @@ from .catalogue import curve
 from .evidence.bench import SIZES, Bench
 from .evidence.blocks import Blocks
 from .evidence.fit import Problem
+from .evidence.gain import Level
 from .evidence.prior import stated
 from .evidence.screening import Probe
 from .propose import PROMISE, is_part, motions, propose
@@ -71,9 +72,13 @@ class Rounds:
         while none is large, enough that little may remain: one more cause may explain the rest. If it does, all forms are judged again by
         the smaller level that remains."""
         bench, scores, found = self.beside(accepted)
+        good = self.good(bench, scores, found)
+        if not good and not found and bench.level.size >= WORTH:
+            bench, scores, found = self.beside(self.pair(bench, scores))
+            good = self.good(bench, scores, found) if found else ()
         large = [is_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
         hides = not found or large[-1] or any(_hidden(t, found[-1].trial) for t in found[-1].trials)
-        while good := self.good(bench, scores, found):
+        while good:
             best = simplest(good, scores, terms_of(found))
             if not hides and not _matters(best) and not _may_remain(bench, large, best):
                 break
@@ -86,9 +91,26 @@ class Rounds:
             if not hides and not mostly(best.whole) and not _may_remain(bench, large, best):
                 good = ()
                 break
+            good = self.good(bench, scores, found)
         if found and (alone(found[-1].trial.whole) or least(bench.level.size, 0.0) < WORTH):
             large = [is_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
         return Grown(bench, scores, tuple(found), tuple(large), good)
+
+    def pair(self, bench: Bench, scores: Array) -> list[Accepted]:
+        """Two causes that together predict left-out blocks better than `scores`, where no cause does alone: the delay and the friction of a
+        drive that starts from rest. Empty without any."""
+        best, total = [], float(np.sum(scores)) + 2.0 * MIN_GAIN
+        trials, wide = propose(bench, (), self.log)
+        for t in (_scored(bench, bench.problem(wide), self.blocks, x) for x in trials[:SCORED]):
+            beside, terms = adopt(bench, t, 0)
+            beside, level = _based(beside, self.blocks)
+            first = Accepted(t, 0, tuple(terms), (t,))
+            if good := self.good(beside, level, [first]):
+                second = simplest(good, level, terms)
+                if np.sum(second.blocks > scores) >= MIN_BLOCKS and np.sum(second.blocks) > total:
+                    best, total = [first, Accepted(second, 1, (), good)], float(np.sum(second.blocks))
+        self.log(f"a pair: {[name_of(a.trial) for a in best]}")
+        return best
 
     def beside(self, accepted: Sequence[Accepted]) -> tuple[Bench, Array, list[Accepted]]:
         """Rebuilds the bench with these forms; returns it, its scores, and the forms with the share of their name in it. What a form took
@@ -152,10 +174,14 @@ def is_large(t: Trial, least_share: float) -> bool:
     return t.share >= least_share and t.taken >= MIN_TAKEN
 
 
+def levels(level: Level) -> list[float]:
+    """Larger sizes of the unmodelled force that are tried, up to all forces: beyond that an observer follows any motion."""
+    return [size for factor in LEVEL_FACTORS if (size := max(level.size, SIZES[1]) * factor) <= 1.0]
+
+
 def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
     """The bench with the level that predicts best, and its scores [blocks], less what parameters cost that are not what the file states."""
-    sizes = [max(bench.level.size, SIZES[1]) * factor for factor in LEVEL_FACTORS]
-    level, fit, scores = blocks.fit_level(bench, bench.problem(), bench.fit, bench.level, sizes)
+    level, fit, scores = blocks.fit_level(bench, bench.problem(), bench.fit, bench.level, levels(bench.level))
     return replace(bench, level=level, fit=fit), scores - stated(fit.free) / len(scores)
 
 
