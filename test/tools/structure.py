@@ -67,7 +67,7 @@ ELEMENTARY = {"pen_elementary.h", "pen_parts.h", "pen_trig.c", "pen_atan.c", "pe
 
 NEWER, TABLE = BUDGETS[:2]
 ROOMS = re.compile(
-    r"sil/penode_sil/diagnosis/(evidence|catalogue)/|sil/penode_sil/diagnosis/(propose|terms|worth|rounds|reconsider|innovate|parameters|real|weighed|beginning)\.py"
+    r"sil/penode_sil/diagnosis/(evidence|catalogue)/|sil/penode_sil/diagnosis/(propose|terms|worth|rounds|reconsider|innovate|parameters|real|unmodelled|verdict|beginning)\.py"
 )
 
 Found = dict[str, list[str]]

@@ -32,7 +32,6 @@ from . import (
     straight,
     tones,
 )
-from .answers import alternatives
 from .broken import still_broken
 from .checks.case import Case, End
 from .checks.written import write_extended
@@ -40,13 +39,12 @@ from .explanation import Explanation
 from .hypotheses import CLOCK
 from .judging import cause, damped, judge, pitching, resized, worth
 from .noise import UNSEEN
-from .result import MAY_BE_NOTHING, OUTSIDE, Cause, Diagnosis, Gain, Named, place
+from .result import MAY_BE_NOTHING, OUTSIDE, UNKNOWN, Cause, Diagnosis, Gain, Named, place
 from .study import Study, look
 
 CHANGING = 1e-9  # chance that noise makes as much of a change with time; 2e-6 where it is 1.4 times louder than its law says
 FARTHER = 0.02  # share of samples outside of the training, above which a hold-out is no evidence for a name
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
-SURELY_NOT = (Cause(OUTSIDE, "", {}, 0.5),)  # named by nothing on the list
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +68,7 @@ class Judged:
 
     def nothing(self, note: str) -> Judged:
         """Unexplained after all, for what the note says."""
-        return replace(self, causes=SURELY_NOT, verdict="unexplained", explained=0.0, named=None, unnamed=None, notes=(*self.notes, note))
+        return replace(self, causes=(UNKNOWN,), verdict="unexplained", explained=0.0, named=None, unnamed=None, notes=(*self.notes, note))
 
 
 def judge_explanations(
@@ -106,9 +104,24 @@ def by_noise(case: Case, study: Study, best: Explanation | None, judged: Judged)
         judged.alike,
         tuple([judged.doubt] * bool(judged.doubt)) + judged.notes,
         absorbed=absorbed,
-        explanations=alternatives(judged.causes),
+        explanations=_alternatives(judged.causes),
     )
     return End(answer, study, extended, judged.named.fit if whole else None, held)
+
+
+def _alternatives(causes: Sequence[Cause]) -> tuple[dict[str, object], ...]:
+    """Explanations as sets of causes: the one named, and it with one cause exchanged for an alternative."""
+    own = [{"kind": c.kind, "where": c.where} for c in causes if c.kind != OUTSIDE]
+    if not own:
+        return ()
+    sure = float(np.prod([c.confidence for c in causes]))
+    sets = [{"causes": own, "posterior": sure}]
+    for k, c in enumerate(causes):
+        others = float(np.prod([x.confidence for x in causes if x is not c]))
+        for a in c.alternatives:
+            other = [*own[:k], {"kind": a.kind, "where": a.where}, *own[k + 1 :]]
+            sets.append({"causes": other, "posterior": others * (1.0 - c.confidence) / len(c.alternatives)})
+    return tuple(sets)
 
 
 def _weighed(case: Case, study: Study, explanations: Sequence[Explanation], faults: list[Cause]) -> Judged:
@@ -128,7 +141,7 @@ def _weighed(case: Case, study: Study, explanations: Sequence[Explanation], faul
     doubt = plausible.doubt(study, best, verdict)
     behind = not doubt and verdict != "unexplained" and best is not None and pitching(best) and echo.echo(study, best.fit).detected
     if doubt or behind:
-        causes, verdict = SURELY_NOT, "unexplained"
+        causes, verdict = (UNKNOWN,), "unexplained"
     if step is not None and not any(c.kind == OUTSIDE for c in causes):
         causes, verdict = (*causes, step), "explained"
     drift = sum(t.gain for t in best.terms if t.candidate.kind == CLOCK) if best else 0.0
@@ -203,7 +216,7 @@ def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, di
     unseen = [s for s, g in gain.items() if g.after_rmse > UNSEEN * g.noise_floor] if not judged.causes else []
     if unseen:
         note = f"{', '.join(unseen)}: the hold-out shows an effect that the training does not: train with recordings like that one"
-        judged = replace(judged, causes=SURELY_NOT, verdict="unexplained", explained=0.0, notes=(*judged.notes, note))
+        judged = replace(judged, causes=(UNKNOWN,), verdict="unexplained", explained=0.0, notes=(*judged.notes, note))
     return judged, text, gain, held
 
 
@@ -226,8 +239,7 @@ def hints(
         masses = [cause(study, explanations, g) for g in explanations[0].groups if g[0] == "hidden_resonance"]
         notes += damped([c for c in masses if worth(study, c)])
     if tone.detected:
-        own = study.model.sensors[tone.sensor].name
-        notes.append(f"{own} contains a tone at about {tone.frequency:.0f} Hz: an engine, a wheel, the mains?")
+        notes.append(tones.note(study.model, tone))
     if drift:
         notes.append(f"clocks of sensors and inputs drift apart by {1e6 * abs(drift):.3g} ppm: put both on one clock")
     return notes

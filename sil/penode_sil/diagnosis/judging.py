@@ -14,13 +14,13 @@ from .echo import LAGGING
 from .explanation import Explanation
 from .hypotheses import CLOCK, Basis
 from .late import SHORT
-from .result import OUTSIDE, Cause, Named
+from .leftover import DOUBT, beyond_noise
+from .result import OUTSIDE, UNKNOWN, Cause, Named
 from .study import Study
 
 PATCHED = 0.985  # share that several causes must take away if sensors still share a residual, and any cause if something changes too
 WHOLE = 0.94  # share of several causes from which on a residual beyond chance may be of their form
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
-DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
 DAMPED = 0.2  # a hidden mass with more damping is no part on rubber, whose loss factor is 0.4 at most: it stands for some other dynamics
 MAIN = 0.5  # of the gain: causes that do less without a drift of the clocks only stand in for it
 # What is positive by its nature: a cause of which that is not sure stands for something else. Others are unsure for a bent curve.
@@ -42,14 +42,14 @@ def judge(
     excess = study.null.cost - rows
     evidence = excess / np.sqrt(2.0 * rows)
     if not explanations:
-        if (evidence > DOUBT and excess > 0.15 * rows) or alike > noise.ALIKE or pure or changed:
-            return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", 0.0, evidence
+        if beyond_noise(excess, rows) or alike > noise.ALIKE or pure or changed:
+            return (UNKNOWN,), "unexplained", 0.0, evidence
         verdict = "explained" if faults else "not_identifiable" if evidence > DOUBT else "no_discrepancy"
         return tuple(faults), verdict, 1.0, evidence
     best = explanations[0]
     left = max(best.fit.chi2 - rows, shared if alike > noise.ALIKE else 0.0, 0.0)  # in the noise that the best explanation leaves
     gained, part = study.null.cost - best.fit.cost, share(study, best, left)
-    if part < ENOUGH and (left > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows) or alike > noise.ALIKE):
+    if part < ENOUGH and (beyond_noise(left, rows) or alike > noise.ALIKE):
         return (Cause(OUTSIDE, "", {}, 1.0 - part),), "unexplained", part, evidence
     shown = alike > noise.ALIKE or (part < WHOLE and left > DOUBT * np.sqrt(2.0 * rows))
     patched = len(best.groups) > 1 and part < PATCHED and shown  # several causes, and still no whole
@@ -58,18 +58,18 @@ def judge(
         return (Cause(OUTSIDE, "", {}, 1.0 - part),), "unexplained", part, evidence
     masses = [t for t in best.terms if t.candidate.kind == "hidden_resonance"]
     if len(masses) > 1 and len(best.groups) == 1 and explaining.explain(study, masses[:1]).gain < refining.FILTER * best.gain:
-        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
+        return (UNKNOWN,), "unexplained", part, evidence
     others = [t for t in best.terms if t.candidate.kind != CLOCK]
     if not others or (len(others) < len(best.terms) and explaining.explain(study, others).gain < MAIN * best.gain):
-        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
+        return (UNKNOWN,), "unexplained", part, evidence
     causes = [cause(study, explanations, group) for group in best.groups if group[0] != CLOCK]
     causes = [c for c in causes if worth(study, c)]
     if any(unsized(best, c) for c in causes):
-        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
+        return (UNKNOWN,), "unexplained", part, evidence
     kinds = [c.kind for c in causes]  # several wrong parameters are another vehicle, several delays another clock
     several = max(kinds.count("wrong_parameter"), kinds.count("sensor_delay")) > 1
     if several or damped(causes):
-        return (Cause(OUTSIDE, "", {}, 0.5),), "unexplained", part, evidence
+        return (UNKNOWN,), "unexplained", part, evidence
     faulty = {(c.kind, c.where) for c in causes}
     causes += [f for f in faults if (f.kind, f.where) not in faulty]
     whole = (part > search.WHOLE or left < 0.15 * rows) and not pure

@@ -58,6 +58,9 @@ class Cause:
         return len(self.parameters) == 1 and all(v.ci95[0] <= NOTHING.get(k, 0.0) <= v.ci95[1] for k, v in self.parameters.items())
 
 
+UNKNOWN = Cause(OUTSIDE, "", {}, 0.5)  # one that is not in the catalogue
+
+
 @dataclass(frozen=True)
 class Gain:
     """RMS errors of one signal on data that were not used, with the generated C; `share` of the possible gain.

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.ndimage import maximum_filter1d
 
+from penode_gen.model import Model
+
 from .noise import TOP, Experiment, Metric
 
 Array = NDArray[np.float64]
@@ -74,6 +76,11 @@ def tone(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated
             surprise, k = _followed(np.prod(hears, axis=0)[:, None])
             found.append(Tone(surprise, float(hertz[k + HALF]), int(np.argmax(np.sum(np.log(hears[:, :, k]), axis=1)))))
     return max(found, key=lambda t: t.surprise)
+
+
+def note(model: Model, tone: Tone) -> str:
+    """A note on a tone."""
+    return f"{model.sensors[tone.sensor].name} contains a tone at about {tone.frequency:.0f} Hz: an engine, a wheel, the mains?"
 
 
 def _whitened(e: Experiment, m: Metric, residual: Array) -> Array:

@@ -17,7 +17,7 @@ from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
 from ..noise import UNSEEN
 from ..report.figure import number
-from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, Cause, place
+from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, UNKNOWN, Cause, place
 from ..worth import RATIO
 from . import values
 from .case import Case, End
@@ -81,7 +81,7 @@ def nameless(case: Case, end: End, table: Table, broken: Sequence[tuple[Cause, s
     d = replace(d, causes=causes, explanations=tuple(s for s in sets if s["causes"]), notes=notes)
     if not causes:
         off = misses(table.rows, "refitted", table.noise)
-        d = replace(d, causes=(Cause(OUTSIDE, "", {}, 0.5),) * bool(off), verdict="unexplained" if off else "no_discrepancy", explained=0.0)
+        d = replace(d, causes=(UNKNOWN,) * bool(off), verdict="unexplained" if off else "no_discrepancy", explained=0.0)
     return replace(end, answer=d)
 
 
@@ -149,7 +149,7 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
         return end
     off = f"the error of the model at {', '.join(sensors)} exceeds the noise, that of {EXTENDED} is smaller"
     note = f"{off}: neither its small causes nor other parameter values explain that"
-    unsure = (Cause(OUTSIDE, "", {}, 0.5),)
+    unsure = (UNKNOWN,)
     return replace(end, answer=replace(d, verdict="unexplained", causes=unsure, explained=0.0, notes=(*d.notes, note)))
 
 
