@@ -82,9 +82,8 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
     def by_innovations(known: bool = True) -> End:
         return verdict.conclude(case, study, ask(), lambda fit: still_broken(case.train, study, fit, faults, bursts) if known else ())
 
-    unknown = bool(guessed(study.model)) or (not study.model.inputs and unmodelled(study, study.null, case.log) > 0.0)
-    if followed and unknown:  # no motion is about right: samples show neither causes nor faults
-        return by_innovations(False)
+    if followed and (guessed(study.model) or (not study.model.inputs and unmodelled(study, study.null, case.log) > 0.0)):
+        return by_innovations(False)  # no motion is about right: samples show neither causes nor faults
     case.tell(SEARCH[0], "looking for causes")
     found, beam = search.first(study, case.log)
     wrong = followed and bool(beam) and unmodelled(found, beam[0].fit, case.log) > UNMODELLED

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 """
-The search by innovations and the one beside sensor noise on the same cases of every generator: which is right where?
+Each search of the diagnosis alone, and both together, on the same cases of every generator: who is right where?
 
     build/venv/bin/python test/diagnosis/ablation/searches.py --cases 40 --worlds 20 --mechanisms 6 --mujoco 20 --out DIR      a fresh draw
     build/venv/bin/python test/diagnosis/ablation/searches.py --out DIR --page SEARCHES.md      the page of its rows
@@ -18,9 +18,11 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -33,17 +35,29 @@ from hidden import cases
 from mujoco_cases import cases as mujoco
 from worlds import equivalents, world
 
-from penode_sil.diagnosis import verdict
+from penode_sil.diagnosis import engine, verdict
 
-SEARCHES = ("noise", "innovations")
-HEAD = "| | cases | sensor noise | innovations | innovations lose what sensor noise has | neither |\n|---|---|---|---|---|---|"
+SEARCHES = ("noise", "innovations", "both")
+HEAD = "| | cases | sensor noise alone | innovations alone | both | both lose what one has | neither |\n|---|---|---|---|---|---|---|"
 
 
 @contextmanager
 def only(search: str) -> Iterator[None]:
-    """The diagnosis with the search in samples, beside sensor noise, for all models, or as the command has it: by innovations, where they
-    support the model."""
-    with mock.patch.object(verdict, "supports", lambda model: False) if search == "noise" else nullcontext():
+    """The diagnosis with one of its searches alone; innovations leave what they do not support to the other."""
+
+    def innovations(case: Any, study: Any, other: Any, bursts: Any) -> Any:
+        if not verdict.supports(study.model):
+            return both(case, study, other, bursts)
+        faults = engine.broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
+        broken = partial(engine.still_broken, case.train, study, faults=faults, bursts=bursts)
+        return verdict.conclude(case, study, verdict.searched(case, study), broken)
+
+    both = engine._searched
+    with (
+        mock.patch.object(verdict, "supports", lambda model: False)
+        if search == "noise"
+        else mock.patch.object(engine, "_searched", innovations if search == "innovations" else both)
+    ):
         yield
 
 
@@ -105,7 +119,7 @@ def share(what: str, some: Sequence[Mapping[str, Mapping]]) -> str:
     """One row of the table."""
     right = [{s: bool(c[s]["right"]) for s in SEARCHES} for c in some]
     counts = [sum(r[s] for r in right) for s in SEARCHES]
-    lost = sum(r["noise"] and not r["innovations"] for r in right)
+    lost = sum(not r["both"] and (r["noise"] or r["innovations"]) for r in right)
     neither = sum(not any(r.values()) for r in right)
     return f"| {' | '.join(map(str, (what, len(some), *counts, lost, neither)))} |"
 
@@ -113,26 +127,26 @@ def share(what: str, some: Sequence[Mapping[str, Mapping]]) -> str:
 def page(rows: Sequence[Mapping], about: str) -> str:
     """The table by generator, by stratum and by kind of a single effect; then what both lose, and time."""
     every = by_case(rows)
-    out = [f"# Both searches\n\n{about}\n\nCases that are right: every effect named with its place, and nothing else.\n\n{HEAD}"]
+    out = [f"# Each search alone\n\n{about}\n\nCases that are right: every effect named with its place, and nothing else.\n\n{HEAD}"]
     for generator in GENERATORS:
-        some = [c for c in every if c["innovations"]["generator"] == generator]
+        some = [c for c in every if c["both"]["generator"] == generator]
         if not some:
             continue
         out.append(share(f"**{generator}**", some))
-        strata = sorted({c["innovations"]["stratum"] for c in some})
-        out += [share(f"{generator}, {s}", [c for c in some if c["innovations"]["stratum"] == s]) for s in strata]
-    kinds = sorted({c["innovations"]["kinds"][0] for c in every if len(c["innovations"]["kinds"]) == 1})
-    out += [share(f"`{k}`", [c for c in every if c["innovations"]["kinds"] == [k]]) for k in kinds]
+        strata = sorted({c["both"]["stratum"] for c in some})
+        out += [share(f"{generator}, {s}", [c for c in some if c["both"]["stratum"] == s]) for s in strata]
+    kinds = sorted({c["both"]["kinds"][0] for c in every if len(c["both"]["kinds"]) == 1})
+    out += [share(f"`{k}`", [c for c in every if c["both"]["kinds"] == [k]]) for k in kinds]
     out.append("\n| processor time, without compilers | median | 90 % within | longest |\n|---|---|---|---|")
     for search in SEARCHES:
         times = sorted(c[search]["seconds"] for c in every)
         out.append(f"| {search} | {times[len(times) // 2]:.0f} s | {times[int(0.9 * (len(times) - 1))]:.0f} s | {times[-1]:.0f} s |")
-    out.append("\n## Where not both are right\n\n| case | hidden | sensor noise | innovations |\n|---|---|---|---|")
+    out.append("\n## Where not all three are right\n\n| case | hidden | sensor noise | innovations | both |\n|---|---|---|---|---|")
     for c in every:
         if not all(c[s]["right"] for s in SEARCHES):
-            hidden = " + ".join(c["innovations"]["kinds"]) or "nothing"
+            hidden = " + ".join(c["both"]["kinds"]) or "nothing"
             said = " | ".join(answered(c[s]) for s in SEARCHES)
-            out.append(f"| {c['innovations']['generator']} {c['innovations']['case'].split(':')[1]} | {hidden} | {said} |")
+            out.append(f"| {c['both']['generator']} {c['both']['case'].split(':')[1]} | {hidden} | {said} |")
     return "\n".join(out) + "\n"
 
 
