@@ -17,7 +17,7 @@ from test_innovations import swing
 import penode_gen
 from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
-from penode_sil.diagnosis import adopting, applied, clipping, plant
+from penode_sil.diagnosis import adopting, applied, clipping
 from penode_sil.diagnosis.between import joined, parts, straight
 from penode_sil.diagnosis.catalogue.actuators import lagging
 from penode_sil.diagnosis.catalogue.form import Form, Part
@@ -110,7 +110,7 @@ def test_an_observer_counts_the_samples_that_are_kept(tmp_path):
 def test_a_scale_of_a_sensor_does_not_tune_the_filter(tmp_path):
     """Twice as large a measurement of a sensor of scale 2 has twice the innovations, whatever the gain."""
     model, (e,) = swing(tmp_path, lambda s, v: 0.02 * math.sin(9.0 * s), seconds=2.0)
-    wide, by = augmented(model, plant.places(model)), Filter(np.array([[0.4], [3.0], [0.0]]), np.array([0.01]))
+    wide, by = augmented(model), Filter(np.array([[0.4], [3.0], [0.0]]), np.array([0.01]))
     twice = Free(scale("phi"), 2.0, 0.01)
     nus = []
     for y, free in ((e.y, ()), (2.0 * e.y, (twice,))):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from penode_sil.diagnosis import weighed
+from penode_sil.diagnosis import verdict
 from penode_sil.diagnosis.result import Cause, Value
 
 
@@ -30,7 +30,7 @@ def wrong(model: SimpleNamespace, **factors: float) -> tuple[Cause, ...]:
 def test_one_factor_is_the_gain_of_the_input():
     model = plant()
     delay = Cause("sensor_delay", "x", {"delay": Value(1e-3, "s", (9e-4, 1.1e-3))}, 0.9)
-    (gain, other), notes = weighed._plausible(model, (*wrong(model, m=1.37, c=1.35, d=1.39), delay))
+    (gain, other), notes = verdict._plausible(model, (*wrong(model, m=1.37, c=1.35, d=1.39), delay))
     assert (gain.kind, gain.where, other) == ("input_gain", "push", delay) and "by a common factor" in notes[0]
     # weights are those of intervals 4 % of each factor wide; truth: their mean is within a tenth of a per cent of 1.37
     assert gain.parameters["gain"].value == pytest.approx(1.0 / 1.37, rel=2e-3)
@@ -49,19 +49,19 @@ def test_one_factor_is_the_gain_of_the_input():
     ],
 )
 def test_other_factors_are_another_plant(model, factors):
-    causes, notes = weighed._plausible(model, wrong(model, **factors))
+    causes, notes = verdict._plausible(model, wrong(model, **factors))
     assert causes == () and "another plant" in notes[0]
 
 
 def test_without_tolerances_one_factor_is_a_gain_too_and_several_are_parameters():
     model = plant(tolerance=0.0)
-    (gain,), _ = weighed._plausible(model, wrong(model, m=1.17, c=1.18))
+    (gain,), _ = verdict._plausible(model, wrong(model, m=1.17, c=1.18))
     assert (gain.kind, gain.where) == ("input_gain", "push")
     causes = wrong(model, m=1.17, c=1.40)
-    assert weighed._plausible(model, causes) == (causes, [])
+    assert verdict._plausible(model, causes) == (causes, [])
 
 
 def test_one_parameter_is_itself():
     model = plant()
     causes = wrong(model, m=1.37)
-    assert weighed._plausible(model, causes) == (causes, [])
+    assert verdict._plausible(model, causes) == (causes, [])

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import by_noise, engine, propose, rounds
+from penode_sil.diagnosis import by_noise, propose, rounds
 from penode_sil.diagnosis.catalogue import springs
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
 from penode_sil.diagnosis.result import Cause, Value
@@ -52,22 +52,6 @@ def test_of_curves_that_predict_equally_well_the_one_with_fewer_values_is_named(
 def test_what_is_a_part_of_a_form_is_tried_too():
     both, alone = (trial("coulomb_friction", 1.0, *parts).form for parts in ((SLIDES, PUSHES), (SLIDES,)))
     assert propose.is_part(alone, both) and not propose.is_part(both, alone) and not propose.is_part(alone, alone)
-
-
-@pytest.mark.parametrize(
-    "causes, laws, groups, terms, simpler",
-    [
-        (1, 1, 2, 2, True),  # fewer causes
-        (1, 1, 1, 4, True),  # as many, by fewer laws
-        (1, 2, 1, 2, False),
-        (2, 2, 1, 4, False),
-        (0, 0, 1, 4, False),  # nothing named is no explanation by fewer laws
-        (0, 0, 2, 8, True),  # small deviations everywhere, where the other has two causes
-    ],
-)
-def test_the_simpler_explanation(causes, laws, groups, terms, simpler):
-    weighed = SimpleNamespace(causes=(None,) * causes, laws=laws)
-    assert engine._simpler(weighed, SimpleNamespace(groups=(None,) * groups, terms=(None,) * terms)) is simpler
 
 
 @pytest.mark.parametrize("low, high, unsized", [(-1e-5, 3e-4, True), (1e-5, 3e-4, False), (-3e-4, -1e-5, False)])

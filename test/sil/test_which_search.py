@@ -27,9 +27,11 @@ def answers(monkeypatch: pytest.MonkeyPatch):
         guessed: tuple[str, ...] = (),
         inputs: tuple[str, ...] = ("road",),
         supported: bool = True,
+        doubt: str = "",
     ) -> tuple[str, bool]:
         def end(name: str, verdict: str) -> End:
-            return End(SimpleNamespace(verdict=verdict, by=name), None, None, None, ())  # type: ignore[arg-type]
+            own: Any = (SimpleNamespace(verdict=verdict, by=name), None, None, None, ())
+            return End(*own)
 
         ones, all_of_them = SimpleNamespace(fit="single", terms=()), SimpleNamespace(fit="beside", terms=())
         left = {"null": free, "single": single, "beside": beside}
@@ -44,7 +46,7 @@ def answers(monkeypatch: pytest.MonkeyPatch):
             (engine.search, "first"): lambda study, log: (study, [ones]),
             (engine.search, "grow"): lambda study, beam, log, hopeless: (study, [all_of_them]),
             (engine, "resting"): lambda other, study, explanations, log: (study, explanations),
-            (engine, "judge_explanations"): lambda case, study, *of: (study, SimpleNamespace(verdict=says[0])),
+            (engine, "judge_explanations"): lambda case, study, *of: (study, SimpleNamespace(verdict=says[0], doubt=doubt, drift=0.0)),
             (engine, "by_noise"): lambda case, study, best, judged: end("samples", says[0]),
         }
         for (module, name), stub in same.items():
@@ -52,8 +54,8 @@ def answers(monkeypatch: pytest.MonkeyPatch):
         null = type("Null", (str,), {"simulated": ()})("null")
         study: Any = SimpleNamespace(model=SimpleNamespace(inputs=inputs), null=null)
         case: Any = SimpleNamespace(train=(), log=print, tell=lambda *of: None)
-        found = engine._searched(case, study, study, [])
-        return found.answer.by, found.other is not None  # type: ignore[attr-defined]
+        found: Any = engine._searched(case, study, study, [])
+        return found.answer.by, found.other is not None
 
     return search
 
@@ -81,7 +83,8 @@ def test_samples_answer_where_innovations_explain_nothing_and_little_is_left(ans
     assert answers(beside=0.01) == ("innovations", False)
     assert answers(beside=0.01, says=("explained", "unexplained")) == ("samples", True)
     assert answers(says=("unexplained", "explained")) == ("innovations", False)
-    assert answers(says=("unexplained", "unexplained")) == ("samples", True)
+    assert answers(says=("unexplained", "unexplained")) == ("samples", False)
+    assert answers(says=("unexplained", "explained"), doubt="another plant") == ("samples", False)
 
 
 def test_samples_alone_answer_for_models_that_innovations_do_not_support(answers) -> None:

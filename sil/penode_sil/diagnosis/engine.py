@@ -98,12 +98,13 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
     best = explanations[0] if explanations else None
     beside = unmodelled(found, best.fit if best else found.null, case.log) if followed else 0.0
     found, judged = judge_explanations(case, found, explanations, faults, bursts)
-    if followed and (beside > 0.0 or judged.verdict == "unexplained"):
+    nothing = judged.verdict == "unexplained" and not (judged.doubt or judged.drift)  # of another plant, or of clocks, samples tell more
+    if followed and (beside > 0.0 or nothing):
         end = by_innovations()
         if end.answer.verdict != "unexplained" or beside > UNMODELLED:
             return end
     end = by_noise(case, found, best, judged)
-    return replace(end, other=by_innovations) if followed else end
+    return replace(end, other=by_innovations) if followed and end.answer.verdict != "unexplained" else end
 
 
 def _recorded(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[Recorded, ...]:
