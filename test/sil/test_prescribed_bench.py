@@ -15,28 +15,12 @@ from penode_sil.diagnosis import plant
 from penode_sil.diagnosis.evidence import bench
 from penode_sil.diagnosis.evidence.observer import Record, augmented, with_probes
 
-MODEL = """[model]
-name = "damper"
-sample_time = "10 ms"
-[parameters]
-c = { value = 1500, unit = "N/m", tolerance = "unknown" }
-d = { value = 2000, unit = "N*s/m", tolerance = "unknown" }
-[inputs]
-pos = { unit = "m" }
-[elements]
-spring = { between = ["pos", "ground"], law = "linear_spring", stiffness = "c" }
-damper = { between = ["pos", "ground"], law = "linear_damper", damping = "d" }
-[outputs]
-total = { value = "F_spring + F_damper", unit = "N" }
-[sensors]
-force = { value = "F_spring + F_damper", unit = "N", noise = 3 }
-"""
+RIG = Path(__file__).resolve().parents[1] / "diagnosis" / "rigs" / "labcontrol_mr"  # its model: spring and damper, whose motion is an input
 
 
 @pytest.fixture
-def model(tmp_path: Path):
-    (tmp_path / "model.toml").write_text(MODEL)
-    return penode_gen.load(tmp_path / "model.toml")
+def model():
+    return penode_gen.load(RIG / "damper.toml")
 
 
 @pytest.mark.parametrize("period", [0.8, 2.4])

@@ -97,12 +97,12 @@ def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bo
     found, explanations = resting(other, found, explanations, case.log)
     best = explanations[0] if explanations else None
     beside = unmodelled(found, best.fit if best else found.null, case.log) if followed else 0.0
+    if beside > 0.0 and ((end := by_innovations()).answer.verdict != "unexplained" or beside > UNMODELLED):
+        return end
     found, judged = judge_explanations(case, found, explanations, faults, bursts)
     nothing = judged.verdict == "unexplained" and not (judged.doubt or judged.drift)  # of another plant, or of clocks, samples tell more
-    if followed and (beside > 0.0 or nothing):
-        end = by_innovations()
-        if end.answer.verdict != "unexplained" or beside > UNMODELLED:
-            return end
+    if followed and not beside and nothing and (end := by_innovations()).answer.verdict != "unexplained":
+        return end
     end = by_noise(case, found, best, judged)
     return replace(end, other=by_innovations) if followed and end.answer.verdict != "unexplained" else end
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""What an explanation leaves of recordings beyond the noise of sensors and inputs: power, coherence of sensors, tones."""
+"""What an explanation leaves of recordings beyond the noise of sensors and inputs: power, and coherence of sensors. Tones: `tones`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from .noise import ALIKE, correlation
 from .study import Study
-from .tones import tone
 
 Array = NDArray[np.float64]
 DOUBT = 6.0  # standard deviations of chi2 that count as a discrepancy
@@ -25,7 +24,7 @@ def left_over(study: Study, simulated: Sequence[Array]) -> bool:
         chi2, rows = chi2 + float(np.sum(white**2)), rows + white.size * float(np.mean(e.good))
     if beyond_noise(chi2 - rows, rows):
         return True
-    return correlation(study.experiments, study.metrics, simulated)[0] > ALIKE or tone(study.experiments, study.metrics, simulated).detected
+    return correlation(study.experiments, study.metrics, simulated)[0] > ALIKE
 
 
 def beyond_noise(excess: float, rows: float) -> bool:

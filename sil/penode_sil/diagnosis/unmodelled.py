@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ UNMODELLED = 0.02  # size from which on a model is wrong everywhere; 0.01 may be
 MIN_UNMODELLED = 0.0055  # of all forces, and worth MIN_GAIN: true causes leave less, 0.003 of the levels tried at most
 
 
+@lru_cache(maxsize=2)  # the search asks, and the engine asks for the same again
 def unmodelled(study: Study, fit: Fit, log: Callable[[str], None]) -> float:
     """The unmodelled force beside an explanation, as a share of all forces; 0 if it may be chance, infinite if the explanation follows the
     measurement worse than the model as it is: its curves hold along its own way alone, and bend away beside it. One fit by innovations."""

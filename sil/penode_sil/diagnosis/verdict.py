@@ -10,18 +10,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen import units
 from penode_gen.model import Model
 
 from . import applied, explanation, leftover, measuring, numerics, plausible, real, tones
-from .catalogue import values as of_values
+from .catalogue import drives, values as of_values
 from .checks.case import Case, End
 from .checks.written import write_extended
 from .evidence.bench import UNSTATED
 from .fit import Fit
 from .judging import ENOUGH
 from .resolving import resolved
-from .result import UNKNOWN, Cause, Diagnosis, Named, Value
+from .result import UNKNOWN, Cause, Diagnosis, Named
 from .study import Study, fitted, guessed, look
 from .unmodelled import within
 
@@ -57,7 +56,7 @@ def conclude(case: Case, study: Study, found: real.Answer, broken: Broken) -> En
     )  # the others may compensate for laws that were added
     numbers, coarse = numerics.numerics(replace(measured, model=fitted(model, known)))
     share = max(_taken(study, after), found.taken, 0.0)  # the first without what sensors and inputs are off by
-    verdict = _verdict(found, causes, share, _quiet(study, after, bench.noise))
+    verdict = _verdict(found, causes, share, not causes and _quiet(study, after, bench.noise))
     if coarse and verdict != "unexplained":
         causes, verdict = (*causes, coarse), "explained" if verdict == "no_discrepancy" else verdict
     explanations = _explanations(causes, found.explanations)
@@ -103,7 +102,7 @@ def _taken(study: Study, after: Sequence[Array]) -> float:
 
 
 def _quiet(study: Study, after: Sequence[Array], noise: Array) -> bool:
-    """Does a simulation leave nothing but noise: what the file states of a sensor, or else that of its samples [n_z]?"""
+    """Does a simulation leave nothing but noise, tones aside: what the file states of a sensor, or else that of its samples [n_z]?"""
     stated = np.array([s.noise for s in study.model.sensors])
     return within(study, after, np.where(stated > 0.0, stated, noise)) and not leftover.left_over(study, after)
 
@@ -142,7 +141,7 @@ def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ..
     off = [c for c in causes if of_values.is_one(c) and model.parameters[c.where].tolerance <= 1.0]
     if len(off) < 2:
         return causes, []
-    if gain := _gain(model, off):
+    if gain := drives.common_gain(model, off, UNSTATED):
         names = ", ".join(c.where for c in off)
         return (gain, *(c for c in causes if c not in off)), [
             f"{names} changed by a common factor have the same effect; model_extended.toml has that form"
@@ -151,20 +150,3 @@ def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ..
     if len(stated) < 2:
         return causes, []
     return (), [f"{', '.join(stated)} would all have to be outside of their tolerances: another plant, or dynamics that the model lacks"]
-
-
-def _gain(model: Model, off: Sequence[Cause]) -> Cause | None:
-    """The gain of the only input, a force, that does what parameters do together: with all masses among them, by one factor, beside which
-    each is within its tolerance. A sensor of motion shows forces over masses only."""
-    forces = [i for i in model.inputs if units.si(i.unit) in ("N", "N*m")]
-    if len(model.inputs) != 1 or not forces or not {b.mass for b in model.bodies} <= {c.where for c in off}:
-        return None
-    values = [(c.parameters[c.where], model.parameters[c.where]) for c in off]
-    low, high = (np.array([v.ci95[k] / p.value for v, p in values]) for k in (0, 1))
-    weights = 1.0 / np.maximum(high - low, 1e-300) ** 2
-    factor = float(np.sum(weights * 0.5 * (low + high)) / np.sum(weights))
-    if factor <= 0.0 or any(abs(v.value / p.value / factor - 1.0) > (p.tolerance or UNSTATED) for v, p in values):
-        return None
-    gain = Value(1.0 / factor, "1", (1.0 / float(np.max(high)), 1.0 / float(np.min(low))))  # what a model leaves out moves each another way
-    others = tuple(Named(c.kind, c.where) for c in off[:3])
-    return Cause("input_gain", forces[0].name, {"gain": gain}, min(c.confidence for c in off), others)

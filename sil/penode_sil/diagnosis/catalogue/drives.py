@@ -2,13 +2,15 @@
 # Copyright (c) 2026 the penode authors
 """Inputs that differ from the excitation of the plant, and sensors that differ from its motion."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from penode_gen import units
 from penode_gen.model import Model
 
+from ..result import Cause, Named, Value
 from .actuators import ACTUATORS, Drive
 from .form import Form, Sizes
 
@@ -122,3 +124,20 @@ def sizes(form: Form, v: Sizes, unit: str) -> dict[str, tuple[str, float]]:
 def of_input(unit: str, own: str) -> str:
     """A unit of ACTUATORS for an input in `own` units."""
     return own + unit if unit in ("", "/s") else unit
+
+
+def common_gain(model: Model, off: Sequence[Cause], unstated: float) -> Cause | None:
+    """The gain of the only input, a force, that does what parameters do together: with all masses among them, by one factor, beside which
+    each is within its tolerance (`unstated` where the file has none). A sensor of motion shows forces over masses only."""
+    forces = [i for i in model.inputs if units.si(i.unit) in ("N", "N*m")]
+    if len(model.inputs) != 1 or not forces or not {b.mass for b in model.bodies} <= {c.where for c in off}:
+        return None
+    values = [(c.parameters[c.where], model.parameters[c.where]) for c in off]
+    low, high = (np.array([v.ci95[k] / p.value for v, p in values]) for k in (0, 1))
+    weights = 1.0 / np.maximum(high - low, 1e-300) ** 2
+    factor = float(np.sum(weights * 0.5 * (low + high)) / np.sum(weights))
+    if factor <= 0.0 or any(abs(v.value / p.value / factor - 1.0) > (p.tolerance or unstated) for v, p in values):
+        return None
+    gain = Value(1.0 / factor, "1", (1.0 / float(np.max(high)), 1.0 / float(np.min(low))))  # what a model leaves out moves each another way
+    others = tuple(Named(c.kind, c.where) for c in off[:3])
+    return Cause("input_gain", forces[0].name, {"gain": gain}, min(c.confidence for c in off), others)
