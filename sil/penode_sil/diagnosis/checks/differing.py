@@ -13,7 +13,7 @@ import numpy as np
 from penode_gen import units
 from penode_gen.model import Parameter
 
-from .. import measuring, numerics
+from .. import measuring, numerics, search
 from ..entries import table, toml, unlike
 from ..explanation import CHANCE, rows
 from ..fit import Fit, Free, Problem
@@ -69,7 +69,14 @@ def different(case: Case, study: Study) -> End | None:
         if not _missed(study, problem.solve([*others, _free(p)]), noise):
             return None
         good.append(found)
-    return _end(case, study, sorted(good, key=lambda x: x.fit.cost)) if good else None
+    good.sort(key=lambda x: x.fit.cost)
+    return _end(case, study, good) if good and not has_common_cause(case, study, good[0].fit) else None
+
+
+def has_common_cause(case: Case, study: Study, fit: Fit) -> bool:
+    """Does one cause with the same values in all recordings leave less than a fit with values of their own? A damper that is not linear has
+    another best value at another amplitude."""
+    return any(e.fit.cost < fit.cost for e in search.first(study, case.log)[1])
 
 
 def _beyond(study: Study, k: int, noise: np.ndarray) -> bool:
