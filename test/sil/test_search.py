@@ -15,6 +15,7 @@ from penode_sil.diagnosis.build import Term
 from penode_sil.diagnosis.exchange import sprung
 from penode_sil.diagnosis.explaining import acting, heavy
 from penode_sil.diagnosis.explanation import COST, NEW, Explanation, distinct, only_noise, spared
+from penode_sil.diagnosis.fit import Fit, Free
 from penode_sil.diagnosis.hypotheses import HALVES, Basis
 from penode_sil.diagnosis.pursuit import PART, elsewhere, pursue, strongest, terms_of
 from penode_sil.diagnosis.refining import called
@@ -284,3 +285,11 @@ def test_a_hopeless_search_ends_after_its_round(monkeypatch, hopeless, causes):
     study = SimpleNamespace(null=SimpleNamespace(free=()))
     found = search.grow(study, [made(1)], lambda text: None, hopeless=lambda study, e: hopeless)[1]
     assert len(found[0].groups) == causes and bool(exchanged) != hopeless
+
+
+def test_a_time_constant_that_nothing_shows_leaves_a_size_as_sure_as_it_is():
+    """A loss of 0.5 +- 0.01 and a time along which it changes by 1e-8 a factor of e: that may be off by a factor of 1e20, not of exp(5e7)."""
+    free = (Free("loss", 0.5, 0.01), Free("cooling", 1e8, 1.0, log=True))
+    fit = Fit(None, free, 0.0, 0.0, np.zeros(2), np.diag([1.0, 1e-9]), ())
+    along = np.array([0.01, 1e-8])
+    assert np.sqrt(along @ fit.covariance() @ along) == pytest.approx(0.01, rel=1e-6)

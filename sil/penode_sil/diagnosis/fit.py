@@ -84,8 +84,9 @@ class Fit:
         return next(f.value for f in self.free if f.target == target)
 
     def covariance(self) -> Array:
-        """Covariance of all free values, in their units (log: relative)."""
-        priors = np.array([(f.unit / f.sigma) ** 2 for f in self.free])
+        """Covariance of all free values, in their units (log: relative). None is off by more than a factor of FAR: else the least slope
+        along the time constant of a cooling that nothing shows would make a well-known loss uncertain."""
+        priors = np.array([max(f.unit / f.sigma, f.log / np.log(FAR)) ** 2 for f in self.free])
         curvature = self.jacobian.T @ self.jacobian + np.diag(priors)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
         return np.linalg.pinv(curvature * np.outer(scale, scale), rcond=1e-10) * np.outer(scale, scale)
