@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from pickle import PickleError
@@ -33,25 +34,60 @@ _POWER = r"(?:\s*(?:\^|\*\*)\s*-?\d(?:\.\d{1,2})?|[\u00b2\u00b3])?"
 _NAMED = rf"(?:[^\W\d][^\W\d]*|[%°]){_POWER}"
 _GROUP = rf"(?:{_NAMED}|\(\s*{_NAMED}(?:\s*[*/·]\s*{_NAMED})*\s*\){_POWER})"
 _UNIT = re.compile(rf"\s*(?:1|1\s*/\s*{_GROUP}|{_GROUP})?(?:(?:\s*[*/·]\s*|\s+){_GROUP})*\s*")
+_WORD = re.compile(r"°?[^\W\d]+")
+# names in common use that are no units here; pint takes Nm for a measure of yarn
+_OTHERWISE = {"Nm": "N*m", "kNm": "kN*m", "rev": "turn", "khz": "kHz", **dict.fromkeys(("°C", "°F", "Celsius", "Fahrenheit"), "K")}
+_LONGEST = 60
 _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
 
 class UnitError(ValueError):
-    """A unit that is unknown or does not fit; the message says which and what would."""
+    """A unit that is unknown or does not fit; the message says which and what would, or `instead` does."""
+
+    def __init__(self, message: str, unknown: str = "") -> None:
+        super().__init__(message)
+        self.unknown = unknown
+
+    @property
+    def instead(self) -> str:
+        """Asks for an unknown unit as it has to be written: Ohm as ohm, Nm as N*m; empty if that makes no unit either."""
+        return _instead(self.unknown) if len(self.unknown) <= _LONGEST else ""
 
 
 @cache
 def _unit(text: str) -> pint.Unit:
-    plain = text.replace("·", "*").replace("²", "^2").replace("³", "^3").strip() or "dimensionless"
-    if len(text) > 60 or not _UNIT.fullmatch(text):
-        raise UnitError(f"unknown unit '{text}'")
     try:
-        unit = _registry.parse_units(re.sub(r"^1", "dimensionless", plain))
+        unit = _parsed(text)
     except Exception as error:  # pint raises a dozen kinds
-        raise UnitError(f"unknown unit '{text}'") from error
+        raise UnitError(f"unknown unit '{text}'", text) from error
     if not _registry.Quantity(1, unit)._is_multiplicative:
         raise UnitError(f"unit '{text}' has an offset; use kelvin or another unit that starts at zero")
     return unit
+
+
+def _parsed(text: str) -> pint.Unit:
+    """The unit as pint reads it, which raises a dozen kinds of error."""
+    plain = text.replace("·", "*").replace("²", "^2").replace("³", "^3").strip() or "dimensionless"
+    if len(text) > _LONGEST or not _UNIT.fullmatch(text) or any(word in _OTHERWISE for word in _WORD.findall(text)):
+        raise UnitError(f"unknown unit '{text}'")
+    return _registry.parse_units(re.sub(r"^1", "dimensionless", plain))
+
+
+def _instead(text: str) -> str:
+    """See UnitError."""
+
+    def known(word: str) -> bool:
+        with suppress(Exception):
+            return _parsed(word) is not None
+        return False
+
+    def other(found: re.Match[str]) -> str:
+        word = found[0]
+        name = _OTHERWISE.get(word) or next((w for w in (word, word.lower(), word.capitalize()) if known(w)), word)
+        return f"({name})" if "*" in name and (found.string[: found.start()].rstrip().endswith("/") or "^" in found.string) else name
+
+    written = _WORD.sub(other, text)
+    return f"write '{written}'" if written != text and known(written) else ""
 
 
 def factor(text: str) -> float:

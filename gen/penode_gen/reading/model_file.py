@@ -355,9 +355,10 @@ class _Reader(MonitorTables):
         for n in (*parameters, *networks):
             changes = n in networks or parameters[n].tunable
             for name in (f"AT_{n}",) if changes else (n, f"{n}_INVERSE"):
-                if seen.setdefault(name.upper(), n) != n:
+                if (other := seen.setdefault(name.upper(), n)) != n:
                     where = self.made.get(n, ("parameters" if n in parameters else "networks", n))
-                    self.problem(where, f"its C constant {model.upper()}_{name.upper()} is already taken", "rename it")
+                    by = f" by that of '{other}'" if other else ""
+                    self.problem(where, f"its C constant {model.upper()}_{name.upper()} is already taken{by}", "rename it")
                     break
 
 

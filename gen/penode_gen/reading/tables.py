@@ -188,7 +188,7 @@ class Tables:
         try:
             return units.factor(text)
         except units.UnitError as error:
-            self.problem(where, str(error), "write it like 'N*s/m' or 'mm'")
+            self.problem(where, str(error), error.instead or "write it like 'N*s/m' or 'mm'")
             return 1.0
 
     def number(self, where: tuple[str, ...], value: int | float, scale: float = 1.0) -> float:
@@ -207,7 +207,7 @@ class Tables:
         try:
             value, given = units.quantity(text)
         except units.UnitError as error:
-            self.problem(where, str(error), f"give a number with a unit, in {unit}")
+            self.problem(where, str(error), error.instead or f"give a number with a unit, in {unit}")
             return math.nan
         if not same(given, unit):
             self.problem(where, f"{show(text)} is not measured in {unit}", f"give a quantity in {unit}")

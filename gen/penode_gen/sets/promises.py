@@ -59,7 +59,7 @@ def _quantity(where: tuple[str, ...], text: Any, of: list[str], problem: Problem
         value, unit = units.quantity(text)
         needed = units.dimension(of[0]) / units.dimension(of[1]) if len(of) > 1 else units.dimension(of[0])
     except (units.UnitError, IndexError) as error:
-        problem(where, str(error), "give a number with a unit")
+        problem(where, str(error), getattr(error, "instead", "") or "give a number with a unit")
         return None
     if units.dimension(unit) != needed:
         problem(where, f"'{text}' is not measured in {units.describe(needed)}", f"give a quantity in {' / '.join(of)}")

@@ -115,7 +115,8 @@ def _read(given: str, asked: str) -> float:
             return next(iter(fits))
     if _known(asked) and _units.dimension(asked) == _units.NONE and ANGLE.search(asked) and is_unit(given):
         raise UnitError(f"{given.strip() or 'no unit'} is no angle; give rad or deg")
-    return factor(given.strip(), asked)  # says why it does not fit
+    known = (text for readings in _levels(given) for text in readings if _known(text))
+    return factor(next(known, given.strip()), asked)  # says why it does not fit
 
 
 def is_unit(text: str) -> bool:

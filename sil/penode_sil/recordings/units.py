@@ -18,7 +18,7 @@ def factor(unit: str, like: str | None = None) -> float:
     try:
         fits = like is None or _units.same_dimension(unit, like)
     except UnitError as exc:
-        raise UnitError(f"{exc}; write it like mm, m/s^2 or N*s/m") from exc
+        raise UnitError(f"{exc}; {exc.instead or 'write it like mm, m/s^2 or N*s/m'}") from exc
     if not fits:
         raise UnitError(f"{'a plain number' if unit == '1' else unit} cannot be turned into {like}; give it in {like}")
     return _units.factor(unit)
@@ -36,7 +36,8 @@ def quantity(value: object, like: str) -> float:
         try:
             number, unit = _units.quantity(value)
         except UnitError as exc:
-            raise UnitError(f'{exc}; write a number and its unit, like "1 {like}"') from exc
+            remedy = exc.instead or f'write a number and its unit, like "1 {like}"'
+            raise UnitError(f"{exc}; {remedy}") from exc
         factor(unit, like)
     else:
         raise UnitError(f'{value!r} is no quantity; write a number and its unit, like "1 {like}"')
