@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The page of the causes, from the catalogue of the diagnosis and the campaign that is kept in test/diagnosis/CAMPAIGN.md."""
+"""The page of the causes, which `causes.py` prints: from the catalogue of the diagnosis and the campaign in test/diagnosis/CAMPAIGN.md."""
 
 from __future__ import annotations
 
@@ -160,8 +160,8 @@ def page() -> str:
         "# The causes",
         "",
         f"`penode diagnose` can name {len(catalogue.MEANING)} kinds of cause. Between ends that turn, forces are torques, with",
-        "the units of those. A positive force pulls the two ends of an element together; positive deflection and rate",
-        "are rebound.",
+        "the units of those. A positive force pulls the two ends of an element together; positive deflection and rate,",
+        "the first end less the second, are called rebound.",
         f"Hit rates are from the campaign of {draw} (`test/diagnosis/CAMPAIGN.md`); a kind is counted where it was hidden by itself.",
         "",
         "| kind | meaning | named rightly |",
@@ -174,3 +174,7 @@ def page() -> str:
     for kind in catalogue.MEANING:
         lines += _section(kind, of[kind], means.get(kind, {}), rate.get(kind))
     return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(page())

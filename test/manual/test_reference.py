@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import c_api
@@ -43,6 +44,12 @@ def test_every_cause(kind: str, of_causes: str) -> None:
     assert re.search(rf"^\| \[`{kind}`\]\(#{kind}\) \| {re.escape(catalogue.MEANING[kind])} \| (\d+ of \d+|-) \|$", of_causes, re.MULTILINE)
     for pair in catalogue.RIVALS:
         assert kind not in pair or all(f"](#{other})" in section[1] for other in pair - {kind})
+
+
+def test_causes_are_printed(of_causes: str) -> None:
+    """As README.md and sil/README.md promise."""
+    done = subprocess.run([sys.executable, ROOT / "sil/manual/causes.py"], capture_output=True, text=True, check=True)
+    assert done.stdout == of_causes + "\n"
 
 
 @pytest.mark.parametrize("kind", [*catalogue.OF, *drives.KINDS])
