@@ -54,6 +54,7 @@ LAWS: dict[str, Law] = {
     "quadratic_spring": Law("quadratic*s^2", {"quadratic": "N/m^2"}),
     # extra stiffness of the stretched side
     "asymmetric_spring": Law("stiffness*max(s, 0)", {"stiffness": "N/m"}),
+    # by the sign of s, whatever the order of the ends: with the upper end first, bump_stop acts in rebound
     "bump_stop": Law("stiffness*max(s - gap, 0)", {"stiffness": "N/m", "gap": "m"}),
     "rebound_stop": Law("stiffness*min(s + gap, 0)", {"stiffness": "N/m", "gap": "m"}),
     # takes a parallel spring of that stiffness away: within the play altogether, beyond it a constant force is missing

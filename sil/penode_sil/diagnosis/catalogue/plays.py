@@ -13,7 +13,7 @@ from .form import Form, Motion, Moved, Part, Sizes
 KINDS = ("backlash",)
 MEANING = {"backlash": "Play: within a gap the element transmits no force."}
 PARAMETERS = {  # what each number of a report means
-    "backlash": {"gap": "the whole play, from contact to contact"}
+    "backlash": {"gap": "the whole play, from contact to contact: twice the `gap` of the laws `backlash` and `loose_damper`"}
 }
 STRAIGHT = REVERSING = KINDS
 GAPS = (0.05, 0.2, 0.6)  # of the rms deflection
