@@ -25,7 +25,14 @@ LANES_INTERNAL pen_real_t pen_tanh(pen_real_t x);
 LANES_INTERNAL pen_real_t pen_sigmoid(pen_real_t x);
 LANES_INTERNAL pen_real_t pen_softplus(pen_real_t x);
 
+#ifdef LANES_SIMPLE
+#pragma GCC push_options
+#pragma GCC optimize("O3")
+#endif
 #include "pen_math.c"
+#ifdef LANES_SIMPLE
+#pragma GCC pop_options
+#endif
 
 #if defined(__AVX512F__)
 #define LANES_BYTES 64
@@ -37,6 +44,15 @@ LANES_INTERNAL pen_real_t pen_softplus(pen_real_t x);
 #define LANES        (LANES_BYTES / sizeof(pen_real_t))
 #define LANES_INLINE static inline __attribute__((always_inline, unused))
 #define LANES_APART  static __attribute__((noinline)) /* one copy of long functions */
+
+/* LANES_SIMPLE, with gcc: short to compile. There is one copy of what is long, and of that only functions of a number are optimised. */
+#ifdef LANES_SIMPLE
+#define LANES_FUNCTION static __attribute__((noinline, unused, optimize("O3")))
+#define LANES_RATES    static __attribute__((noinline, unused))
+#else
+#define LANES_FUNCTION LANES_INLINE
+#define LANES_RATES    LANES_INLINE
+#endif
 
 #ifdef PEN_REAL_DOUBLE
 typedef int64_t integer_t; /* as wide as pen_real_t */
@@ -59,6 +75,7 @@ typedef int32_t integer_t;
 #endif
 
 typedef pen_real_t lanes_t __attribute__((vector_size(LANES_BYTES)));
+typedef lanes_t lanes_unaligned_t __attribute__((aligned(sizeof(pen_real_t)), may_alias)); /* in memory of callers */
 typedef integer_t mask_t __attribute__((vector_size(LANES_BYTES))); /* -1: yes, 0: no */
 
 #ifdef WEIGHTS_PER_RUN
@@ -141,7 +158,7 @@ LANES_INLINE mask_t lanes_finite(size_t n, const lanes_t value[])
 
 /* A polynomial in each lane: straight-line code, which the compiler vectorises. */
 #define LANES_EACH(name) \
-    LANES_INLINE lanes_t lanes_##name(lanes_t x) \
+    LANES_FUNCTION lanes_t lanes_##name(lanes_t x) \
     { \
         lanes_t y = { 0 }; \
         for (size_t l = 0U; l < LANES; l++) { \
@@ -191,14 +208,14 @@ LANES_INLINE lanes_power_t lanes_power(lanes_t x, pen_real_t low, pen_real_t hig
     return e;
 }
 
-LANES_INLINE lanes_t lanes_exp(lanes_t x)
+LANES_FUNCTION lanes_t lanes_exp(lanes_t x)
 {
     const lanes_power_t e = lanes_power(x, EXP_LOW, EXP_HIGH, BIAS);
 
     return ((ONE + e.p) * e.low) * e.high;
 }
 
-LANES_INLINE lanes_t lanes_sigmoid(lanes_t x)
+LANES_FUNCTION lanes_t lanes_sigmoid(lanes_t x)
 {
     const lanes_power_t e = lanes_power(-x, SIGMOID_LOW, -EXP_LOW, SIGMOID_BIAS);
     const lanes_t scale = e.low * e.high;
@@ -208,7 +225,7 @@ LANES_INLINE lanes_t lanes_sigmoid(lanes_t x)
     return SIGMOID_SCALE / (sum + ((scale * e.p) + lost));
 }
 
-LANES_INLINE lanes_t lanes_tanh(lanes_t x)
+LANES_FUNCTION lanes_t lanes_tanh(lanes_t x)
 {
     const lanes_t size = lanes_abs(x);
     const lanes_t z = x * x;
@@ -220,7 +237,7 @@ LANES_INLINE lanes_t lanes_tanh(lanes_t x)
     return lanes_pick(size < TANH_NEAR, inner, lanes_pick(x > ZERO, outer, -outer));
 }
 
-LANES_INLINE lanes_t lanes_softplus(lanes_t x)
+LANES_FUNCTION lanes_t lanes_softplus(lanes_t x)
 {
     const lanes_t size = lanes_abs(x);
     const lanes_t z = x * x;

@@ -10,6 +10,10 @@
 
 #include "pen_lanes.h"
 
+#ifdef LANES_SIMPLE
+#pragma GCC push_options
+#pragma GCC optimize("O3")
+#endif
 #if defined(LANES_FLUSH) && defined(__clang__)
 #pragma clang fp reassociate(off) contract(off)
 #elif defined(LANES_FLUSH) && defined(__GNUC__)
@@ -23,6 +27,9 @@
 #if defined(LANES_FLUSH) && defined(__clang__)
 #pragma clang fp reassociate(on)
 #elif defined(LANES_FLUSH) && defined(__GNUC__)
+#pragma GCC pop_options
+#endif
+#ifdef LANES_SIMPLE
 #pragma GCC pop_options
 #endif
 

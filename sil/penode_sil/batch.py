@@ -33,8 +33,8 @@ from .output import whole
 
 Array = NDArray[Any]
 OPTIMISE = ("-O3", "-march=native")
-SIMPLE = ("-Og", "-march=native")  # with gcc: 0.12 s to compile instead of 0.35 s, and code that takes two to six times as long
-SHORT = 200_000  # steps of all runs and calls, up to which code is by SIMPLE: 2 to 12 ms; most models of a diagnosis are run no further
+SIMPLE = ("-Og", "-march=native", "-DLANES_SIMPLE")  # with gcc: 0.1 s to compile instead of 0.3 s, and code that takes up to twice as long
+SHORT = 5_000_000  # steps of all runs and calls, up to which code is by SIMPLE: what OPTIMISE gains in them is what it costs to compile
 # Not -ffast-math, which takes nothing for NaN. But gcc drops 0*x, by which lanes_max and its like pass NaN on: states, inputs and outputs
 # that are not finite are detected by their bits all the same.
 QUICK = (
