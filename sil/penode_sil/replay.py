@@ -16,6 +16,7 @@ from penode_gen.model import Model
 from . import recordings, scenario as scenarios
 from .errors import Problem, RecordingError, UserError
 from .recordings import Recording
+from .recordings.uneven import held_rows
 from .signals import Samples
 
 Array = NDArray[np.float64]
@@ -116,7 +117,7 @@ def _between(tables: list[Recording], wanted: dict[str, str], raster: Array, ste
         time, values = table.time(), table.channel(name, unit)
         usual = float(np.median(np.diff(time)))
         if how == "held":
-            columns.append(values[np.maximum(np.searchsorted(time, raster + 1e-3 * step, side="right") - 1, 0)])
+            columns.append(values[held_rows(time, raster)])
             continue
         grid = time[0] + np.arange(time.size) * (time[-1] - time[0]) / (time.size - 1)
         worst = float(np.max(np.abs(time - grid))) / usual

@@ -13,7 +13,7 @@ from penode_sil.errors import UserError
 from penode_sil.recordings import on_raster, read
 from penode_sil.recordings.look import look
 from penode_sil.recordings.measured import load
-from penode_sil.recordings.uneven import joined, longest, measured_near
+from penode_sil.recordings.uneven import held_rows, joined, longest, measured_near
 
 STEP, N = 1e-3, 8000  # of the model
 SIZE = {"foot": 10.0, "z": 12.0}  # mm
@@ -125,3 +125,14 @@ def test_a_row_beside_its_sample_rings_no_more_than_the_signal(tmp_path, oscilla
     near = np.rint((one.time - time[0]) / 0.9984e-3).astype(int).clip(2, N - 3)
     calm = np.all([jump[near + k] == jump[near] for k in (-2, -1, 1, 2)], axis=0)
     assert 1e3 * one.z["z"][calm] == pytest.approx(jump[near][calm], abs=0.05) and one.mask["z"].mean() > 0.99
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.003, 0.1])
+def test_jitter_of_a_logger_delays_no_held_value(jitter):
+    """Each row is that of its sample, also where the raster begins at a row that is early. A clock that is slower by a sixtieth is no
+    jitter: there the last row counts that is not later."""
+    time = STEP * (np.arange(N) + jitter * np.random.default_rng(4).uniform(-1.0, 1.0, N))
+    assert (held_rows(time, time[0] + STEP * np.arange(N)) == np.arange(N)).all()
+    slow = STEP * np.arange(N) * 61.0 / 60.0
+    late = (raster := STEP * np.arange(N)) - slow[held_rows(slow, raster)]
+    assert np.min(late) > -1e-3 * STEP and np.max(late) < 1.02 * STEP

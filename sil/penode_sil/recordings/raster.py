@@ -14,7 +14,7 @@ from ..errors import RecordingError
 from .resampling import Kernel
 from .stamps import evened, sampled_evenly
 from .table import GAP, Recording, more
-from .uneven import joined, longest, mean_interval, measured_near
+from .uneven import held_rows, joined, longest, mean_interval, measured_near, regular_clock, row_numbers
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -95,7 +95,7 @@ def parted(rows: NDArray[np.int64], time: Array) -> Clock:
     bounds = [0, *cuts.tolist(), rows.size]
     parts = [(a, b) for a, b in itertools.pairwise(bounds) if b - a > 1]
     usual = float(np.median(between))
-    lengths = [int(_ticks(time[a:b], usual)[-1]) for a, b in parts]
+    lengths = [int(row_numbers(time[a:b], usual)[-1]) for a, b in parts]
     interval = sum(float(time[b - 1] - time[a]) for a, b in parts) / sum(lengths) if sum(lengths) else usual
     found = Clock(rows, time, interval, parts, bridge)
     if scatter(found) > 0.5:  # whatever rows are lost
@@ -105,7 +105,7 @@ def parted(rows: NDArray[np.int64], time: Array) -> Clock:
 
 def scatter(clock: Clock) -> float:
     """The largest distance of a stamp from a regular clock, in intervals."""
-    return max((_line(clock.time[a:b], clock.interval)[2] for a, b in clock.parts), default=0.0)
+    return max((regular_clock(clock.time[a:b], clock.interval)[2] for a, b in clock.parts), default=0.0)
 
 
 def steadied(clock: Clock, place: str, columns: list[Array], notes: list[str]) -> Clock:
@@ -120,8 +120,8 @@ def steadied(clock: Clock, place: str, columns: list[Array], notes: list[str]) -
     off = scatter(clock)
     time = clock.time.copy()
     for a, b in clock.parts:
-        start, interval, _ = _line(clock.time[a:b], clock.interval)
-        time[a:b] = start + _ticks(clock.time[a:b], clock.interval) * interval
+        start, interval, _ = regular_clock(clock.time[a:b], clock.interval)
+        time[a:b] = start + row_numbers(clock.time[a:b], clock.interval) * interval
     if off <= SCATTER:
         return replace(clock, time=time)
     text = f"{place}: time stamps are off a regular clock of {clock.interval:.6g} s by up to {100.0 * off:.2g} % of that"
@@ -132,29 +132,12 @@ def steadied(clock: Clock, place: str, columns: list[Array], notes: list[str]) -
     return replace(clock, even=False)
 
 
-def _ticks(time: Array, interval: float) -> NDArray[np.int64]:
-    """The number of each row on a regular clock, from 0."""
-    steps = np.maximum(1, np.round(np.diff(time) / interval).astype(np.int64))
-    return np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(steps)))
-
-
-def _line(time: Array, interval: float) -> tuple[float, float, float]:
-    """Start [s] and interval [s] of the regular clock nearest to the times; the largest distance, in intervals."""
-    ticks = _ticks(time, interval)
-    if np.max(np.abs(time[0] + ticks * interval - time)) < 1e-3 * interval:
-        return float(time[0]), interval, 0.0
-    slope, start = np.polynomial.polynomial.polyfit(ticks, time - time[0], 1)[::-1]
-    start += time[0]
-    return float(start), float(slope), float(np.max(np.abs(start + ticks * slope - time)) / slope)
-
-
 def held_on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags) -> tuple[Array, Flags]:
     """The last sample of a channel that is held until the next one; up to BRIDGE bad samples are passed over."""
     good = np.flatnonzero(~bad)
-    last = np.searchsorted(clock.time[good], raster + 1e-3 * step, side="right") - 1
-    last = good[np.maximum(last, 0)] if good.size else np.zeros(raster.size, dtype=np.int64)
+    last = good[held_rows(clock.time[good], raster)] if good.size else np.zeros(raster.size, dtype=np.int64)
     age = raster - clock.time[last]
-    return si[last], (age > -1e-3 * step) & (age < _bridged(clock, good))
+    return si[last], (age > -0.5 * clock.interval) & (age < _bridged(clock, good))
 
 
 def _bridged(clock: Clock, good: NDArray[np.int64]) -> float:
@@ -188,7 +171,7 @@ def on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags, d
 
 def _on_rows(raster: Array, clock: Clock, part: tuple[int, int]) -> bool:
     """Do all samples of a raster lie on the regular instants of a part of a clock?"""
-    start, interval, off = _line(clock.time[slice(*part)], clock.interval)
+    start, interval, off = regular_clock(clock.time[slice(*part)], clock.interval)
     return off <= SCATTER and not np.any(_beside((raster - start) / interval))
 
 
@@ -211,8 +194,8 @@ def _filtered(
     """Rows of a part of the clock as even samples, then on the raster within them; `bridge` [s] is 0 for a sensor."""
     a, b = part
     time, rows, wrong_row, driving = clock.time[a:b], si[a:b], bad[a:b], bridge > 0.0
-    start, interval, off = _line(time, clock.interval)
-    ticks = _ticks(time, clock.interval)
+    start, interval, off = regular_clock(time, clock.interval)
+    ticks = row_numbers(time, clock.interval)
     even, wrong = np.full(ticks[-1] + 1, np.nan), np.ones(ticks[-1] + 1, dtype=bool)
     if off <= SCATTER:
         even[ticks], wrong[ticks] = rows, wrong_row

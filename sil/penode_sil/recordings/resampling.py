@@ -13,7 +13,7 @@ from ..errors import RecordingError, UserError
 from .clocks import Samples, own_samples
 from .files import pick
 from .table import GAP, Recording
-from .uneven import joined, mean_interval
+from .uneven import held_rows, joined, mean_interval
 
 Array = NDArray[np.float64]
 STOP_BAND = 60.0  # [dB] what lies above the new raster's Nyquist frequency is damped by this
@@ -75,8 +75,7 @@ def _of_samples(time: Array, values: Array, own: Samples, sample_time: float, fi
     clock = f"{1e3 * own.interval:.6g} ms, every {own.every:.4g} rows"
     if own.how == "held":
         raster = first + np.arange(int((last - first) / sample_time + 1e-3) + 1, dtype=float) * sample_time
-        at = np.searchsorted(time, raster + 1e-3 * sample_time, side="right") - 1
-        return raster, values[at.clip(0), None], f"repeats its last value between samples ({clock}): simulated as held"
+        return raster, values[held_rows(time, raster), None], f"repeats its last value between samples ({clock}): simulated as held"
     whole = np.interp(time, own.time, own.values)  # beyond its samples, the first and the last one
     raster, column, _ = resample(time, whole[:, None], sample_time, first, last)
     return raster, column, f"has empty cells between samples ({clock}): joined by straight lines"

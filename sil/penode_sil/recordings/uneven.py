@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from .stamps import predicted
+from .stamps import RULES, predicted
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -111,3 +111,28 @@ def _along(time: Array, values: Array, count: Array, off: Array, usual: float) -
     bend = np.linalg.solve(square, right[:, :, None])[:, :, 0]
     u = off / usual
     return bend[:, 1] * u + bend[:, 2] * u**2, known
+
+
+def row_numbers(time: Array, interval: float) -> NDArray[np.int64]:
+    """The number of each row on a regular clock, from 0."""
+    steps = np.maximum(1, np.round(np.diff(time) / interval).astype(np.int64))
+    return np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(steps)))
+
+
+def regular_clock(time: Array, interval: float) -> tuple[float, float, float]:
+    """Start [s] and interval [s] of the regular clock nearest to the times; the largest distance, in intervals."""
+    number = row_numbers(time, interval)
+    if np.max(np.abs(time[0] + number * interval - time)) < 1e-3 * interval:
+        return float(time[0]), interval, 0.0
+    slope, start = np.polynomial.polynomial.polyfit(number, time - time[0], 1)[::-1]
+    start += time[0]
+    return float(start), float(slope), float(np.max(np.abs(start + number * slope - time)) / slope)
+
+
+def held_rows(time: Array, raster: Array) -> NDArray[np.int64]:
+    """The row [n] of a held channel that counts at each time of a raster [n, s]: the last one that is not later; or later by as much as
+    time stamps are off a regular clock, so that the jitter of a logger delays no value by a whole row."""
+    usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    off = regular_clock(time, usual)[2] if usual > 0.0 else 0.0
+    late = max(2.0 * off if off < RULES.jitter else 0.0, 1e-3) * usual  # a raster that begins at a row is off as well
+    return np.maximum(np.searchsorted(time, raster + late, side="right") - 1, 0)
