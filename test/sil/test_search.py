@@ -288,7 +288,7 @@ def test_a_hopeless_search_ends_after_its_round(monkeypatch, hopeless, causes):
 
 
 def test_a_time_constant_that_nothing_shows_leaves_a_size_as_sure_as_it_is():
-    """A loss of 0.5 +- 0.01 and a time along which it changes by 1e-8 a factor of e: that may be off by a factor of 1e20, not of exp(5e7)."""
+    """A loss of 0.5 +- 0.01 and a time along which it changes by 1e-8 a factor of e: it is off by 1e20 at most, not by exp(5e7)."""
     free = (Free("loss", 0.5, 0.01), Free("cooling", 1e8, 1.0, log=True))
     fit = Fit(None, free, 0.0, 0.0, np.zeros(2), np.diag([1.0, 1e-9]), ())
     along = np.array([0.01, 1e-8])

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from penode_gen.model import GROUND
 
+from .catalogue import lines
 from .hypotheses import BENDS, HALVES, KNEE, STRIBECK, Basis, Motion, bent, lag, losses, size, slips, warm
 from .plant import Place
 
@@ -62,7 +63,7 @@ def force_laws(
         return
     at = _At(place, p, motions, step, prescribed, wanted, *size(motions))
     if at.reach > 0.0 and at.speed > 0.0:
-        for family in (_tyre,) if p.role == "tyre" else FAMILIES:
+        for family in (_tyre,) if p.role == "tyre" else (_lines, *FAMILIES):
             yield from filter(None, family(at))
 
 
@@ -374,6 +375,14 @@ def _gaps(at: _At) -> Iterator[Basis | None]:
                 lambda s, v, t, side=side, g=g: -side * np.clip(side * s, 0.0, g),
                 True,
             )
+
+
+def _lines(at: _At) -> Iterator[Basis | None]:
+    """What the model has no element for."""
+    for kind in lines.lacking(at.p):
+        name, gain = lines.LINES[kind]
+        for sign in (lines.sign(kind),) if lines.sign(kind) else (1, -1):
+            yield at.law(kind, name, gain, {}, sign, lambda s, v, t, name=name: v if name == "linear_damper" else s)
 
 
 FAMILIES = (_network, _friction, _hysteresis, _stribeck, _relaxation, _in_series, _damping, _uneven_damping, _fading, _springs, _gaps)

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from . import explaining, explanation, noise, refining, search, sized
+from .catalogue import lines
 from .echo import LAGGING
 from .explanation import Explanation
 from .hypotheses import CLOCK, Basis
@@ -143,6 +144,8 @@ def cause(study: Study, explanations: Sequence[Explanation], group: tuple[str, s
         if group in e.groups:
             continue
         swapped = [g for g in e.groups if g not in best.groups and g[0] != CLOCK]
+        if group[0] in lines.KINDS and {where for _, where in swapped} == {group[1]} and e.gain < best.gain + explanation.COST:
+            continue  # a curve there that gains no more has become that line
         behind = best.score - e.score
         margin = min(margin, behind)
         if len(swapped) == 1 and behind < max(50.0, 0.01 * best.gain) and swapped[0] not in others:

@@ -10,8 +10,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen.model import Model
-
 from .build import Term
 from .explanation import Group
 from .fit import Fit
@@ -129,20 +127,17 @@ def _tyre(terms: Sequence[Term], names: Sequence[str], values: Values, reach: fl
     return "tyre_liftoff" if max(lost, default=0.0) > EDGE * reach else "tyre_nonlinear"
 
 
-def straight(model: Model, places: Sequence[Place], terms: Sequence[Term], names: Sequence[str], group: Group, values: Values) -> str:
-    """The parameter of the linear element that a curve beside it only changes; empty if it is a curve, or there is none."""
-    own = [(t, n) for t, n in zip(terms, names, strict=True) if t.group == group]
+def straight(terms: Sequence[Term], names: Sequence[str], group: Group, values: Values) -> str:
+    """The law of a line that the curve of a group is, but for STRAIGHT of it; empty if it is a curve."""
     if group[0] not in (*DAMPERS, "cubic_spring", "asymmetric_spring", "tyre_nonlinear"):
         return ""
-    law, argument = ("linear_damper", "damping") if group[0] in DAMPERS else ("linear_spring", "stiffness")
+    law = "linear_damper" if group[0] in DAMPERS else "linear_spring"
     size = {True: 0.0, False: 0.0}  # of linear parts, and of others
-    for term, name in own:
+    for term, name in ((t, n) for t, n in zip(terms, names, strict=True) if t.group == group):
         what = term.candidate.what
         gain = values.get(f"{name}_{what.gain[0]}", term.gain)
         size[what.law == law] += abs(gain) * float(np.sqrt(np.mean(np.concatenate(what.series) ** 2)))
-    elements = {name for name, _ in places[own[0][0].candidate.what.place].elements}
-    found = [e.arguments[argument] for e in model.elements if e.law == law and e.name in elements]
-    return found[0] if size[False] < STRAIGHT * size[True] and found and model.parameters[found[0]].tolerance > 0.0 else ""
+    return law if size[False] < STRAIGHT * size[True] else ""
 
 
 def _beyond(curve: Curve, values: Values, place: Place, reach: float) -> bool:

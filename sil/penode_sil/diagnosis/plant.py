@@ -39,6 +39,7 @@ class Place:
     role: str
     trained: tuple[tuple[str, str, float, float, bool], ...] = ()  # element, "s" or "v", range of its network, if it is stated
     turns: bool = False
+    lacks: tuple[str, ...] = ()  # laws, of a spring and of a damper that are straight lines, that no element there has
 
     @property
     def name(self) -> str:
@@ -76,10 +77,20 @@ def places(model: Model, set_name: str = "default") -> tuple[Place, ...]:
         tyre = bool(set(ends) & inputs) and bool(set(ends) & carried) and not turns
         own = [e for e in model.elements if e.network and any(e.name == name for name, _ in elements)]
         trained = tuple(entry for e in own for entry in _trained(model, e, set_name))
-        result.append(Place(ends, tuple(elements), "tyre" if tyre else "force", trained, turns))
+        lacks = () if tyre else _lacking(model, [e for e in model.elements if any(e.name == name for name, _ in elements)])
+        result.append(Place(ends, tuple(elements), "tyre" if tyre else "force", trained, turns, lacks))
     known = {frozenset(p.ends) for p in result}
     result += [Place((b.name, GROUND), (), "body", (), b.rotational) for b in model.bodies if frozenset((b.name, GROUND)) not in known]
     return tuple(result)
+
+
+def _lacking(model: Model, elements: Sequence[Element]) -> tuple[str, ...]:
+    """The laws of lines that none of the elements of a place has, nor an expression or a network that may be one."""
+    ways = {"linear_spring": {"s", *(b.position for b in model.bodies)}, "linear_damper": {"v", *(b.velocity for b in model.bodies)}}
+    words = {word for e in elements for word in re.findall(r"\w+", e.expression)}
+    words |= {word[0] for e in elements for word in words if word in (f"s_{e.name}", f"v_{e.name}")}
+    learnt = any(e.network for e in elements)
+    return tuple(law for law, names in ways.items() if not learnt and not names & words and all(e.law != law for e in elements))
 
 
 def placeless(found: Sequence[Place]) -> str:

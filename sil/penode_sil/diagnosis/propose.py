@@ -19,7 +19,7 @@ from .evidence.bench import Bench, fit_level
 from .evidence.observer import Filter, drives as drives_of, force_at
 from .evidence.screening import AT_ONCE, Probe, Score, as_they_are, scores
 from .fit import Free
-from .terms import Term, Trial, drive, free_of, with_forms
+from .terms import Term, Trial, drive, free_of, moves, with_forms
 from .worth import share
 
 Array = NDArray[np.float64]
@@ -65,14 +65,15 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
             turning = friction.turns(motion.rates)
             for file in catalogue.FILES:
                 forms += (f for f in file.forms(bench.model, k, place, motion) if turning or f.kind not in catalogue.REVERSING)
-    forms += drives.inputs(bench.model, n_u)
+    moving = [j for j in range(n_u) if moves(bench, j)]  # of others nothing would show
+    forms += (f for f in drives.inputs(bench.model, n_u) if f.index in moving)
     forms += drives.sensors(bench.model, len(bench.noise))
     forms = [f for f in forms if not _taken(f, terms)]
     ranked = _screened(bench, probe, forms, moved)
     cut = {t.form.where for t in terms if t.form.how == "clip"}
     seen = bench.problem().predictor.sensors(bench.fit.free)
     limits = [clipping.propose(bench, j, seen) for j, s in enumerate(bench.model.sensors) if s.name not in cut]
-    actuators = [pair for j in range(n_u) for pair in _bent(bench, j, terms)]
+    actuators = [pair for j in moving for pair in _bent(bench, j, terms)]
     ranked = sorted([*ranked, *filter(None, limits), *actuators], key=lambda pair: -pair[0].gain)
     chosen = _chosen(ranked)
     wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))

@@ -18,6 +18,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from .build import Term
+from .catalogue import lines
 from .explanation import Explanation, Group
 from .hypotheses import HALVES, STRIBECK, Basis, Fault, lag, size, warm
 from .naming import Curve, line
@@ -353,6 +354,11 @@ def _constant_force(c: _Cause) -> Parameters:
     return {"force": ("N", lambda p: sense * sum(p[f"{n}_force"] for n in names))}  # in the end
 
 
+def _line(c: _Cause) -> Parameters:
+    _, (name, unit) = lines.LINES[c.terms[0].candidate.kind]
+    return {name: (unit, lambda p: sum(p[f"{n}_{name}"] for n in c.names))}
+
+
 OF: dict[str, Callable[[_Cause], Parameters]] = {
     "coulomb_friction": _coulomb_friction,
     "stribeck_friction": _stribeck_friction,
@@ -371,4 +377,5 @@ OF: dict[str, Callable[[_Cause], Parameters]] = {
     "tyre_nonlinear": _tyre_nonlinear,
     "network_extrapolation": _network_extrapolation,
     "constant_force": _constant_force,
+    **dict.fromkeys(lines.KINDS, _line),
 }

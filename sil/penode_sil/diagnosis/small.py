@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .catalogue import lines
 from .explanation import Explanation
 from .hypotheses import Basis
 from .naming import Curve
@@ -25,16 +26,17 @@ def notes(study: Study, e: Explanation, causes: Sequence[Cause]) -> list[str]:
 
 
 def share(study: Study, e: Explanation, group: tuple[str, str]) -> float:
-    """Rms of a cause's force beside straight lines, over BENT, as a share of that of the linear elements at its place; 0 where there is
-    none, and for laws with memory, which have no curve."""
+    """Rms of a cause's force, of a curve what is beside straight lines, over BENT, as a share of that of the linear elements at its place;
+    0 where there is none, and for laws with memory, which have no curve."""
     pairs = [(t, n) for t, n in zip(e.terms, e.built.names, strict=True) if t.group == group and isinstance(t.candidate.what, Basis)]
     if not pairs:
         return 0.0
     k, values = pairs[0][0].candidate.what.place, {f.target: f.value for f in e.fit.free}
     s, v = (np.concatenate([getattr(seen.motions[k], q) for seen in study.seen]) for q in "sv")
     force = Curve(*zip(*pairs, strict=True))(s, v, values)
-    lines = np.stack([s, v], axis=1) / np.maximum([np.linalg.norm(s), np.linalg.norm(v)], 1e-300)
-    left = force - lines @ np.linalg.lstsq(lines, force, rcond=None)[0]
+    columns = np.stack([s, v], axis=1) / np.maximum([np.linalg.norm(s), np.linalg.norm(v)], 1e-300)
+    straight = group[0] in lines.KINDS
+    left = BENT * force if straight else force - columns @ np.linalg.lstsq(columns, force, rcond=None)[0]
     stiffness, damping = (
         nominal(study.model, study.places[k], law, of, values) for law, of in (("linear_spring", "stiffness"), ("linear_damper", "damping"))
     )

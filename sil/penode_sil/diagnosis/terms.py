@@ -68,6 +68,11 @@ def drive(bench: Bench, index: int) -> Drive:
     return Drive([r.u[:, index] for r in bench.records], bench.step, update, UPDATES * update)
 
 
+def moves(bench: Bench, index: int) -> bool:
+    """Does an input change in any recording?"""
+    return any(np.ptp(r.u[:, index]) > 0.0 for r in bench.records)
+
+
 def free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
     """The value of a form of an input or a sensor."""
     step = bench.update * bench.step

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from .build import Term
+from .catalogue import lines
 from .explaining import explain, gains
 from .explanation import COST, CURVES, FORM, Explanation, cost, law_of, missing
 from .hypotheses import BENDS, HALVES, KNEE, STRIBECK, Fault
@@ -79,7 +80,7 @@ def plain(study: Study, e: Explanation, parameters: Sequence[str], log) -> Expla
             same = set(simple.groups) == {other if g == group else g for g in e.groups}
             if same and ((group == other and simple.gain > e.gain - COST) or simple.score > e.score - COST):
                 e = simple
-    return joined(study, e, log)
+    return joined(study, unbent(study, e, log), log)
 
 
 def level_friction(study: Study, e: Explanation, log) -> Explanation:
@@ -161,16 +162,45 @@ def weak(e: Explanation) -> list[Term]:
 
 
 def unbent(study: Study, e: Explanation, log) -> Explanation:
-    """The explanation with the parameter of an element in place of a curve beside it that is a straight line."""
+    """The explanation with the parameter of an element in place of a curve beside it that is a straight line, or with that line, where
+    the model has none."""
     for group in e.groups:
-        name = straight(study.model, study.places, e.terms, e.built.names, group, {f.target: f.value for f in e.fit.free})
-        if name and all(t.group != ("wrong_parameter", name) for t in e.terms):
-            term = Term(Candidate("wrong_parameter", name, 0, False, name), 0.0)
+        law = straight(e.terms, e.built.names, group, {f.target: f.value for f in e.fit.free})
+        term = _line(study, next(t for t in e.terms if t.group == group), law, e) if law else None
+        if term and all(t.group != term.group for t in e.terms):
             simple = explain(study, [*(t for t in e.terms if t.group != group), term], start=e.fit, formulas=e.formulas)
             log(f"  straight {group}: {simple.gain:.0f} for {e.gain:.0f}")
             if simple.score > e.score - COST:
                 e = simple
     return e
+
+
+def _line(study: Study, t: Term, law: str, e: Explanation) -> Term | None:
+    """What a straight curve at the place of a term is: a parameter that may change, or what the place lacks; None if it is neither."""
+    place = study.places[t.candidate.what.place]
+    elements, argument = {name for name, _ in place.elements}, LINES[law][0]
+    found = [x.arguments[argument] for x in study.model.elements if x.law == law and x.name in elements]
+    if found:
+        name = found[0]
+        return Term(Candidate("wrong_parameter", name, 0, False, name), 0.0) if study.model.parameters[name].tolerance > 0.0 else None
+    kind = next((kind for kind in lines.lacking(place) if lines.LINES[kind][0] == law), "")
+    values = {f.target: f.value for f in e.fit.free}
+    gain = next(
+        (
+            values[f"{n}_{argument}"]
+            for x, n in zip(e.terms, e.built.names, strict=True)
+            if x.group == t.group and law_of(x.candidate) == law
+        ),
+        0.0,
+    )
+    sign = lines.sign(kind)
+    if not kind or gain == 0.0 or gain * sign < 0.0:
+        return None
+    along = tuple(getattr(s.motions[t.candidate.what.place], LINEAR[law]) for s in look(study, e.fit))
+    what = replace(
+        t.candidate.what, kind=kind, law=law, gain=LINES[law], shapes={}, sign=sign, series=along, companion=False, fixed={}, least={}
+    )
+    return Term(replace(t.candidate, kind=kind, sign=sign, companion=False, what=what), gain)
 
 
 def owned(study: Study, e: Explanation, log) -> Explanation:

@@ -17,7 +17,7 @@ from .catalogue.actuators import ACTUATORS
 from .catalogue.form import Motion
 from .evidence.bench import UPDATES, Bench
 from .evidence.fit import Fit
-from .terms import Term, drive
+from .terms import Term, drive, moves
 
 Array = NDArray[np.float64]
 WORTH = 0.07  # of the force there: less is a small deviation. Any model is 2 to 5 % wrong, a name is worth it from 10 % on; the middle
@@ -166,7 +166,8 @@ def _beside(bench: Bench, place: int, motion: Motion, force: Array) -> Array:
     names, ends = {n for n, _ in bench.places[place].elements}, bench.places[place].ends
     lines = {ABOUT_LINEAR[e.law] for e in bench.model.elements if e.name in names and e.law in ABOUT_LINEAR}
     columns = [np.concatenate([getattr(p, q) for p in motion.parts]) for q in sorted(lines)]
-    if names and GROUND in ends and any(b.name in ends and not bench.model.parameters[b.mass].exact for b in bench.model.bodies):
+    driven = any(moves(bench, j) for j in range(len(bench.model.inputs)))  # in a free motion, forces are a line of the acceleration
+    if names and driven and GROUND in ends and any(b.name in ends and not bench.model.parameters[b.mass].exact for b in bench.model.bodies):
         columns.append(np.concatenate([np.gradient(p.v, p.step) for p in motion.parts]))
     others = np.array([c / max(float(np.linalg.norm(c)), 1e-300) for c in columns]).T.reshape(len(force), -1)
     return force - others @ np.linalg.lstsq(others, force, rcond=None)[0]

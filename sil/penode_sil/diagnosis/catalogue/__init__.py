@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 from penode_gen.model import Model
 
-from . import aerated, bushings, channels, dampers, drives, experiments, friction, loads, masses, others, plays, springs, tyres
+from . import aerated, bushings, channels, dampers, drives, experiments, friction, lines, loads, masses, others, plays, springs, tyres
 
-FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aerated)
+FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aerated, lines)
 MEANING = {kind: text for file in (*FILES, drives, channels, others) for kind, text in file.MEANING.items()}
 OF = {kind: file for file in FILES for kind in file.KINDS}
 

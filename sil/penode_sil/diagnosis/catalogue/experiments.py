@@ -9,8 +9,16 @@ from penode_gen.model import GROUND, Model
 
 SHOWN = {  # by which excitation a kind shows; a kind that is not here shows under a broad one
     "slow": ("coulomb_friction", "stribeck_friction", "bouc_wen", "load_dependent_friction", "position_dependent_friction"),
-    "rates": ("asymmetric_damper", "degressive_damper", "quadratic_damper", "damper_fading", "tyre_damping", "aerated_damper"),
-    "travel": ("cubic_spring", "asymmetric_spring", "bump_stop", "backlash", "tyre_nonlinear", "tyre_liftoff"),
+    "rates": (
+        "asymmetric_damper",
+        "degressive_damper",
+        "quadratic_damper",
+        "damper_fading",
+        "tyre_damping",
+        "aerated_damper",
+        "missing_damper",
+    ),
+    "travel": ("cubic_spring", "asymmetric_spring", "bump_stop", "backlash", "tyre_nonlinear", "tyre_liftoff", "missing_spring"),
     "steps": ("maxwell_bushing", "hidden_resonance"),
     "command": (
         *("input_gain", "input_offset", "input_delay", "input_lag", "input_hold", "input_sign"),
