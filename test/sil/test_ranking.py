@@ -54,7 +54,7 @@ def test_what_is_a_part_of_a_form_is_tried_too():
     assert propose.is_part(alone, both) and not propose.is_part(both, alone) and not propose.is_part(alone, alone)
 
 
-@pytest.mark.parametrize("low, high, unsized", [(-1e-5, 3e-4, True), (1e-5, 3e-4, False), (-3e-4, -1e-5, False)])
+@pytest.mark.parametrize("low, high, unsized", [(-1e-5, 3e-4, True), (1e-5, 3e-4, False), (-3e-4, -1e-5, False), (np.nan, np.nan, True)])
 def test_a_cause_whose_interval_holds_0_has_no_size(low, high, unsized):
     gap = Value(0.5 * (low + high), "m", (low, high))
     assert Cause("backlash", "spring", {"gap": gap}, 0.9).may_be_nothing is unsized

@@ -26,6 +26,10 @@ class Value:
     unit: str
     ci95: tuple[float, float]
 
+    def may_be(self, x: float) -> bool:
+        """Does the interval include x? So does one that could not be computed (NaN)."""
+        return not (x < self.ci95[0] or self.ci95[1] < x)
+
 
 @dataclass(frozen=True)
 class Named:
@@ -50,12 +54,12 @@ class Cause:
     def neutral(self, nominal: Mapping[str, float]) -> bool:
         """Does the interval of one of its sizes include what has no effect: 0, 1 of a scale, the `nominal` value of a parameter?"""
         none = {k: nominal.get(k, NOTHING.get(k, 0.0)) for k in self.parameters if k in nominal or k in SIZES or len(self.parameters) == 1}
-        return any(self.parameters[k].ci95[0] <= x <= self.parameters[k].ci95[1] for k, x in none.items())
+        return any(self.parameters[k].may_be(x) for k, x in none.items())
 
     @property
     def may_be_nothing(self) -> bool:
         """Does the interval of its only size include no effect at all?"""
-        return len(self.parameters) == 1 and all(v.ci95[0] <= NOTHING.get(k, 0.0) <= v.ci95[1] for k, v in self.parameters.items())
+        return len(self.parameters) == 1 and all(v.may_be(NOTHING.get(k, 0.0)) for k, v in self.parameters.items())
 
 
 UNKNOWN = Cause(OUTSIDE, "", {}, 0.5)  # one that is not in the catalogue
