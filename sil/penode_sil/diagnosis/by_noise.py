@@ -6,7 +6,7 @@ and changes with time, written into the extended model and measured on the hold-
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -217,7 +217,18 @@ def _measured(case: Case, study: Study, judged: Judged) -> tuple[Judged, str, di
     if unseen:
         note = f"{', '.join(unseen)}: the hold-out shows an effect that the training does not: train with recordings like that one"
         judged = replace(judged, causes=(UNKNOWN,), verdict="unexplained", explained=0.0, notes=(*judged.notes, note))
+    if judged.verdict == "unexplained" and judged.named is None and not judged.doubt and (better := _refitted(case, study, gain)):
+        note = "no cause is named; model_extended.toml has the parameters that fit best within their tolerances: it predicts better"
+        return replace(judged, notes=(*judged.notes, note)), *better
     return judged, text, gain, held
+
+
+def _refitted(case: Case, study: Study, nominal: Mapping[str, Gain]) -> tuple[str, dict[str, Gain], list[residual.Channel]] | None:
+    """Text, gain, and channels of the hold-out, of the model with its parameters fitted within their tolerances; None where that is not
+    better than the `nominal` one for all sensors."""
+    text, extended = extension.extend_file(study, explaining.explain(study, []), ())
+    gain, _, held = measuring.measure(study, extended, case.unused)
+    return (text, gain, held) if all(g.after_rmse < nominal[s].after_rmse for s, g in gain.items()) else None
 
 
 def hints(

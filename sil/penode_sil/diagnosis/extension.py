@@ -51,7 +51,7 @@ def _head(study: Study, e: Explanation | None, causes: Sequence[Cause]) -> list[
     if e is not None and not e.terms and e.built.model.elements != model.elements:
         learnt = "an effect that no known cause explains; the element nameless approximates it"
     lines = [
-        f"# Extension of {model.path.name} from recordings: {learnt or 'nothing'}.",
+        f"# Extension of {model.path.name} from recordings: {learnt or ('nothing' if e is None else 'values within tolerances')}.",
         "",
         "[model]",
         extends(model.path.resolve()),
