@@ -35,12 +35,16 @@ push = { unit = "N" }
 [bodies]
 upper = { mass = "m" }
 lower = { mass = "m" }
+third = { mass = "m" }
 [elements]
 drive = { between = ["upper", "ground"], law = "expression", force = "-push" }
 spring = { between = ["upper", "lower"], law = "linear_spring", stiffness = "c" }
 damper = { between = ["upper", "lower"], law = "linear_damper", damping = "d" }
 mount = { between = ["lower", "ground"], law = "linear_spring", stiffness = "c" }
 tyre = { between = ["lower", "road"], law = "linear_spring", stiffness = "c" }
+rail = { between = ["third", "ground"], law = "linear_damper", damping = "d" }
+loss = { between = ["third", "upper"], law = "linear_damper", damping = "d" }
+coil = { between = ["third", "lower"], law = "linear_spring", stiffness = "c" }
 [outputs]
 z = { value = "z_upper", unit = "m" }
 [sensors]
@@ -70,7 +74,7 @@ class _Any(dict[tuple[int, str], float]):
 
 
 def example() -> Model:
-    """A model with a place of each role."""
+    """A model with a place of each role, some without a spring or a damper."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "example.toml"
         file.write_text(EXAMPLE, encoding="utf-8")
