@@ -13,6 +13,7 @@ RECORDED  := sil/recordings/friction
 RIGS_DIR  ?= ../shared/measured
 WORLDS    := 300
 MUJOCO    := 240
+RIGS      := 28 # two turns of the 14 cases of a draw
 WATCHED   := $(PYTHON) test/diagnosis/ablation/probes.py
 CASES     := 192 # eight rounds of the 24 cases of a draw
 # and of each kind seven in a common form and four in a foreign one, so that one wrong answer is not below 85 or 70 %
@@ -113,6 +114,9 @@ campaign-worlds: setup ## Wrong worlds: plants that are a few per cent wrong eve
 campaign-mujoco: setup build/setup/mujoco ## Recordings of MuJoCo with something hidden in joints, carts, drives, pendulums, quarter cars: is it named, and nothing else?
 	$(Q)$(PYTHON) test/diagnosis/mujoco_cases/mujoco_campaign.py --cases $(MUJOCO) --jobs $$(nproc)
 
+campaign-rigs: setup ## Laboratory rigs with something hidden: RIGS cases of a fresh draw, or of SEED=n; is it named, and nothing else?
+	$(Q)$(PYTHON) test/diagnosis/rig_cases/rigs_campaign.py --cases $(RIGS) $(SEED:%=--seed %) --jobs $$(nproc)
+
 campaign-values: setup ## One value or two wrong in model files without tolerances: are these named, and no others?
 	$(Q)$(PYTHON) test/diagnosis/values_cases/values_campaign.py --cases 100 --jobs $$(nproc)
 
@@ -140,7 +144,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run watch pythons test nightly prove figures bench bench-filters train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-values searches campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
+.PHONY: help setup run watch pythons test nightly prove figures bench bench-filters train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-rigs campaign-values searches campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

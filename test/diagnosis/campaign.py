@@ -78,11 +78,18 @@ def forked(call: list[str], timeout: float) -> tuple[int, str]:
 
 
 def diagnose(
-    command: str, folder: Path, recordings: list[Path], timeout: float, start: Callable[[list[str], float], tuple[int, str]] = started
+    command: str,
+    folder: Path,
+    recordings: list[Path],
+    timeout: float,
+    start: Callable[[list[str], float], tuple[int, str]] = started,
+    holdouts: int = 1,
 ) -> tuple[dict | None, float, str]:
-    """Runs the command as a user would. Returns the diagnosis or None, seconds of one core that it took, and why there is none."""
+    """Runs the command as a user would, the last `holdouts` recordings as the hold-out. Returns the diagnosis or None, seconds of one
+    core that it took, and why there is none."""
     answer = folder / "diagnosis"
-    call = [*shlex.split(command), folder / "model.toml", "--data", *recordings[:-1], "--holdout", recordings[-1], "-o", answer]
+    train, held_out = recordings[:-holdouts], recordings[-holdouts:]
+    call = [*shlex.split(command), folder / "model.toml", "--data", *train, "--holdout", *held_out, "-o", answer]
     try:
         begin = worked()
         code, stderr = start(list(map(str, call)), timeout)
