@@ -21,8 +21,9 @@ from xdist.workermanage import WorkerController
 TOGETHER = {"install", "packages"}  # folders whose tests share what lies at one place: for one worker
 # Where no run before says so, these begin.
 LONG = (
-    "test_diagnosis test_coarse_rigs test_drives test_bench test_commands test_packages test_targets "
-    "test_holding test_folder test_recording test_batch test_selftest test_hidden test_emit"
+    "test_diagnosis test_folder test_bench test_selftest test_holding test_tutorials test_commands test_batch test_emit "
+    "test_hidden test_packages test_targets test_step test_coarse_rigs test_bent_inputs test_other_cores test_absorb "
+    "test_diagnose_bad_input test_tune_filter test_filter_file test_innovations test_drives test_serve_lines test_mix_ups"
 ).split()
 took: Counter[str] = Counter()
 

@@ -18,12 +18,12 @@ import penode_gen
 from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
 from penode_sil.diagnosis import adopting, applied, clipping
-from penode_sil.diagnosis.between import joined, parts, straight
+from penode_sil.diagnosis.between import finer, joined, parts, straight
 from penode_sil.diagnosis.catalogue.actuators import lagging
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence import gain, samples
 from penode_sil.diagnosis.evidence.fit import Fit
-from penode_sil.diagnosis.evidence.observer import Filter, Predictor, Record, augmented, scale
+from penode_sil.diagnosis.evidence.observer import Filter, Predictor, Record, alike, augmented, scale
 from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.terms import Term
 
@@ -214,3 +214,19 @@ def test_a_lag_of_an_input_is_that_of_straight_lines(tau):
     time = np.arange(n) * step
     exact = signal.lsim(([1.0], [tau, 1.0]), x - x[0], time)[1]
     assert lagging(x - x[0], tau, step) == pytest.approx(exact, abs=1e-9 * np.ptp(x))
+
+
+def test_runs_with_the_same_input_are_filled_in_once():
+    """To the bit as if each had been, whichever differ; a single signal too."""
+    rng = np.random.default_rng(7)
+    u = np.repeat(np.cumsum(rng.standard_normal((1, 300, 2)), axis=1), 6, axis=0)
+    u[2] *= 1.1
+    u[5, :, 1] += 0.2
+    asked = []
+
+    def filled(some):
+        asked.append(len(some))
+        return finer(some, 0.01, 2)
+
+    assert (alike(u, filled) == finer(u, 0.01, 2)).all() and asked == [1, 2]
+    assert (alike(u[0], lambda some: finer(some, 0.01, 2)) == finer(u[0], 0.01, 2)).all()

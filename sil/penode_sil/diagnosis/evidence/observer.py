@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -232,7 +232,7 @@ class Predictor:
         if self.fine == 1:
             return u
         if u is not record.u:
-            return finer(u, record.step, self.fine)
+            return alike(u, lambda some: finer(some, record.step, self.fine))
         if self.fine not in record.between:
             record.between[self.fine] = finer(u, record.step, self.fine)
         return record.between[self.fine]
@@ -328,3 +328,15 @@ def _limited(x: Array, shifts: Array) -> Array:
     moving = power > noise
     turn = np.exp(2j * np.pi * moving * np.fft.rfftfreq(2 * len(x) - 2) * shifts[:, None])
     return x[0] + slope * (at + shifts[:, None]) + np.fft.irfft(spectrum * turn, 2 * len(x) - 2)[:, : len(x)]
+
+
+def alike(u: Array, filled: Callable[[Array], Array]) -> Array:
+    """Inputs [runs, n, n_u], `filled` in: once for all runs that have those of the first one, as most derivatives do."""
+    other = np.any(u != u[:1], axis=(1, 2)) if u.shape[:-2] else np.ones(0, bool)
+    if other.all():
+        return filled(u)
+    own = filled(u[:1])
+    found = np.repeat(own, len(u), axis=0)
+    if other.any():
+        found[other] = filled(u[other])
+    return found
