@@ -17,7 +17,7 @@ from scipy.signal import butter, lfilter
 import penode_gen
 from penode_sil.cli import cli
 from penode_sil.diagnosis import diagnose, study
-from penode_sil.diagnosis.checks import final
+from penode_sil.diagnosis.checks import final, rules
 from penode_sil.diagnosis.checks.case import Case, End
 from penode_sil.diagnosis.checks.differing import different, has_common_cause
 from penode_sil.diagnosis.checks.written import write_extended
@@ -242,3 +242,16 @@ def test_a_high_pass_of_a_sensor_is_no_agreement(tmp_path):
     end = End(Diagnosis("no_discrepancy", (), {}, {}, 1.0, 0.0, 0.0), one, write_extended(same, case), None, [])
     found = final.checked(case, end)
     assert found.verdict == "not_identifiable" and found.notes[0].startswith("speed (0.")
+
+
+@pytest.mark.parametrize("stiffness, law, within", [(1.019, "", True), (1.021, "", False), (1.019, "quadratic_damper", False)])
+def test_values_within_tolerances_are_what_the_file_allows(tmp_path, stiffness, law, within):
+    """Of a stiffness known to 2 %; a law beside it is more than that."""
+    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS))
+    nominal = penode_gen.load(tmp_path / "rig.toml")
+    case = Case(nominal, nominal, (), (), (), (), tmp_path, lambda text: None, lambda share, doing: None)
+    k = nominal.parameters["k"]
+    written = replace(nominal, parameters={**nominal.parameters, "k": replace(k, value=stiffness * k.value)})
+    if law:
+        written = replace(written, elements=(*written.elements, replace(written.elements[0], name="more", law=law)))
+    assert rules.allowed(case, End(None, None, written, None, [])) is within

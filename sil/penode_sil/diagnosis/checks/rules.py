@@ -15,6 +15,7 @@ from ...compared import REJECTED, rejected, worsened
 from .. import catalogue
 from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
+from ..evidence.bench import with_tolerances
 from ..noise import UNSEEN
 from ..report.figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, UNKNOWN, Cause, place
@@ -116,11 +117,22 @@ def relieved(case: Case, end: End, table: Table, gone: Sequence[tuple[str, str]]
 
 def mended(case: Case, end: End, table: Table) -> list[str]:
     """Sensors that the nominal model misses by more than noise, however its file allows to fit it, and that the written one mends; where
-    nothing was explained, only if the written one leaves no sensor more than its noise."""
+    nothing was explained, only if the written one leaves no sensor more than its noise. Values within their tolerances are what the file
+    allows, also where a refit from the nominal ones did not find them."""
     verdict = end.answer.verdict
     if verdict != "no_discrepancy" and (verdict != "unexplained" or misses(table.rows, "extended", table.noise)):
         return []
+    if verdict == "no_discrepancy" and allowed(case, end):
+        return []
     return list(dict.fromkeys(r.figure.signal for r in _missed(table) if UNSEEN * r.rms("extended") < min(map(r.rms, NOMINAL))))
+
+
+def allowed(case: Case, end: End) -> bool:
+    """Is the written model the nominal one with other values, all within their tolerances?"""
+    known, written = with_tolerances(case.model).parameters, end.extended.parameters
+    if known.keys() != written.keys() or len(end.extended.elements) != len(case.model.elements):
+        return False
+    return all(abs(written[n].value - p.value) <= p.tolerance * abs(p.value) for n, p in known.items())
 
 
 def _missed(table: Table) -> list[Row]:
@@ -179,14 +191,15 @@ def by_values(case: Case, end: End, table: Table, found: Sequence[values.Few]) -
 
 
 def coupled(case: Case, end: End, table: Table) -> list[tuple[str, float]]:
-    """Sensors that a model without discrepancy misses by more than noise, as a high-pass explains; and the corner of that [Hz]."""
+    """Sensors that a model without discrepancy misses by more than noise, as a high-pass explains better than the written one; and its
+    corner [Hz]."""
     found: dict[str, float] = {}
     for r in _missed(table) if end.answer.verdict == "no_discrepancy" else ():
         predicted = table.predicted[r.figure.recording][0]
         step = case.model.sample_time
         corners = np.geomspace(1.0 / np.ptp(predicted.time), 0.1 / step, 40)
         left = [r.rms_of(predicted.time, _high_pass(predicted.z[:, r.sensor], f * step)) for f in corners]
-        if UNSEEN * min(left) < min(map(r.rms, NOMINAL)):
+        if UNSEEN * min(left) < min(map(r.rms, (*NOMINAL, "extended"))):
             found[r.figure.signal] = float(corners[int(np.argmin(left))])
     return list(found.items())
 
