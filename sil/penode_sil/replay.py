@@ -117,7 +117,7 @@ def _between(tables: list[Recording], wanted: dict[str, str], raster: Array, ste
         time, values = table.time(), table.channel(name, unit)
         usual = float(np.median(np.diff(time)))
         if how == "held":
-            columns.append(values[held_rows(time, raster)])
+            columns.append(values[held_rows(time, raster).clip(0)])
             continue
         grid = time[0] + np.arange(time.size) * (time[-1] - time[0]) / (time.size - 1)
         worst = float(np.max(np.abs(time - grid))) / usual

@@ -133,6 +133,7 @@ def test_jitter_of_a_logger_delays_no_held_value(jitter):
     jitter: there the last row counts that is not later."""
     time = STEP * (np.arange(N) + jitter * np.random.default_rng(4).uniform(-1.0, 1.0, N))
     assert (held_rows(time, time[0] + STEP * np.arange(N)) == np.arange(N)).all()
+    assert held_rows(time, time[:1] - 0.4 * STEP)[0] == -1  # nothing is held yet
     slow = STEP * np.arange(N) * 61.0 / 60.0
     late = (raster := STEP * np.arange(N)) - slow[held_rows(slow, raster)]
     assert np.min(late) > -1e-3 * STEP and np.max(late) < 1.02 * STEP

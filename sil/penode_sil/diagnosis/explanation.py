@@ -17,7 +17,7 @@ from scipy import constants
 from penode_gen.model import Model
 
 from .build import Extended, Term
-from .catalogue import lines
+from .catalogue import drives, lines, loads, masses, values
 from .catalogue.others import DRIFTING
 from .fit import Fit, Problem
 from .hypotheses import CLOCK, VALUED, Basis, Fault
@@ -45,8 +45,8 @@ CURVES = {  # kinds of one family at one place are one curve with one name
     "tyre_nonlinear": "tyre",
     "tyre_liftoff": "tyre",
 }
-EXACT = ("wrong_parameter", "constant_force", "hidden_resonance", CLOCK, *lines.KINDS)  # a formula after all
-FORMULAS = ("wrong_parameter", "constant_force", "sensor_bias", "sensor_scale", "sensor_delay", *lines.KINDS)  # and of one number
+EXACT = (values.KIND, *loads.KINDS, *masses.KINDS, *lines.KINDS, CLOCK)  # a formula after all
+FORMULAS = (values.KIND, *loads.KINDS, *DRIFTING, *drives.SENSORS, *lines.KINDS)  # and of one number
 LOADS = {"constant_force", "sensor_bias"}  # one looks like the other
 Group = tuple[str, str]
 

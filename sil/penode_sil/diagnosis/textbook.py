@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from .build import Term
-from .catalogue import lines
+from .catalogue import lines, values
 from .explaining import explain, gains
 from .explanation import COST, CURVES, FORM, Explanation, cost, law_of, missing
 from .hypotheses import BENDS, HALVES, KNEE, STRIBECK, Fault
@@ -46,7 +46,7 @@ TAKING = {  # laws that take an element away: its law and argument
     "loose_damper": ("linear_damper", "damping"),
     **dict.fromkeys(HALVES, ("linear_spring", "stiffness")),
 }
-LINES = {"linear_spring": ("stiffness", "N/m"), "linear_damper": ("damping", "N*s/m")}  # laws and their gains
+LINES = dict(lines.LINES.values())  # laws and their gains
 LINES_OF = {"spring": "linear_spring", "damper": "linear_damper"}
 TWO = ("asymmetric_spring", "asymmetric_damper")  # of two numbers, and the nominal element is hardly their mean
 
@@ -182,12 +182,12 @@ def _line(study: Study, t: Term, law: str, e: Explanation) -> Term | None:
     found = [x.arguments[argument] for x in study.model.elements if x.law == law and x.name in elements]
     if found:
         name = found[0]
-        return Term(Candidate("wrong_parameter", name, 0, False, name), 0.0) if study.model.parameters[name].tolerance > 0.0 else None
+        return Term(Candidate(values.KIND, name, 0, False, name), 0.0) if study.model.parameters[name].tolerance > 0.0 else None
     kind = next((kind for kind in lines.lacking(place) if lines.LINES[kind][0] == law), "")
-    values = {f.target: f.value for f in e.fit.free}
+    fitted = {f.target: f.value for f in e.fit.free}
     gain = next(
         (
-            values[f"{n}_{argument}"]
+            fitted[f"{n}_{argument}"]
             for x, n in zip(e.terms, e.built.names, strict=True)
             if x.group == t.group and law_of(x.candidate) == law
         ),

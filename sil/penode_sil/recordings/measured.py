@@ -234,9 +234,9 @@ def _take(raster: Array, model: Model, signal: Input | Signal, table: Recording,
     _tell(notes, table, clock, signal, faults, own, driving)
     smooth = None
     if driving and model.interpolation == "held" and (own.how or clock.one_by_one(step) or clock.interval > step):
-        values, usable = held_on_raster(raster, step, clock, rows, bad)
+        values, usable = held_on_raster(raster, clock, rows, bad)
     elif driving and own.how == "held":
-        values, usable = held_on_raster(raster, step, clock, rows, bad)
+        values, usable = held_on_raster(raster, clock, rows, bad)
         smooth, curved = on_raster(raster, step, clock, rows, bad, driving, curved=True)
         usable &= curved
     else:

@@ -132,12 +132,12 @@ def steadied(clock: Clock, place: str, columns: list[Array], notes: list[str]) -
     return replace(clock, even=False)
 
 
-def held_on_raster(raster: Array, step: float, clock: Clock, si: Array, bad: Flags) -> tuple[Array, Flags]:
+def held_on_raster(raster: Array, clock: Clock, si: Array, bad: Flags) -> tuple[Array, Flags]:
     """The last sample of a channel that is held until the next one; up to BRIDGE bad samples are passed over."""
     good = np.flatnonzero(~bad)
-    last = good[held_rows(clock.time[good], raster)] if good.size else np.zeros(raster.size, dtype=np.int64)
-    age = raster - clock.time[last]
-    return si[last], (age > -0.5 * clock.interval) & (age < _bridged(clock, good))
+    held = held_rows(clock.time[good], raster)
+    last = good[held.clip(0)] if good.size else np.zeros(raster.size, dtype=np.int64)
+    return si[last], (held >= 0) & (raster - clock.time[last] < _bridged(clock, good))
 
 
 def _bridged(clock: Clock, good: NDArray[np.int64]) -> float:

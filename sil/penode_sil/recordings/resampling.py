@@ -75,7 +75,7 @@ def _of_samples(time: Array, values: Array, own: Samples, sample_time: float, fi
     clock = f"{1e3 * own.interval:.6g} ms, every {own.every:.4g} rows"
     if own.how == "held":
         raster = first + np.arange(int((last - first) / sample_time + 1e-3) + 1, dtype=float) * sample_time
-        return raster, values[held_rows(time, raster), None], f"repeats its last value between samples ({clock}): simulated as held"
+        return raster, values[held_rows(time, raster).clip(0), None], f"repeats its last value between samples ({clock}): simulated as held"
     whole = np.interp(time, own.time, own.values)  # beyond its samples, the first and the last one
     raster, column, _ = resample(time, whole[:, None], sample_time, first, last)
     return raster, column, f"has empty cells between samples ({clock}): joined by straight lines"

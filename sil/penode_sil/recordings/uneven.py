@@ -130,9 +130,9 @@ def regular_clock(time: Array, interval: float) -> tuple[float, float, float]:
 
 
 def held_rows(time: Array, raster: Array) -> NDArray[np.int64]:
-    """The row [n] of a held channel that counts at each time of a raster [n, s]: the last one that is not later; or later by as much as
-    time stamps are off a regular clock, so that the jitter of a logger delays no value by a whole row."""
+    """The row [n] of a held channel that counts at each time of a raster [n, s], -1 before the first: the last one that is not later; or
+    later by as much as time stamps are off a regular clock, so that the jitter of a logger delays no value by a whole row."""
     usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
     off = regular_clock(time, usual)[2] if usual > 0.0 else 0.0
     late = max(2.0 * off if off < RULES.jitter else 0.0, 1e-3) * usual  # a raster that begins at a row is off as well
-    return np.maximum(np.searchsorted(time, raster + late, side="right") - 1, 0)
+    return np.searchsorted(time, raster + late, side="right") - 1

@@ -16,7 +16,8 @@ from .form import Form, Sizes
 
 Array = NDArray[np.float64]
 INPUTS = (*ACTUATORS, "input_hold")
-KINDS = (*INPUTS, "sensor_scale", "sensor_delay")
+SENSORS = ("sensor_scale", "sensor_delay")
+KINDS = (*INPUTS, *SENSORS)
 MEANING = {
     "input_gain": "The input that drives the plant is larger, or smaller, than its recording by a factor.",
     "input_offset": "A constant acts on top of the recorded input.",
