@@ -15,7 +15,7 @@ from .evidence.fit import Fit
 from .evidence.observer import Filter, bias
 from .propose import FREE_RUN
 from .reconsider import reconsidered
-from .rounds import Accepted, Grown, Rounds, is_large, name_of, terms_of
+from .rounds import LEVEL_FACTORS, Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term
 from .worth import Z_95, least, mostly, remaining
 
@@ -51,9 +51,14 @@ class Found:
 
 
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
-    """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own."""
+    """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own.
+    Where none is large, it looks again with an observer that corrects less: one that follows all that moves hides what happens seldom."""
     rounds = Rounds(bench, Blocks.of([len(r) // bench.update for r in bench.records]), log)
     end = reconsidered(rounds, rounds.grow())
+    if not any(end.large) and bench.level.size > 0.0:
+        stiffer = replace(rounds, stiffer=LEVEL_FACTORS[1])
+        again = reconsidered(stiffer, stiffer.grow())
+        rounds, end = (stiffer, again) if any(again.large) else (rounds, end)
     after, sensors = end.bench, [bias(s.name) for s in bench.model.sensors]
     none = [b for b in sensors if abs(after.fit.value(b)) <= Z_95 * after.fit.deviation(b)]
     run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 2 * FREE_RUN)

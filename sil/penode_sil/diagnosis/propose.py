@@ -16,6 +16,7 @@ from . import catalogue, clipping, holding
 from .catalogue import drives, friction
 from .catalogue.form import Form, Motion, Moved
 from .evidence.bench import Bench, fit_level
+from .evidence.fit import Fit
 from .evidence.observer import Filter, drives as drives_of, force_at
 from .evidence.screening import AT_ONCE, Probe, Score, as_they_are, scores
 from .fit import Free
@@ -54,8 +55,10 @@ def _inertia(bench: Bench, body: str) -> float:
     return bench.fit.values.get(b.mass, bench.model.parameters[b.mass].value) * float(bench.forces[k])
 
 
-def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> tuple[list[Trial], Model]:
-    """The likeliest forms beside those accepted, fitted, the best first; and the model that has all of them."""
+def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None], stiffer: float = 1.0) -> tuple[list[Trial], Model]:
+    """The likeliest forms beside those accepted, fitted, the best first; and the model that has all of them. They are looked for by an
+    observer for `stiffer` times less unmodelled force than the bench has, and compared with the bench as it is."""
+    base, bench = bench.fit, _corrected_less(bench, stiffer)
     probe = Probe.of(bench)
     moved = motions(probe)
     n_u = bench.records[0].u.shape[1]
@@ -78,9 +81,17 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None]) -> 
     chosen = _chosen(ranked)
     wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
-    trials = [_fitted(bench, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen, strict=True)]
-    trials += [_fitted(bench, wide, moved, terms, t, np.ones(1)) for t in _holds(bench, trials, terms)]
+    trials = [_fitted(bench, base, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen, strict=True)]
+    trials += [_fitted(bench, base, wide, moved, terms, t, np.ones(1)) for t in _holds(bench, trials, terms)]
     return sorted(trials, key=lambda t: -t.gain), wide
+
+
+def _corrected_less(bench: Bench, stiffer: float) -> Bench:
+    """The bench fitted with an observer for so many times less unmodelled force."""
+    if stiffer == 1.0:
+        return bench
+    level = replace(bench.level, size=bench.level.size / stiffer)
+    return replace(bench, level=level, fit=bench.problem().solve(bench.fit.free, bench.gains(bench.fit).at(level), FREE_RUN))
 
 
 def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
@@ -170,10 +181,10 @@ def _slope(bench: Bench, form: Form) -> Array:
     return (nu[1] - nu[0]) / (0.1 * f.unit)
 
 
-def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], term: Term, sizes: Array) -> Trial:
-    """Fits a term beside those accepted, from the best fit so far with the sizes that its score promises. Where parameters are hardly
-    known, and for a limit, which may have bent them, it also starts from the nominal values, and from a free run of these: the motion of a
-    wrong plant promises little."""
+def _fitted(bench: Bench, base: Fit, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], term: Term, sizes: Array) -> Trial:
+    """Fits a term beside those accepted, from the best fit so far with the sizes that its score promises; its gain is that over `base`.
+    Where parameters are hardly known, and for a limit, which may have bent them, it also starts from the nominal values, and from a free
+    run of these: the motion of a wrong plant promises little."""
     problem = bench.problem(wide)
     n_x = len(wide.states)
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
@@ -188,9 +199,9 @@ def _fitted(bench: Bench, wide: Model, moved: Sequence[Motion], terms: Sequence[
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
     same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
     level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
-    most = float(np.max(bench.fit.taken(best, problem.floor)))  # the force at one place is seen by few sensors
-    whole = bench.fit.taken_whole(best, problem.floor)
-    gain, free = best.criterion() - bench.fit.criterion(), max((r.likelihood for r in runs), default=-np.inf)
+    most = float(np.max(base.taken(best, problem.floor)))  # the force at one place is seen by few sensors
+    whole = base.taken_whole(best, problem.floor)
+    gain, free = best.criterion() - base.criterion(), max((r.likelihood for r in runs), default=-np.inf)
     return Trial(term.form, term, best, gain, level, share(bench, [*same, term], best, moved), most, whole, free)
 
 

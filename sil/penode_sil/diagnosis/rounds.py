@@ -14,7 +14,7 @@ from . import holding
 from .adopting import adopt
 from .catalogue import curve
 from .evidence.bench import SIZES, Bench
-from .evidence.blocks import Blocks
+from .evidence.blocks import BLOCKS, Blocks
 from .evidence.fit import Problem
 from .evidence.gain import Level
 from .evidence.prior import stated
@@ -31,7 +31,7 @@ MIN_FORM = (
 )
 # of the power of a sensor's innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
 MIN_TAKEN = 0.25
-MIN_BLOCKS = 3  # of the blocks in which it does
+MIN_BLOCKS = BLOCKS - 1  # in which it does
 LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
 
 
@@ -60,11 +60,13 @@ class Grown:
 
 @dataclass(frozen=True, eq=False)
 class Rounds:
-    """Rounds of a search that starts from a bench without any cause."""
+    """Rounds of a search that starts from a bench without any cause. Causes are proposed by an observer for `stiffer` times less unmodelled
+    force than there is."""
 
     start: Bench
     blocks: Blocks
     log: Callable[[str], None]
+    stiffer: float = 1.0
 
     def grow(self, accepted: Sequence[Accepted] = ()) -> Grown:
         """Accepts causes beside those accepted already, one at a time, the best predictor first, until none predicts enough better, or the
@@ -100,7 +102,7 @@ class Rounds:
         """Two causes that together predict left-out blocks better than `scores`, where no cause does alone: the delay and the friction of a
         drive that starts from rest. Empty without any."""
         best, total = [], float(np.sum(scores)) + 2.0 * MIN_GAIN
-        trials, wide = propose(bench, (), self.log)
+        trials, wide = propose(bench, (), self.log, self.stiffer)
         for t in (_scored(bench, bench.problem(wide), self.blocks, x) for x in trials[:SCORED]):
             beside, terms = adopt(bench, t, 0)
             beside, level = _based(beside, self.blocks)
@@ -128,7 +130,7 @@ class Rounds:
     def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
         """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the
         best, to MIN_GAIN, only large ones; otherwise the large form only imitates a smaller one."""
-        trials, wide = propose(bench, terms_of(accepted), self.log)
+        trials, wide = propose(bench, terms_of(accepted), self.log, self.stiffer)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
         freest = sorted(trials, key=lambda t: -t.run)[:1]
         trials = [t for t in trials if t in trials[:SCORED] or t in freest]

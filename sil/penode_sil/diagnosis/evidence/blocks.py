@@ -16,7 +16,8 @@ from .gain import Level
 
 Array = NDArray[np.float64]
 BLOCKS = 4
-BURN_IN = 0.15  # of the first block of a recording, that stay in training: they carry its start
+PIECES = 5  # of each block, in turn: what happens once would be held out as a whole
+BURN_IN = 0.15  # of as many updates as a block has, at the beginning of a recording, that stay in training: they carry its start
 REFIT = 3  # iterations from the fit of all blocks
 FREEDOM = 4.0  # degrees of freedom of what one update is off
 DRAWS = 4000  # of the Bayesian bootstrap
@@ -30,9 +31,9 @@ class Blocks:
 
     @staticmethod
     def of(lengths: Sequence[int]) -> Blocks:
-        """Of recordings with so many updates: as many blocks of each as there are, where one is short, a block is a whole recording."""
+        """Of recordings with so many updates: pieces of equal length, in turn of each block."""
         total = sum(lengths)
-        number = np.minimum((np.arange(total) * BLOCKS) // max(total, 1), BLOCKS - 1)
+        number = (np.arange(total) * BLOCKS * PIECES) // max(total, 1) % BLOCKS
         begin = 0
         for n in lengths:
             stay = max(1, int(BURN_IN * min(n, total / BLOCKS)))
