@@ -97,7 +97,7 @@ def known() -> dict[str, Known]:
     t = np.arange(1000, dtype=np.float64) * 1e-3
     s = 0.01 * np.sin(40.0 * t)
     motion = form.Motion.of([form.Moved(s, 0.4 * np.cos(40.0 * t), t, {"+ F_spring": 1000.0 * np.abs(s)})], 10.0)
-    sizes = form.Sizes(_Any(), {}, 1.0, True, 1.0)
+    sizes = form.Sizes(_Any(), {}, True, 1.0, motion.parts[0])
     for file in catalogue.FILES:
         for index, place in enumerate(places(model)):
             for one in file.forms(model, index, place, motion):

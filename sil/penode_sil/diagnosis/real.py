@@ -106,7 +106,7 @@ def answer(
         enough, chance, first = least(found.level, a.trial.whole), chances[a.trial], term is a.terms[0]
         size = share(plain, [t for t in named if name_of(t) == name_of(term)], plain.fit, moved)
         rivals = _rivals(chance, term) if first else _loads(model, bench.places[term.form.index])
-        cause = _cause(model, plain, term, size, rivals, _sure(chance, a.trial.form), found.level)
+        cause = _cause(model, plain, moved, term, size, rivals, _sure(chance, a.trial.form), found.level)
         log(f"{cause.kind} at {cause.where}: {size:.1%} of the force there")
         if size >= enough and not cause.may_be_nothing:
             causes = _merged(causes, cause)
@@ -120,7 +120,8 @@ def answer(
             else f"{a.trial.share:.1%} of the force there"
         )
         notes.append(_small(a.terms[0], what))
-        withheld.append(_cause(model, after, a.terms[0], a.trial.share, (), _sure(_weighed(a.trials), a.trial.form), found.level))
+        sure = _sure(_weighed(a.trials), a.trial.form)
+        withheld.append(_cause(model, after, moved, a.terms[0], a.trial.share, (), sure, found.level))
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
     shifts = np.full(len(noise), np.inf) if any(c.kind in stopped for c in causes) else _shifts(after, found.run, found.terms)
     biased, remarks = _offsets(model, after, Probe.of(after), found.level, shifts)
@@ -209,18 +210,21 @@ def _explanations(named: Sequence[tuple[Term, Sequence[tuple[Form, float]]]]) ->
     return tuple((names, p / whole) for names, p in sets)
 
 
-def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Named, ...], sure: float, level: float) -> Cause:
-    """A term as a cause with sizes and intervals; `sure`: posterior of its name among the forms of the catalogue;
-    `level`: the unmodelled force that remains."""
+def _cause(
+    model: Model, bench: Bench, moved: Sequence[Motion], term: Term, size: float, rivals: tuple[Named, ...], sure: float, level: float
+) -> Cause:
+    """A term as a cause with sizes and intervals, along a motion of every place; `sure`: posterior of its name among the forms of the
+    catalogue; `level`: the unmodelled force that remains."""
     form = term.form
     file = catalogue.OF.get(form.kind, drives)
     own = {t.target for t in term.free}
     at = bench.places[form.index] if form.how == "force" else None
+    first = moved[form.index].parts[0] if at else None
 
     def sizes(values: Mapping[object, float]) -> dict[str, tuple[str, float]]:
         if file is drives:
             unit = units.si((model.inputs if form.how.startswith("input_") else model.sensors)[form.index].unit)
-            return drives.sizes(form, Sizes({}, {}, 0.0, True, values[term.free[0].target]), unit)
+            return drives.sizes(form, Sizes({}, {}, True, values[term.free[0].target]), unit)
         parts = {}
         for k, (name, part) in enumerate(zip(term.elements, form.parts, strict=True)):
             for key in (part.gain[0], *part.shapes):
@@ -231,8 +235,8 @@ def _cause(model: Model, bench: Bench, term: Term, size: float, rivals: tuple[Na
                 for argument, parameter in e.arguments.items():
                     key = f"{e.law}.{argument}"
                     linear[key] = linear.get(key, 0.0) + values.get(parameter, model.parameters[parameter].value)
-        longest = max(len(r) * r.step for r in bench.records)
-        return {k: (at.unit(u), v) for k, (u, v) in file.sizes(form, Sizes(parts, linear, longest, bool(model.bodies))).items()}
+        known = Sizes(parts, linear, bool(model.bodies), first=first)
+        return {k: (at.unit(u), v) for k, (u, v) in file.sizes(form, known).items()}
 
     values = {f.target: f.value for f in bench.fit.free}
     found = sizes(values)

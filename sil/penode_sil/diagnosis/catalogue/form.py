@@ -132,13 +132,14 @@ class Form:
 @dataclass(frozen=True, eq=False)
 class Sizes:
     """What a fit found of a form: v(part, argument); v.nominal(law, argument) is the sum of what the place has of a linear law already;
-    `longest` recording [s]; `moving`: the model has bodies; `alone`: the value of a form of an input or a sensor."""
+    `moving`: the model has bodies; `alone`: the value of a form of an input or a sensor; `first`: motion of the place along the first
+    recording."""
 
     values: Mapping[tuple[int, str], float]
     own: Mapping[str, float]
-    longest: float
     moving: bool
     alone: float = 0.0
+    first: Moved | None = None
 
     def __call__(self, part: int, argument: str) -> float:
         return self.values[part, argument]
