@@ -192,7 +192,7 @@ def _of_signal(bench: Bench, term: Term, fit: Fit) -> float:
     value = fit.value(term.free[0].target)
     turn = 2.0 * np.pi / (UPDATES * bench.update * bench.step)  # of the motion [rad/s]
     own = ACTUATORS.get(term.form.how)
-    if own and own.tried:
+    if own and (own.tried or own.by_change):
         return own.change(drive(bench, term.form.index), value)
     match term.form.how:
         case "input_offset":

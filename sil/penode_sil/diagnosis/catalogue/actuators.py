@@ -36,6 +36,11 @@ class Drive:
         return float(np.maximum(np.std(np.concatenate(list(self.series))), TINY))
 
     @cached_property
+    def longest(self) -> float:
+        """Length of the longest recording [s]."""
+        return self.step * max(map(len, self.series))
+
+    @cached_property
     def largest(self) -> float:
         """But for a thousandth of the time: one spike does not count."""
         return float(np.maximum(np.quantile(np.abs(np.concatenate(list(self.series))), 0.999), TINY))
@@ -58,7 +63,7 @@ class Actuator:
     [runs]; `fitted`: how its value is fitted, and `tried`: values that a score test compares, where the effect is not proportional to
     it; `size`: name and unit in a report ("": the unit of the input, "/s" behind it), and `shown` that for a value; `law` of
     [actuators] that does the same, empty if there is none, and its `entry` for a value; `order` of actuators in series, as in the model
-    file."""
+    file; `by_change`: the value alone does not say how much of the input it changes."""
 
     output: Callable[[Array, Array, float], Array]
     fitted: Callable[[Drive], Value]
@@ -68,6 +73,7 @@ class Actuator:
     entry: Callable[[float], Entry] = lambda value: {}
     tried: Callable[[Drive], Sequence[float]] | None = None
     order: int = 0
+    by_change: bool = False
 
     def change(self, drive: Drive, value: float) -> float:
         """Rms difference of output and recorded input, relative to the standard deviation of the input."""
@@ -111,6 +117,12 @@ def _late(u: Array, values: Array, step: float) -> Array:
     return np.array([np.interp(at - d, at, x) for x, d in zip(u, values / step, strict=True)])
 
 
+def _later(u: Array, values: Array, step: float) -> Array:
+    """By a delay that grows with time: the clock of the input runs slow."""
+    at = np.arange(u.shape[-1])
+    return np.array([np.interp(at * (1.0 - d), at, x) for x, d in zip(u, values, strict=True)])
+
+
 def _limited(u: Array, values: Array, step: float) -> Array:
     """Behind a limit of the rate. Lanes that are alike, as most are in finite differences, are computed once."""
     known: dict[tuple[float, bytes], Array] = {}
@@ -152,6 +164,14 @@ def _offset() -> Actuator:
 
 def _time(d: Drive) -> Value:
     return Value(0.2 * d.step, 0.2 * d.update, 2.0 * d.update, 0.0)
+
+
+def _drift() -> Actuator:
+    def fitted(d: Drive) -> Value:
+        """As for a delay, at the end of the longest recording."""
+        return Value(0.0, 0.2 * d.update / d.longest, 2.0 * d.update / d.longest)
+
+    return Actuator(_later, fitted, ("drift", "1"), by_change=True)
 
 
 def _behind() -> Actuator:
@@ -198,6 +218,7 @@ ACTUATORS: dict[str, Actuator] = {
     "input_gain": _gain(),
     "input_offset": _offset(),
     "input_delay": Actuator(_late, _time, ("delay", "s")),
+    "input_drift": _drift(),
     "input_lag": _behind(),
     "input_dead_zone": _dead_zone(),
     "input_saturation": _saturation(),

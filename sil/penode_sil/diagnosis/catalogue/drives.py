@@ -22,6 +22,7 @@ MEANING = {
     "input_gain": "The input that drives the plant is larger, or smaller, than its recording by a factor.",
     "input_offset": "A constant acts on top of the recorded input.",
     "input_delay": "The input acts later than recorded.",
+    "input_drift": "The input acts later and later, or earlier and earlier, than recorded: its clock is not that of the sensors.",
     "input_lag": "The input acts with a lag: an actuator that the model does not have.",
     "input_hold": "The input acts in steps: its controller is slower than the recorder and holds the value in between.",
     "input_dead_zone": "Inputs below a width have no effect; of larger ones the part beyond it drives the plant.",
@@ -33,6 +34,7 @@ MEANING = {
 RIVALS = {
     ("sensor_scale", "wrong_parameter"): "record acceleration and deflection of other parts too, or weigh a body",
     ("input_delay", "sensor_delay"): "measure with a second sensor of another make: if the input is late, both are",
+    ("input_drift", "input_delay"): "compare the start and the end of a recording: a delay stays, a drift grows",
     ("input_gain", "sensor_scale"): "measure the force of the actuator, or show the sensor a known size",
     (
         "input_dead_zone",
@@ -51,6 +53,7 @@ PARAMETERS = {
     "input_gain": {"gain": "acting over recorded input"},
     "input_offset": {"offset": "acting minus recorded input"},
     "input_delay": {"delay": "from the recording to the effect"},
+    "input_drift": {"drift": "delay that each second of a recording adds; above zero where the clock of the input runs slow"},
     "input_lag": {"lag": "time constant of a first-order lag"},
     "input_hold": {"period": "time between two steps of the input"},
     "input_dead_zone": {"width": "magnitude below which the input has no effect"},

@@ -21,7 +21,7 @@ SHOWN = {  # by which excitation a kind shows; a kind that is not here shows und
     "travel": ("cubic_spring", "asymmetric_spring", "bump_stop", "backlash", "tyre_nonlinear", "tyre_liftoff", "missing_spring"),
     "steps": ("maxwell_bushing", "hidden_resonance"),
     "command": (
-        *("input_gain", "input_offset", "input_delay", "input_lag", "input_hold", "input_sign"),
+        *("input_gain", "input_offset", "input_delay", "input_drift", "input_lag", "input_hold", "input_sign"),
         *("input_dead_zone", "input_saturation", "input_slew_limit"),
     ),
     "rest": ("sensor_bias", "sensor_scale", "sensor_delay", "sensor_sign", "sensor_clipping", "sensor_dropout", "constant_force"),
